@@ -20,7 +20,7 @@ from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.rounds.open_rounds import RoundDone
-from foretwin.sim_worker.analysis.agreement.criteria import Court, Heard, Users, Window
+from foretwin.sim_worker.analysis.agreement.criteria import CriteriaEvaluator, Heard, Users, Window
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.route_rules import RouteRules
@@ -179,7 +179,7 @@ def judge_in(world: World, windows: list[Window], vehicle: VehicleParameters) ->
     found = []
     for window in windows:
         rules = RouteRules(world, FrenetPath(window.path_xy_m))
-        found.append(judged(window, Court(window, rules, ground, vehicle)))
+        found.append(judged(window, CriteriaEvaluator(window, rules, ground, vehicle)))
     return found
 
 

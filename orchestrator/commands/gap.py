@@ -16,11 +16,10 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import nobody_accused, table_lines, verdict_lines
 from foretwin.orchestrator.commands.progress_bar import progress_bar
-from foretwin.sim_worker.analysis.gap.errors import GapMeter, GapRow, gap_table
+from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
-from foretwin.sim_worker.analysis.gap.verdict import Judge, without_manual_commands
+from foretwin.sim_worker.analysis.gap.verdict import FaultDetector, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import estimator_of
@@ -43,7 +42,7 @@ class GapReport(NamedTuple):
 
 
 def gap_of(log: Log, vehicle: VehicleParameters, *, name: str, progress: bool = False) -> GapReport:
-    """Replay a drive through the estimator, the model and the judge.
+    """Replay a drive through the estimator, the model and the detector.
 
     `name` is what errors call the drive; with `progress` a bar runs over its seconds. Raises
     UserError for a drive without a position or without motion.
@@ -69,7 +68,7 @@ def _measured(
     advance: Callable[[str], None],
 ) -> GapReport:
     estimator = estimator_of(log.info, vehicle)
-    judge = Judge(log.info, vehicle, frame=frame)
+    detector = FaultDetector(log.info, vehicle, frame=frame)
     recorder = MotionRecorder(frame=frame, keep_s=1e6, depth=len(messages) + 1)
     states: list[VehicleState] = []
     verdicts: list[Verdict] = []
@@ -81,7 +80,7 @@ def _measured(
             next_ns += _SECOND_NS
             advance(Path(name).name)
         recorder.handle(channel, message)
-        verdict = judge.handle(channel, message)
+        verdict = detector.handle(channel, message)
         if verdict is not None:
             verdicts.append(verdict)
         state = estimator.handle(channel, message)

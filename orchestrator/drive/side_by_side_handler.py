@@ -17,7 +17,7 @@ from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import Tell
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.sim_worker.analysis.side_by_side.segment import Place
+from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import SideBySide
 
 WORDS: dict[DisagreementKind, str] = {
@@ -85,10 +85,10 @@ class SideBySideHandler:
             ],
         }
 
-    def _place(self) -> Place:
+    def _place(self) -> DrivePlace:
         latest = self._intake.latest
         position = GeoPoint(math.nan, math.nan) if latest is None else latest.state.position
-        return Place(position, self._mission.junction_id, self._mission.route_m)
+        return DrivePlace(position, self._mission.junction_id, self._mission.route_m)
 
     @property
     def _segments(self) -> list[DrivenSegment]:

@@ -7,12 +7,13 @@ invented.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Stamps
 from foretwin.contracts.drive import (
     ControlCommand,
     GnssFix,
@@ -25,32 +26,29 @@ from foretwin.contracts.drive import (
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 
 PERIOD_S = 0.02
-_NAN = float("nan")
 
 
 class MotionRecord(NamedTuple):
     """Signals at N even instants; NaN where a sensor is absent or silent for too long.
 
-    Positions are those of the antenna in the given local frame; specific force and rates are in
-    body axes; steering as measured (wheel, tyre) and as commanded, positive to the left. `manual`
+    Positions are those of the antenna in the given local frame; the yaw rate is the
+    body's; steering as measured (wheel, tyre) and as commanded, positive to the left. `manual`
     says where a human drives.
     """
 
-    stamp_ns: np.ndarray[Any, np.dtype[np.int64]]
+    stamp_ns: Stamps
     x_m: Array
     y_m: Array
     altitude_m: Array
     yaw_rad: Array
     speed_mps: Array
     yaw_rate_radps: Array
-    force_x_mps2: Array
-    force_y_mps2: Array
     wheel_rad: Array
     tire_rad: Array
     command_accel_mps2: Array
     command_wheel_rad: Array
     command_tire_rad: Array
-    manual: np.ndarray[Any, np.dtype[np.bool_]]
+    manual: Flags
 
     @property
     def time_s(self) -> Array:
@@ -66,7 +64,7 @@ _MEASURED = {
     "gnss": ("x_m", "y_m", "altitude_m"),
     "heading": ("yaw_rad",),
     "speed": ("speed_mps",),
-    "imu": ("yaw_rate_radps", "force_x_mps2", "force_y_mps2"),
+    "imu": ("yaw_rate_radps",),
     "steering": ("wheel_rad", "tire_rad"),
 }
 _HELD = {"control": ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")}
@@ -122,16 +120,12 @@ class MotionRecorder:
                 )
             case SpeedSample(speed_mps=speed):
                 return (speed,)
-            case ImuSample(accel_mps2=force, rate_radps=rate):
-                return rate[2], force[0], force[1]
+            case ImuSample(rate_radps=rate):
+                return (rate[2],)
             case SteeringSample(steering_wheel_rad=wheel, tire_angle_rad=tire):
-                return _NAN if wheel is None else wheel, _NAN if tire is None else tire
+                return _or_nan(wheel), _or_nan(tire)
             case ControlCommand(accel_mps2=accel, steering_wheel_rad=wheel, tire_angle_rad=tire):
-                return (
-                    accel,
-                    _NAN if wheel is None else wheel,
-                    _NAN if tire is None else tire,
-                )
+                return accel, _or_nan(wheel), _or_nan(tire)
             case VehicleStatus(control_mode=mode):
                 return (float(mode == "manual"),)
             case _:
@@ -177,6 +171,10 @@ class MotionRecorder:
         # Late samples came out of order; of two with one stamp the first counts.
         _, index = np.unique(table[:, 0], return_index=True)
         return table[index]
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def between_samples(time_s: Array, values: Array, at_s: Array, *, gap_s: float) -> Array:

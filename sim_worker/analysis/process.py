@@ -28,9 +28,13 @@ _UNANNOUNCED_AFTER = 4000
 """Samples after which a vehicle that does not answer is taken as it is."""
 _CHANNELS = (*SAMPLES, "state")
 """In the order in which messages with one stamp are taken."""
-_FINDINGS: dict[type, str] = {
-    Identification: "identification", GapSample: "gap", GapAlarm: "gap_alarm", Verdict: "verdict",
-}  # fmt: skip
+_FINDINGS: dict[type, tuple[str, str]] = {
+    Identification: ("identification", "identifications"),
+    GapSample: ("gap", "gaps"),
+    GapAlarm: ("gap_alarm", "alarms"),
+    Verdict: ("verdict", "verdicts"),
+}
+"""The channel of each kind of finding, and its field in the answer to a `tune` question."""
 
 log = logging.getLogger("sim_worker")
 
@@ -39,7 +43,7 @@ class TuningWorker:
     """Feeds a VehicleWatch from messages; one that cannot be used is logged and passed over.
 
     In lock step messages wait for a `tune` question, which says how many there are, and are taken
-    in the order of their stamps: the answer must not depend on who was faster.
+    in the order of their stamps: the answer must not depend on which came first.
     """
 
     def __init__(self, setup: TuningSetup, bus: Bus, mailbox: Mailbox) -> None:
@@ -97,9 +101,8 @@ class TuningWorker:
         elif received > self._asked_for_info:
             self._asked_for_info = received + _ASK_EVERY
             self._bus.request(
-                "info", InfoRequest(), self._mailbox, timeout_s=5.0,
-                vehicle=self._setup.vehicle_id,
-            )  # fmt: skip
+                "info", InfoRequest(), self._mailbox, timeout_s=5.0, vehicle=self._setup.vehicle_id
+            )
 
     def _begin(self, info: VehicleInfo) -> None:
         if self._watch is not None:
@@ -128,7 +131,7 @@ class TuningWorker:
             log.exception("%s at %s passed over", channel, message.stamp_ns)
             return []
         for one in found:
-            self._bus.publish(_FINDINGS[type(one)], one, run=self._setup.run_id)
+            self._bus.publish(_FINDINGS[type(one)][0], one, run=self._setup.run_id)
         return found
 
     def _answer_if_all_is_there(self) -> None:
@@ -141,17 +144,11 @@ class TuningWorker:
             return
         question, self._question = self._question, None
         held, self._held = sorted(self._held, key=lambda one: one[0]), []
-        found = [
-            finding for _, channel, message in held for finding in self._weigh(channel, message)
-        ]
-        question.reply(
-            TuneReply(
-                identifications=tuple(one for one in found if isinstance(one, Identification)),
-                gaps=tuple(one for one in found if isinstance(one, GapSample)),
-                alarms=tuple(one for one in found if isinstance(one, GapAlarm)),
-                verdicts=tuple(one for one in found if isinstance(one, Verdict)),
-            )
-        )
+        by_field: dict[str, list[Any]] = {field: [] for _, field in _FINDINGS.values()}
+        for _, channel, message in held:
+            for finding in self._weigh(channel, message):
+                by_field[_FINDINGS[type(finding)][1]].append(finding)
+        question.reply(TuneReply(**{field: tuple(one) for field, one in by_field.items()}))
 
 
 def serve_tuning(setup: TuningSetup, bus: Bus, life: ProcessLife) -> None:
@@ -177,13 +174,10 @@ def serve_tuning(setup: TuningSetup, bus: Bus, life: ProcessLife) -> None:
 def _take(
     worker: TuningWorker, mailbox: Mailbox, timeout_s: float, *, most: int = _AT_ONCE
 ) -> None:
-    item = mailbox.take(timeout_s)
-    for _ in range(most - 1):
+    for taken in range(most):
+        item = mailbox.take(0.0 if taken else timeout_s)
         if item is None:
             return
-        worker.handle(item)
-        item = mailbox.take()
-    if item is not None:
         worker.handle(item)
 
 

@@ -1,4 +1,4 @@
-"""What a drive says of its vehicle while it goes on: parameters, the model's gap, and who departs.
+"""What a drive says of its vehicle while it goes on: parameters, the model's gap, departures.
 
 Pure: its time is that of the samples, so that the same samples say the same.
 """
@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
-import msgspec
-
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.monitor import GapMonitor
-from foretwin.sim_worker.analysis.identify.acceptance import in_force
+from foretwin.sim_worker.analysis.identify.acceptance import with_priors
 from foretwin.sim_worker.analysis.identify.tuner import Tuner
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS
 
@@ -30,7 +28,7 @@ _AHEAD_NS = 10_000_000_000
 
 
 class VehicleWatch:
-    """Identifies one vehicle and watches its gap; what is in force is told by `use`.
+    """Identifies one vehicle and watches its gap; what is in force is result by `use`.
 
     `handle` takes samples under their channels, and estimated VehicleStates under "state". Where
     those go back in time, the vehicle's clock has been set: all is watched anew. Samples far ahead
@@ -61,19 +59,12 @@ class VehicleWatch:
         found: list[Finding] = list(self._monitor.handle(channel, message))
         if channel == "state":
             return found
-        told = self._tuner.handle(channel, message)
-        if told is not None:
+        result = self._tuner.handle(channel, message)
+        if result is not None:
             # Taken here in any case: a later step is one from what was found, applied or not.
-            self._tuner.take(told)
-            found.append(self._against_what_counts(told))
+            self._tuner.take(result)
+            found.append(with_priors(result, self._in_force))
         return found
-
-    def _against_what_counts(self, told: Identification) -> Identification:
-        estimates = tuple(
-            msgspec.structs.replace(one, prior=in_force(self._in_force, one.name))
-            for one in told.estimates
-        )
-        return msgspec.structs.replace(told, estimates=estimates)
 
     def use(self, message: UseVehicle) -> None:
         """Compare with these parameters from now on."""

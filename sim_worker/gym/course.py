@@ -3,80 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import Job, PathAhead
-from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.contracts.world import World
 from foretwin.sim_worker.gym.actions import Control, action_size, commands
-from foretwin.sim_worker.gym.episodes import (
-    Episodes,
-    episodes_of_job,
-    episodes_of_scenario,
-    episodes_of_states,
-)
+from foretwin.sim_worker.gym.episodes import Source
 from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
 from foretwin.sim_worker.gym.reward import Reward, default_reward
 from foretwin.sim_worker.gym.rows import EpisodeRows, StepFacts
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-
-CASE = "case"
-
-
-class Source(NamedTuple):
-    """Where episodes come from: a scenario at a place, a job, or recorded states on a path.
-
-    See the functions of `gym.episodes` that have these arguments; with `states`, a
-    scenario is optional.
-    """
-
-    world: World | str | Path
-    scenario: Scenario | str | None = None
-    values: Mapping[str, float] | None = None
-    place: str | int = 0
-    job: Job | str | Path | None = None
-    states: Sequence[VehicleState] = ()
-    path: PathAhead | None = None
-    cases: int = 64
-    cases_seed: int = 0
-    early_or_late_s: float = 2.0
-
-    def altered(self, options: Mapping[str, Any]) -> Source:
-        """Return the source with other values; raises UserError for an unknown one."""
-        for name in options:
-            if name not in self._fields:
-                known = ", ".join((CASE, *self._fields))
-                raise UserError(f"reset knows no option {name!r}; known: {known}")
-        kept = {} if not {"job", "states"} & options.keys() else {"job": None, "states": ()}
-        if "scenario" in options and "states" not in options:
-            kept["job"] = None
-        return self._replace(**{**kept, **options})
-
-    def episodes(self, vehicle: VehicleParameters) -> Episodes:
-        """Return the episodes; raises UserError where the arguments do not fit."""
-        if self.job is not None:
-            return episodes_of_job(self.world, self.job)
-        drawn: dict[str, Any] = {
-            "values": self.values,
-            "cases": self.cases,
-            "cases_seed": self.cases_seed,
-            "early_or_late_s": self.early_or_late_s,
-        }
-        if len(self.states):
-            if self.path is None:
-                raise UserError("recorded states need the path that lay ahead")
-            return episodes_of_states(
-                self.world, self.states, self.path, vehicle, scenario=self.scenario, **drawn
-            )
-        scenario = self.scenario or "roundabout_entry"
-        return episodes_of_scenario(self.world, scenario, vehicle, place=self.place, **drawn)
 
 
 class Begun(NamedTuple):
@@ -159,7 +98,7 @@ class Course:
         return np.asarray(self.rows.ticks >= self._most_ticks)
 
 
-def told(facts: StepFacts) -> dict[str, Array | Flags]:
+def info_of(facts: StepFacts) -> dict[str, Array | Flags]:
     """Return what `info` says of a step: the fields of `StepFacts` that are no motion."""
     names = ("collided", "off_road", "arrived", "ran_red", "did_not_wait", "failed")
     return {"progress_m": facts.progress_m, **{name: getattr(facts, name) for name in names}}

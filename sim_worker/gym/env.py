@@ -9,12 +9,12 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
-from foretwin.sim_worker.gym.course import CASE, Course, Source, told
+from foretwin.sim_worker.gym.course import info_of
+from foretwin.sim_worker.gym.episodes import CASE
 from foretwin.sim_worker.gym.observation import Observation
 from foretwin.sim_worker.gym.picture import Picture, draw_row
-from foretwin.sim_worker.gym.spaces import action_space, observation_space, split_settings
+from foretwin.sim_worker.gym.spaces import action_space, course_of, observation_space
 
 ONE = np.zeros(1, dtype=np.intp)
 
@@ -34,10 +34,7 @@ class JunctionEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
 
         Raises UserError for settings that do not fit.
         """
-        if render_mode not in (None, "rgb_array"):
-            raise UserError(f"render_mode {render_mode!r} is not rgb_array")
-        of_source, of_course = split_settings(settings)
-        self.course = Course(Source(world, **of_source), count=1, **of_course)
+        self.course = course_of(world, settings, count=1, render_mode=render_mode)
         self.metadata = {**self.metadata, "render_fps": self.course.control_hz}
         self.render_mode = render_mode
         self.observation_space = observation_space(self.course)
@@ -66,7 +63,7 @@ class JunctionEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
         reward, facts = self.course.step(np.asarray(action, dtype=np.float64)[None])
         terminated = bool(facts.terminated[0])
         truncated = bool(self.course.over_time()[0]) and not terminated
-        info = {name: values[0].item() for name, values in told(facts).items()}
+        info = {name: values[0].item() for name, values in info_of(facts).items()}
         return self.course.look()[0], float(reward[0]), terminated, truncated, info
 
     def render(self) -> Picture | None:

@@ -1,10 +1,15 @@
-"""How episodes begin: cases of a scenario at a place, or states that a real car was in."""
+"""How episodes begin: cases of a scenario at a place, or states that a real car was in.
+
+They are futures of a `Job` like any other, and a runner could play it; but a runner answers with
+whole trajectories, while here actions come from outside between two control ticks. So the
+environments cast the job's scene as `run_job` does and step it themselves (`gym.rows`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -27,11 +32,58 @@ from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
 
+CASE = "case"
 BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""
 _LATE = ".arrives_after_s"
-_PLANNER = "pure_pursuit_idm"
 _DEFAULT_SPEED_MPS = 8.3
+_LEAST_SPEED_MPS = 4.0
+
+
+class Source(NamedTuple):
+    """Where episodes come from: a scenario at a place, a job, or recorded states on a path.
+
+    World, scenario and job are given as such or as a file, scenarios also by their id in the
+    catalogue. `values` fix what a scenario leaves open, named as `Scenario` tells; `place` is a
+    name or a number; `cases` are drawn with `cases_seed`, and others come up to `early_or_late_s`
+    before or after they would meet a car that keeps its speed. `states` lay on `path`, in the
+    World's frame; with a scenario, which they do not need, each is combined with each of its cases.
+    The speed aimed at is then the fastest of the states, and no less than 4 m/s.
+    """
+
+    world: World | str | Path
+    scenario: Scenario | str | None = None
+    values: Mapping[str, float] | None = None
+    place: str | int = 0
+    job: Job | str | Path | None = None
+    states: Sequence[VehicleState] = ()
+    path: PathAhead | None = None
+    cases: int = 64
+    cases_seed: int = 0
+    early_or_late_s: float = 2.0
+
+    def altered(self, options: Mapping[str, Any]) -> Source:
+        """Return the source with other values; raises UserError for an unknown one."""
+        for name in options:
+            if name not in self._fields:
+                known = ", ".join((CASE, *self._fields))
+                raise UserError(f"reset knows no option {name!r}; known: {known}")
+        kept = {} if not {"job", "states"} & options.keys() else {"job": None, "states": ()}
+        if "scenario" in options and "states" not in options:
+            kept["job"] = None
+        return self._replace(**{**kept, **options})
+
+    def episodes(self, vehicle: VehicleParameters) -> Episodes:
+        """Return the episodes; raises UserError where the fields do not fit, or none can begin."""
+        world = self.world
+        if not isinstance(world, World):
+            world = read_message(Path(world), World)
+        if self.job is not None:
+            job = self.job if isinstance(self.job, Job) else read_message(Path(self.job), Job)
+            return _of_job(world, job)
+        if len(self.states):
+            return _of_states(self, world, vehicle)
+        return _of_scenario(self, world, vehicle)
 
 
 class Episodes(NamedTuple):
@@ -46,145 +98,110 @@ class Episodes(NamedTuple):
     scenes: SceneMaker
 
 
-def read_world(world: World | str | Path) -> World:
-    """Return a World, read from its file where that is what is given."""
-    return world if isinstance(world, World) else read_message(Path(world), World)
-
-
-def episodes_of_scenario(
-    world: World | str | Path,
-    scenario: Scenario | str,
-    vehicle: VehicleParameters,
-    *,
-    values: Mapping[str, float] | None = None,
-    place: str | int = 0,
-    cases: int = 64,
-    cases_seed: int = 0,
-    early_or_late_s: float = 2.0,
-) -> Episodes:
-    """Return cases of a scenario, an id of the catalogue or a file, at one of its places.
-
-    `values` fix what the scenario leaves open, named as `Scenario` tells; `cases` are drawn
-    with `cases_seed`, and others come up to `early_or_late_s` before or after they would meet a
-    car that keeps its speed. `place` is a name or a number. Raises UserError where the scenario,
-    the place or a value is unknown, or no case can be played.
-    """
-    world = read_world(world)
-    scenario = find_scenario(scenario) if isinstance(scenario, str) else scenario
-    scenes = SceneMaker(world)
-    at = _place(scenario, world, vehicle, place)
-    if at.reverse:
-        raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
-    drawn = _cases(scenario, values or {}, cases, cases_seed, early_or_late_s)
-    played = scenes.scenarios.cast(scenario, drawn, at.name, vehicle)
-    futures: list[Future] = []
-    starts: list[Array] = []
-    reasons: list[str] = []
-    for case, one in zip(drawn, played, strict=True):
-        if isinstance(one, Unplaced):
-            reasons.append(one.reason)
-            continue
-        name = f"{scenario.id} {len(futures)}"
-        futures.append(
-            Future(
-                index=len(futures), name=name, planner=_PLANNER, scenario_id=scenario.id,
-                values=case, place=at.name,
-            )
-        )  # fmt: skip
-        starts.append(staged_start(one, vehicle))
-    if not futures:
-        raise UserError(f"{scenario.id} at {at.name}: no case can be played: {reasons[0]}")
-    job = Job(
-        round_id=0,
-        job_index=0,
-        world_id=world.id,
-        state=_somewhere(world, starts[0]),
-        path=PathAhead(xy_m=at.ego.xy_m, speed_limit_mps=at.ego.speed_limit_mps),
-        futures=tuple(futures),
-        horizon_s=scenario.horizon_s,
-        step_s=0.1,
-        seed=cases_seed,
-        cruise_speed_mps=_DEFAULT_SPEED_MPS,
-        scenarios=(scenario,),
-        starts=np.array(starts),
-        lights_by_plan=True,
-    )
-    end = at.ego.exit_m if at.ego.exit_m > at.ego.entry_m else at.ego.path.length_m
-    return Episodes(world, job, min(end + BEYOND_JUNCTION_M, at.ego.path.length_m), scenes)
-
-
-def episodes_of_job(world: World | str | Path, job: Job | str | Path) -> Episodes:
-    """Return the futures of a job, as recorded or read from its file, as ways to begin.
-
-    Raises UserError where the job is for another World.
-    """
-    world = read_world(world)
-    job = job if isinstance(job, Job) else read_message(Path(job), Job)
+def _of_job(world: World, job: Job) -> Episodes:
+    """Return the futures of a job, as recorded, as ways to begin."""
     if job.world_id != world.id:
         raise UserError(f"the job is for World {job.world_id}; given is {world.id}")
     return Episodes(world, job, FrenetPath(job.path.xy_m).length_m - 1.0, SceneMaker(world))
 
 
-def episodes_of_states(
-    world: World | str | Path,
-    states: Sequence[VehicleState],
-    path: PathAhead,
-    vehicle: VehicleParameters,
-    *,
-    scenario: Scenario | str | None = None,
-    values: Mapping[str, float] | None = None,
-    cases: int = 8,
-    cases_seed: int = 0,
-    early_or_late_s: float = 2.0,
-    cruise_speed_mps: float | None = None,
-) -> Episodes:
-    """Return states that a real car was in on its path ahead, alone or with a scenario's cases.
+def _of_scenario(source: Source, world: World, vehicle: VehicleParameters) -> Episodes:
+    """Return cases of a scenario at one of its places."""
+    scenario = _scenario(source.scenario or "roundabout_entry")
+    scenes = SceneMaker(world)
+    at = _place(scenario, world, vehicle, source.place)
+    if at.reverse:
+        raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
+    cases = _cases(scenario, source, source.values or {})
+    played = scenes.scenarios.cast(scenario, cases, at.name, vehicle)
+    begun = [
+        (staged_start(one, vehicle), case)
+        for case, one in zip(cases, played, strict=True)
+        if not isinstance(one, Unplaced)
+    ]
+    if not begun:
+        reason = next(one.reason for one in played if isinstance(one, Unplaced))
+        raise UserError(f"{scenario.id} at {at.name}: no case can be played: {reason}")
+    job = _job(
+        source,
+        begun,
+        scenario=scenario,
+        name=scenario.id,
+        place=at.name,
+        world_id=world.id,
+        state=_somewhere(world, begun[0][0]),
+        path=PathAhead(xy_m=at.ego.xy_m, speed_limit_mps=at.ego.speed_limit_mps),
+        horizon_s=scenario.horizon_s,
+        cruise_speed_mps=_DEFAULT_SPEED_MPS,
+    )
+    end = at.ego.exit_m if at.ego.exit_m > at.ego.entry_m else at.ego.path.length_m
+    return Episodes(world, job, min(end + BEYOND_JUNCTION_M, at.ego.path.length_m), scenes)
 
-    With a scenario each state is combined with each of its cases, which meet the car as it drives.
-    `path` is in the World's frame. The speed aimed at is, unless given, the fastest of the states,
-    and no less than 4 m/s. Raises UserError for no state, and as `episodes_of_scenario`.
-    """
-    world = read_world(world)
-    if not states:
-        raise UserError("no recorded state to begin episodes with")
-    rows = [local_state(state, world.frame, vehicle) for state in states]
-    cruise = cruise_speed_mps or max(4.0, *(state.speed_mps for state in states))
-    scenario = find_scenario(scenario) if isinstance(scenario, str) else scenario
-    drawn: Sequence[Values | None] = [None]
+
+def _of_states(source: Source, world: World, vehicle: VehicleParameters) -> Episodes:
+    """Return states that a real car was in on its path, alone or with a scenario's cases."""
+    if source.path is None:
+        raise UserError("recorded states need the path that lay ahead")
+    rows = [local_state(state, world.frame, vehicle) for state in source.states]
+    cruise = max(_LEAST_SPEED_MPS, *(state.speed_mps for state in source.states))
+    scenario = None if source.scenario is None else _scenario(source.scenario)
+    cases: Sequence[Values] = [{}]
     if scenario is not None:
-        fixed = {f"{EGO}.speed_mps": cruise, **(values or {})}
-        drawn = _cases(scenario, fixed, cases, cases_seed, early_or_late_s)
-    begun = [(row, case) for row in rows for case in drawn]
-    futures = tuple(
-        Future(
-            index=index, name=f"recorded {index}", planner=_PLANNER,
-            scenario_id="" if scenario is None else scenario.id, values=case or {},
-        )
-        for index, (_, case) in enumerate(begun)
-    )  # fmt: skip
-    job = Job(
+        fixed = {f"{EGO}.speed_mps": cruise, **(source.values or {})}
+        cases = _cases(scenario, source, fixed)
+    job = _job(
+        source,
+        [(row, case) for row in rows for case in cases],
+        scenario=scenario,
+        name="recorded",
+        world_id=world.id,
+        state=source.states[0],
+        path=source.path,
+        horizon_s=8.0,
+        cruise_speed_mps=cruise,
+    )
+    return _of_job(world, job)
+
+
+def _scenario(given: Scenario | str) -> Scenario:
+    return find_scenario(given) if isinstance(given, str) else given
+
+
+def _job(
+    source: Source,
+    begun: Sequence[tuple[Array, Values]],
+    *,
+    scenario: Scenario | None,
+    name: str,
+    place: str = "",
+    **fields: Any,
+) -> Job:
+    """Return the job of futures that begin at states (8,), each with the values of its case."""
+    scenario_id = "" if scenario is None else scenario.id
+    return Job(
         round_id=0,
         job_index=0,
-        world_id=world.id,
-        state=states[0],
-        path=path,
-        futures=futures,
-        horizon_s=8.0,
+        futures=tuple(
+            Future(
+                index=index,
+                name=f"{name} {index}",
+                scenario_id=scenario_id,
+                values=case,
+                place=place,
+            )
+            for index, (_, case) in enumerate(begun)
+        ),
         step_s=0.1,
-        seed=cases_seed,
-        cruise_speed_mps=cruise,
+        seed=source.cases_seed,
         scenarios=() if scenario is None else (scenario,),
-        starts=np.array([row for row, _ in begun]),
+        starts=np.array([start for start, _ in begun]),
         lights_by_plan=True,
+        **fields,
     )
-    return episodes_of_job(world, job)
 
 
 def _place(
-    scenario: Scenario,
-    world: World,
-    vehicle: VehicleParameters,
-    wanted: str | int,
+    scenario: Scenario, world: World, vehicle: VehicleParameters, wanted: str | int
 ) -> ScenarioPlace:
     most = wanted + 1 if isinstance(wanted, int) and wanted >= 0 else None
     found = places(scenario, world, vehicle=vehicle, most=most)
@@ -201,22 +218,17 @@ def _place(
     return found.places[wanted]
 
 
-def _cases(
-    scenario: Scenario,
-    values: Mapping[str, float],
-    count: int,
-    seed: int,
-    early_or_late_s: float,
-) -> tuple[Values, ...]:
-    """Return `count` cases with what is fixed in them, those who come early or late."""
-    rng = np.random.default_rng(seed)
+def _cases(scenario: Scenario, source: Source, values: Mapping[str, float]) -> tuple[Values, ...]:
+    """Return the source's cases with `values` fixed in them, arrivals early or late."""
+    rng = np.random.default_rng(source.cases_seed)
+    count = source.cases
     # As many draws for each combination of listed values; so many are taken evenly.
-    drawn = draw_cases(msgspec.structs.replace(scenario, samples=count), seed=seed)
+    drawn = draw_cases(msgspec.structs.replace(scenario, samples=count), seed=source.cases_seed)
     unknown = sorted(values.keys() - drawn[0].keys())
     if unknown:
         raise UserError(f"{scenario.id} has no value {unknown[0]!r}; known: {', '.join(drawn[0])}")
     chosen = [drawn[k] for k in np.linspace(0, len(drawn) - 1, count).round().astype(int)]
-    late = early_or_late_s * rng.uniform(-1.0, 1.0, count)
+    late = source.early_or_late_s * rng.uniform(-1.0, 1.0, count)
     found = []
     for case, shift in zip(chosen, late, strict=True):
         times = {name: v + float(shift) for name, v in case.items() if name.endswith(_LATE)}

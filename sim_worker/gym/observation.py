@@ -29,10 +29,9 @@ GROUND_PIECES = 2
 
 _EGO = ("speed", "slide", "yaw_rate", "tire_angle", "accel", "offset", "heading")
 _WAY = ("target_speed", "bend_speed", "to_end", "lead_gap", "lead_speed", "stop_line", "wait_line")
-_USER = (
-    "present", "ahead", "left", "ahead_speed", "left_speed", "heading_cos", "heading_sin", "length",
-    "width",
-)  # fmt: skip
+_MOTION = ("ahead", "left", "ahead_speed", "left_speed", "heading_cos", "heading_sin")
+_USER = ("present", *_MOTION, "length", "width")
+_GROUND = ("enter", "leave", "waits")
 
 
 def feature_names(nearest: int) -> tuple[str, ...]:
@@ -41,9 +40,6 @@ def feature_names(nearest: int) -> tuple[str, ...]:
     ground = [f"ground{k}_{part}" for k in range(GROUND_PIECES) for part in _GROUND]
     users = [f"user{k}_{part}" for k in range(nearest) for part in _USER]
     return (*_EGO, *curves, *_WAY, *ground, *users)
-
-
-_GROUND = ("enter", "leave", "waits")
 
 
 def observe(seen: Sighting, *, nearest: int) -> Observation:

@@ -1,4 +1,4 @@
-"""A small picture from above: the road, the path, the car and everybody around it."""
+"""A small picture from above: the road, the path, the car and the road users around it."""
 
 from __future__ import annotations
 

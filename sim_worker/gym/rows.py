@@ -20,7 +20,7 @@ from foretwin.sim_worker.planners.giving_way import wait_arcs
 from foretwin.world_gen.rules.signal_state import cycle_s
 
 OFF_PATH_M = 6.0
-"""Who is so far beside the path has left it."""
+"""A car so far beside the path has left it."""
 _BEGINS_WITHIN_M = 5.0
 
 

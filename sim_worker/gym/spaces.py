@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.spaces import Box, Space
 
-from foretwin.sim_worker.gym.course import Course, Source
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.sim_worker.gym.course import Course
+from foretwin.sim_worker.gym.episodes import Source
 
 Floats: TypeAlias = Space[npt.NDArray[np.float32]]
 
@@ -24,7 +27,14 @@ def action_space(course: Course) -> Floats:
     return cast(Floats, Box(-1.0, 1.0, (course.action_size,), np.float32))
 
 
-def split_settings(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the settings of a `Source`, and the others, which are those of a `Course`."""
-    of_source = {name: value for name, value in settings.items() if name in Source._fields}
-    return of_source, {name: v for name, v in settings.items() if name not in of_source}
+def course_of(
+    world: World | str | Path, settings: dict[str, Any], *, count: int, render_mode: str | None
+) -> Course:
+    """Return the course of an environment, whose settings are those of `Source` and of `Course`.
+
+    Raises UserError for settings or a render mode that do not fit.
+    """
+    if render_mode not in (None, "rgb_array"):
+        raise UserError(f"render_mode {render_mode!r} is not rgb_array")
+    of_source = {name: settings.pop(name) for name in Source._fields if name in settings}
+    return Course(Source(world, **of_source), count=count, **settings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,11 @@ from gymnasium.vector.utils import batch_space
 from foretwin.contracts.arrays import Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
-from foretwin.sim_worker.gym.course import CASE, Course, Source, told
+from foretwin.sim_worker.gym.course import info_of
+from foretwin.sim_worker.gym.episodes import CASE
 from foretwin.sim_worker.gym.observation import Observation
 from foretwin.sim_worker.gym.picture import Picture, draw_row
-from foretwin.sim_worker.gym.spaces import action_space, observation_space, split_settings
+from foretwin.sim_worker.gym.spaces import action_space, course_of, observation_space
 
 MASK = "reset_mask"
 
@@ -46,10 +47,7 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
 
         Raises UserError for settings that do not fit.
         """
-        if render_mode not in (None, "rgb_array"):
-            raise UserError(f"render_mode {render_mode!r} is not rgb_array")
-        of_source, of_course = split_settings(settings)
-        self.course = Course(Source(world, **of_source), count=num_envs, **of_course)
+        self.course = course_of(world, settings, count=num_envs, render_mode=render_mode)
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {
@@ -132,41 +130,45 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
         terminated = facts.terminated & ~before
         truncated = self.course.over_time() & ~facts.terminated & ~before
         self._over = terminated | truncated
-        infos: dict[str, Any] = {}
-        for name, values in told(facts).items():
-            infos[name] = np.where(before, np.zeros_like(values), values)
-            infos[f"_{name}"] = ~before
+        info = info_of(facts)
+        infos = _of_rows(info, ~before)
         if before.any():
             rewards = np.where(before, 0.0, rewards)
             infos.update(self._begin(np.flatnonzero(before), looked=False))
         observations = self.course.look()
         if mode is AutoresetMode.SAME_STEP and self._over.any():
-            observations, infos = self._begin_at_once(observations, infos)
+            observations, infos = self._begin_at_once(observations, info)
         return observations, rewards, terminated, truncated, infos
 
     def _begin_at_once(
-        self, observations: Observation, infos: dict[str, Any]
+        self, observations: Observation, info: Mapping[str, Any]
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin the rows that are over, and keep what they ended with, as Gymnasium does."""
-        rows = np.flatnonzero(self._over)
+        over = self._over.copy()
+        rows = np.flatnonzero(over)
         ended = np.full(self.num_envs, None, dtype=object)
         for row in rows:
             ended[row] = observations[row].copy()
-        over = self._over.copy()
-        final = {k: np.where(over, v, np.zeros_like(v)) for k, v in infos.items() if k[0] != "_"}
-        final.update({f"_{name}": over.copy() for name in final})
         kept: dict[str, Any] = {
-            "final_obs": ended, "_final_obs": over, "final_info": final, "_final_info": over.copy(),
-        }  # fmt: skip
-        for name, values in infos.items():
-            if name[0] != "_":
-                kept[name] = np.where(over, np.zeros_like(values), values)
-                kept[f"_{name}"] = infos[f"_{name}"] & ~over
-        return_infos = {**kept, **self._begin(rows, looked=True)}
-        return self.course.look(), return_infos
+            "final_obs": ended,
+            "_final_obs": over,
+            "final_info": _of_rows(info, over),
+            "_final_info": over.copy(),
+        }
+        infos = {**kept, **_of_rows(info, ~over), **self._begin(rows, looked=True)}
+        return self.course.look(), infos
 
     def render(self) -> tuple[Picture, ...] | None:
         """Return a picture of each row from above (H, W, 3), or None without a render mode."""
         if not self.render_mode:
             return None
         return tuple(draw_row(self.course.rows, row) for row in range(self.num_envs))
+
+
+def _of_rows(info: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
+    """Return what `info` says of some rows (S,), and beside each name which rows these are."""
+    found = {}
+    for name, values in info.items():
+        found[name] = np.where(rows, values, np.zeros_like(values))
+        found[f"_{name}"] = rows.copy()
+    return found

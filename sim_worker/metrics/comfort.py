@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.metrics.rollout import Flags, Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array, Flags
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 BOUNDS = MappingProxyType(
     {
@@ -31,7 +30,7 @@ _ORDER = 2
 """Smoothing as there: quadratics over 8 samples of 0.1 s for accelerations, 15 for derivatives."""
 
 
-class Motion(NamedTuple):
+class EgoMotion(NamedTuple):
     """How base_link moves, all (S, N), smoothed; jerk is the rate of the acceleration's size."""
 
     lon_accel_mps2: Array
@@ -42,26 +41,26 @@ class Motion(NamedTuple):
     yaw_accel_radps2: Array
 
 
-def motion(scene: Scene) -> Motion:
+def motion(view: RolloutView) -> EgoMotion:
     """Return the motion of the ego by Savitzky and Golay (1964), Smoothing and Differentiation.
 
     Accelerations follow from the velocities in the states, so that planned motion is judged like
     simulated: a_lon = dvx/dt - vy ω, a_lat = dvy/dt + vx ω. Raises ValueError where the instants
     are not evenly spaced.
     """
-    steps = np.diff(scene.time_s)
+    steps = np.diff(view.time_s)
     if np.ptp(steps) > 1e-3 * steps[0]:
         raise ValueError("comfort needs evenly spaced instants")
-    vx, vy = scene.states[..., 3], scene.states[..., 4]
-    yaw = np.unwrap(scene.states[..., 2], axis=1)
-    count, step_s = len(scene.time_s), float(steps.mean())
+    vx, vy = view.states[..., 3], view.states[..., 4]
+    yaw = np.unwrap(view.states[..., 2], axis=1)
+    count, step_s = len(view.time_s), float(steps.mean())
     slope = _operator(count, step_s, _ACCEL_WINDOW_S, 1)
     rate = _operator(count, step_s, _JERK_WINDOW_S, 1)
     curve = _operator(count, step_s, _JERK_WINDOW_S, 2)
     turning = yaw @ rate
     lon = vx @ slope - vy * turning
     lat = vy @ slope + vx * turning
-    return Motion(
+    return EgoMotion(
         lon_accel_mps2=lon,
         lat_accel_mps2=lat,
         jerk_mps3=np.hypot(lon, lat) @ rate,
@@ -95,49 +94,45 @@ def _operator(count: int, step_s: float, window_s: float, derivative: int) -> Ar
     return operator
 
 
-def _kept(scene: Scene) -> Motion:
-    return scene.keep(motion)
-
-
-def max_acceleration(scene: Scene) -> Measure:
+def max_acceleration(view: RolloutView) -> Measure:
     """Greatest acceleration along the road (S,)."""
-    return scene.measure(_kept(scene).lon_accel_mps2.max(axis=1))
+    return view.measure(view.keep(motion).lon_accel_mps2.max(axis=1))
 
 
-def max_deceleration(scene: Scene) -> Measure:
+def max_deceleration(view: RolloutView) -> Measure:
     """Greatest deceleration along the road (S,), positive where it brakes at all."""
-    return scene.measure(-_kept(scene).lon_accel_mps2.min(axis=1))
+    return view.measure(-view.keep(motion).lon_accel_mps2.min(axis=1))
 
 
-def max_lateral_acceleration(scene: Scene) -> Measure:
+def max_lateral_acceleration(view: RolloutView) -> Measure:
     """Greatest lateral acceleration (S,) to either side."""
-    return scene.measure(np.abs(_kept(scene).lat_accel_mps2).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).lat_accel_mps2).max(axis=1))
 
 
-def max_jerk(scene: Scene) -> Measure:
+def max_jerk(view: RolloutView) -> Measure:
     """Greatest rate of change of the acceleration's size (S,)."""
-    return scene.measure(np.abs(_kept(scene).jerk_mps3).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).jerk_mps3).max(axis=1))
 
 
-def max_longitudinal_jerk(scene: Scene) -> Measure:
+def max_longitudinal_jerk(view: RolloutView) -> Measure:
     """Greatest rate of change of the acceleration along the road (S,)."""
-    return scene.measure(np.abs(_kept(scene).lon_jerk_mps3).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).lon_jerk_mps3).max(axis=1))
 
 
-def max_yaw_rate(scene: Scene) -> Measure:
+def max_yaw_rate(view: RolloutView) -> Measure:
     """Greatest yaw rate (S,) to either side."""
-    return scene.measure(np.abs(_kept(scene).yaw_rate_radps).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).yaw_rate_radps).max(axis=1))
 
 
-def max_yaw_acceleration(scene: Scene) -> Measure:
+def max_yaw_acceleration(view: RolloutView) -> Measure:
     """Greatest yaw acceleration (S,) to either side."""
-    return scene.measure(np.abs(_kept(scene).yaw_accel_radps2).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).yaw_accel_radps2).max(axis=1))
 
 
-def comfortable(scene: Scene) -> Measure:
+def comfortable(view: RolloutView) -> Measure:
     """Whether all of `BOUNDS` are kept at all instants (S,): 1 or 0."""
-    found = _kept(scene)._asdict()
-    kept: Flags = np.ones(len(scene.valid), dtype=bool)
+    found = view.keep(motion)._asdict()
+    kept: Flags = np.ones(len(view.valid), dtype=bool)
     for name, (least, most) in BOUNDS.items():
         kept &= ((found[name] >= least) & (found[name] <= most)).all(axis=1)
-    return scene.measure(kept.astype(np.float64))
+    return view.measure(kept.astype(np.float64))

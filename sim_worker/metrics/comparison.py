@@ -1,4 +1,7 @@
-"""Futures against what the car did, and against what the car itself had planned."""
+"""Futures against what the car did, and against what the car itself had planned.
+
+What a future must beat to be worth its cost are predictions that need no simulation.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.drive import PlannedTrajectory
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import PathAhead, Trajectory
 from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from foretwin.sim_worker.metrics.displacement import horizon_error
 
-_MAX_GAP_S = 1.5
+MAX_GAP_S = 1.5
 """Across a longer hole in the track nothing is interpolated: no truth is known there."""
 _MIN_PLAN_S = 0.5
 """A plan that overlaps the future by less than this is not compared."""
@@ -39,7 +40,7 @@ class NominalTrack(NamedTuple):
 class ActualTrack(NamedTuple):
     """What the car did: `stamps_ns` (M,) rising, `xy_yaw` (M, 3) in the nominal's frame."""
 
-    stamps_ns: npt.NDArray[np.int64]
+    stamps_ns: Stamps
     xy_yaw: Array
 
 
@@ -136,7 +137,7 @@ def _poses_at(actual: ActualTrack, stamp_ns: int, time_s: Array) -> Array | None
         return None
     first = max(int(np.searchsorted(known_s, time_s[0], side="right")) - 1, 0)
     last = int(np.searchsorted(known_s, time_s[-1] - 1e-6))
-    if (np.diff(known_s[first : last + 1]) > _MAX_GAP_S).any():
+    if (np.diff(known_s[first : last + 1]) > MAX_GAP_S).any():
         return None
     return _interpolated(time_s, known_s, actual.xy_yaw)
 
@@ -145,3 +146,34 @@ def _interpolated(at_s: Array, known_s: Array, poses: Array) -> Array:
     yaw = np.unwrap(poses[:, 2])
     columns = (poses[:, 0], poses[:, 1], yaw)
     return np.stack([np.interp(at_s, known_s, column) for column in columns], axis=1)
+
+
+_STRAIGHT_RADPS = 1e-6
+
+
+def constant_velocity(pose: Array, *, speed_mps: float, time_s: Array) -> Array:
+    """Return (N, 3) poses at `time_s` (N,) of a car that goes straight on from `pose` (3,)."""
+    return constant_turn_rate(pose, speed_mps=speed_mps, yaw_rate_radps=0.0, time_s=time_s)
+
+
+def constant_turn_rate(
+    pose: Array, *, speed_mps: float, yaw_rate_radps: float, time_s: Array
+) -> Array:
+    """Return (N, 3) poses at `time_s` (N,) of a car that keeps its speed and yaw rate.
+
+    Schubert, Richter, Wanielik (2008), Comparison and Evaluation of Advanced Motion Models, CTRV.
+    """
+    x, y, yaw = (float(value) for value in pose)
+    heading = yaw + yaw_rate_radps * time_s
+    if abs(yaw_rate_radps) < _STRAIGHT_RADPS:
+        along = speed_mps * time_s
+        return np.stack([x + along * np.cos(yaw), y + along * np.sin(yaw), heading], axis=1)
+    radius = speed_mps / yaw_rate_radps
+    return np.stack(
+        [
+            x + radius * (np.sin(heading) - np.sin(yaw)),
+            y - radius * (np.cos(heading) - np.cos(yaw)),
+            heading,
+        ],
+        axis=1,
+    )

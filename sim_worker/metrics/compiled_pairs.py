@@ -8,31 +8,31 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.compiled import REAL, WHOLE, given, kernel, types
 
-_ALL, _SIZES, _ROWS, _LINE = given(3, "C"), given(3), given(2), given(1)
+_ALL, _ROWS, _LINE = given(3, "C"), given(2), given(1)
+_SIZES, _HALF = types.UniTuple(given(3), 2), types.UniTuple(REAL, 2)
 _PICKED, _OUT_ROWS = types.Array(WHOLE, 1, "A", readonly=True), REAL[:, ::1]
 NEVER_ZERO = 1e-300
 """Added to speeds before division: standing still becomes a very long time."""
-Indices = npt.NDArray[np.intp]
 
 
-@kernel(types.void, types.UniTuple(_ALL, 6), _SIZES, _SIZES, REAL, REAL, _OUT_ROWS)
+@kernel(types.void, types.UniTuple(_ALL, 6), _SIZES, _HALF, _OUT_ROWS)
 def least_until_touch(
-    relative: tuple[Array, ...], half_length_m: Array, half_width_m: Array,
-    length: float, width: float, least_s: Array,
-) -> None:  # fmt: skip
-    """Lower `least_s` (S, N) to the seconds until anybody is touched, by the formulas of `meeting`.
+    relative: tuple[Array, ...],
+    other_half_m: tuple[Array, Array],
+    half_m: tuple[float, float],
+    least_s: Array,
+) -> None:
+    """Lower `least_s` (S, N) to the seconds until any is touched, by the formulas of `meeting`.
 
     `relative` holds (S, N, R) each: ahead, left, cos, sin, and the speeds ahead and left. Half
     sizes (S, 1, R) are the road users'; `length` and `width` are half of the ego's.
     """
     ahead_m, left_m, cos, sin, ahead_mps, left_mps = relative
     futures, instants, users = ahead_m.shape
+    (length, width), (half_length_m, half_width_m) = half_m, other_half_m
     own_reach = math.hypot(length, width)
     for future in range(futures):
         for user in range(users):
@@ -71,13 +71,16 @@ def least_until_touch(
 
 
 @kernel(
-    WHOLE, types.UniTuple(_ALL, 5), _SIZES, _SIZES, _ROWS, types.UniTuple(REAL, 5),
-    WHOLE[::1], _OUT_ROWS,
-)  # fmt: skip
+    WHOLE, types.UniTuple(_ALL, 5), _SIZES, _ROWS, types.UniTuple(REAL, 5), WHOLE[::1], _OUT_ROWS
+)
 def find_leaders(
-    relative: tuple[Array, ...], half_length_m: Array, half_width_m: Array, curvature_pm: Array,
-    limits: tuple[float, ...], pair: Indices, found: Array,
-) -> int:  # fmt: skip
+    relative: tuple[Array, ...],
+    other_half_m: tuple[Array, Array],
+    curvature_pm: Array,
+    limits: tuple[float, ...],
+    pair: Indices,
+    found: Array,
+) -> int:
     """Return how many (K) are ahead on the ego's course, as `following.leaders` defines it.
 
     `relative` holds (S, N, R) each: ahead, left, cos, sin and speed; half sizes (S, 1, R);
@@ -86,6 +89,7 @@ def find_leaders(
     """
     ahead_m, left_m, cos, sin, speed_mps = relative
     centre_ahead, length, width, along_cos, stands_mps = limits
+    half_length_m, half_width_m = other_half_m
     futures, instants, users = ahead_m.shape
     front, count = centre_ahead + length, 0
     for future in range(futures):
@@ -126,25 +130,36 @@ def find_leaders(
 
 
 @kernel(
-    types.void, types.UniTuple(given(3), 3), _LINE, _LINE, _PICKED, _PICKED, _PICKED, _ROWS,
-    _ROWS, _LINE, _LINE, _OUT_ROWS,
-)  # fmt: skip
+    types.void,
+    types.UniTuple(given(3), 3),
+    types.UniTuple(_LINE, 2),
+    types.UniTuple(_PICKED, 3),
+    *(_ROWS, _ROWS, _LINE, _LINE, _OUT_ROWS),
+)
 def stays_on_strips(
-    poses: tuple[Array, ...], half_length_m: Array, half_width_m: Array,
-    future: Indices, user: Indices, step: Indices,
-    point_m: Array, way: Array, strip_half_m: Array, time_s: Array, found: Array,
-) -> None:  # fmt: skip
+    poses: tuple[Array, ...],
+    half_m: tuple[Array, ...],
+    picked: tuple[Indices, ...],
+    point_m: Array,
+    way: Array,
+    strip_half_m: Array,
+    time_s: Array,
+    found: Array,
+) -> None:
     """Fill `found` (2, K): when boxes come onto and leave strips through points along `way` (K, 2).
 
-    `poses` are x, y, yaw (S, N, R), of which box k has `future[k]`, `user[k]`; `strip_half_m` (K,)
-    half widths of strips. Only the stay that includes the instant after `step` (K,) counts; a box
-    that is on the strip at the first instant came at that time, one that is at the last never
-    leaves. Between instants, what a corner lies off the strip changes evenly.
+    `poses` are x, y, yaw (S, N, R), `half_m` half lengths and widths (K,), `strip_half_m` (K,) half
+    widths of strips. `picked` are future, user and step (K,) of box k: only the stay that includes
+    the instant after that step counts; a box that is on the strip at the first instant came at that
+    time, one that is at the last never leaves. Between instants, what a corner lies off the strip
+    changes evenly.
     """
     x, y, yaw = poses
     last = len(time_s) - 1
+    half_length_m, half_width_m = half_m
+    future, user, step = picked
     for k in range(len(step)):
-        who, other = future[k], user[k]
+        row, other = future[k], user[k]
         normal_x, normal_y = -way[k, 1], way[k, 0]
         found[0, k], found[1, k] = time_s[0], math.inf
         for end in range(2):
@@ -153,9 +168,9 @@ def stays_on_strips(
             within = at = step[k] + 1 - end
             inside_aside = inside_reach = 0.0
             while 0 <= at <= last:
-                aside = (x[who, at, other] - point_m[k, 0]) * normal_x
-                aside += (y[who, at, other] - point_m[k, 1]) * normal_y
-                cos, sin = math.cos(yaw[who, at, other]), math.sin(yaw[who, at, other])
+                aside = (x[row, at, other] - point_m[k, 0]) * normal_x
+                aside += (y[row, at, other] - point_m[k, 1]) * normal_y
+                cos, sin = math.cos(yaw[row, at, other]), math.sin(yaw[row, at, other])
                 reach = strip_half_m[k] + half_length_m[k] * abs(cos * normal_x + sin * normal_y)
                 reach += half_width_m[k] * abs(cos * normal_y - sin * normal_x)
                 if at != within and abs(aside) >= reach:

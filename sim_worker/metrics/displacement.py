@@ -1,4 +1,7 @@
-"""Displacement of predictions from what happened, and how many futures really differ."""
+"""Displacement of predictions from what happened, and how many futures really differ.
+
+How far two courses lie apart whatever the time: discrete Fréchet distance and time warping.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.simulation import HorizonError
-from foretwin.sim_worker.metrics.rollout import Flags, Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.geometry import compiled
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _Summary = Callable[["Displacements"], Array]
 _SEED_S = 1e-6
@@ -83,75 +86,75 @@ def distinct_count(ends: Array, least_m: float = 0.1) -> int:
     return len(kept)
 
 
-def known(scene: Scene) -> tuple[Array, Array]:
+def known(view: RolloutView) -> tuple[Array, Array]:
     """Return the futures' poses (S, K, 3) and the reference (K, 3) where that is known."""
-    reference = scene.context.reference
+    reference = view.context.reference
     if reference is None:
         raise ValueError("no reference to compare with")
-    if reference.shape != (len(scene.time_s), 3):
-        raise ValueError(f"reference: {reference.shape}, expected ({len(scene.time_s)}, 3)")
+    if reference.shape != (len(view.time_s), 3):
+        raise ValueError(f"reference: {reference.shape}, expected ({len(view.time_s)}, 3)")
     there: Flags = np.asarray(np.isfinite(reference).all(axis=1))
-    return scene.states[:, there, :3], np.asarray(reference[there], dtype=np.float64)
+    return view.states[:, there, :3], np.asarray(reference[there], dtype=np.float64)
 
 
-def ade(scene: Scene) -> Measure:
+def ade(view: RolloutView) -> Measure:
     """Average displacement error (S,): Pellegrini et al. (2009), You'll Never Walk Alone."""
-    return _of(scene, lambda found: found.distance_m.mean(axis=1))
+    return _of(view, lambda found: found.distance_m.mean(axis=1))
 
 
-def fde(scene: Scene) -> Measure:
+def fde(view: RolloutView) -> Measure:
     """Final displacement error (S,), at the last known instant: Alahi et al. (2016), Social LSTM.
 
     Where the reference ends before the rollout, that is not the rollout's last.
     """
-    return _of(scene, lambda found: found.distance_m[:, -1])
+    return _of(view, lambda found: found.distance_m[:, -1])
 
 
-def lateral(scene: Scene) -> Measure:
+def lateral(view: RolloutView) -> Measure:
     """How far to the left of the reference (S,) the future ends, negative to the right."""
-    return _of(scene, lambda found: found.lateral_m[:, -1])
+    return _of(view, lambda found: found.lateral_m[:, -1])
 
 
-def longitudinal(scene: Scene) -> Measure:
+def longitudinal(view: RolloutView) -> Measure:
     """How far ahead of the reference (S,) the future ends, negative behind."""
-    return _of(scene, lambda found: found.longitudinal_m[:, -1])
+    return _of(view, lambda found: found.longitudinal_m[:, -1])
 
 
-def heading(scene: Scene) -> Measure:
+def heading(view: RolloutView) -> Measure:
     """How far the future's yaw is turned (S,) from the reference's at the end."""
-    return _of(scene, lambda found: found.heading_rad[:, -1])
+    return _of(view, lambda found: found.heading_rad[:, -1])
 
 
-def ape(scene: Scene) -> Measure:
+def ape(view: RolloutView) -> Measure:
     """Absolute pose error (S,) over all known instants but the seeding one, without alignment.
 
     Absolute trajectory error: Sturm et al. (2012), A Benchmark for the Evaluation of RGB-D SLAM
     Systems, equation 3, with the identity for S. What evo calls the APE's translation part.
     """
-    return _of(scene, lambda found: np.sqrt(np.square(found.distance_m).mean(axis=1)))
+    return _of(view, lambda found: np.sqrt(np.square(found.distance_m).mean(axis=1)))
 
 
-def rpe(scene: Scene) -> Measure:
+def rpe(view: RolloutView) -> Measure:
     """Relative pose error (S,) from each known instant to the next."""
-    predicted, reference = known(scene)
+    predicted, reference = known(view)
     if len(reference) < 2:
-        return nowhere(scene)
-    return scene.measure(relative_pose_error(predicted, reference))
+        return nowhere(view)
+    return view.measure(relative_pose_error(predicted, reference))
 
 
-def nowhere(scene: Scene) -> Measure:
+def nowhere(view: RolloutView) -> Measure:
     """Return a measure (S,) that is valid for no future."""
-    return scene.measure(np.full(len(scene.valid), np.nan), np.zeros(len(scene.valid), dtype=bool))
+    return view.measure(np.full(len(view.valid), np.nan), np.zeros(len(view.valid), dtype=bool))
 
 
-def _of(scene: Scene, summary: _Summary) -> Measure:
-    found = scene.keep(_after_seed)
-    return nowhere(scene) if found is None else scene.measure(np.asarray(summary(found)))
+def _of(view: RolloutView, summary: _Summary) -> Measure:
+    found = view.keep(_after_seed)
+    return nowhere(view) if found is None else view.measure(np.asarray(summary(found)))
 
 
-def _after_seed(scene: Scene) -> Displacements | None:
-    predicted, reference = known(scene)
-    time_s = scene.time_s[np.isfinite(scene.context.reference).all(axis=1)]  # type: ignore[arg-type]
+def _after_seed(view: RolloutView) -> Displacements | None:
+    predicted, reference = known(view)
+    time_s = view.time_s[np.isfinite(view.context.reference).all(axis=1)]  # type: ignore[arg-type]
     later = time_s > _SEED_S
     if not later.any():
         return None
@@ -164,3 +167,37 @@ def _steps_in_own_axes(poses: Array) -> Array:
     return np.stack(
         [cos * step[..., 0] + sin * step[..., 1], cos * step[..., 1] - sin * step[..., 0]], axis=-1
     )
+
+
+def cheapest_walks(curves: Array, reference: Array) -> Array:
+    """Return (2, S) metres: of curves (S, N, 2) from one (M, 2), the discrete Fréchet distances
+    (Eiter and Mannila 1994, Computing Discrete Fréchet Distance, table 1) and the least sums.
+
+    Both are of the walks along the pairs of points that never go back and have the least of it.
+    The sums are dynamic time warping: Sakoe and Chiba (1978), Dynamic Programming Algorithm
+    Optimization for Spoken Word Recognition, equation 11, weight 1 for every pair and no window.
+    """
+    x, y = (np.ascontiguousarray(curves[..., k], dtype=np.float64) for k in range(2))
+    to_x, to_y = (np.ascontiguousarray(reference[:, k], dtype=np.float64) for k in range(2))
+    found = np.empty((2, len(x)))
+    compiled.cheapest_walks(x, y, to_x, to_y, found)
+    return found
+
+
+def frechet(view: RolloutView) -> Measure:
+    """Discrete Fréchet distance (S,) from the reference's course."""
+    found = view.keep(_from_reference)
+    return view.measure(found[0]) if found is not None else nowhere(view)
+
+
+def dtw(view: RolloutView) -> Measure:
+    """Time warping distance (S,) from the reference's course, a sum over pairs of points."""
+    found = view.keep(_from_reference)
+    return view.measure(found[1]) if found is not None else nowhere(view)
+
+
+def _from_reference(view: RolloutView) -> Array | None:
+    predicted, reference = known(view)
+    if not len(reference):
+        return None
+    return cheapest_walks(predicted[..., :2], reference[:, :2])

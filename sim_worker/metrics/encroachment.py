@@ -5,19 +5,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.sim_worker.metrics import compiled_pairs
-from foretwin.sim_worker.metrics.rollout import Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _CHUNK = 8
 """Steps whose bounding boxes are compared before their lines are."""
 _PARALLEL_SIN = 0.17
 """Ways that never differ by 10° follow or meet each other; they do not cross."""
 _HALF_STEP = 0.5 + 1e-9
-Indices = npt.NDArray[np.intp]
 
 
 class Crossings(NamedTuple):
@@ -36,50 +33,49 @@ class Crossings(NamedTuple):
     user_way: Array
 
 
-def post_encroachment_time(scene: Scene) -> Measure:
+def post_encroachment_time(view: RolloutView) -> Measure:
     """Least post-encroachment time (S,); infinite where no tracks cross, 0 where both meet there.
 
     From the moment the first leaves the other's path until that other reaches the first one's:
     Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. A path is the
-    strip as wide as the road user, straight around the crossing; who is on it is told by the
-    oriented outlines. Both must pass within the rollout.
+    strip as wide as the road user, straight around the crossing; the oriented outlines
+    say when it is on it. Both must pass within the rollout.
     """
-    found = scene.keep(crossings)
+    found = view.keep(crossings)
     future, user = found.future, found.user
-    half_length, half_width = (half[future, 0, user] for half in scene.user_half_m)
-    own_half_length = np.full(len(future), scene.half_length_m)
-    own_half_width = np.full(len(future), scene.half_width_m)
-    centre = scene.centre_m
-    alone = tuple(v[..., None] for v in (centre[..., 0], centre[..., 1], scene.states[..., 2]))
+    half_m = tuple(half[future, 0, user] for half in view.user_half_m)
+    own_half_m = tuple(np.full(len(future), half) for half in view.half_m)
+    x, y, yaw = (v[..., None] for v in (*np.moveaxis(view.centre_m, 2, 0), view.states[..., 2]))
+    own_picked = (future, np.zeros_like(user), found.ego_step)
+    picked = (future, user, found.user_step)
     stays = np.empty((4, len(future)))
-    compiled_pairs.stays_on_strips(
-        alone, own_half_length, own_half_width, future, np.zeros_like(user), found.ego_step,
-        found.point_m, found.user_way, half_width, scene.time_s, stays[:2],
-    )  # fmt: skip
-    compiled_pairs.stays_on_strips(
-        scene.users[:3], half_length, half_width, future, user, found.user_step,
-        found.point_m, found.ego_way, own_half_width, scene.time_s, stays[2:],
-    )  # fmt: skip
+    for poses, half, which, way, strip_half, stay in (
+        ((x, y, yaw), own_half_m, own_picked, found.user_way, half_m[1], stays[:2]),
+        (view.users[:3], half_m, picked, found.ego_way, own_half_m[1], stays[2:]),
+    ):
+        compiled_pairs.stays_on_strips(
+            poses, half, which, found.point_m, way, strip_half, view.time_s, stay
+        )
     ego_from, ego_until, other_from, other_until = stays
     between = np.maximum(np.maximum(other_from - ego_until, ego_from - other_until), 0.0)
-    least = np.full(len(scene.valid), np.inf)
+    least = np.full(len(view.valid), np.inf)
     np.minimum.at(least, future, between)
-    return scene.measure(least)
+    return view.measure(least)
 
 
-def crossings(scene: Scene) -> Crossings:
+def crossings(view: RolloutView) -> Crossings:
     """Return where the ego's track crosses road users' tracks at an angle of 10° or more."""
-    future, user, ego_chunk, user_chunk = _near_chunks(scene)
-    instants = len(scene.time_s)
-    users = scene.there.shape[2]
+    future, user, ego_chunk, user_chunk = _near_chunks(view)
+    instants = len(view.time_s)
+    users = view.there.shape[2]
     # Pairs on the last axis: numpy is slow where the last axis is short.
     node = np.arange(_CHUNK + 1)[:, None]
     i = np.minimum(ego_chunk * _CHUNK + node, instants - 1)
     j = np.minimum(user_chunk * _CHUNK + node, instants - 1)
-    ego = scene.centre_m.reshape(-1, 2)[future * instants + i]
+    ego = view.centre_m.reshape(-1, 2)[future * instants + i]
     ego_x, ego_y = ego[..., 0].copy(), ego[..., 1].copy()
     place = (future * instants + j) * users + user
-    x, y, there = (v.reshape(-1)[place] for v in (*scene.users[:2], scene.there))
+    x, y, there = (v.reshape(-1)[place] for v in (*view.users[:2], view.there))
     step_x, step_y = (np.diff(values, axis=0)[:, None] for values in (ego_x, ego_y))
     way_x, way_y = (np.diff(values, axis=0)[None] for values in (x, y))
     from_x, from_y = x[None, :-1] - ego_x[:-1, None], y[None, :-1] - ego_y[:-1, None]
@@ -112,27 +108,27 @@ def _unit(x: Array, y: Array) -> Array:
     return np.stack([x, y], axis=-1) / np.hypot(x, y)[:, None]
 
 
-def _near_chunks(scene: Scene) -> tuple[Indices, Indices, Indices, Indices]:
+def _near_chunks(view: RolloutView) -> tuple[Indices, Indices, Indices, Indices]:
     """Return future, user, ego chunk and user chunk of all stretches that may cross."""
-    x, y, _, _ = scene.users
-    ego = _bounds(scene.centre_m[..., 0], scene.centre_m[..., 1])
+    x, y, _, _ = view.users
+    ego = _bounds(view.centre_m[..., 0], view.centre_m[..., 1])
     user = _bounds(x, y)
     meet = ego.least_x[:, :, None, None] <= user.most_x[:, None]
     meet &= ego.most_x[:, :, None, None] >= user.least_x[:, None]
     meet &= ego.least_y[:, :, None, None] <= user.most_y[:, None]
     meet &= ego.most_y[:, :, None, None] >= user.least_y[:, None]
     found = np.flatnonzero(meet)
-    future, ego_chunk, user_chunk, who = np.unravel_index(found, meet.shape)
-    own_yaw, yaw = scene.states[..., 2], scene.users[2]
-    last = len(scene.time_s) - 1
+    future, ego_chunk, user_chunk, other = np.unravel_index(found, meet.shape)
+    own_yaw, yaw = view.states[..., 2], view.users[2]
+    last = len(view.time_s) - 1
     turned = [
-        yaw[future, np.minimum(user_chunk * _CHUNK + j, last), who]
+        yaw[future, np.minimum(user_chunk * _CHUNK + j, last), other]
         - own_yaw[future, np.minimum(ego_chunk * _CHUNK + i, last)]
         for i in (0, _CHUNK)
         for j in (0, _CHUNK)
     ]
     steep = np.any([np.abs(np.sin(angle)) >= _PARALLEL_SIN for angle in turned], axis=0)
-    return future[steep], who[steep], ego_chunk[steep], user_chunk[steep]
+    return future[steep], other[steep], ego_chunk[steep], user_chunk[steep]
 
 
 class _Bounds(NamedTuple):
@@ -155,7 +151,4 @@ def _bounds(x: Array, y: Array) -> _Bounds:
             of(found, padded[:, k::_CHUNK], out=found)
         return np.asarray(found)
 
-    return _Bounds(
-        extreme(x, np.minimum), extreme(x, np.maximum),
-        extreme(y, np.minimum), extreme(y, np.maximum),
-    )  # fmt: skip
+    return _Bounds(*(extreme(v, of) for v in (x, y) for of in (np.minimum, np.maximum)))

@@ -1,7 +1,7 @@
-"""Who drives or stands ahead on the ego's course: headway, and what avoiding them would take.
+"""Road users ahead on the ego's course: headway, and what avoiding them would take.
 
-The course is the circle of the ego's present yaw rate and speed. Ahead on it is who overlaps the
-strip that the ego would sweep and is not driven against it or across it.
+The course is the circle of the ego's present yaw rate and speed. Ahead on it are those that overlap
+the strip that the ego would sweep, not driven against it or across it.
 """
 
 from __future__ import annotations
@@ -9,16 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics import compiled_pairs
-from foretwin.sim_worker.metrics.rollout import Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
-Indices = npt.NDArray[np.intp]
 _SLOW_MPS = 1.0
 """Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
 _MOVES_MPS = 0.1
@@ -43,76 +40,74 @@ class Leaders(NamedTuple):
     accel_mps2: Array
 
 
-def time_headway(scene: Scene) -> Measure:
-    """Least time headway (S,), infinite where nobody is ahead or the ego stands.
+def time_headway(view: RolloutView) -> Measure:
+    """Least time headway (S,), infinite where none is ahead or the ego stands.
 
     Seconds until the ego's front is where the leader's rear is now: Jansson (2005), Collision
     Avoidance Theory, section 5.3.1; Westhofen et al. (2023), Criticality Metrics for Automated
     Driving, THW.
     """
-    ahead = scene.keep(leaders)
+    ahead = view.keep(leaders)
     moving = ahead.ego_mps > _MOVES_MPS
     headway = np.where(moving, ahead.gap_m, np.inf) / np.where(moving, ahead.ego_mps, 1.0)
-    return _extreme(scene, ahead, headway, np.minimum, np.inf)
+    return _extreme(view, ahead, headway, np.minimum, np.inf)
 
 
-def drac(scene: Scene) -> Measure:
-    """Greatest deceleration rate to avoid the crash (S,), 0 where nobody is approached.
+def drac(view: RolloutView) -> Measure:
+    """Greatest deceleration rate to avoid the crash (S,), 0 where none is approached.
 
     Cooper and Ferguson (1976), Traffic studies at T-junctions; (v - v_leader)² / (2 gap) in
     Archer (2005), Indicators for traffic safety assessment and prediction, equation 4.
     """
-    ahead = scene.keep(leaders)
-    return _extreme(scene, ahead, _drac(ahead), np.maximum, 0.0)
+    ahead = view.keep(leaders)
+    return _extreme(view, ahead, _drac(ahead), np.maximum, 0.0)
 
 
-def required_deceleration(scene: Scene) -> Measure:
+def required_deceleration(view: RolloutView) -> Measure:
     """Greatest deceleration (S,) that matches the leader's speed just before touching it.
 
     Jansson (2005), Collision Avoidance Theory, section 5.3.5: the leader keeps its acceleration;
-    0 where nobody is approached. Positive here, negative in the source.
+    0 where none is approached. Positive here, negative in the source.
     """
-    ahead = scene.keep(leaders)
-    return _extreme(scene, ahead, _longitudinal(ahead), np.maximum, 0.0)
+    ahead = view.keep(leaders)
+    return _extreme(view, ahead, _longitudinal(ahead), np.maximum, 0.0)
 
 
-def required_lateral_acceleration(scene: Scene) -> Measure:
+def required_lateral_acceleration(view: RolloutView) -> Measure:
     """Greatest lateral acceleration (S,) that gets past the leader just before touching it.
 
     Jansson (2005), Collision Avoidance Theory, section 5.3.8, to the easier side.
     """
-    ahead = scene.keep(leaders)
-    return _extreme(scene, ahead, _lateral(ahead), np.maximum, 0.0)
+    ahead = view.keep(leaders)
+    return _extreme(view, ahead, _lateral(ahead), np.maximum, 0.0)
 
 
-def required_acceleration(scene: Scene) -> Measure:
+def required_acceleration(view: RolloutView) -> Measure:
     """Greatest root sum of squares (S,) of the two above, taken at the same instant.
 
     Jansson (2005), Collision Avoidance Theory, section 5.3.10.
     """
-    ahead = scene.keep(leaders)
-    return _extreme(scene, ahead, np.hypot(_longitudinal(ahead), _lateral(ahead)), np.maximum, 0.0)
+    ahead = view.keep(leaders)
+    return _extreme(view, ahead, np.hypot(_longitudinal(ahead), _lateral(ahead)), np.maximum, 0.0)
 
 
-def leaders(scene: Scene) -> Leaders:
-    """Return everybody who is ahead on the ego's course at some instant.
+def leaders(view: RolloutView) -> Leaders:
+    """Return all road users ahead on the ego's course at some instant.
 
     With κ the curvature, a point at (x, y) of base_link's axes lies ((1 - r) / κ) to the left of
     the circle and atan2(κ x, 1 - κ y) / κ along it, where r² = (κ x)² + (1 - κ y)².
     """
-    seen = scene.relative
-    speed = scene.states[..., 3]
+    seen = view.relative
+    speed = view.states[..., 3]
     curvature = np.where(
-        np.abs(speed) > _SLOW_MPS, scene.states[..., 5] / np.maximum(np.abs(speed), _SLOW_MPS), 0.0
+        np.abs(speed) > _SLOW_MPS, view.states[..., 5] / np.maximum(np.abs(speed), _SLOW_MPS), 0.0
     )
     curvature = np.clip(curvature, -MAX_CURVATURE_PM, MAX_CURVATURE_PM)
     pairs = np.empty(seen.ahead_m.size, dtype=np.intp)
     found = np.empty((5, len(pairs)))
-    count = compiled_pairs.find_leaders(
-        (*seen[:4], seen.speed_mps), *scene.user_half_m, curvature,
-        (scene.centre_ahead_m, scene.half_length_m, scene.half_width_m, ALONG_COS, STANDING_MPS),
-        pairs, found,
-    )  # fmt: skip
+    limits = (view.centre_ahead_m, *view.half_m, ALONG_COS, STANDING_MPS)
+    relative = (*seen[:4], seen.speed_mps)
+    count = compiled_pairs.find_leaders(relative, view.user_half_m, curvature, limits, pairs, found)
     pair = pairs[:count]
     gap, left, reach, turned_cos, turned_sin = found[:, :count]
     row, user = np.divmod(pair, max(seen.ahead_m.shape[2], 1))
@@ -125,18 +120,18 @@ def leaders(scene: Scene) -> Leaders:
         ego_mps=speed.reshape(-1)[row],
         other_mps=other * turned_cos,
         other_left_mps=other * turned_sin,
-        accel_mps2=_user_acceleration(scene, row, user) * turned_cos,
+        accel_mps2=_user_acceleration(view, row, user) * turned_cos,
     )
 
 
-def _user_acceleration(scene: Scene, row: Indices, user: Indices) -> Array:
+def _user_acceleration(view: RolloutView, row: Indices, user: Indices) -> Array:
     """Return the accelerations (K,) of road users, 0 where they come or go."""
-    instants = len(scene.time_s)
+    instants = len(view.time_s)
     future, instant = np.divmod(row, instants)
     before, after = np.maximum(instant - 1, 0), np.minimum(instant + 1, instants - 1)
-    speed = scene.rollout.user_speed_mps
+    speed = view.rollout.user_speed_mps
     gain = speed[future, after, user] - speed[future, before, user]
-    return np.asarray(np.nan_to_num(gain / (scene.time_s[after] - scene.time_s[before])))
+    return np.asarray(np.nan_to_num(gain / (view.time_s[after] - view.time_s[before])))
 
 
 def _closing(ahead: Leaders) -> Array:
@@ -168,10 +163,10 @@ def _lateral(ahead: Leaders) -> Array:
 
 
 def _extreme(
-    scene: Scene, ahead: Leaders, values: Array, extreme: np.ufunc, without: float
+    view: RolloutView, ahead: Leaders, values: Array, extreme: np.ufunc, without: float
 ) -> Measure:
     """Return the smallest or greatest of `values` (K,) for each future (S,)."""
-    futures, instants = scene.states.shape[:2]
+    futures, instants = view.states.shape[:2]
     found = np.full(futures, without)
     extreme.at(found, ahead.row // instants, values)
-    return scene.measure(found)
+    return view.measure(found)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.world import Area, World
 
 TOLERANCE_M = 0.3
@@ -35,7 +34,7 @@ class DrivableGround:
         self._columns, self._rows = np.ceil(size / _CELL_M).astype(int) + 1
         self._cells = np.full(self._columns * self._rows, _UNKNOWN, dtype=np.int8)
 
-    def contains(self, x_m: Array, y_m: Array) -> npt.NDArray[np.bool_]:
+    def contains(self, x_m: Array, y_m: Array) -> Flags:
         """Return (…) whether points (…) in the World's frame lie on drivable ground."""
         column = ((x_m - self._origin[0]) * (1.0 / _CELL_M)).astype(np.intp)
         row = ((y_m - self._origin[1]) * (1.0 / _CELL_M)).astype(np.intp)
@@ -52,7 +51,7 @@ class DrivableGround:
             inside[edge] = shapely.intersects_xy(self.surface, x_m[edge], y_m[edge])
         return np.asarray(inside)
 
-    def _look(self, cells: npt.NDArray[np.intp]) -> None:
+    def _look(self, cells: Indices) -> None:
         row, column = np.divmod(cells, self._columns)
         west = self._origin[0] + column * _CELL_M
         south = self._origin[1] + row * _CELL_M

@@ -5,18 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
-from foretwin.sim_worker.metrics.rollout import Flags, Measure
-from foretwin.sim_worker.metrics.scene import Scene
-from foretwin.sim_worker.metrics.time_to_collision import Pairs, meeting
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
+from foretwin.sim_worker.metrics.time_to_collision import meeting
 
 _STANDS_MPS = 0.05
 """An ego slower than this stands: nuPlan, no_ego_at_fault_collisions."""
-Indices = npt.NDArray[np.intp]
 
 
 class Impacts(NamedTuple):
@@ -35,155 +32,149 @@ class Impacts(NamedTuple):
     at_fault: Flags
 
 
-def minimum_clearance(scene: Scene) -> Measure:
-    """Least distance (S,) between the ego's outline and anybody's, infinite where nobody is there.
+def minimum_clearance(view: RolloutView) -> Measure:
+    """Least distance (S,) between the ego's outline and any other, infinite where there is none.
 
     Boxes are at least as far apart as their centres less the half diagonals, and at most as their
     centres less the half widths: only pairs that can be the nearest are measured. 0 where they
     touch, be it between instants.
     """
-    distance = scene.centre_distance_m
-    half_length, half_width = scene.user_half_m
-    touched = scene.keep(impacts).collided
-    ego_diagonal = np.hypot(scene.half_length_m, scene.half_width_m)
+    distance = view.centre_distance_m
+    half_length, half_width = view.user_half_m
+    touched = view.keep(impacts).collided
+    ego_diagonal = np.hypot(view.half_length_m, view.half_width_m)
     least = distance - (np.hypot(half_length, half_width) + ego_diagonal)
-    inner = np.minimum(half_length, half_width) + min(scene.half_length_m, scene.half_width_m)
+    inner = np.minimum(half_length, half_width) + min(view.half_length_m, view.half_width_m)
     most = (distance - inner).min(axis=(1, 2), initial=np.inf)
     most[touched] = -np.inf
     users = least.shape[2]
-    pair = np.flatnonzero((least <= most[:, None, None]) & scene.there)
+    pair = np.flatnonzero((least <= most[:, None, None]) & view.there)
     row, user = np.divmod(pair, max(users, 1))
-    future = row // len(scene.time_s)
-    x, y, yaw, _ = (values.reshape(-1)[pair] for values in scene.users)
+    future = row // len(view.time_s)
+    x, y, yaw, _ = (values.reshape(-1)[pair] for values in view.users)
+    centre, own_yaw = view.centre_m.reshape(-1, 2)[row], view.states[..., 2].reshape(-1)[row]
+    sizes = 2.0 * half_length[future, 0, user], 2.0 * half_width[future, 0, user]
     apart = clearance(
-        Rectangles(
-            scene.centre_m.reshape(-1, 2)[row], scene.states[..., 2].reshape(-1)[row],
-            2.0 * scene.half_length_m, 2.0 * scene.half_width_m,
-        ),
-        Rectangles(
-            np.stack([x, y], axis=-1), yaw,
-            2.0 * half_length[future, 0, user], 2.0 * half_width[future, 0, user],
-        ),
-    )  # fmt: skip
+        Rectangles(centre, own_yaw, 2.0 * view.half_length_m, 2.0 * view.half_width_m),
+        Rectangles(np.stack([x, y], axis=-1), yaw, *sizes),
+    )
     found = np.where(touched, 0.0, np.inf)
     np.minimum.at(found, future, apart)
-    return scene.measure(found)
+    return view.measure(found)
 
 
-def collided(scene: Scene) -> Measure:
+def collided(view: RolloutView) -> Measure:
     """Whether the ego touches a road user (S,): 1 or 0."""
-    return scene.measure(scene.keep(impacts).collided.astype(np.float64))
+    return view.measure(view.keep(impacts).collided.astype(np.float64))
 
 
-def at_fault_collision(scene: Scene) -> Measure:
+def at_fault_collision(view: RolloutView) -> Measure:
     """Whether the ego drives into a road user (S,): 1 or 0; see `Impacts.at_fault`."""
-    return scene.measure(scene.keep(impacts).at_fault.astype(np.float64))
+    return view.measure(view.keep(impacts).at_fault.astype(np.float64))
 
 
-def collision_time(scene: Scene) -> Measure:
+def collision_time(view: RolloutView) -> Measure:
     """Seconds until the first touch (S,), invalid where there is none."""
-    found = scene.keep(impacts)
-    return scene.measure(found.time_s, found.collided)
+    found = view.keep(impacts)
+    return view.measure(found.time_s, found.collided)
 
 
-def impact_speed(scene: Scene) -> Measure:
+def impact_speed(view: RolloutView) -> Measure:
     """The ego's speed at the first touch (S,), invalid where there is none."""
-    found = scene.keep(impacts)
-    return scene.measure(found.impact_mps, found.collided)
+    found = view.keep(impacts)
+    return view.measure(found.impact_mps, found.collided)
 
 
-def closing_speed(scene: Scene) -> Measure:
+def closing_speed(view: RolloutView) -> Measure:
     """Speed of one relative to the other at the first touch (S,), invalid where there is none."""
-    found = scene.keep(impacts)
-    return scene.measure(found.closing_mps, found.collided)
+    found = view.keep(impacts)
+    return view.measure(found.closing_mps, found.collided)
 
 
-def delta_v(scene: Scene) -> Measure:
+def delta_v(view: RolloutView) -> Measure:
     """Change of the ego's velocity (S,) if both went on as one body from the first touch.
 
     Plastic and central: m_other / (m_ego + m_other) times the relative speed; Shelby (2011),
     Delta-V as a measure of traffic conflict severity, equation 1. A simulated accident replaces
     this estimate. Invalid where nothing is hit or the other's mass is unknown.
     """
-    found, masses = scene.keep(impacts), scene.context.user_mass_kg
+    found, masses = view.keep(impacts), view.context.user_mass_kg
     if masses is None:
         raise ValueError("delta-v needs the road users' masses")
     if not masses.shape[1]:
-        return scene.measure(found.closing_mps, found.collided)
+        return view.measure(found.closing_mps, found.collided)
     other = masses[np.arange(len(masses)), np.maximum(found.user, 0)]
-    share = other / (other + scene.rollout.vehicle.mass_kg.value)
-    return scene.measure(found.closing_mps * share, found.collided & np.isfinite(other))
+    share = other / (other + view.rollout.vehicle.mass_kg.value)
+    return view.measure(found.closing_mps * share, found.collided & np.isfinite(other))
 
 
-def impacts(scene: Scene) -> Impacts:
+def impacts(view: RolloutView) -> Impacts:
     """Return the first touch of each future; between instants both move straight and evenly.
 
     How a box is turned is taken from the instant before; a touch that only the turn between two
     instants brings about is found at the later one.
     """
-    seen = scene.relative
+    seen = view.relative
     _, instants, users = seen.ahead_m.shape
-    reach = np.hypot(*scene.user_half_m) + np.hypot(scene.half_length_m, scene.half_width_m)
-    step_m = MAX_CLOSING_MPS * float(np.diff(scene.time_s).max())
-    pair = np.flatnonzero(scene.centre_distance_m < reach + step_m)
+    reach = np.hypot(*view.user_half_m) + np.hypot(view.half_length_m, view.half_width_m)
+    step_m = MAX_CLOSING_MPS * float(np.diff(view.time_s).max())
+    pair = np.flatnonzero(view.centre_distance_m < reach + step_m)
     row, user = np.divmod(pair, max(users, 1))
     instant = row % instants
-    # Where there is no next instant, or nobody at it, nothing moves.
+    # Where there is no next instant, or no road user at it, nothing moves.
     goes_on = instant < instants - 1
     next_row, next_pair = row + goes_on, pair + users * goes_on
-    both, then = (scene.there.reshape(-1)[which] for which in (pair, next_pair))
+    both, then = (view.there.reshape(-1)[which] for which in (pair, next_pair))
     next_row, next_pair = np.where(then, next_row, row), np.where(then, next_pair, pair)
-    x, y = (values.reshape(-1) for values in scene.users[:2])
-    ego_x, ego_y = (np.ascontiguousarray(scene.centre_m[..., k]).reshape(-1) for k in range(2))
+    x, y = (values.reshape(-1) for values in view.users[:2])
+    ego_x, ego_y = (np.ascontiguousarray(view.centre_m[..., k]).reshape(-1) for k in range(2))
     move_x = x[next_pair] - x[pair] - (ego_x[next_row] - ego_x[row])
     move_y = y[next_pair] - y[pair] - (ego_y[next_row] - ego_y[row])
-    gap = scene.centre_distance_m.reshape(-1)[pair] - reach[row // instants, 0, user]
+    gap = view.centre_distance_m.reshape(-1)[pair] - reach[row // instants, 0, user]
     near = np.flatnonzero(both & (gap <= np.abs(move_x) + np.abs(move_y)))
     pair, row, user, instant = pair[near], row[near], user[near], instant[near]
     move_x, move_y, goes_on, future = move_x[near], move_y[near], goes_on[near], row // instants
-    cos, sin = (values.reshape(-1)[row] for values in scene.heading)
-    half_length, half_width = scene.user_half_m
-    touch = meeting(
-        Pairs(
-            seen.ahead_m.reshape(-1)[pair], seen.left_m.reshape(-1)[pair],
-            cos * move_x + sin * move_y, cos * move_y - sin * move_x,
-            seen.cos.reshape(-1)[pair], seen.sin.reshape(-1)[pair],
-            (scene.half_length_m, scene.half_width_m),
-            (half_length[future, 0, user], half_width[future, 0, user]),
-        )
-    )  # fmt: skip
+    cos, sin = (values.reshape(-1)[row] for values in view.heading)
+    half_length, half_width = view.user_half_m
+    position = seen.ahead_m.reshape(-1)[pair], seen.left_m.reshape(-1)[pair]
+    turn = seen.cos.reshape(-1)[pair], seen.sin.reshape(-1)[pair]
+    motion = cos * move_x + sin * move_y, cos * move_y - sin * move_x
+    other_half_m = half_length[future, 0, user], half_width[future, 0, user]
+    touch = meeting((*position, *turn, *motion), view.half_m, other_half_m)
     # In units of the step: 0 at this instant, 1 at the next.
     share = np.maximum(touch.from_s, 0.0)
     hit = (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)
     hit &= share < np.where(goes_on, 1.0, 1e-300)
-    return _first(scene, future[hit], instant[hit], user[hit], share[hit])
+    return _first(view, future[hit], instant[hit], user[hit], share[hit])
 
 
-def _first(scene: Scene, future: Indices, instant: Indices, user: Indices, share: Array) -> Impacts:
-    futures, instants = scene.states.shape[:2]
+def _first(
+    view: RolloutView, future: Indices, instant: Indices, user: Indices, share: Array
+) -> Impacts:
+    futures, instants = view.states.shape[:2]
     order = np.lexsort((user, instant + share, future))
-    who, first = np.unique(future[order], return_index=True)
+    hit_rows, first = np.unique(future[order], return_index=True)
     chosen = order[first]
     instant, user, share = instant[chosen], user[chosen], share[chosen]
     after = np.minimum(instant + 1, instants - 1)
-    begin, end = scene.time_s[instant], scene.time_s[after]
-    state = scene.states[who, instant]
-    motion = state[:, 3:5] + share[:, None] * (scene.states[who, after, 3:5] - state[:, 3:5])
-    _, _, yaw, speed = scene.users
-    other_mps = speed[who, instant, user]
-    turned = yaw[who, instant, user] - state[:, 2]
+    begin, end = view.time_s[instant], view.time_s[after]
+    state = view.states[hit_rows, instant]
+    motion = state[:, 3:5] + share[:, None] * (view.states[hit_rows, after, 3:5] - state[:, 3:5])
+    _, _, yaw, speed = view.users
+    other_mps = speed[hit_rows, instant, user]
+    turned = yaw[hit_rows, instant, user] - state[:, 2]
     relative = other_mps[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=-1) - motion
     impact = np.hypot(motion[:, 0], motion[:, 1])
-    ahead = scene.relative.ahead_m[who, instant, user] + scene.centre_ahead_m
+    ahead = view.relative.ahead_m[hit_rows, instant, user] + view.centre_ahead_m
 
     def spread(values: Array, without: float) -> Array:
         found = np.full(futures, without)
-        found[who] = values
+        found[hit_rows] = values
         return found
 
     return Impacts(
-        collided=spread(np.ones(len(who)), 0.0) > 0.0,
-        time_s=spread(begin + share * (end - begin), np.nan) - scene.time_s[0],
+        collided=spread(np.ones(len(hit_rows)), 0.0) > 0.0,
+        time_s=spread(begin + share * (end - begin), np.nan) - view.time_s[0],
         user=spread(user.astype(np.float64), -1.0).astype(np.intp),
         impact_mps=spread(impact, np.nan),
         closing_mps=spread(np.hypot(relative[:, 0], relative[:, 1]), np.nan),

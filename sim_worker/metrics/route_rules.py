@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -10,11 +10,12 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Conflict, Connection, LineControl, World
 from foretwin.geometry.frenet_path import FrenetPath
 
+_CONTROLS: dict[str, LineControl] = {name: name for name in get_args(LineControl)}
 _ON_PATH_M = 1.2
 """A connection whose middle stays this near to the path is the one that it takes."""
 _SAMPLES = 9
 _APPROACH_M = 120.0
-"""How far back the way of those who have priority is followed."""
+"""How far back a way with priority is followed."""
 
 
 class LineAhead(NamedTuple):
@@ -57,12 +58,14 @@ class RouteRules:
         entered |= {c.id: None for c in taken}
         self.lines = tuple(
             LineAhead(
-                line.id, np.asarray(line.ends), _control(line.control.value),
+                line.id,
+                np.asarray(line.ends),
+                _CONTROLS.get(line.control.value, "none"),
                 entered[line.across_id],
             )
             for line in world.stop_lines
             if line.across_id in entered
-        )  # fmt: skip
+        )
         by_id = {c.id: c for c in world.connections}
         own = {c.id for c in taken}
         self.conflicts = tuple(
@@ -108,7 +111,7 @@ def _priority(world: World, conflict: Conflict, by_id: dict[str, Connection]) ->
         point_m=point,
         own_way=own_way,
         own_from_m=float(along.min()),
-        # Who merges shares the lane from there on: that both have passed the point must do.
+        # Merging ways share the lane from there on: that both have passed the point must do.
         own_until_m=0.0 if merging else float(along.max()),
         way=way,
         way_from_m=float(arcs[0] if merging else arcs[1:].min()),
@@ -129,11 +132,3 @@ def _last(line: Array, length_m: float) -> Array:
     """Return the points of a line (N, 2) within `length_m` before its end."""
     to_end = np.cumsum(np.hypot(*np.diff(line[::-1], axis=0).T))[::-1]
     return line[np.concatenate([to_end, [0.0]]) <= length_m]
-
-
-def _control(value: str) -> LineControl:
-    found: LineControl = "none"
-    for known in ("signal", "stop", "give_way"):
-        if value == known:
-            found = known
-    return found

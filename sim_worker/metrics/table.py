@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 
 from foretwin.sim_worker.metrics import (
     comfort,
-    curves,
     displacement,
     encroachment,
     following,
@@ -18,8 +17,7 @@ from foretwin.sim_worker.metrics import (
     time_to_collision,
     violations,
 )
-from foretwin.sim_worker.metrics.rollout import Measure, Rollout
-from foretwin.sim_worker.metrics.scene import Context, Scene
+from foretwin.sim_worker.metrics.rollout import Context, Measure, Rollout, RolloutView
 
 Need = Literal["path", "ground", "rules", "reference", "user_mass_kg"]
 """Fields of `Context` without which a metric cannot be computed."""
@@ -30,7 +28,7 @@ class Metric(NamedTuple):
     """One row: how it is computed, its unit ("1" for counts, shares and verdicts), which direction
     is better, what it needs, and whether it has a value for each instant (S, N)."""
 
-    compute: Callable[[Scene], Measure]
+    compute: Callable[[RolloutView], Measure]
     unit: str
     better: Better
     needs: tuple[Need, ...] = ()
@@ -48,8 +46,8 @@ METRICS = MappingProxyType(
         "heading": Metric(displacement.heading, "rad", "neither", ("reference",)),
         "ape": Metric(displacement.ape, "m", "lower", ("reference",)),
         "rpe": Metric(displacement.rpe, "m", "lower", ("reference",)),
-        "frechet": Metric(curves.frechet, "m", "lower", ("reference",)),
-        "dtw": Metric(curves.dtw, "m", "lower", ("reference",)),
+        "frechet": Metric(displacement.frechet, "m", "lower", ("reference",)),
+        "dtw": Metric(displacement.dtw, "m", "lower", ("reference",)),
         "ttc": Metric(time_to_collision.ttc, "s", "higher"),
         "ttc_series": Metric(time_to_collision.ttc_series, "s", "higher", series=True),
         "time_exposed": Metric(time_to_collision.time_exposed, "s", "lower"),
@@ -81,15 +79,13 @@ METRICS = MappingProxyType(
         "backwards": Metric(progress.backwards, "m", "lower", ("path",)),
         "off_road_share": Metric(progress.off_road_share, "1", "lower", ("ground",)),
         "on_road": Metric(progress.on_road, "1", "higher", ("ground",)),
-        "red_light_violations": Metric(
-            violations.red_light_violations, "1", "lower", ("rules",)
-        ),
+        "red_light_violations": Metric(violations.red_light_violations, "1", "lower", ("rules",)),
         "right_of_way_violations": Metric(
             violations.right_of_way_violations, "1", "lower", ("rules",)
         ),
         "driving_score": Metric(score.driving_score, "1", "higher", _DRIVEN),
     }
-)  # fmt: skip
+)
 
 ROW_METRICS = tuple(
     name for name, row in METRICS.items() if not row.series and "reference" not in row.needs
@@ -119,8 +115,8 @@ def evaluate(
     for name in chosen:
         if missing := _missing(name, given):
             raise ValueError(f"metric {name} needs {', '.join(missing)}, which is not given")
-    scene = Scene(rollout, given)
-    return {name: METRICS[name].compute(scene) for name in chosen}
+    view = RolloutView(rollout, given)
+    return {name: METRICS[name].compute(view) for name in chosen}
 
 
 def _missing(name: str, context: Context) -> tuple[Need, ...]:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics import compiled_pairs
-from foretwin.sim_worker.metrics.rollout import Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 EXPOSED_BELOW_S = 1.5
 """Threshold τ* of the exposed and integrated times: Minderhoud and Bovy (2001), section 5."""
 
 
-class Meeting(NamedTuple):
+class TouchInterval(NamedTuple):
     """When two moving boxes touch (…): first at `from_s`, last at `until_s`; no touch where later
     than that. Either may be negative, which is in the past."""
 
@@ -23,46 +23,39 @@ class Meeting(NamedTuple):
     until_s: Array
 
 
-class Pairs(NamedTuple):
-    """Two boxes each, in the axes of the first: the second's centre, velocity and turn (…).
-
-    Half lengths and half widths broadcast against them.
-    """
-
-    ahead_m: Array
-    left_m: Array
-    ahead_mps: Array
-    left_mps: Array
-    cos: Array
-    sin: Array
-    first_half_m: tuple[float, float]
-    second_half_m: tuple[Array, Array]
-
-
-def meeting(pairs: Pairs) -> Meeting:
+def meeting(
+    relative: Sequence[Array], half_m: tuple[float, float], other_half_m: tuple[Array, Array]
+) -> TouchInterval:
     """Return when boxes that only translate touch each other.
+
+    `relative` holds six arrays (…) in the order of `Relative`: the other's centre, turn and
+    velocity in the axes of the first. Half lengths and half widths broadcast against them.
 
     Separating axes of moving convex shapes: Eberly (2001), Intersection of Convex Objects: The
     Method of Separating Axes, section 4. On each of the four face normals the projections overlap
     during one interval; the boxes touch while all four do.
     """
-    length, width = pairs.first_half_m
-    other_length, other_width = pairs.second_half_m
-    cos, sin = np.abs(pairs.cos), np.abs(pairs.sin)
-    x, y, vx, vy = pairs.ahead_m, pairs.left_m, pairs.ahead_mps, pairs.left_mps
-    first, last = _interval(x, vx, cos * other_length + sin * other_width + length)
-    _narrow(first, last, y, vy, sin * other_length + cos * other_width + width)
-    _narrow(
-        first, last,
-        pairs.cos * x + pairs.sin * y, pairs.cos * vx + pairs.sin * vy,
-        cos * length + sin * width + other_length,
-    )  # fmt: skip
-    _narrow(
-        first, last,
-        pairs.cos * y - pairs.sin * x, pairs.cos * vy - pairs.sin * vx,
-        sin * length + cos * width + other_width,
-    )  # fmt: skip
-    return Meeting(first, last)
+    ahead, left, cos, sin, ahead_mps, left_mps = relative
+    (length, width), (other_length, other_width) = half_m, other_half_m
+    along, across = np.abs(cos), np.abs(sin)
+    first, last = _interval(ahead, ahead_mps, along * other_length + across * other_width + length)
+    for distance, speed, reach in (
+        (left, left_mps, across * other_length + along * other_width + width),
+        (
+            cos * ahead + sin * left,
+            cos * ahead_mps + sin * left_mps,
+            along * length + across * width + other_length,
+        ),
+        (
+            cos * left - sin * ahead,
+            cos * left_mps - sin * ahead_mps,
+            across * length + along * width + other_width,
+        ),
+    ):
+        begin, end = _interval(distance, speed, reach)
+        np.maximum(first, begin, out=first)
+        np.minimum(last, end, out=last)
+    return TouchInterval(first, last)
 
 
 def _interval(distance: Array, speed: Array, reach: Array) -> tuple[Array, Array]:
@@ -76,49 +69,41 @@ def _interval(distance: Array, speed: Array, reach: Array) -> tuple[Array, Array
     return first, last
 
 
-def _narrow(first: Array, last: Array, distance: Array, speed: Array, reach: Array) -> None:
-    begin, end = _interval(distance, speed, reach)
-    np.maximum(first, begin, out=first)
-    np.minimum(last, end, out=last)
+def ttc_series(view: RolloutView) -> Measure:
+    """Least time to collision with any other at each instant (S, N), infinite where with none."""
+    return view.measure(view.keep(_least_at_each_instant))
 
 
-def ttc_series(scene: Scene) -> Measure:
-    """Least time to collision with anybody at each instant (S, N), infinite where with nobody."""
-    return scene.measure(scene.keep(_least_at_each_instant))
-
-
-def ttc(scene: Scene) -> Measure:
+def ttc(view: RolloutView) -> Measure:
     """Least time to collision of each future (S,)."""
-    return scene.measure(scene.keep(_least_at_each_instant).min(axis=1))
+    return view.measure(view.keep(_least_at_each_instant).min(axis=1))
 
 
-def time_exposed(scene: Scene) -> Measure:
+def time_exposed(view: RolloutView) -> Measure:
     """Seconds (S,) with a time to collision below 1.5 s.
 
     TET of Minderhoud and Bovy (2001), Extended time-to-collision measures, equation 3.
     """
-    below = scene.keep(_least_at_each_instant)[:, :-1] <= EXPOSED_BELOW_S
-    return scene.measure((below * np.diff(scene.time_s)).sum(axis=1))
+    below = view.keep(_least_at_each_instant)[:, :-1] <= EXPOSED_BELOW_S
+    return view.measure((below * np.diff(view.time_s)).sum(axis=1))
 
 
-def time_integrated(scene: Scene) -> Measure:
+def time_integrated(view: RolloutView) -> Measure:
     """By how much and how long (S,), in s², time to collision is below 1.5 s.
 
     TIT of Minderhoud and Bovy (2001), Extended time-to-collision measures, equation 6.
     """
-    short = np.maximum(EXPOSED_BELOW_S - scene.keep(_least_at_each_instant)[:, :-1], 0.0)
-    return scene.measure((short * np.diff(scene.time_s)).sum(axis=1))
+    short = np.maximum(EXPOSED_BELOW_S - view.keep(_least_at_each_instant)[:, :-1], 0.0)
+    return view.measure((short * np.diff(view.time_s)).sum(axis=1))
 
 
-def _least_at_each_instant(scene: Scene) -> Array:
+def _least_at_each_instant(view: RolloutView) -> Array:
     """Return (S, N) seconds until any road user is touched, infinite where none ever is.
 
     Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
     the road users instead of a common lane: both keep their velocity and heading.
     """
-    seen = scene.relative
+    seen = view.relative
     least = np.full(seen.ahead_m.shape[:2], np.inf)
-    compiled_pairs.least_until_touch(
-        seen[:6], *scene.user_half_m, scene.half_length_m, scene.half_width_m, least
-    )
+    compiled_pairs.least_until_touch(seen[:6], view.user_half_m, view.half_m, least)
     return least

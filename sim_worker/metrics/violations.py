@@ -3,78 +3,74 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import SignalColour
 from foretwin.sim_worker.driver_model import ALONG_COS
-from foretwin.sim_worker.metrics.rollout import Flags, Measure
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.route_rules import PriorityConflict, RouteRules
-from foretwin.sim_worker.metrics.scene import Scene
 from foretwin.world_gen.rules.signal_state import colours_at, parts_of_cycle
 
 HARD_BRAKING_MPS2 = 2.0
-"""Who has priority and must brake harder was not given way to."""
+"""A road user with priority that must brake harder was not given way to."""
 NARROW_S = 1.0
-"""Nor was who reaches the shared ground sooner than this after the ego has left it."""
+"""Nor was one that reaches the shared ground sooner than this after the ego has left it."""
 _AT_POINT_M = 2.5
 _ON_WAY_M = 2.0
-_STOPS = ("red", "red_amber")
-Indices = npt.NDArray[np.intp]
+STOPS = ("red", "red_amber")
+"""Colours that no front may pass a line at."""
 
 
-def red_light_violations(scene: Scene) -> Measure:
+def red_light_violations(view: RolloutView) -> Measure:
     """How many stop lines (S,) the ego's front crosses while their group shows red.
 
     Colours are those of the signal plans, or as heard, at the drive time of the crossing; amber is
     no violation, red and amber together is. Between instants the front moves straight.
     """
-    rules = _rules(scene)
-    count = np.zeros(len(scene.valid))
-    cos, sin = scene.heading
-    front = scene.centre_m + scene.half_length_m * np.stack([cos, sin], axis=-1)
+    rules = _rules(view)
+    count = np.zeros(len(view.valid))
     for line in rules.lines:
         if line.group_id is None or line.control != "signal":
             continue
-        future, time_s = line_crossings(front, line.ends_m, scene.time_s)
-        colours = _colours(scene, line.group_id, time_s)
-        np.add.at(count, future, [colour in _STOPS for colour in colours])
-    return scene.measure(count)
+        future, time_s = line_crossings(view.front_m, line.ends_m, view.time_s)
+        colours = _colours(view, line.group_id, time_s)
+        np.add.at(count, future, [colour in STOPS for colour in colours])
+    return view.measure(count)
 
 
-def right_of_way_violations(scene: Scene) -> Measure:
+def right_of_way_violations(view: RolloutView) -> Measure:
     """How many road users (S,) the ego forces to brake hard, or narrowly misses, against priority.
 
-    Counted is who drives on a movement that the ego must wait for, has not reached the shared
+    Counted are those that drive on a movement that the ego must wait for, have not reached shared
     ground when the ego enters it, and would then have to brake by more than `HARD_BRAKING_MPS2`
-    to arrive after the ego has left, or does arrive within `NARROW_S` of that. Constant
+    to arrive after the ego has left, or do arrive within `NARROW_S` of that. Constant
     deceleration from a distance d at speed v: v² / 2d to stop, 2 (v T - d) / T² to be there no
     sooner than in T. A movement whose signal is not green has no priority.
     """
-    rules = _rules(scene)
-    futures, _, users = scene.there.shape
+    rules = _rules(view)
+    futures, _, users = view.there.shape
     wronged = np.zeros((futures, users), dtype=bool)
     for conflict in rules.conflicts:
-        enters, leaves = _own_passage(scene, conflict)
-        rows = np.flatnonzero(np.isfinite(enters) & scene.valid)
+        enters, leaves = _own_passage(view, conflict)
+        rows = np.flatnonzero(np.isfinite(enters) & view.valid)
         group = conflict.other_group_id
         if group is not None:
-            colours = _colours(scene, group, enters[rows])
+            colours = _colours(view, group, enters[rows])
             rows = rows[[colour in ("green", "unknown", "dark") for colour in colours]]
         if len(rows) and users:
-            wronged[rows] |= _forced(scene, conflict, rows, enters[rows], leaves[rows])
-    return scene.measure(wronged.sum(axis=1).astype(np.float64))
+            wronged[rows] |= _forced(view, conflict, rows, enters[rows], leaves[rows])
+    return view.measure(wronged.sum(axis=1).astype(np.float64))
 
 
-def _rules(scene: Scene) -> RouteRules:
-    if scene.context.rules is None:
+def _rules(view: RolloutView) -> RouteRules:
+    if view.context.rules is None:
         raise ValueError("rules of the road need a World and a path")
-    return scene.context.rules
+    return view.context.rules
 
 
-def _colours(scene: Scene, group_id: str, at_s: Array) -> list[SignalColour]:
+def _colours(view: RolloutView, group_id: str, at_s: Array) -> list[SignalColour]:
     """Return the colours of a group at times (K,)."""
-    context, world = scene.context, _rules(scene).world
+    context, world = view.context, _rules(view).world
     plans = (*(junction.plan for junction in world.junctions), *world.crossing_plans)
     mine = [p for p in plans if p is not None and group_id in {group.id for group in p.groups}]
     plan = mine[-1] if mine else None
@@ -83,7 +79,7 @@ def _colours(scene: Scene, group_id: str, at_s: Array) -> list[SignalColour]:
     drive_s = context.start_s + at_s
     if context.live:
         return [colours_at(plan, time_s, context.live)[group_id] for time_s in drive_s.tolist()]
-    # Colours change a few times a cycle: they are looked up once for all who come in between.
+    # Colours change a few times a cycle: they are looked up once for all in between.
     _, first, part = np.unique(
         parts_of_cycle(plan, drive_s), return_index=True, return_inverse=True
     )
@@ -94,7 +90,7 @@ def _colours(scene: Scene, group_id: str, at_s: Array) -> list[SignalColour]:
 def line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices, Array]:
     """Return future (K,) and time (K,) of each crossing of a line, in the direction of travel.
 
-    The line runs from left to right as its driver sees it: who crosses comes from its right-hand
+    The line runs from left to right as its driver sees it: a crossing comes from its right-hand
     side, seen along it, to the left.
     """
     left, right = ends_m
@@ -113,18 +109,18 @@ def line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices,
     return future[within], when[within]
 
 
-def _own_passage(scene: Scene, conflict: PriorityConflict) -> tuple[Array, Array]:
+def _own_passage(view: RolloutView, conflict: PriorityConflict) -> tuple[Array, Array]:
     """Return when (S,) the ego enters shared ground, NaN where it does not or was there already,
     and when it has left it, infinite where it stays."""
-    offset = scene.centre_m - conflict.point_m
+    offset = view.centre_m - conflict.point_m
     way = conflict.own_way
     along = offset @ way
-    cos, sin = scene.heading
+    cos, sin = view.heading
     on_way: Flags = (np.abs(offset[..., 1] * way[0] - offset[..., 0] * way[1]) < _AT_POINT_M) & (
         cos * way[0] + sin * way[1] > ALONG_COS
     )
-    enters = _first_above(along + scene.half_length_m, conflict.own_from_m, scene.time_s, on_way)
-    leaves = _first_above(along - scene.half_length_m, conflict.own_until_m, scene.time_s, on_way)
+    enters = _first_above(along + view.half_length_m, conflict.own_from_m, view.time_s, on_way)
+    leaves = _first_above(along - view.half_length_m, conflict.own_until_m, view.time_s, on_way)
     return enters, np.where(np.isnan(leaves), np.inf, leaves)
 
 
@@ -140,11 +136,11 @@ def _first_above(values: Array, level: float, time_s: Array, counts: Flags) -> A
 
 
 def _forced(
-    scene: Scene, conflict: PriorityConflict, rows: Indices, enters: Array, leaves: Array
+    view: RolloutView, conflict: PriorityConflict, rows: Indices, enters: Array, leaves: Array
 ) -> Flags:
     """Return (K, R) whether road users of futures `rows` (K,) are not given way to."""
-    x, y, yaw, speeds = scene.users
-    instant = np.searchsorted(scene.time_s, enters).clip(0, len(scene.time_s) - 1)
+    x, y, yaw, speeds = view.users
+    instant = np.searchsorted(view.time_s, enters).clip(0, len(view.time_s) - 1)
     users = x.shape[2]
     place = conflict.way.locate(
         np.stack([x[rows, instant].ravel(), y[rows, instant].ravel()], axis=-1)
@@ -152,13 +148,13 @@ def _forced(
     direction = conflict.way.pose_at(place.arc_m).yaw_rad
     along = np.cos(yaw[rows, instant].ravel() - direction)
     on_way = (np.abs(place.offset_m) < _ON_WAY_M) & (along > ALONG_COS)
-    half_length = scene.user_half_m[0][rows, 0].ravel()
+    half_length = view.user_half_m[0][rows, 0].ravel()
     distance = conflict.way_from_m - place.arc_m - half_length
-    candidate = np.flatnonzero(on_way & (distance > 0.0) & scene.there[rows, instant].ravel())
+    candidate = np.flatnonzero(on_way & (distance > 0.0) & view.there[rows, instant].ravel())
     row, user = np.divmod(candidate, users)
     ahead, speed = distance[candidate], speeds[rows, instant].ravel()[candidate]
     needed = _needed_deceleration(ahead, speed, (leaves - enters)[row])
-    arrives = _arrival(scene, conflict, rows[row], user)
+    arrives = _arrival(view, conflict, rows[row], user)
     narrow = (arrives < leaves[row] + NARROW_S) & (arrives > enters[row])
     found = np.zeros((len(rows), users), dtype=bool)
     found[row, user] = (needed > HARD_BRAKING_MPS2) | narrow
@@ -174,15 +170,17 @@ def _needed_deceleration(distance_m: Array, speed_mps: Array, within_s: Array) -
     return np.maximum(np.where(late, slowing, stopping), 0.0)
 
 
-def _arrival(scene: Scene, conflict: PriorityConflict, future: Indices, user: Indices) -> Array:
+def _arrival(
+    view: RolloutView, conflict: PriorityConflict, future: Indices, user: Indices
+) -> Array:
     """Return when (K,) the fronts of road users reach shared ground, infinite where never."""
-    x, y, _, _ = scene.users
-    half = scene.user_half_m[0][future, 0, user]
+    x, y, _, _ = view.users
+    half = view.user_half_m[0][future, 0, user]
     start = conflict.way.point_at(np.array([conflict.way_from_m]))[0]
     yaw = float(conflict.way.pose_at(np.array([conflict.way_from_m])).yaw_rad[0])
     dx, dy = x[future, :, user] - start[0], y[future, :, user] - start[1]
     along = np.cos(yaw) * dx + np.sin(yaw) * dy + half[:, None]
     aside = np.abs(np.cos(yaw) * dy - np.sin(yaw) * dx)
-    counts = (aside < _AT_POINT_M) & scene.there[future, :, user]
-    arrived = _first_above(along, 0.0, scene.time_s, counts)
+    counts = (aside < _AT_POINT_M) & view.there[future, :, user]
+    arrived = _first_above(along, 0.0, view.time_s, counts)
     return np.where(np.isnan(arrived), np.inf, arrived)

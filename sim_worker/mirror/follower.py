@@ -68,7 +68,7 @@ class Follower:
         return moved
 
     def stop(self) -> None:
-        """Add nothing from now on: whoever is followed has been put somewhere else."""
+        """Add nothing from now on: what is followed has been put somewhere else."""
         self.velocity = np.zeros_like(self.velocity)
         self.acceleration = np.zeros_like(self.acceleration)
 

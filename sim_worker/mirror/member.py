@@ -12,7 +12,7 @@ from foretwin.contracts.frames import LocalFrame, wrap_angle
 from foretwin.contracts.roles import FollowLimits, Role
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.mirror.follower import plane_follower
-from foretwin.sim_worker.mirror.track import Measured, Track
+from foretwin.sim_worker.mirror.track import MeasuredPose, Track
 from foretwin.sim_worker.mirror.twin_body import TwinBody
 from foretwin.sim_worker.vehicle.commands import CommandMemory
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
@@ -24,7 +24,7 @@ _ROLLS_MPS = 0.5
 """Below it a brake that holds would eat what is passed over."""
 
 
-class CastMember(NamedTuple):
+class GroupMember(NamedTuple):
     """A vehicle and its parameters; `commanded` where its own commands are known."""
 
     vehicle_id: str
@@ -35,17 +35,17 @@ class CastMember(NamedTuple):
 class Member:
     """Twin and box of one vehicle; a role says which of them others see and meet.
 
-    Whoever is no longer moved by physics keeps pose and speed, and drifts to where it is measured
-    under the limits of correction; whoever begins to be starts with the pose and speed it had.
+    A vehicle no longer moved by physics keeps pose and speed, and drifts to where it is measured
+    under the limits of correction; one that begins to be starts with the pose and speed it had.
     """
 
     def __init__(
-        self, who: CastMember, body: TwinBody, frame: LocalFrame, limits: FollowLimits
+        self, spec: GroupMember, body: TwinBody, frame: LocalFrame, limits: FollowLimits
     ) -> None:
-        self.who = who
+        self.spec = spec
         self.body = body
-        self.track = Track(who.vehicle, frame)
-        self.commands = CommandMemory(who.vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
+        self.track = Track(spec.vehicle, frame)
+        self.commands = CommandMemory(spec.vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
         self.role: Role = "ghost"
         self.present = False
         self.touching = False
@@ -68,7 +68,7 @@ class Member:
 
     def take_command(self, command: ControlCommand) -> None:
         """Take a command of the vehicle; ignored where none are expected."""
-        if self.who.commanded:
+        if self.spec.commanded:
             self.commands.add(command)
 
     def start_anew(self, stamp_ns: int) -> None:
@@ -96,7 +96,7 @@ class Member:
             twin = self.twin()
             self.stand_as_measured()
             if box_goes_on_from_twin:
-                self._leave_twin(twin, self.track.at(stamp_ns))
+                self.offset, self.settling.velocity = _seen_from(self.track.at(stamp_ns), twin)
 
     def _begin_twin(self, stamp_ns: int) -> None:
         box = self.box(self.track.at(stamp_ns))
@@ -107,16 +107,6 @@ class Member:
         self.drawn.velocity = np.array([0.0, across - state[4], box.rate[2] - state[5]])
         self.put(state, stamp_ns)
 
-    def _leave_twin(self, twin: Measured, measured: Measured) -> None:
-        yaw = measured.pose[2]
-        self.offset[:2] = _into(yaw, twin.pose[:2] - measured.pose[:2])
-        self.offset[2] = wrap_angle(twin.pose[2] - yaw)
-        rate = np.empty(3)
-        rate[:2] = _into(yaw, twin.rate[:2] - measured.rate[:2])
-        rate[:2] -= measured.rate[2] * np.array([-self.offset[1], self.offset[0]])
-        rate[2] = twin.rate[2] - measured.rate[2]
-        self.settling.velocity = rate
-
     def put(self, state: Array, stamp_ns: int) -> None:
         """Put the twin at `state` (8,), as if it had driven there under its commands."""
         history = self.commands.angles_before(
@@ -124,15 +114,15 @@ class Member:
         )
         self.body.seed(state, steering_history_rad=history)
 
-    def twin(self) -> Measured:
+    def twin(self) -> MeasuredPose:
         """Return the twin's pose and how it changes, correction included."""
         state = self.body.state
         velocity = state[3:6] + self.drawn.velocity
         rate = np.empty(3)
         rate[:2], rate[2] = _out_of(state[2], velocity[:2]), velocity[2]
-        return Measured(state[:3], rate)
+        return MeasuredPose(state[:3], rate)
 
-    def box(self, measured: Measured) -> Measured:
+    def box(self, measured: MeasuredPose) -> MeasuredPose:
         """Return the box's pose and how it changes, where the vehicle is `measured`."""
         yaw, turning = measured.pose[2], measured.rate[2]
         aside = _out_of(yaw, self.offset[:2])
@@ -140,7 +130,7 @@ class Member:
         pose[:2] = measured.pose[:2] + aside
         rate[:2] = measured.rate[:2] + _out_of(yaw, self.settling.velocity[:2])
         rate[:2] += turning * np.array([-aside[1], aside[0]])
-        return Measured(pose, rate)
+        return MeasuredPose(pose, rate)
 
     def settle(self) -> None:
         """Let the box drift on towards where it is measured, for one step."""
@@ -150,12 +140,12 @@ class Member:
         if np.abs([self.offset, self.settling.velocity, self.settling.acceleration]).max() < 1e-4:
             self.stand_as_measured()
 
-    def tell_twin(self, stamp_ns: int) -> None:
+    def command_twin(self, stamp_ns: int) -> None:
         """Command the twin for the step from `stamp_ns` on: as its vehicle was, or as it moved."""
         command = self.commands.at(stamp_ns) or self.track.command()
         self.body.command(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
 
-    def draw(self, measured: Measured, stamp_ns: int, *, follow: bool) -> None:
+    def draw(self, measured: MeasuredPose, stamp_ns: int, *, follow: bool) -> None:
         """Correct the twin after a step: towards `measured`, or less and less.
 
         In contact with something it is left to physics. Too far away it starts anew.
@@ -165,15 +155,10 @@ class Member:
             return
         if follow and not self.touching:
             twin = self.twin()
-            gap, gap_rate = np.empty(3), np.empty(3)
-            gap[:2] = _into(twin.pose[2], measured.pose[:2] - twin.pose[:2])
-            gap[2] = wrap_angle(measured.pose[2] - twin.pose[2])
+            gap, gap_rate = _seen_from(twin, measured)
             if np.hypot(gap[0], gap[1]) > self._reach_m:
                 self.start_anew(stamp_ns)
                 return
-            gap_rate[:2] = _into(twin.pose[2], measured.rate[:2] - twin.rate[:2])
-            gap_rate[:2] -= twin.rate[2] * np.array([-gap[1], gap[0]])
-            gap_rate[2] = measured.rate[2] - twin.rate[2]
             moved = self.drawn.step(gap, gap_rate)
         elif self.drawn.at_rest:
             return
@@ -183,6 +168,15 @@ class Member:
         faster = self.drawn.velocity[0] * TIMESTEP_S / _PASSES_OVER_S if rolls else 0.0
         self.drawn.velocity[0] -= faster
         self.body.nudge(moved, faster_mps=faster)
+
+
+def _seen_from(one: MeasuredPose, other: MeasuredPose) -> MeasuredPose:
+    """Return another pose and how it changes in the axes of one, which turn with it."""
+    yaw = one.pose[2]
+    pose, rate = other.pose - one.pose, other.rate - one.rate
+    pose[:2], pose[2] = _into(yaw, pose[:2]), wrap_angle(pose[2])
+    rate[:2] = _into(yaw, rate[:2]) - one.rate[2] * np.array([-pose[1], pose[0]])
+    return MeasuredPose(pose, rate)
 
 
 def _into(yaw_rad: float, vector: Array) -> Array:

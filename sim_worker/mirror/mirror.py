@@ -11,18 +11,13 @@ from foretwin.contracts.roles import MirrorCast, OtherVehicle, UseRoles
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.mirror.casting import Casting, FreeTwin
-from foretwin.sim_worker.mirror.member import STEP_NS, CastMember
-from foretwin.sim_worker.mirror.mirror_world import GHOST, SHADOW, MirrorWorld
+from foretwin.sim_worker.mirror.member import STEP_NS, GroupMember
+from foretwin.sim_worker.mirror.role_manager import FreeTwin, RoleManager
+from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
-from foretwin.sim_worker.vehicle.commands import (
-    STEP_BACK_NS,
-    CommandMemory,
-    TwinCommand,
-    estimated_command,
-)
+from foretwin.sim_worker.mirror.track import Track
+from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory, TwinCommand
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
-from foretwin.sim_worker.vehicle.seeding import local_state
 
 _ALONE = MirrorCast()
 _GRID_TOLERANCE = 0.05
@@ -34,9 +29,9 @@ class Mirror:
 
     The free twin starts from the measured state, runs on commands alone, and starts anew after each
     `window_s`, in each new World and where its physics diverged; it never teleports otherwise. All
-    gaps are its own. Roles, corrections and other vehicles need a `Cast` beside it, which is there
-    only as long as something asks for it. States must come in time order; a command counts from its
-    stamp on and should come before the first state after it.
+    gaps are its own. Roles, corrections and other vehicles need a `VehicleGroup` beside it, which
+    is there only as long as something asks for it. States must come in time order; a command counts
+    from its stamp on and should come before the first state after it.
     """
 
     def __init__(
@@ -50,7 +45,7 @@ class Mirror:
         vehicle_id: str = "ego",
         cast: MirrorCast = _ALONE,
     ) -> None:
-        self._vehicle = vehicle
+        self._vehicle_id, self._vehicle = vehicle_id, vehicle
         self._drive_frame = drive_frame
         self._window_ns = round(window_s * 1e9)
         self._period_ns = 1e9 / rate_hz
@@ -60,15 +55,14 @@ class Mirror:
         self._pending_vehicles: list[tuple[int, VehicleParameters]] = []
         self._world_id: str | None = None
         self._frame = drive_frame
-        self._scene = self._build(None)
-        self._casting = Casting(
-            CastMember(vehicle_id, vehicle, commands_recorded),
+        self._build(None)
+        self._track = self._new_track()
+        self._role_manager = RoleManager(
+            GroupMember(vehicle_id, vehicle, commands_recorded),
             cast,
             drive_frame=drive_frame,
             commands=self._commands,
         )
-        self._measured: Array | None = None
-        self._measured_stamp_ns = 0
         self._map_shift_m = self._seed_map_shift_m = np.zeros(2)
         self._seed_stamp_ns = 0
         self._steps = 0
@@ -76,12 +70,15 @@ class Mirror:
         self._first_stamp_ns: int | None = None
         self._last_index = -1
 
-    def _build(self, world: World | None) -> MirrorWorld:
-        return MirrorWorld(
-            world,
-            self._vehicle,
-            steering_delay_s=None if self._recorded else 0.0,
-        )
+    def _build(self, world: World | None) -> None:
+        name = self._vehicle_id
+        commanded = frozenset({name} if self._recorded else ())
+        self._world = RoleWorld(world, {name: self._vehicle}, commanded=commanded)
+        self._world.set_role(name, "all")
+        self._twin = self._world.twins[name]
+
+    def _new_track(self) -> Track:
+        return Track(self._vehicle, self._frame, continuous_ns=self._window_ns)
 
     def set_world(self, world: World | None, *, from_stamp_ns: int = 0) -> None:
         """Use `world`, or open ground, from the first state at or after `from_stamp_ns` on."""
@@ -98,11 +95,11 @@ class Mirror:
 
     def set_roles(self, use: UseRoles) -> None:
         """Let roles and correction count from the first state at or after their stamp on."""
-        self._casting.set_roles(use)
+        self._role_manager.set_roles(use)
 
     def handle_other(self, other: OtherVehicle) -> None:
-        """Take where another vehicle was measured, and what it was told."""
-        self._casting.take_other(other)
+        """Take where another vehicle was measured, and what was commanded."""
+        self._role_manager.take_other(other)
 
     def handle_state(self, state: VehicleState) -> MirrorSample | None:
         """Step the twin up to the state; returns a sample where one is due.
@@ -113,28 +110,28 @@ class Mirror:
         """
         if not state.yaw_valid:
             return None
-        if self._measured is not None and (state.stamp_ns < self._measured_stamp_ns - STEP_BACK_NS):
+        last = self._track.latest
+        if last is not None and state.stamp_ns < last.stamp_ns - STEP_BACK_NS:
             # Worlds that were to come by the old clock are due: their time has passed.
             self._pending = [(state.stamp_ns, world) for _, world in self._pending]
-            self._measured, self._first_stamp_ns, self._last_index = None, None, -1
-        if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
+            self._first_stamp_ns, self._last_index = None, -1
+            self._track, last = self._new_track(), None
+        if last is not None and state.stamp_ns <= last.stamp_ns:
             return None
         self._change_vehicle(state.stamp_ns)
         self._change_world(state.stamp_ns)
-        measured = local_state(state, self._frame, self._vehicle)
+        self._track.take(state)
+        measured, before = self._track.state(), self._track.before
         self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
-        gap_ns = state.stamp_ns - self._measured_stamp_ns
-        self._casting.before(state, self._free_twin)
-        if self._measured is None or gap_ns > self._window_ns:
+        self._role_manager.before(state, self._free_twin)
+        if before is None or state.stamp_ns - before.stamp_ns > self._window_ns:
             self._seed(measured, state.stamp_ns)
         else:
-            self._advance(measured, state.stamp_ns)
-        self._measured, self._measured_stamp_ns = measured, state.stamp_ns
-        self._scene.place(SHADOW, measured[:3])
-        self._scene.place(GHOST, measured[:3])
-        if not self._sound():
+            self._advance(state.stamp_ns)
+        self._world.place(self._vehicle_id, measured[:3])
+        if not np.isfinite(self._twin.state).all():
             self._seed(measured, state.stamp_ns)
-        self._casting.advance(state.stamp_ns)
+        self._role_manager.advance(state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
         if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
             self._seed(measured, state.stamp_ns)
@@ -145,10 +142,10 @@ class Mirror:
         if not due:
             return
         self._pending_vehicles = [one for one in self._pending_vehicles if one[0] > stamp_ns]
-        self._vehicle = due[-1]
+        self._vehicle = self._track.vehicle = due[-1]
         self._commands.use_vehicle(self._vehicle)
-        self._scene.use_vehicle(self._vehicle)
-        self._casting.use_vehicle(self._vehicle)
+        self._world.use_vehicle(self._vehicle_id, self._vehicle)
+        self._role_manager.use_vehicle(self._vehicle)
 
     def _change_world(self, stamp_ns: int) -> None:
         due = [world for stamp, world in self._pending if stamp <= stamp_ns]
@@ -161,46 +158,33 @@ class Mirror:
             return
         self._world_id = world_id
         self._frame = self._drive_frame if world is None else world.frame
-        self._scene = self._build(world)
-        self._casting.change_world(world, self._frame)
-        self._measured = None
+        self._build(world)
+        self._role_manager.change_world(world, self._frame)
+        self._track = self._new_track()
 
     def _seed(self, measured: Array, stamp_ns: int) -> None:
-        scene = self._scene
         history = self._commands.angles_before(
-            stamp_ns, count=scene.history_samples, step_ns=STEP_NS
+            stamp_ns, count=self._twin.history_samples, step_ns=STEP_NS
         )
-        scene.place(SHADOW, measured[:3])
-        scene.place(GHOST, measured[:3])
-        scene.seed_twin(measured, steering_history_rad=history)
+        self._world.place(self._vehicle_id, measured[:3])
+        self._world.reset()
+        self._twin.seed(measured, steering_history_rad=history)
         self._seed_stamp_ns, self._steps = stamp_ns, 0
         self._seed_map_shift_m = self._map_shift_m
-        self._casting.start_anew(stamp_ns)
+        self._role_manager.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
 
-    def _advance(self, measured: Array, stamp_ns: int) -> None:
+    def _advance(self, stamp_ns: int) -> None:
         """Step in whole physics steps, moving the shadow evenly towards its measured pose."""
-        before = self._measured
-        assert before is not None
-        start_ns = self._measured_stamp_ns
-        guess = estimated_command(
-            self._vehicle,
-            before,
-            measured,
-            stamp_ns=start_ns,
-            duration_s=(stamp_ns - start_ns) / 1e9,
-        )
-        turn = float(wrap_angle(measured[2] - before[2]))
-        moved = np.array([measured[0] - before[0], measured[1] - before[1], turn])
+        guess = self._track.command()
         total = (stamp_ns - self._seed_stamp_ns) // STEP_NS
         while self._steps < total:
             now_ns = self._seed_stamp_ns + self._steps * STEP_NS
             command = self._command(now_ns, guess)
-            share = (now_ns + STEP_NS - start_ns) / (stamp_ns - start_ns)
-            pose = before[:3] + min(max(share, 0.0), 1.0) * moved
-            self._scene.place(SHADOW, pose)
-            self._scene.place(GHOST, pose)
-            self._scene.step(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
+            self._world.place(self._vehicle_id, self._track.at(now_ns + STEP_NS).pose)
+            self._twin.command(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
+            self._world.step()
+            self._twin.read()
             self._steps += 1
         self._commands.forget_before(stamp_ns)
 
@@ -212,13 +196,10 @@ class Mirror:
         return command
 
     def _free_twin(self) -> FreeTwin | None:
-        if self._measured is None:
+        if self._track.before is None:
             return None
         stamp_ns = self._seed_stamp_ns + self._steps * STEP_NS
-        return FreeTwin(self._scene.twin_state, stamp_ns)
-
-    def _sound(self) -> bool:
-        return bool(np.isfinite(self._scene.twin_state).all())
+        return FreeTwin(self._twin.state, stamp_ns)
 
     def _due(self, stamp_ns: int) -> bool:
         if self._first_stamp_ns is None:
@@ -230,8 +211,7 @@ class Mirror:
 
     def _sample(self, state: VehicleState, measured: Array) -> MirrorSample:
         twin = self._twin_at(state.stamp_ns)
-        shadow = self._scene.measured_pose(SHADOW)
-        ghost = self._scene.measured_pose(GHOST)
+        box = self._in_drive_frame(self._world.box_pose(self._vehicle_id), measured[3])
         # What a map has moved the position by since is no motion that the twin lacks.
         shift = self._map_shift_m - self._seed_map_shift_m
         dx, dy = twin[:2] - measured[:2] + shift
@@ -241,8 +221,8 @@ class Mirror:
             world_id=self._world_id,
             real=self._in_drive_frame(measured[:3], measured[3]),
             twin=self._in_drive_frame(twin[:3], twin[3]),
-            shadow=self._in_drive_frame(shadow, measured[3]),
-            ghost=self._in_drive_frame(ghost, measured[3]),
+            shadow=box,
+            ghost=box,
             gap_m=float(np.hypot(dx, dy)),
             gap_along_m=float(cos * dx + sin * dy),
             gap_across_m=float(cos * dy - sin * dx),
@@ -252,11 +232,11 @@ class Mirror:
             independent=self._independent,
             twin_yaw_rate_radps=float(twin[5]),
         )
-        return self._casting.told(sample)
+        return self._role_manager.completed(sample)
 
     def _twin_at(self, stamp_ns: int) -> Array:
         """Return the twin's state (8,), carried on by the part of a step that is left."""
-        twin = self._scene.twin_state
+        twin = self._twin.state
         left_s = (stamp_ns - self._seed_stamp_ns) / 1e9 - self._steps * TIMESTEP_S
         cos, sin = np.cos(twin[2]), np.sin(twin[2])
         twin[0] += left_s * (cos * twin[3] - sin * twin[4])

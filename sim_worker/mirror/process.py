@@ -32,7 +32,7 @@ class MirrorWorker:
     """Feeds a Mirror from messages; a message that cannot be used is logged and passed over.
 
     In lock step a state waits until the commands up to its stamp are there: they come from
-    another process, and results must not depend on who is faster. So it does for the other
+    another process, and results must not depend on which is faster. So it does for the other
     vehicles: the bus keeps no order between keys.
     """
 
@@ -60,27 +60,27 @@ class MirrorWorker:
         """Take one message or question; never raises."""
         try:
             message = item.message()
-            if isinstance(message, VehicleState):
-                self._held.append(message)
-                self._release()
-            elif isinstance(message, OtherVehicles):
-                self._others.append(message)
-                self._release()
-            elif isinstance(message, ControlCommand):
-                if message.stamp_ns < (self._commanded_ns or 0) - STEP_BACK_NS:
-                    self._release(everything=True)  # no more commands of the old clock will come
-                self._mirror.handle_command(message)
-                self._commanded_ns = message.stamp_ns
-                self._release()
-            elif isinstance(message, ActiveWorld) and isinstance(item, Request):
-                self._change_world(message)
+            match message:
+                case VehicleState():
+                    self._held.append(message)
+                case OtherVehicles():
+                    self._others.append(message)
+                case ControlCommand():
+                    if message.stamp_ns < (self._commanded_ns or 0) - STEP_BACK_NS:
+                        # No more commands of the old clock will come.
+                        self._release(everything=True)
+                    self._mirror.handle_command(message)
+                    self._commanded_ns = message.stamp_ns
+                case ActiveWorld():
+                    self._change_world(message)
+                case UseVehicle():
+                    self._mirror.use_vehicle(message.vehicle, from_stamp_ns=message.stamp_ns)
+                case UseRoles():
+                    self._mirror.set_roles(message)
+            if isinstance(item, Request):
                 item.reply(message)
-            elif isinstance(message, UseVehicle) and isinstance(item, Request):
-                self._mirror.use_vehicle(message.vehicle, from_stamp_ns=message.stamp_ns)
-                item.reply(message)
-            elif isinstance(message, UseRoles) and isinstance(item, Request):
-                self._mirror.set_roles(message)
-                item.reply(message)
+            else:
+                self._release()
         except Exception as error:
             log.exception("message on %s passed over", item.key)
             if isinstance(item, Request):
@@ -117,9 +117,8 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Mirror the car until the run is over, then finish what has arrived."""
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
     worker = MirrorWorker(setup, bus)
-    bus.serve("use_world", mailbox, run=setup.run_id, process=setup.process_id)
-    bus.serve("use_vehicle", mailbox, run=setup.run_id, process=setup.process_id)
-    bus.serve("use_roles", mailbox, run=setup.run_id, process=setup.process_id)
+    for channel in ("use_world", "use_vehicle", "use_roles"):
+        bus.serve(channel, mailbox, run=setup.run_id, process=setup.process_id)
     bus.subscribe("other_vehicles", mailbox, run=setup.run_id)
     bus.subscribe("control", mailbox, vehicle=setup.vehicle_id)
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import msgspec
 import mujoco
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.roles import Role
-from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.batch.model import world_spec
+from foretwin.sim_worker.batch.model import change_vehicle, world_spec
 from foretwin.sim_worker.mirror.twin_body import TwinBody
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.lag import without_lags
@@ -32,7 +33,7 @@ class RoleWorld:
     """The bodies of `vehicles` in one World; poses are those of base_link in its frame.
 
     Twins meet what stands, other vehicles' twins and other vehicles' shadows; a vehicle's own
-    shadow it passes through. Boxes of shadows move as they are told, whatever stands in their way.
+    shadow it passes through. Boxes of shadows move as they are placed, whatever stands in the way.
     """
 
     def __init__(
@@ -42,16 +43,15 @@ class RoleWorld:
         *,
         commanded: frozenset[str],
     ) -> None:
-        """Compile. Whose commands are not known (not in `commanded`) moves without lags."""
+        """Compile. A twin not in `commanded` moves without lags: its commands are estimated."""
         silence_step_clock()
         log_mujoco_warnings()
+        self._commanded = commanded
+        self._prefixes = {name: f"v{number}_" for number, name in enumerate(vehicles)}
+        parameters = {name: self._as_driven(name, vehicle) for name, vehicle in vehicles.items()}
         spec = world_spec(world)
-        parameters = {
-            name: vehicle if name in commanded else without_lags(vehicle)
-            for name, vehicle in vehicles.items()
-        }
-        for number, vehicle in enumerate(parameters.values()):
-            prefix = _prefix(number)
+        for name, vehicle in parameters.items():
+            prefix = self._prefixes[name]
             spec.attach(vehicle_spec(vehicle), prefix=prefix, frame=spec.worldbody.add_frame())
             _add_box(spec, prefix + _BOX, vehicle)
             spec.add_exclude(
@@ -63,17 +63,32 @@ class RoleWorld:
         self._mocap: dict[str, int] = {}
         self._geoms: dict[str, tuple[int, int]] = {}
         self._owner_of_geom: dict[int, str] = {}
-        for number, (name, vehicle) in enumerate(parameters.items()):
-            prefix = _prefix(number)
-            delay_s = None if name in commanded else 0.0
-            self.twins[name] = TwinBody(
-                model, data, vehicle, prefix=prefix, steering_delay_s=delay_s
-            )
+        for name, vehicle in parameters.items():
+            prefix = self._prefixes[name]
+            self.twins[name] = TwinBody(model, data, vehicle, prefix=prefix)
             self._mocap[name] = int(model.body(prefix + _BOX).mocapid[0])
             geoms = (model.geom(prefix + "box").id, model.geom(prefix + _BOX + "_measured").id)
             self._geoms[name] = geoms
             self._owner_of_geom |= dict.fromkeys(geoms, name)
             self.set_role(name, "ghost")
+
+    def _as_driven(self, name: str, vehicle: VehicleParameters) -> VehicleParameters:
+        if name in self._commanded:
+            return vehicle
+        return msgspec.structs.replace(without_lags(vehicle), steering_delay_s=Parameter(0.0))
+
+    def use_vehicle(self, name: str, vehicle: VehicleParameters) -> None:
+        """Go on from here with a twin of other parameters; nothing is moved."""
+        vehicle = self._as_driven(name, vehicle)
+        change_vehicle(self._model, vehicle, prefix=self._prefixes[name])
+        self.twins[name].use_vehicle(vehicle)
+
+    def reset(self) -> None:
+        """Forget all motion, contacts and time; boxes stay where they were placed last."""
+        data = self._data
+        mocap_pos, mocap_quat = data.mocap_pos.copy(), data.mocap_quat.copy()
+        mujoco.mj_resetData(self._model, data)
+        data.mocap_pos[:], data.mocap_quat[:] = mocap_pos, mocap_quat
 
     def set_role(self, name: str, role: Role | None) -> None:
         """Let others meet the vehicle's twin, its shadow, both or (ghost, None) neither."""
@@ -95,12 +110,19 @@ class RoleWorld:
         half = 0.5 * pose[2]
         self._data.mocap_quat[index] = (np.cos(half), 0.0, 0.0, np.sin(half))
 
+    def box_pose(self, name: str) -> Array:
+        """Return x, y, yaw (3,) of a vehicle's box as MuJoCo has it."""
+        mujoco.mj_kinematics(self._model, self._data)
+        body = self._data.body(self._prefixes[name] + _BOX)
+        w, _, _, z = body.xquat
+        return np.array([body.xpos[0], body.xpos[1], 2.0 * np.arctan2(z, w)])
+
     def step(self) -> None:
-        """Advance 10 ms; whoever commands a twin does so before, and reads it after."""
+        """Advance 10 ms; twins are commanded before it and read after it."""
         mujoco.mj_step(self._model, self._data)
 
     def contacts(self) -> set[tuple[str, str]]:
-        """Return who met whom in the last step, as sorted pairs of names, `world` among them."""
+        """Return which met in the last step, as sorted pairs of names, `world` among them."""
         pairs = set()
         for index in range(self._data.ncon):
             geoms = self._data.contact[index].geom
@@ -108,10 +130,6 @@ class RoleWorld:
             if one != other:
                 pairs.add((min(one, other), max(one, other)))
         return pairs
-
-
-def _prefix(number: int) -> str:
-    return f"v{number}_"
 
 
 def _add_box(spec: mujoco.MjSpec, name: str, vehicle: VehicleParameters) -> None:

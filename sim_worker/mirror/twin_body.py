@@ -8,7 +8,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
-from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
+from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _REFRESH_STEPS = 2
@@ -18,25 +18,15 @@ _REFRESH_STEPS = 2
 class TwinBody:
     """The vehicle attached under `prefix` to a compiled model; states are those of base_link.
 
-    Whoever steps the model calls `command` before and `read` after each step.
+    `command` has to be called before and `read` after each step of the model.
     """
 
     def __init__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        vehicle: VehicleParameters,
-        *,
-        prefix: str,
-        steering_delay_s: float | None = None,
+        self, model: mujoco.MjModel, data: mujoco.MjData, vehicle: VehicleParameters, *, prefix: str
     ) -> None:
-        """`steering_delay_s` replaces the vehicle's."""
         self._model, self._data, self._vehicle = model, data, vehicle
-        self._actuators = ids = actuator_ids(model, prefix)
-        if steering_delay_s is not None:
-            check_steering_delay(steering_delay_s)
-            model.actuator_delay[ids.steer] = steering_delay_s
-        self._steer = ids.steer
+        self._actuators = actuator_ids(model, prefix)
+        self._steer = self._actuators.steer
         self._joints = np.array([model.joint(prefix + name).qposadr[0] for name in JOINTS])
         self._dofs = np.array([model.joint(prefix + name).dofadr[0] for name in JOINTS])
         self._state = np.zeros((1, 8))
@@ -44,16 +34,10 @@ class TwinBody:
         self._steps = 0
         self._actuation = self._fresh_actuation()
 
-    def use_vehicle(
-        self, vehicle: VehicleParameters, *, steering_delay_s: float | None = None
-    ) -> None:
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Go on from here with other parameters, which the model has already."""
         self._vehicle = vehicle
-        if steering_delay_s is not None:
-            self._model.actuator_delay[self._steer] = steering_delay_s
-        wheels = self._data.qvel[self._dofs[3]]
-        self._write()
-        self._data.qvel[self._dofs[3]] = wheels
+        self._move()
         self._actuation = self._fresh_actuation()
 
     def _fresh_actuation(self) -> Actuation:
@@ -99,7 +83,7 @@ class TwinBody:
         self._actuation = self._fresh_actuation()
 
     def command(self, *, accel_mps2: float, tire_angle_rad: float) -> None:
-        """Set what the vehicle is told for the next step."""
+        """Set the vehicle's command for the next step."""
         if self._steps % _REFRESH_STEPS == 0:
             self._actuation.apply(speed_mps=self._state[:, 3], accel_mps2=np.array([accel_mps2]))
         self._steps += 1
@@ -130,6 +114,10 @@ class TwinBody:
         state[1] += sin * moved[0] + cos * moved[1]
         state[2] += moved[2]
         state[3] += faster_mps
+        self._move()
+
+    def _move(self) -> None:
+        """Write the state, the steered wheels turning on as they did."""
         wheels = self._data.qvel[self._dofs[3]]
         self._write()
         self._data.qvel[self._dofs[3]] = wheels

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.table import METRICS, evaluate
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
 from tests.sim_worker.metrics.junction import context

@@ -21,7 +21,7 @@ from tests.telemetry.standin_drive import FRAME, Drive
 PERIOD_S = 0.01
 MINUTE_S = 60.0
 _TOLD = (
-    "x_m", "y_m", "altitude_m", "speed_mps", "yaw_rate_radps", "force_x_mps2", "force_y_mps2",
+    "x_m", "y_m", "altitude_m", "speed_mps", "yaw_rate_radps",
     "wheel_rad", "command_accel_mps2", "command_wheel_rad",
 )  # fmt: skip
 
@@ -75,8 +75,6 @@ def straight_minute(*, speed_mps: float = 33.0, seed: int = 0) -> MotionRecord:
         yaw_rate_radps=rate
         + sensors.gyro_bias_radps
         + random.normal(0.0, sensors.gyro_std_radps, count),
-        force_x_mps2=pedal + random.normal(0.0, sensors.accel_std_mps2, count),
-        force_y_mps2=speed * rate + random.normal(0.0, sensors.accel_std_mps2, count),
         wheel_rad=wheel + random.normal(0.0, sensors.steering_wheel_std_rad, count),
         tire_rad=absent,
         command_accel_mps2=(pedal + drag) / car.drive_gain,
@@ -92,7 +90,7 @@ def samples_of(record: MotionRecord) -> list[tuple[str, Any]]:
     for index, stamp in enumerate(record.stamp_ns):
         ns, at = int(stamp), {name: float(getattr(record, name)[index]) for name in _TOLD}
         place = geo_from_local(FRAME, np.array([at["x_m"], at["y_m"]]))
-        force = (at["force_x_mps2"], at["force_y_mps2"], 9.81)
+        force = (0.0, 0.0, 9.81)
         position = GeoPoint(float(place[0]), float(place[1]), at["altitude_m"])
         samples += [
             ("gnss", GnssFix(stamp_ns=ns, position=position, std_m=0.02)),

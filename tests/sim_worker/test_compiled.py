@@ -20,7 +20,7 @@ from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.metrics import compiled_pairs
-from foretwin.sim_worker.metrics.curves import cheapest_walks
+from foretwin.sim_worker.metrics.displacement import cheapest_walks
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled as compiled_pursuit
 from foretwin.sim_worker.planners import pure_pursuit_idm as idm

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from foretwin.contracts.gap import ALARM_HORIZON_S, GapSample
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
+from foretwin.sim_worker.analysis.gap.errors import GapLimits
 from foretwin.viewer.log_drive import DriveLog
 from foretwin.viewer.log_tuning import TuningLog
 from foretwin.viewer.rows import Row

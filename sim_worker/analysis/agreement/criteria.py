@@ -6,27 +6,24 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Stamps
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.metrics.ground import DrivableGround
-from foretwin.sim_worker.metrics.rollout import Flags, Rollout
+from foretwin.sim_worker.metrics.rollout import Context, Rollout, RolloutView
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
-from foretwin.sim_worker.metrics.scene import Context, Scene
 from foretwin.sim_worker.metrics.table import METRICS
-from foretwin.sim_worker.metrics.violations import line_crossings
+from foretwin.sim_worker.metrics.violations import STOPS, line_crossings
 
 CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2
 """Nearer to another road user is a failure; boxes as detected are no more exact than that."""
 _STOP_WITHIN_M = 6.0
-"""Whoever stands within so much before a stop line has stopped for it."""
+"""A car that stands within so much before a stop line has stopped for it."""
 _HEARD_FOR_NS = 2_000_000_000
-_STOPS = ("red", "red_amber")
 _PRECISE_M, _NEAR_M = 0.5, 1.0
 """Positions of such standard deviations tell whether a car is on the road, or crosses a line."""
 
@@ -43,14 +40,14 @@ class Users(NamedTuple):
 class Heard(NamedTuple):
     """What a signal group was heard to show: stamps (M,), rising, and colours."""
 
-    stamps_ns: npt.NDArray[np.int64]
+    stamps_ns: Stamps
     colours: tuple[SignalColour, ...]
 
 
 class Window(NamedTuple):
     """The same seconds simulated and driven, in one World: states (N, 8) at `time_s` (N,).
 
-    `known_users` says whether the car told of road users throughout; `position_std_m` is the
+    `known_users` says whether the car reported road users throughout; `position_std_m` is the
     greatest while it drove, None where unknown.
     """
 
@@ -69,15 +66,11 @@ class Window(NamedTuple):
     position_std_m: float | None
 
 
-class Court:
+class CriteriaEvaluator:
     """Judges motion through one window, by the World and the path that `rules` are of."""
 
     def __init__(
-        self,
-        window: Window,
-        rules: RouteRules,
-        ground: DrivableGround,
-        vehicle: VehicleParameters,
+        self, window: Window, rules: RouteRules, ground: DrivableGround, vehicle: VehicleParameters
     ) -> None:
         self._window, self._rules, self._ground, self._vehicle = window, rules, ground, vehicle
 
@@ -104,31 +97,23 @@ class Court:
     def failures(self, states: Array, users: Users) -> Flags:
         """Return (S, 5) which of `CRITERIA` motions (S, N, 8) among `users` fail."""
         count = len(states)
-        rollout = Rollout(
-            time_s=self._window.time_s,
-            states=states,
-            users=np.broadcast_to(users.poses, (count, *users.poses.shape)),
-            user_speed_mps=np.broadcast_to(users.speed_mps, (count, *users.speed_mps.shape)),
-            user_size_m=np.broadcast_to(users.size_m, (count, *users.size_m.shape)),
-            valid=np.ones(count, dtype=bool),
-            vehicle=self._vehicle,
-        )
-        scene = Scene(rollout, Context(ground=self._ground))
-        cos, sin = scene.heading
-        front = scene.centre_m + scene.half_length_m * np.stack([cos, sin], axis=-1)
+        poses, speeds, sizes = (np.broadcast_to(part, (count, *part.shape)) for part in users)
+        valid = np.ones(count, dtype=bool)
+        rollout = Rollout(self._window.time_s, states, poses, speeds, sizes, valid, self._vehicle)
+        view = RolloutView(rollout, Context(ground=self._ground))
         red, unstopped = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         for line in self._rules.lines:
             if line.control == "signal":
-                self._at_red(front, line, red)
+                self._at_red(view.front_m, line, red)
             elif line.control == "stop":
-                self._without_stop(front, line, scene.speed_mps, unstopped)
+                self._without_stop(view.front_m, line, view.speed_mps, unstopped)
         return np.column_stack(
             [
-                METRICS["min_clearance"].compute(scene).values < LEAST_CLEARANCE_M,
-                METRICS["on_road"].compute(scene).values < 0.5,
+                METRICS["min_clearance"].compute(view).values < LEAST_CLEARANCE_M,
+                METRICS["on_road"].compute(view).values < 0.5,
                 red,
                 unstopped,
-                METRICS["comfortable"].compute(scene).values < 0.5,
+                METRICS["comfortable"].compute(view).values < 0.5,
             ]
         )
 
@@ -141,12 +126,12 @@ class Court:
             stamp_ns = self._window.stamp_ns + round(float(at_s) * 1e9)
             last = int(np.searchsorted(heard.stamps_ns, stamp_ns, side="right")) - 1
             if last >= 0 and stamp_ns - heard.stamps_ns[last] <= _HEARD_FOR_NS:
-                red[row] |= heard.colours[last] in _STOPS
+                red[row] |= heard.colours[last] in STOPS
 
     def _without_stop(
         self, front: Array, line: LineAhead, speed_mps: Array, unstopped: Flags
     ) -> None:
-        """Mark who crosses a stop line without standing before it; who begins near it is free."""
+        """Mark motions that cross a line without standing before it, unless they begin near it."""
         time_s = self._window.time_s
         future, crossed_s = line_crossings(front, line.ends_m, time_s)
         for row, at_s in zip(future, crossed_s, strict=True):
@@ -175,9 +160,9 @@ class Verdicts(NamedTuple):
         return not bool(self.driven.any())
 
 
-def verdicts(window: Window, court: Court) -> Verdicts:
+def verdicts(window: Window, evaluator: CriteriaEvaluator) -> Verdicts:
     """Judge both sides of a window; what reality does not show is counted on neither."""
-    observable = court.observable
-    simulated = court.failures(window.simulated[None], window.simulated_users)[0]
-    driven = court.failures(window.driven[None], window.driven_users)[0]
+    observable = evaluator.observable
+    simulated = evaluator.failures(window.simulated[None], window.simulated_users)[0]
+    driven = evaluator.failures(window.driven[None], window.driven_users)[0]
     return Verdicts(observable, simulated & observable, driven & observable)

@@ -6,12 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
-from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA, Court, Users
-from foretwin.sim_worker.metrics.rollout import Flags
+from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA, CriteriaEvaluator, Users
 
 DIRECTIONS = ("along", "across", "both")
 MOST_M = 10.0
@@ -97,7 +96,13 @@ def grown(simulated: Array, gap: Gap, factors: Array, direction: str) -> Array:
 
 
 def flips(
-    court: Court, simulated: Array, users: Users, gap: Gap, observable: Flags, *, passes: bool
+    evaluator: CriteriaEvaluator,
+    simulated: Array,
+    users: Users,
+    gap: Gap,
+    observable: Flags,
+    *,
+    passes: bool,
 ) -> tuple[Flip, ...]:
     """Return for each of `DIRECTIONS` the smallest growth of the gap that flips the verdict.
 
@@ -118,7 +123,7 @@ def flips(
             for name in asked
         }
         states = np.concatenate([grown(simulated, gap, factors[name], name) for name in asked])
-        fails = (court.failures(states, users) & observable).reshape(len(asked), count, -1)
+        fails = (evaluator.failures(states, users) & observable).reshape(len(asked), count, -1)
         for name, mine in zip(asked, fails, strict=True):
             other = mine.any(axis=1) == passes
             flipped[name] = bool(other.any())

@@ -10,7 +10,7 @@ import numpy as np
 
 from foretwin.sim_worker.analysis.agreement.criteria import (
     CRITERIA,
-    Court,
+    CriteriaEvaluator,
     Verdicts,
     Window,
     verdicts,
@@ -36,14 +36,18 @@ class Judged(NamedTuple):
         return outcome(self.verdicts.simulated_passes, self.verdicts.driven_passes)
 
 
-def judged(window: Window, court: Court) -> Judged:
+def judged(window: Window, evaluator: CriteriaEvaluator) -> Judged:
     """Judge one window."""
-    both = verdicts(window, court)
+    both = verdicts(window, evaluator)
     gap = gap_between(window.simulated, window.driven)
     found = flips(
-        court, window.simulated, window.simulated_users, gap, both.observable,
+        evaluator,
+        window.simulated,
+        window.simulated_users,
+        gap,
+        both.observable,
         passes=both.simulated_passes,
-    )  # fmt: skip
+    )
     return Judged(window, both, gap.peak_m("along"), gap.peak_m("across"), found)
 
 

@@ -1,1 +1,1 @@
-"""The gap between the real vehicle and its model, by horizon and manoeuvre, and who causes it."""
+"""The gap between the real vehicle and its model, by horizon and manoeuvre, and its cause."""

@@ -1,4 +1,4 @@
-"""Who departs from commanded accelerations: a sequential test over blocks of driving.
+"""Departures from commanded accelerations: a sequential test over blocks of driving.
 
 Braking and pulling away last a second or two with a minute between them, so that a window of time
 forgets the last one before the next begins. Kept here are the blocks in which something was asked
@@ -10,26 +10,18 @@ else that may be off, and named where nothing else explains as much.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.gap import Culprit, Evidence
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.joint_fit import JointFit, joint_fit
-from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.analysis.gap.findings import Finding
+from foretwin.sim_worker.analysis.gap.fitting import JointFit, joint_fit
+from foretwin.sim_worker.analysis.gap.pairs import BLOCK_S, PushBlocks
 
-Indices = np.ndarray[Any, np.dtype[np.intp]]
-BLOCK = round(0.2 / PERIOD_S)
-_BLOCK_S = BLOCK * PERIOD_S
-_LAG = round(0.1 / PERIOD_S)
-"""With which a car follows its command, give or take as much."""
-_NOISE_MPS2, _UNEVEN = 0.15, 0.6
-"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _TOGETHER = 2.0
 """Neighbouring blocks err alike: so many count as one."""
 _KEPT, _LEAST, _SURE = 60, 3, 3.0
@@ -40,18 +32,9 @@ _PLATEAU = 2.0
 _ASKED_MPS2, _FAST_MPS = 0.25, 5.0
 
 
-class PushBlocks(NamedTuple):
-    """Accelerations (K,) over blocks: commanded, the car's, the model's; speeds, deviations."""
-
-    stamp_ns: Array
-    asked_mps2: Array
-    car_mps2: Array
-    model_mps2: Array
-    speed_mps: Array
-    std_mps2: Array
-
-
 class _Kind(NamedTuple):
+    push: str
+    """Of the causes of one push one alone is right: a gain or a plateau."""
     limit: float
     """Departures within it are what parameters of the right car leave open."""
     usual: float
@@ -62,17 +45,14 @@ _LEFT_OPEN = {"drag": 0.1, "rolling": 0.1, "drive_gain": 0.1, "brake_gain": 0.1}
 """Standard deviations of what parameters of the right car leave open beside a cause."""
 _CLEARLY = 6.63
 """Squared deviations that a cause must explain beyond all others: 1 in 100 does by chance."""
-_PUSH = {
-    "drive_gain": "drive", "saturated_drive": "drive", "brake_gain": "brake",
-    "saturated_brake": "brake", "drag": "drag",
-}  # fmt: skip
 _COMMANDED = " of the commanded acceleration"
+_BEYOND = " of what is commanded beyond {plateau:.1f} m/s²"
 _KINDS = {
-    "drive_gain": _Kind(0.25, 1.0, _COMMANDED),
-    "brake_gain": _Kind(0.25, 1.0, _COMMANDED),
-    "saturated_drive": _Kind(0.2, 1.0, " of what is commanded beyond {plateau:.1f} m/s²"),
-    "saturated_brake": _Kind(0.2, 1.0, " of what is commanded beyond {plateau:.1f} m/s²"),
-    "drag": _Kind(0.33, 0.0, " m/s² lost at 10 m/s"),
+    "drive_gain": _Kind("drive", 0.25, 1.0, _COMMANDED),
+    "brake_gain": _Kind("brake", 0.25, 1.0, _COMMANDED),
+    "saturated_drive": _Kind("drive", 0.2, 1.0, _BEYOND),
+    "saturated_brake": _Kind("brake", 0.2, 1.0, _BEYOND),
+    "drag": _Kind("drag", 0.33, 0.0, " m/s² lost at 10 m/s"),
 }
 
 
@@ -82,34 +62,6 @@ class _Part(NamedTuple):
     column: Array
     rest: Array
     plateau: float = float("nan")
-
-
-def push_blocks(
-    record: MotionRecord, speed_mps: Array, starts: Indices, model_mps: Array
-) -> PushBlocks:
-    """Return the last two blocks of each run at grid indices `starts` (K,).
-
-    `speed_mps` (N,) is the car's on the grid, `model_mps` (K, steps + 1) the model's of each run.
-    """
-    asked = record.command_accel_mps2
-    rows = []
-    for start, model in zip(starts, model_mps, strict=True):
-        for end in (len(model) - 1 - BLOCK, len(model) - 1):
-            at = int(start) + end
-            soon, due, late = (
-                np.mean(asked[at - BLOCK - k * _LAG : at - k * _LAG]) for k in range(3)
-            )
-            rows.append(
-                (
-                    record.stamp_ns[at],
-                    due,
-                    (speed_mps[at] - speed_mps[at - BLOCK]) / _BLOCK_S,
-                    (model[end] - model[end - BLOCK]) / _BLOCK_S,
-                    speed_mps[at - BLOCK // 2],
-                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late)),
-                )
-            )
-    return PushBlocks(*np.array(rows, dtype=np.float64).reshape(len(rows), 6).T)
 
 
 def _parts(blocks: PushBlocks) -> dict[str, _Part]:
@@ -141,7 +93,7 @@ class PushTest:
         came = False
         for row in zip(*blocks, strict=True):
             # Half a block of tolerance: stretches begin where the newest sample was.
-            if row[0] > self._latest_ns + 0.5e9 * _BLOCK_S and np.isfinite(row).all():
+            if row[0] > self._latest_ns + 0.5e9 * BLOCK_S and np.isfinite(row).all():
                 self._latest_ns, came = row[0], True
                 self._blocks.append(row)
         return self._judge() if came else ()
@@ -209,8 +161,7 @@ def _explain(
         if cost(named) - cost([*named, best]) < _CLEARLY:
             break
         named.append(best)
-        # Of one push a gain or a plateau is wrong.
-        others = [one for one in others if _PUSH[one] != _PUSH[best]]
+        others = [one for one in others if _KINDS[one].push != _KINDS[best].push]
     worse = {one: cost([other for other in named if other != one]) - cost(named) for one in named}
     named = sorted((one for one in named if worse[one] >= _CLEARLY), key=lambda one: -worse[one])
     if not named or cost(named) > 0.7 * float(np.sum(gap**2 / variance)):
@@ -224,34 +175,25 @@ def _explain(
             by_car=_KINDS[cause].usual + float(of_car.sizes[index]),
             off=float(whole.sizes[index]),
             std=float(whole.std[index]),
-            began_ns=begun_ns[cause] - round(_BLOCK_S * 1e9),
+            began_ns=begun_ns[cause] - round(BLOCK_S * 1e9),
         )
         for index, cause in enumerate(named)
     )
 
 
-def _by_car(blocks: PushBlocks, part: _Part) -> float:
-    """Return how much of a cause's column the car does."""
-    weighted = blocks.std_mps2**-2 * part.column
-    done = float(np.sum(weighted * (blocks.car_mps2 - part.rest)))
-    return done / float(np.sum(weighted * part.column))
-
-
-def _of(blocks: PushBlocks, part: _Part, used: Indices) -> tuple[PushBlocks, _Part]:
-    chosen = PushBlocks(*(one[used] for one in blocks))
-    return chosen, part._replace(column=part.column[used], rest=part.rest[used])
-
-
 def _exceeds(blocks: PushBlocks, part: _Part, used: Indices, off: float, doubt: float) -> bool:
-    """Return whether somebody does more than is asked: who does has come to no end of it."""
-    by_car = _by_car(*_of(blocks, part, used))
+    """Return whether car or model does more than is asked: its push has come to no end."""
+    column = part.column[used]
+    weighted = blocks.std_mps2[used] ** -2 * column
+    done = float(np.sum(weighted * (blocks.car_mps2[used] - part.rest[used])))
+    by_car = done / float(np.sum(weighted * column))
     return max(by_car, by_car + off) > 1.0 + _KINDS["saturated_drive"].limit + 3.0 * doubt
 
 
 def _finding(
     cause: str, plateau: float, *, by_car: float, off: float, std: float, began_ns: int
 ) -> Finding:
-    """Say who departs: achieved over commanded is 1 for a car that does as told."""
+    """Say which of the two departs: achieved over commanded is 1 for a car that follows."""
     kind, by_model = _KINDS[cause], by_car + off
     off_car, off_model = abs(by_car - kind.usual), abs(by_model - kind.usual)
     culprit: Culprit = "vehicle" if off_car > off_model else "model"
@@ -259,11 +201,16 @@ def _finding(
         culprit = "both"
     unit = kind.unit.format(plateau=plateau)
     said = f"the car does {by_car:.2f} and the model {by_model:.2f}{unit}"
-    who = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
+    departs = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
     evidence = tuple(
-        Evidence(name=f"{whose}_{cause}", value=does, expected=kind.usual, std=std,
-                 text=f"the {whose}: {does:.2f}{unit}")
+        Evidence(
+            name=f"{whose}_{cause}",
+            value=does,
+            expected=kind.usual,
+            std=std,
+            text=f"the {whose}: {does:.2f}{unit}",
+        )
         for whose, does in (("car", by_car), ("model", by_model))
-    )  # fmt: skip
-    text = f"{said}: {who[culprit]} from the command"
+    )
+    text = f"{said}: {departs[culprit]} from the command"
     return Finding(culprit, cause, text, evidence, began_ns)

@@ -1,4 +1,7 @@
-"""Which signals of a stretch of driving agree with which: gains, offsets, delays, plateaus."""
+"""Which signals of a stretch of driving agree with which: gains, offsets, delays, plateaus.
+
+And when a departure began, within the stretch that shows it.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,22 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.fitting import Follower, Line, follower, line_through
-from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, Pairs
+from foretwin.sim_worker.analysis.gap.fitting import (
+    TOGETHER_S,
+    DelayedLine,
+    Line,
+    delayed_line,
+    line_through,
+)
+from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 _MIN_CURVATURE_PM = 0.006
 _HARD_MPS2 = 1.2
 _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
-_TOGETHER_S = 0.3
-"""Samples nearer to each other than this err alike."""
 _LEAST_STOP_S = 0.3
+_SPEEDS_TOGETHER_S = 0.4
+"""For so long, speeds and courses from positions err alike."""
 _EVERY = 5
 """Smoothed signals need not be compared at every sample."""
 
@@ -37,8 +46,8 @@ class Consistency(NamedTuple):
 
     gyro_by_course: Line | None
     speed_by_gnss: Line | None
-    measured_by_command: Follower | None
-    model_by_command: Follower | None
+    measured_by_command: DelayedLine | None
+    model_by_command: DelayedLine | None
     model_stops_at_rad: float
     """The tyre angle that the model holds while commands and car go beyond, NaN where none."""
     motion_by_measured: Line | None
@@ -55,36 +64,37 @@ class Consistency(NamedTuple):
     moved_s: float
 
 
-def consistency_of(pairs: Pairs) -> Consistency:
+def consistency_of(pairs: SignalPairs) -> Consistency:
     """Compare the signals of one stretch (some seconds) pair by pair."""
     measured = model = angle = None
     if _varies(pairs.asked_rad) or _varies(pairs.done_rad):
-        measured = follower(pairs.asked_rad, pairs.done_rad)
+        measured = delayed_line(pairs.asked_rad, pairs.done_rad)
     if _varies(pairs.commanded_rad):
-        model = follower(pairs.commanded_rad, pairs.model_tire_rad)
+        model = delayed_line(pairs.commanded_rad, pairs.model_tire_rad)
     if _varies(pairs.done_rad):
         angle = _line(pairs.done_rad, pairs.arc_rad)
     real, by_measured = pairs.curvature_pm, pairs.by_measured_pm
     hard = np.abs(real * pairs.speed_mps**2) > _HARD_MPS2
-    motion = _turning(by_measured, real)
+    motion, motion_hard = _turning(by_measured, real), None
+    if motion is not None:
+        hard_bends = np.where(hard, by_measured, np.nan)
+        motion_hard = _mean_ratio(hard_bends, real, period_s=PERIOD_S, least_s=0.6)
+    ground, wheels = pairs.ground_mps[::_EVERY], pairs.wheel_mps[::_EVERY]
     return Consistency(
         gyro_by_course=_turn_rates(pairs),
-        speed_by_gnss=_mean_ratio(pairs.ground_mps[::_EVERY], pairs.wheel_mps[::_EVERY],
-                                  period_s=_EVERY * PERIOD_S, together_s=0.4, least_s=1.5),
+        speed_by_gnss=_mean_ratio(ground, wheels, period_s=_EVERY * PERIOD_S, least_s=1.5),
         measured_by_command=measured,
         model_by_command=model,
         model_stops_at_rad=_stop(pairs.commanded_rad, pairs.done_rad, pairs.model_tire_rad),
         motion_by_measured=motion,
-        motion_by_measured_hard=None if motion is None else _mean_ratio(
-            np.where(hard, by_measured, np.nan), real,
-            period_s=PERIOD_S, together_s=0.4, least_s=0.6),
+        motion_by_measured_hard=motion_hard,
         missing_mps2=_missing(pairs),
         motion_lag=_lag(by_measured, real),
         motion_by_command=_turning(pairs.by_command_pm, real),
         motion_by_angle=angle,
         excited_s=float(pairs.excited.sum()) * PERIOD_S,
         moved_s=float(pairs.moves.sum()) * PERIOD_S,
-    )  # fmt: skip
+    )
 
 
 def _varies(angle: Array) -> bool:
@@ -101,9 +111,9 @@ def _stop(asked: Array, done: Array, model: Array) -> float:
     return top if held.sum() * PERIOD_S >= _LEAST_STOP_S else float("nan")
 
 
-def _line(x: Array, y: Array, *, together_s: float = _TOGETHER_S) -> Line | None:
+def _line(x: Array, y: Array) -> Line | None:
     known = np.isfinite(x) & np.isfinite(y)
-    return line_through(x[known], y[known], independent=known.sum() * PERIOD_S / together_s)
+    return line_through(x[known], y[known], independent=known.sum() * PERIOD_S / TOGETHER_S)
 
 
 def _turning(model: Array, real: Array) -> Line | None:
@@ -115,7 +125,7 @@ def _turning(model: Array, real: Array) -> Line | None:
     return _line(model, real) if widest > _MIN_CURVATURE_PM else None
 
 
-def _turn_rates(pairs: Pairs) -> Line | None:
+def _turn_rates(pairs: SignalPairs) -> Line | None:
     """Fit how the gyro goes with the course's rate; without a bend its bias alone."""
     course, gyro = pairs.course_radps[::_EVERY], pairs.gyro_radps[::_EVERY]
     known = np.isfinite(course) & np.isfinite(gyro)
@@ -123,7 +133,7 @@ def _turn_rates(pairs: Pairs) -> Line | None:
     seconds = len(course) * _EVERY * PERIOD_S
     if seconds < 1.2:
         return None
-    independent = max(seconds / 0.4, 2.0)
+    independent = max(seconds / _SPEEDS_TOGETHER_S, 2.0)
     # The course is by far the noisier: over it the gyro's gain would come out too small.
     line = line_through(gyro, course, independent=independent)
     if line is not None and line.gain > 5.0 * line.gain_std:
@@ -141,7 +151,7 @@ def _turn_rates(pairs: Pairs) -> Line | None:
     return Line(1.0, np.inf, offset, std / np.sqrt(heard), std, 0.0)
 
 
-def _missing(pairs: Pairs) -> float:
+def _missing(pairs: SignalPairs) -> float:
     """Return the RMS of the lateral acceleration between model and car in bends, NaN in none."""
     apart = (pairs.curvature_pm - pairs.by_measured_pm) * pairs.speed_mps**2
     apart = apart[pairs.excited & np.isfinite(apart)]
@@ -150,9 +160,7 @@ def _missing(pairs: Pairs) -> float:
     return float(np.sqrt(np.mean(apart * apart)))
 
 
-def _mean_ratio(
-    x: Array, y: Array, *, period_s: float, together_s: float, least_s: float
-) -> Line | None:
+def _mean_ratio(x: Array, y: Array, *, period_s: float, least_s: float) -> Line | None:
     """Fit y = gain x: some signals vary too little in seconds to part an offset from a gain."""
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
@@ -160,7 +168,7 @@ def _mean_ratio(
         return None
     gain = float(np.sum(x * y) / np.sum(x * x))
     left = y - gain * x
-    independent = max(len(x) * period_s / together_s, 2.0)
+    independent = max(len(x) * period_s / _SPEEDS_TOGETHER_S, 2.0)
     residual = float(np.sqrt(np.sum(left * left) / (len(x) - 1)))
     std = residual / float(np.sqrt(np.mean(x * x) * independent))
     return Line(gain, std, 0.0, 0.0, residual, 1.0)
@@ -174,13 +182,54 @@ def _lag(model: Array, real: Array) -> Lag | None:
     known = np.isfinite(model) & np.isfinite(real)
     if known.sum() < 10 or float(np.ptp(model[known])) < _LEAST_SWING_PM:
         return None
-    pair = follower(real, model, longest_s=_LONGEST_LAG_S)
+    pair = delayed_line(real, model, longest_s=_LONGEST_LAG_S)
     at_once = _line(real, model)
     changes = _line(real, np.gradient(real) / PERIOD_S)
     if pair is None or at_once is None or changes is None:
         return None
     # What a lag changes beyond what gain and offset could.
-    tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / _TOGETHER_S)
+    tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / TOGETHER_S)
     std_s = pair.line.residual / max(float(tells), 1e-9)
     helps = pair.line.residual**2 < 0.5 * at_once.residual**2
     return Lag(pair.delay_s if helps else 0.0, std_s)
+
+
+_SHARE = 0.25
+"""Of the mean departure: what counts as one."""
+_LATE_S, _USUAL_LAG_S = 0.36, 0.1
+"""A delay that is itself the departure is no lag to be allowed for."""
+_COMPARED = {
+    "speed": ("ground_mps", "wheel_mps", False),
+    "gyro": ("course_radps", "gyro_radps", False),
+    "model": ("commanded_rad", "model_tire_rad", True),
+    "measured": ("asked_rad", "done_rad", True),
+    "motion_by_angle": ("done_rad", "arc_rad", False),
+    "": ("by_measured_pm", "curvature_pm", False),
+}
+"""By the beginning of a piece of evidence's name: two signals, and whether one lags."""
+
+
+def began_ns(pairs: SignalPairs, seen: Consistency, evidence: str) -> int:
+    """Return since when the pair behind a piece of evidence has departed from agreement.
+
+    The change point of Page's test (1954): where the sum of what departs beyond its allowance was
+    last at its lowest.
+    """
+    x_name, y_name, lags = next(
+        row for prefix, row in _COMPARED.items() if evidence.startswith(prefix)
+    )
+    x, y = getattr(pairs, x_name), getattr(pairs, y_name)
+    lag_s = 0.0
+    if lags and seen.measured_by_command is not None:
+        delay_s = seen.measured_by_command.delay_s
+        lag_s = delay_s if delay_s < _LATE_S else _USUAL_LAG_S
+    late = round(lag_s / PERIOD_S)
+    apart = np.nan_to_num(y[late:] - x[: len(x) - late])
+    return int(pairs.stamp_ns[late + change_index(np.asarray(apart**2))])
+
+
+def change_index(departure: Array) -> int:
+    """Return the index (N,) from which a departure, which is never negative, has been there."""
+    summed = np.cumsum(departure - _SHARE * float(np.mean(departure)))
+    lowest = int(np.argmin(np.concatenate([[0.0], summed[:-1]])))
+    return min(lowest, len(departure) - 1)

@@ -1,27 +1,41 @@
-"""How far the free model leaves reality, by horizon and by manoeuvre."""
+"""How far the free model leaves reality, by horizon and by manoeuvre.
+
+Limits on the gap raise an alarm when it is exceeded, and another when it is well back within.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Indices
 from foretwin.contracts.frames import wrap_angle
-from foretwin.contracts.gap import GapSample, Manoeuvre
+from foretwin.contracts.gap import (
+    ALARM_HORIZON_S,
+    ALARM_LIMITS_PER_S,
+    GapAlarm,
+    GapSample,
+    Manoeuvre,
+)
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.sim_worker.analysis.gap.free_run import (
     FreeRunner,
     accel_commands_from_motion,
     start_states,
-    steering_signals,
+    tire_angles,
 )
-from foretwin.sim_worker.analysis.gap.manoeuvres import MANOEUVRES, manoeuvre_of
-from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.analysis.gap.measured_motion import (
+    MANOEUVRES,
+    MeasuredMotion,
+    manoeuvre_of,
+)
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.vehicle.lag import without_lags
 
+_EVERY_S = 1.0
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
 """Of a sample; a row has `position_m` too, how far apart both are."""
 
@@ -50,20 +64,17 @@ class GapMeter:
         record: MotionRecord,
         motion: MeasuredMotion,
         *,
-        every_s: float = 1.0,
         horizons_s: Sequence[float] = HORIZONS_S,
-        from_index: int = 0,
     ) -> list[GapSample]:
-        """Return the gap at each horizon after each start, `every_s` apart, in time order.
+        """Return the gap at each horizon after each start, 1 s apart, in time order.
 
         Where no commands were recorded, they are estimated from the motion and the samples are
         not independent. Runs that meet a gap in the measured motion are left out.
         """
-        stride = max(1, round(every_s / PERIOD_S))
         known = motion.known
         shortest = round(min(horizons_s) / PERIOD_S)
-        starts = np.arange(from_index, len(known) - shortest, stride)
-        starts = starts[known[starts]] if len(starts) else starts
+        starts = np.arange(0, len(known) - shortest, round(_EVERY_S / PERIOD_S))
+        starts = starts[known[starts]]
         wanted = [(row, horizon) for row in range(len(starts)) for horizon in horizons_s]
         return self._measure(record, motion, starts, wanted)
 
@@ -72,18 +83,16 @@ class GapMeter:
     ) -> list[GapSample]:
         """Return the gap at the record's last instant after each horizon, all in one batch."""
         last = len(motion.known) - 1
-        fitting = [h for h in horizons_s if round(h / PERIOD_S) <= last]
-        starts = np.array([last - round(horizon / PERIOD_S) for horizon in fitting], dtype=np.intp)
-        if not motion.known[starts].all():
-            fitting = [h for h, start in zip(fitting, starts, strict=True) if motion.known[start]]
-            starts = starts[motion.known[starts]]
+        steps = {horizon: round(horizon / PERIOD_S) for horizon in horizons_s}
+        fitting = [h for h, back in steps.items() if back <= last and motion.known[last - back]]
+        starts = np.array([last - steps[horizon] for horizon in fitting], dtype=np.intp)
         return self._measure(record, motion, starts, list(enumerate(fitting)))
 
     def _measure(
         self,
         record: MotionRecord,
         motion: MeasuredMotion,
-        starts: np.ndarray[Any, np.dtype[np.intp]],
+        starts: Indices,
         wanted: Sequence[tuple[int, float]],
     ) -> list[GapSample]:
         """Run from each of `starts`; return the gap of each (row, horizon) wanted."""
@@ -92,7 +101,7 @@ class GapMeter:
         known = motion.known
         found: list[GapSample] = []
         vehicle, runner = self._runner.vehicle, self._runner
-        signals = steering_signals(record, vehicle)
+        signals = tire_angles(record, vehicle)
         recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
         independent = bool(recorded[starts].mean() > 0.9)
         tire = signals.measured_rad
@@ -105,22 +114,25 @@ class GapMeter:
             accel = accel_commands_from_motion(
                 vehicle, speed_mps=motion.speed_mps, accel_mps2=motion.accel_mps2
             )
-            begin = start_states(vehicle, **motion._asdict(), tire_rad=tire)
+            begin = start_states(vehicle, motion, tire_rad=tire)
             steer = np.where(known, begin[:, 6], np.nan)
-        chosen = {name: values[starts] for name, values in motion._asdict().items()}
-        begin = start_states(vehicle, **chosen, tire_rad=tire[starts])
-        begin[:, :2] -= begin[:, :2]  # near the origin, where numbers are exact
+        begin = start_states(vehicle, motion.at(starts), tire_rad=tire[starts])
+        begin[:, :2] = 0.0  # near the origin, where numbers are exact
         steps = round(max(horizon for _, horizon in wanted) / PERIOD_S)
         runs = runner.run(
-            states=begin, starts=starts, steps=steps, accel_mps2=accel, tire_rad=steer,
+            states=begin,
+            starts=starts,
+            steps=steps,
+            accel_mps2=accel,
+            tire_rad=steer,
             delayed=independent,
-        )  # fmt: skip
+        )
         for row, horizon in wanted:
             start, count = int(starts[row]), round(horizon / PERIOD_S)
             end = start + count
             if end >= len(known) or not known[start : end + 1].all():
                 continue
-            real = MeasuredMotion(*(column[end] for column in motion))
+            real = motion.at(end)
             model = runs[row, count]
             dx = model[0] + motion.x_m[start] - real.x_m
             dy = model[1] + motion.y_m[start] - real.y_m
@@ -169,3 +181,46 @@ def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
             )
         )
     return rows
+
+
+_BACK = 0.7
+_OVER_IN_A_ROW, _BACK_IN_A_ROW = 2, 3
+
+
+class GapLimits:
+    """Watches each quantity of `ALARM_LIMITS_PER_S` at one horizon with hysteresis.
+
+    Two samples in a row beyond the limit raise the alarm, three within 70 % of it end it: a gap
+    that plays about its limit is told once.
+    """
+
+    def __init__(self) -> None:
+        self._streak = dict.fromkeys(ALARM_LIMITS_PER_S, 0)
+        self._over = dict.fromkeys(ALARM_LIMITS_PER_S, False)
+
+    def handle(self, sample: GapSample) -> list[GapAlarm]:
+        """Take one sample; other horizons and gaps of estimated commands say nothing here."""
+        if abs(sample.horizon_s - ALARM_HORIZON_S) > 1e-9 or not sample.independent:
+            return []
+        alarms = []
+        for name, limit_per_s in ALARM_LIMITS_PER_S.items():
+            limit = limit_per_s * ALARM_HORIZON_S
+            value = getattr(sample, name)
+            over = self._over[name]
+            against = abs(value) < _BACK * limit if over else abs(value) > limit
+            self._streak[name] = self._streak[name] + 1 if against else 0
+            if self._streak[name] < (_BACK_IN_A_ROW if over else _OVER_IN_A_ROW):
+                continue
+            self._over[name], self._streak[name] = not over, 0
+            alarms.append(
+                GapAlarm(
+                    vehicle_id=sample.vehicle_id,
+                    stamp_ns=sample.stamp_ns,
+                    quantity=name,
+                    value=value,
+                    limit=limit,
+                    manoeuvre=sample.manoeuvre,
+                    over=not over,
+                )
+            )
+        return alarms

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from foretwin.contracts.gap import Evidence
+from foretwin.contracts.gap import Culprit, Evidence
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, Lag
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.fitting import Follower, Line
+from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line
 
 _DEGREES = 180.0 / math.pi
-_GAIN, _GAIN_SHARP = 0.2, 0.1
+_GAIN = 0.2
 """Ratios this far from 1 are beyond what parameters of the right car leave open."""
 _SPEED_GAIN = 0.1
 _GYRO_RADPS = 0.045
@@ -26,6 +26,17 @@ _LEAST_EXCITED_S, _SETTLED_S = 0.8, 1.4
 
 _BY_GYRO = {"steering_ratio", "cornering_stiffness", "friction", "inertia", "steering_offset"}
 """What a wrong gyro could show as well."""
+
+
+class Finding(NamedTuple):
+    """One departure: of which of the two, how, and the comparisons that show it."""
+
+    culprit: Culprit
+    cause: str
+    text: str
+    evidence: tuple[Evidence, ...]
+    since_ns: int = 0
+    """When it began."""
 
 
 def findings_of(seen: Consistency) -> Finding | None:
@@ -58,12 +69,16 @@ def _beyond(seen: Consistency, line: Line) -> bool:
     return abs(line.gain - 1.0) > _GAIN + stds * line.gain_std
 
 
+def _evidence(name: str, value: float, expected: float, std: float, text: str) -> Evidence:
+    return Evidence(name=name, value=value, expected=expected, std=std, text=text)
+
+
 def _of(name: str, line: Line, text: str) -> Evidence:
-    return Evidence(name=name, value=line.gain, expected=1.0, std=line.gain_std, text=text)
+    return _evidence(name, line.gain, 1.0, line.gain_std, text)
 
 
 def _offset(name: str, line: Line, text: str) -> Evidence:
-    return Evidence(name=name, value=line.offset, expected=0.0, std=line.offset_std, text=text)
+    return _evidence(name, line.offset, 0.0, line.offset_std, text)
 
 
 def _sensors(seen: Consistency) -> Finding | None:
@@ -88,9 +103,7 @@ def _sensors(seen: Consistency) -> Finding | None:
 
 def _degrees_without_commands(seen: Consistency) -> Finding | None:
     line = seen.motion_by_angle
-    if line is None or line.explained < 0.8:
-        return None
-    if not 0.6 < line.gain * _DEGREES < 1.6:
+    if line is None or line.explained < 0.8 or not 0.6 < line.gain * _DEGREES < 1.6:
         return None
     said = f"the car turns {line.gain:.4f} of what its measured steering says: 1/57.3 is degrees"
     text = f"steering is sent in degrees where radians are declared: {said}"
@@ -105,7 +118,7 @@ def _model_without_commands(seen: Consistency) -> Finding | None:
     return found._replace(culprit="undecided", text=text)
 
 
-def _actuator(seen: Consistency, pair: Follower) -> Finding | None:
+def _actuator(seen: Consistency, pair: DelayedLine) -> Finding | None:
     line, by_command = pair.line, seen.motion_by_command
     own = f"measured steering is {line.gain:.3f} times the commanded, {pair.delay_s:.2f} s later"
     evidence = [_of("measured_by_command", line, own)]
@@ -126,8 +139,8 @@ def _actuator(seen: Consistency, pair: Follower) -> Finding | None:
         return None
     for ratio in (_DEGREES, 1.0 / _DEGREES):
         if 0.7 < abs(line.gain) / ratio < 1.4:
-            who = "measured steering" if ratio > 1.0 else "the steering command"
-            return accuse("steering_in_degrees", f"{who} is in degrees where radians are declared")
+            sent = "measured steering" if ratio > 1.0 else "the steering command"
+            return accuse("steering_in_degrees", f"{sent} is in degrees where radians are declared")
     if line.gain < -0.3:
         return accuse("steering_sign", "the car steers to the other side than it is told")
     if _beyond(seen, line):
@@ -140,8 +153,7 @@ def _actuator(seen: Consistency, pair: Follower) -> Finding | None:
         evidence.append(
             _offset("measured_offset", line, f"{math.degrees(line.offset):+.1f}° at the tyres")
         )
-        true = by_command is not None and abs(by_command.offset) < _OFFSET_PM
-        if true:
+        if by_command is not None and abs(by_command.offset) < _OFFSET_PM:
             return accuse("offset_sensor", "the steering sensor is off while the motion is as told")
         return accuse("steering_offset", "the car steers beside what it is told")
     return None
@@ -169,9 +181,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
         if late > 0.12 and model.delay_s > _SLOW_S and model.line.explained > 0.8:
             said = f"the model steers {model.delay_s:.2f} s after the command, the car "
             said += f"{car.delay_s:.2f} s"
-            more = Evidence(
-                name="model_delay_s", value=model.delay_s, expected=car.delay_s, std=0.02, text=said
-            )
+            more = _evidence("model_delay_s", model.delay_s, car.delay_s, 0.02, said)
             return accuse("steering_delay", f"the model steers too late: {said}", more)
     if line is None or (car is not None and not obeys) or not _gyro_confirmed(seen.gyro_by_course):
         return None
@@ -182,8 +192,8 @@ def _model_turns(seen: Consistency) -> Finding | None:
     if seen.missing_mps2 > _MISSING_MPS2 and hard is not None and line.explained < _FOLLOWS:
         text = f"the model's tyres do not carry what the car's do: {seen.missing_mps2:.1f} m/s² of "
         text += f"lateral acceleration apart, {said}"
-        more = Evidence(name="missing_mps2", value=seen.missing_mps2, expected=0.0, std=0.15,
-                        text=f"{seen.missing_mps2:.2f} m/s² between model and car")  # fmt: skip
+        apart = f"{seen.missing_mps2:.2f} m/s² between model and car"
+        more = _evidence("missing_mps2", seen.missing_mps2, 0.0, 0.15, apart)
         return accuse("friction", text, more)
     if line.gain_std > 0.1 or line.explained < 0.6:
         return None
@@ -197,9 +207,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
         return None
     if lag.seconds > _LATE_S + 3.0 * lag.std_s:
         said = f"the model's turning lags {lag.seconds:.2f} s behind the car's"
-        more = Evidence(
-            name="motion_lag_s", value=lag.seconds, expected=0.0, std=lag.std_s, text=said
-        )
+        more = _evidence("motion_lag_s", lag.seconds, 0.0, lag.std_s, said)
         return accuse("inertia", f"{said}: its yaw inertia or tyres are wrong", more)
     if abs(line.offset) > _OFFSET_PM + 3.0 * line.offset_std:
         said = f"the model's curvature is off by {-line.offset:+.4f} 1/m"
@@ -209,7 +217,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
 
 
 def _gyro_confirmed(gyro: Line | None) -> bool:
-    """Whether the course over ground turns as the gyro says; without one nobody objects."""
+    """Whether the course over ground turns as the gyro shows; without one it may."""
     if gyro is None:
         return True
     return abs(gyro.gain - 1.0) + gyro.gain_std < _GAIN + 0.05

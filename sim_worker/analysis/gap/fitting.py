@@ -3,6 +3,8 @@
 Of seconds, many times a second. `analysis.identify` fits lines to minutes: its deviations take
 four stretches of three seconds at least and ten times as long, and its actuators follow with a lag,
 where here a pure delay must be found even if command and answer differ in sign, or 57 times.
+
+Several departures are fitted to one gap, so that none is put down to another.
 """
 
 from __future__ import annotations
@@ -13,6 +15,9 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
+
+TOGETHER_S = 0.3
+"""Samples nearer to each other than this err alike."""
 
 
 class Line(NamedTuple):
@@ -27,7 +32,7 @@ class Line(NamedTuple):
     """Share of the variance of y, 0 to 1."""
 
 
-class Follower(NamedTuple):
+class DelayedLine(NamedTuple):
     """How y follows x: the line after the best delay, and the plateau of y where there is one."""
 
     line: Line
@@ -61,9 +66,7 @@ def line_through(x: Array, y: Array, *, independent: float) -> Line | None:
     )
 
 
-def follower(
-    x: Array, y: Array, *, longest_s: float = 0.8, together_s: float = 0.3
-) -> Follower | None:
+def delayed_line(x: Array, y: Array, *, longest_s: float = 0.8) -> DelayedLine | None:
     """Fit how y follows x, both (N,) on the grid, with delays from 0 to `longest_s`.
 
     None where too little is known of both.
@@ -80,10 +83,10 @@ def follower(
         return None
     late, done = late[:, known], done[known]
     shift = int(np.argmin(_residuals(late, done)))
-    line = line_through(late[shift], done, independent=len(done) * PERIOD_S / together_s)
+    line = line_through(late[shift], done, independent=len(done) * PERIOD_S / TOGETHER_S)
     if line is None:
         return None
-    return Follower(line, shift * PERIOD_S, _plateau(late[shift], done, line))
+    return DelayedLine(line, shift * PERIOD_S, _plateau(late[shift], done, line))
 
 
 def _residuals(x: Array, y: Array) -> Array:
@@ -118,3 +121,27 @@ def _plateau(x: Array, y: Array, line: Line) -> float:
     if beyond.sum() * PERIOD_S >= 0.3 and left < 0.6 * straight:
         return top
     return float("nan")
+
+
+class JointFit(NamedTuple):
+    """Sizes (C,) of causes with their standard deviations, and what they leave of the gap."""
+
+    sizes: Array
+    std: Array
+    left: float
+    """Sum of squares of what is left, and of what priors say against the sizes, in deviations."""
+
+
+def joint_fit(gap: Array, columns: Array, *, variance: Array, prior_std: Array) -> JointFit:
+    """Fit gap (K,) = columns (K, C) @ sizes with errors of `variance` (K,).
+
+    Sizes are 0 give or take `prior_std` (C,), infinite for a cause that is free: least squares with
+    a Gaussian prior (Gelman et al., Bayesian Data Analysis, 2013, 14.8).
+    """
+    precision = 1.0 / prior_std**2
+    weighted = columns / variance[:, None]
+    covariance = np.linalg.pinv(weighted.T @ columns + np.diag(precision))
+    sizes = covariance @ (weighted.T @ gap)
+    apart = gap - columns @ sizes
+    left = float(np.sum(apart**2 / variance) + np.sum(precision * sizes**2))
+    return JointFit(sizes, np.sqrt(np.maximum(np.diag(covariance), 0.0)), left)

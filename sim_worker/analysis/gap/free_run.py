@@ -1,33 +1,37 @@
-"""The planar model left to itself from measured states: many windows in one MuJoCo Batch."""
+"""The planar model left to itself from measured states: many windows in one MuJoCo Batch.
+
+Runs need not be made again: stretches overlap by most of their length.
+"""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
+from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
 
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
 
 
-class SteeringSignals(NamedTuple):
+class TireAngles(NamedTuple):
     """Tyre angles (N,) as the model reads them: commanded and measured; NaN where unknown."""
 
     commanded_rad: Array
     measured_rad: Array
 
 
-def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
+def tire_angles(record: MotionRecord, vehicle: VehicleParameters) -> TireAngles:
     """Return the tyre angles that the record's steering means to the model."""
     column = column_of(vehicle)
 
@@ -39,7 +43,7 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         record.command_tire_rad + column.offset_rad,
         column.tire_rad(record.command_wheel_rad),
     )
-    return SteeringSignals(commanded, read(record.tire_rad, record.wheel_rad))
+    return TireAngles(commanded, read(record.tire_rad, record.wheel_rad))
 
 
 class FreeRunner:
@@ -56,7 +60,7 @@ class FreeRunner:
         self,
         *,
         states: Array,
-        starts: np.ndarray[Any, np.dtype[np.intp]],
+        starts: Indices,
         steps: int,
         accel_mps2: Array,
         tire_rad: Array,
@@ -102,27 +106,14 @@ class FreeRunner:
         return np.concatenate(parts) if parts else np.zeros((0, steps + 1, 8))
 
 
-def start_states(
-    vehicle: VehicleParameters,
-    *,
-    x_m: Array,
-    y_m: Array,
-    yaw_rad: Array,
-    speed_mps: Array,
-    yaw_rate_radps: Array,
-    accel_mps2: Array,
-    tire_rad: Array,
-) -> Array:
+def start_states(vehicle: VehicleParameters, motion: MeasuredMotion, *, tire_rad: Array) -> Array:
     """Return (K, 8) states to start from; a tyre angle that is NaN is that of steady cornering."""
-    rows = np.zeros((len(x_m), 8))
-    for index in range(len(x_m)):
-        speed, rate = float(speed_mps[index]), float(yaw_rate_radps[index])
-        tire = float(tire_rad[index])
-        rows[index] = (
-            x_m[index], y_m[index], yaw_rad[index], speed, rear_slip_velocity(vehicle, speed, rate),
-            rate, tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate),
-            accel_mps2[index],
-        )  # fmt: skip
+    rows = np.zeros((len(tire_rad), 8))
+    for row, pose_and_motion, tire in zip(rows, np.stack(motion, axis=1), tire_rad, strict=True):
+        x, y, yaw, speed, rate, accel = pose_and_motion.tolist()
+        slip = rear_slip_velocity(vehicle, speed, rate)
+        angle = tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate)
+        row[:] = x, y, yaw, speed, slip, rate, angle, accel
     return rows
 
 
@@ -141,3 +132,38 @@ def _filled(values: Array) -> Array:
     known = np.isfinite(values)
     index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
     return np.where(index >= 0, values[np.maximum(index, 0)], 0.0)
+
+
+class RunMemory:
+    """Keeps the runs of one vehicle's model by when and how they began.
+
+    Belongs to one FreeRunner; what is kept is no older than the stretch asked for last.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, bool], Array] = {}
+
+    def states(
+        self,
+        *,
+        stamp_ns: Stamps,
+        held: Flags,
+        settled: Flags,
+        from_stamp_ns: int,
+        run: Callable[[Indices], Array],
+    ) -> Array:
+        """Return the states (K, steps + 1, 8) of K runs that began at `stamp_ns`, in both kinds.
+
+        `run` makes those that are not known, by their rows. A run is kept once it is `settled`:
+        until then samples may come that belong into it. Older ones than `from_stamp_ns` are
+        forgotten.
+        """
+        keys = list(zip(stamp_ns.tolist(), held.tolist(), strict=True))
+        missing = np.array([row for row, key in enumerate(keys) if key not in self._known], np.intp)
+        fresh = dict(zip(missing.tolist(), run(missing), strict=True)) if len(missing) else {}
+        states = np.stack(
+            [fresh[row] if row in fresh else self._known[key] for row, key in enumerate(keys)]
+        )
+        self._known = {key: kept for key, kept in self._known.items() if key[0] >= from_stamp_ns}
+        self._known |= {keys[row]: made for row, made in fresh.items() if settled[row]}
+        return states

@@ -1,15 +1,19 @@
-"""The vehicle's estimated states on the grid of its record: what a free run is compared with."""
+"""The vehicle's estimated states on the grid of its record: what a free run is compared with.
+
+What the vehicle is doing follows from its measured motion alone.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.gap import Manoeuvre
 from foretwin.sim_worker.analysis.motion_record import between_samples
 
 _LONGEST_GAP_S = 0.5
@@ -25,17 +29,18 @@ class MeasuredMotion(NamedTuple):
     yaw_rate_radps: Array
     accel_mps2: Array
 
+    def at(self, index: int | Indices) -> MeasuredMotion:
+        """Return the motion at one instant, or at some."""
+        return MeasuredMotion(*(column[index] for column in self))
+
     @property
-    def known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def known(self) -> Flags:
         """Where the motion is known, shape (N,)."""
         return np.isfinite(self.x_m)
 
 
 def motion_on_grid(
-    states: Sequence[VehicleState],
-    stamp_ns: np.ndarray[Any, np.dtype[np.int64]],
-    *,
-    frame: LocalFrame,
+    states: Sequence[VehicleState], stamp_ns: Stamps, *, frame: LocalFrame
 ) -> MeasuredMotion:
     """Interpolate states with a known heading to `stamp_ns` (N,), which ascend.
 
@@ -47,9 +52,14 @@ def motion_on_grid(
     for state in states:
         place = state.position
         values = (
-            place.lat_deg, place.lon_deg, state.yaw_rad, state.speed_mps, state.yaw_rate_radps,
-            state.accel_mps2, *(state.map_shift_m or (0.0, 0.0)),
-        )  # fmt: skip
+            place.lat_deg,
+            place.lon_deg,
+            state.yaw_rad,
+            state.speed_mps,
+            state.yaw_rate_radps,
+            state.accel_mps2,
+            *(state.map_shift_m or (0.0, 0.0)),
+        )
         time_s = (state.stamp_ns - base_ns) * 1e-9
         if state.yaw_valid and np.isfinite(values).all() and (not rows or time_s > rows[-1][0]):
             rows.append((time_s, *values))
@@ -63,3 +73,30 @@ def motion_on_grid(
     return MeasuredMotion(
         *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
     )
+
+
+MANOEUVRES: tuple[Manoeuvre, ...] = get_args(Manoeuvre)
+_STANDS_MPS = 0.3
+_BRAKES_MPS2, _ACCELERATES_MPS2 = -0.7, 0.7
+_CURVE_RADPS, _CURVE_PM = 0.06, 0.01
+
+
+def manoeuvre_of(
+    *, speed_mps: Array | float, yaw_rate_radps: Array | float, accel_mps2: Array | float
+) -> Manoeuvre:
+    """Name what a stretch of motion is, from its mean speed, yaw rate and acceleration.
+
+    Standing counts first, then the change of speed, then the bend: a car that brakes in a bend
+    is braking.
+    """
+    speed = float(np.mean(np.abs(speed_mps)))
+    rate, accel = float(np.mean(yaw_rate_radps)), float(np.mean(accel_mps2))
+    if speed < _STANDS_MPS:
+        return "standstill"
+    if accel < _BRAKES_MPS2:
+        return "braking"
+    if accel > _ACCELERATES_MPS2:
+        return "accelerating"
+    if abs(rate) > _CURVE_RADPS or abs(rate) / max(speed, 1.0) > _CURVE_PM:
+        return "curve"
+    return "straight"

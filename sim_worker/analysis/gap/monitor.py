@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.frames import LocalFrame
-from foretwin.contracts.gap import ALARM_LIMITS_PER_S, GapAlarm, GapSample, Verdict
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.gap.errors import GapMeter
+from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
-from foretwin.sim_worker.analysis.gap.verdict import Judge, without_manual_commands
-from foretwin.sim_worker.analysis.motion_record import MotionRecorder
+from foretwin.sim_worker.analysis.gap.verdict import KEPT_S, FaultDetector, without_manual_commands
 
 _SECOND_NS = 1_000_000_000
+_MOST_STATES_HZ = 120.0
 _STATE = "state"
 _SHORT_S, _LONG_EVERY = 2.0, 4
 """Longer runs overlap by most of their length: every fourth says the same at half the cost."""
@@ -32,46 +30,26 @@ class GapMonitor:
     four seconds over the long ones too.
     """
 
-    def __init__(
-        self,
-        info: VehicleInfo,
-        vehicle: VehicleParameters,
-        *,
-        frame: LocalFrame,
-        horizons_s: Sequence[float] = HORIZONS_S,
-        limits_per_s: Mapping[str, float] = ALARM_LIMITS_PER_S,
-    ) -> None:
+    def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
         self._vehicle_id = info.vehicle_id
         self._frame = frame
-        self._horizons_s = tuple(sorted(horizons_s))
-        self._judge = Judge(info, vehicle, frame=frame)
+        self._detector = FaultDetector(info, vehicle, frame=frame)
         self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=info.vehicle_id)
-        self._limits = GapLimits(limits_per_s=limits_per_s)
-        keep_s = self._horizons_s[-1] + 2.0
-        self._recorder = MotionRecorder(frame=frame, keep_s=keep_s, depth=4000)
-        self._states: deque[VehicleState] = deque(maxlen=round(keep_s * 120.0))
+        self._limits = GapLimits()
+        self._recorder = self._detector.recorder
+        self._states: deque[VehicleState] = deque(maxlen=round(KEPT_S * _MOST_STATES_HZ))
         self._next_ns: int | None = None
         self._measured = 0
-
-    @property
-    def judge(self) -> Judge:
-        """Who weighs the signals."""
-        return self._judge
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Compare with a model of other parameters from now on."""
         self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=self._vehicle_id)
-        self._judge.use_vehicle(vehicle)
+        self._detector.use_vehicle(vehicle)
 
     def handle(self, channel: str, message: Any) -> list[GapSample | GapAlarm | Verdict]:
         """Take one message; return what follows from it, in time order."""
         if channel != _STATE:
-            newest = self._recorder.newest_stamp_ns
-            stamp_ns = getattr(message, "stamp_ns", None)
-            if stamp_ns is None or (newest is not None and stamp_ns < newest - 2 * _SECOND_NS):
-                return []
-            self._recorder.handle(channel, message)
-            verdict = self._judge.handle(channel, message)
+            verdict = self._detector.handle(channel, message)
             return [] if verdict is None else [verdict]
         if not isinstance(message, VehicleState):
             return []
@@ -79,7 +57,7 @@ class GapMonitor:
             return []
         self._states.append(message)
         if self._next_ns is None:
-            self._next_ns = message.stamp_ns + round(self._horizons_s[0] * 1e9)
+            self._next_ns = message.stamp_ns + round(HORIZONS_S[0] * 1e9)
         if message.stamp_ns < self._next_ns or self._recorder.newest_stamp_ns is None:
             return []
         self._next_ns = message.stamp_ns + _SECOND_NS
@@ -91,18 +69,18 @@ class GapMonitor:
         self._measured += 1
         horizons = [
             horizon
-            for horizon in self._horizons_s
+            for horizon in HORIZONS_S
             if now_ns - round(horizon * 1e9) >= first_ns
             and (horizon <= _SHORT_S or self._measured % _LONG_EVERY == 0)
         ]
         if not horizons:
             return []
-        # One second more before the start: what the delayed steering was told.
+        # One second more before the start: what the delayed steering was found.
         from_ns = now_ns - round(horizons[-1] * 1e9) - _SECOND_NS
         record = without_manual_commands(self._recorder.record(from_ns, now_ns))
         motion = motion_on_grid(self._states, record.stamp_ns, frame=self._frame)
-        told: list[GapSample | GapAlarm | Verdict] = []
+        found: list[GapSample | GapAlarm | Verdict] = []
         for sample in self._meter.latest(record, motion, horizons_s=horizons):
-            told.append(sample)
-            told.extend(self._limits.handle(sample))
-        return told
+            found.append(sample)
+            found.extend(self._limits.handle(sample))
+        return found

@@ -7,21 +7,27 @@ another; ratio and offset only turn steering wheels into tyres.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.acceleration_consistency import BLOCK, PushBlocks, push_blocks
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.sim_worker.analysis.gap.free_run import (
-    Flags,
     FreeRunner,
+    RunMemory,
     start_states,
-    steering_signals,
+    tire_angles,
 )
-from foretwin.sim_worker.analysis.gap.run_memory import Rows, RunMemory
+from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
+BLOCK = round(0.2 / PERIOD_S)
+BLOCK_S = BLOCK * PERIOD_S
+_LAG = round(0.1 / PERIOD_S)
+"""With which a car follows its command, give or take as much."""
+_NOISE_MPS2, _UNEVEN = 0.15, 0.6
+"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 """A run lasts a second, the end of which is compared: where it began is forgotten by then."""
 _SETTLED = round(0.4 / PERIOD_S)
@@ -34,14 +40,25 @@ _FASTEST_MPS = 80.0
 MIN_TURN_RAD = 0.012
 
 
-class Pairs(NamedTuple):
+class PushBlocks(NamedTuple):
+    """Accelerations (K,) over blocks: commanded, the car's, the model's; speeds, deviations."""
+
+    stamp_ns: Array
+    asked_mps2: Array
+    car_mps2: Array
+    model_mps2: Array
+    speed_mps: Array
+    std_mps2: Array
+
+
+class SignalPairs(NamedTuple):
     """Signals on the grid, each (N,) and NaN where unknown; steering in tyre angles.
 
     `asked_rad` and `done_rad` are steering as commanded and as measured, from the steering wheel
     where both are known there, so that no ratio comes in.
     """
 
-    stamp_ns: np.ndarray[Any, np.dtype[np.int64]]
+    stamp_ns: Stamps
     moves: Flags
     excited: Flags
     """Moves and turns."""
@@ -72,7 +89,7 @@ class Pairs(NamedTuple):
         lost = ~known & ~(self.speed_mps < MOVES_MPS)
         return bool(lost[int(np.argmax(known)) :].any()) if known.any() else False
 
-    def latest(self, seconds: float) -> Pairs:
+    def latest(self, seconds: float) -> SignalPairs:
         """Return the signals of the latest seconds, with all of the pushes."""
         kept = slice(max(0, len(self.stamp_ns) - round(seconds / PERIOD_S)), None)
         columns = {name: getattr(self, name)[kept] for name in self._fields if name != "pushes"}
@@ -86,13 +103,13 @@ def pairs_of(
     antenna_ahead_m: float = 0.0,
     precise_positions: bool = True,
     memory: RunMemory | None = None,
-) -> Pairs:
+) -> SignalPairs:
     """Lay the signals of some seconds side by side and run the model over them.
 
     `memory` is that of earlier stretches of the same drive with the same runner. Without precise
     positions no sensor is compared with them: a telephone's are smoothed and late.
     """
-    signals = steering_signals(record, runner.vehicle)
+    signals = tire_angles(record, runner.vehicle)
     speed, rate = record.speed_mps, record.yaw_rate_radps
     moves = np.isfinite(speed) & (speed > MOVES_MPS)
     turn = np.nanmax(np.stack([np.abs(np.nan_to_num(x)) for x in signals]), axis=0)
@@ -102,21 +119,22 @@ def pairs_of(
     asked = record.command_wheel_rad / ratio if wheel else signals.commanded_rad
     done = record.wheel_rad / ratio if wheel else signals.measured_rad
     arc = np.arctan(runner.vehicle.wheelbase_m.value * rate / np.maximum(speed, MOVES_MPS))
-    absent = np.full(len(speed), np.nan)
-    sensors = (absent, absent, absent, absent)
+    sensors: dict[str, Any] = dict.fromkeys(_SENSORS, np.full(len(speed), np.nan))
     if precise_positions:
         sensors = _sensors(record, antenna_ahead_m)
-    course, gyro, ground, wheels = sensors
-    by_measured, by_command, tire, pushes = _runs(record, runner, memory or RunMemory())
-    return Pairs(
-        stamp_ns=record.stamp_ns, moves=moves, excited=moves & (turn > MIN_TURN_RAD),
-        course_radps=course, gyro_radps=gyro, ground_mps=ground, wheel_mps=wheels,
-        asked_rad=np.where(moves, asked, np.nan), done_rad=np.where(moves, done, np.nan),
-        arc_rad=np.where(moves, arc, np.nan), speed_mps=speed,
+    return SignalPairs(
+        stamp_ns=record.stamp_ns,
+        moves=moves,
+        excited=moves & (turn > MIN_TURN_RAD),
+        asked_rad=np.where(moves, asked, np.nan),
+        done_rad=np.where(moves, done, np.nan),
+        arc_rad=np.where(moves, arc, np.nan),
+        speed_mps=speed,
         curvature_pm=np.where(moves, rate / np.maximum(speed, MOVES_MPS), np.nan),
-        by_measured_pm=by_measured, by_command_pm=by_command,
-        commanded_rad=signals.commanded_rad, model_tire_rad=tire, pushes=pushes,
-    )  # fmt: skip
+        commanded_rad=signals.commanded_rad,
+        **sensors,
+        **_runs(record, runner, memory or RunMemory()),
+    )
 
 
 def smooth(values: Array, half: int) -> Array:
@@ -128,13 +146,21 @@ def smooth(values: Array, half: int) -> Array:
     return out
 
 
-def _sensors(record: MotionRecord, ahead_m: float) -> tuple[Array, Array, Array, Array]:
-    """Return rate of the course and gyro, speed over ground and of the wheels."""
-    half, count = _COURSE_HALF, len(record.x_m)
-    dx, dy = np.full(count, np.nan), np.full(count, np.nan)
+def _change(values: Array, half: int) -> Array:
+    """Return by how much values (N,) change over 2 half samples around each; NaN at the ends."""
+    out, count = np.full(len(values), np.nan), len(values)
     if count > 2 * half:
-        dx[half : count - half] = record.x_m[2 * half :] - record.x_m[: count - 2 * half]
-        dy[half : count - half] = record.y_m[2 * half :] - record.y_m[: count - 2 * half]
+        out[half : count - half] = values[2 * half :] - values[: count - 2 * half]
+    return out
+
+
+_SENSORS = ("course_radps", "gyro_radps", "ground_mps", "wheel_mps")
+
+
+def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
+    """Return rate of the course and gyro, speed over ground and of the wheels."""
+    half = _COURSE_HALF
+    dx, dy = _change(record.x_m, half), _change(record.y_m, half)
     gone = np.hypot(dx, dy) / (2 * half * PERIOD_S)
     leapt = gone > _FASTEST_MPS
     dx[leapt], gone[leapt] = np.nan, np.nan
@@ -144,25 +170,20 @@ def _sensors(record: MotionRecord, ahead_m: float) -> tuple[Array, Array, Array,
     fine = np.isfinite(course) & np.isfinite(rate)
     course[fine] = np.unwrap(course[fine])
     course = course - np.arctan2(ahead_m * smooth(rate, half), gone)
-    turns = np.full(count, np.nan)
-    if count > 2 * _TURN_HALF:
-        turns[_TURN_HALF : count - _TURN_HALF] = (
-            course[2 * _TURN_HALF :] - course[: count - 2 * _TURN_HALF]
-        ) / (2 * _TURN_HALF * PERIOD_S)
+    turns = _change(course, _TURN_HALF) / (2 * _TURN_HALF * PERIOD_S)
     turns = np.where(np.abs(turns) < 1.5, turns, np.nan)
     gyro = smooth(smooth(rate, half), _TURN_HALF)
-    return turns, gyro, np.where(drives, gone, np.nan), smooth(record.speed_mps, half)
+    found = (turns, gyro, np.where(drives, gone, np.nan), smooth(record.speed_mps, half))
+    return dict(zip(_SENSORS, found, strict=True))
 
 
-def _runs(
-    record: MotionRecord, runner: FreeRunner, memory: RunMemory
-) -> tuple[Array, Array, Array, PushBlocks]:
+def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[str, Any]:
     """Return the model's curvature by measured steering and by command, its tyres, and pushes.
 
     Runs overlap so that their ends tile the stretch, back from its own end.
     """
     speed, rate, accel = record.speed_mps, record.yaw_rate_radps, record.command_accel_mps2
-    signals = steering_signals(record, runner.vehicle)
+    signals = tire_angles(record, runner.vehicle)
     count = len(speed)
     eased = smooth(speed, _SMOOTH_HALF)
     eased = np.where(np.isfinite(eased), eased, speed)
@@ -180,8 +201,13 @@ def _runs(
     turned, told_starts = turns[told], starts[told]
     at = np.concatenate([measured, told_starts])
     by_measured, by_command, tire = (np.full(count, np.nan) for _ in range(3))
+    found: dict[str, Any] = {
+        "by_measured_pm": by_measured,
+        "by_command_pm": by_command,
+        "model_tire_rad": tire,
+    }
     if not len(at):
-        return by_measured, by_command, tire, push_blocks(record, eased, at, np.zeros((0, 1)))
+        return {**found, "pushes": push_blocks(record, eased, at, np.zeros((0, 1)))}
     # What was measured has the actuator's lag in it; the model's own must not come on top.
     led = signals.measured_rad + runner.vehicle.steering_lag_s.value * (
         np.gradient(signals.measured_rad) / PERIOD_S
@@ -190,24 +216,27 @@ def _runs(
     # One batch for both kinds: the stretch as commanded, then as measured with its speed held.
     held = np.arange(len(at)) < len(measured)
 
-    def run(rows: Rows) -> Array:
+    def run(rows: Indices) -> Array:
         begun, zero = at[rows], np.zeros(len(rows))
-        begin = start_states(
-            runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=eased[begun],
-            yaw_rate_radps=rate[begun], accel_mps2=slope[begun],
-            tire_rad=np.full(len(rows), np.nan),
-        )  # fmt: skip
+        motion = MeasuredMotion(zero, zero, zero, eased[begun], rate[begun], slope[begun])
+        begin = start_states(runner.vehicle, motion, tire_rad=np.full(len(rows), np.nan))
         return runner.run(
-            states=begin, starts=np.where(held[rows], begun + count, begun), steps=_RUN,
+            states=begin,
+            starts=np.where(held[rows], begun + count, begun),
+            steps=_RUN,
             accel_mps2=np.concatenate([accel, accel]),
             tire_rad=np.concatenate([signals.commanded_rad, led]),
-            hold_speed_mps=np.concatenate([nothing, eased]), delayed=~held[rows],
-        )  # fmt: skip
+            hold_speed_mps=np.concatenate([nothing, eased]),
+            delayed=~held[rows],
+        )
 
     states = memory.states(
-        stamp_ns=record.stamp_ns[at], held=held, settled=at + _RUN + _SETTLED < count,
-        from_stamp_ns=int(record.stamp_ns[0]), run=run,
-    )  # fmt: skip
+        stamp_ns=record.stamp_ns[at],
+        held=held,
+        settled=at + _RUN + _SETTLED < count,
+        from_stamp_ns=int(record.stamp_ns[0]),
+        run=run,
+    )
     tail = np.arange(_RUN - _TAIL + 1, _RUN + 1)
     curvature = states[:, tail, 5] / np.maximum(states[:, tail, 3], 1.0)
     by_measured[at[held][:, None] + tail] = curvature[held]
@@ -215,4 +244,32 @@ def _runs(
     by_command[at[commanded][:, None] + tail] = curvature[commanded]
     tire[at[commanded][:, None] + tail] = states[commanded][:, tail, 6]
     pushes = push_blocks(record, eased, told_starts, states[~held][:, :, 3])
-    return by_measured, by_command, tire, pushes
+    return {**found, "pushes": pushes}
+
+
+def push_blocks(
+    record: MotionRecord, speed_mps: Array, starts: Indices, model_mps: Array
+) -> PushBlocks:
+    """Return the last two blocks of each run at grid indices `starts` (K,).
+
+    `speed_mps` (N,) is the car's on the grid, `model_mps` (K, steps + 1) the model's of each run.
+    """
+    asked = record.command_accel_mps2
+    rows = []
+    for start, model in zip(starts, model_mps, strict=True):
+        for end in (len(model) - 1 - BLOCK, len(model) - 1):
+            at = int(start) + end
+            soon, due, late = (
+                np.mean(asked[at - BLOCK - k * _LAG : at - k * _LAG]) for k in range(3)
+            )
+            rows.append(
+                (
+                    record.stamp_ns[at],
+                    due,
+                    (speed_mps[at] - speed_mps[at - BLOCK]) / BLOCK_S,
+                    (model[end] - model[end - BLOCK]) / BLOCK_S,
+                    speed_mps[at - BLOCK // 2],
+                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late)),
+                )
+            )
+    return PushBlocks(*np.array(rows, dtype=np.float64).reshape(len(rows), 6).T)

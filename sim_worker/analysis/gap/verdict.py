@@ -12,18 +12,18 @@ import numpy as np
 from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import Verdict
+from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushTest
-from foretwin.sim_worker.analysis.gap.change import began_ns
-from foretwin.sim_worker.analysis.gap.consistency import Consistency, consistency_of
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.findings import findings_of
-from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.pairs import Pairs, pairs_of
-from foretwin.sim_worker.analysis.gap.run_memory import RunMemory
+from foretwin.sim_worker.analysis.gap.consistency import Consistency, began_ns, consistency_of
+from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
+from foretwin.sim_worker.analysis.gap.free_run import FreeRunner, RunMemory
+from foretwin.sim_worker.analysis.gap.pairs import SignalPairs, pairs_of
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
 
 WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
+KEPT_S = HORIZONS_S[-1] + 2.0
+"""Of samples: enough for the longest run of the gap and what the steering was told before it."""
 _EVERY_NS = round(EVERY_S * 1e9)
 _LATEST_S = 0.1
 """Samples of slower channels may still be on their way."""
@@ -33,11 +33,11 @@ _IN_A_ROW = 2
 _DENSE_S, _PRECISE_M = 0.25, 0.15
 """Positions this near to each other and this good may accuse another sensor."""
 _FORGOTTEN_S = 10.0
-"""A finding that has not come back for so long is over, and a new one is told anew."""
+"""A finding that has not come back for so long is over, and a new one is reported anew."""
 
 
-class Judge:
-    """Takes a vehicle's samples and says, where it is sure, who departs from the commands.
+class FaultDetector:
+    """Takes a vehicle's samples and says, where it is sure, which departs: the car or its model.
 
     Pure: time is that of the samples. A verdict takes two findings in a row, 0.2 s apart, that
     accuse the same, and is given once as long as it holds.
@@ -47,21 +47,17 @@ class Judge:
         lever = info.body_from_antenna_m
         self._vehicle_id = info.vehicle_id
         self._ahead_m = 0.0 if lever is None else lever[0]
-        self._recorder = MotionRecorder(frame=frame, keep_s=WINDOW_S + 4.0, depth=4000)
+        self.recorder = MotionRecorder(frame=frame, keep_s=KEPT_S, depth=4000)
+        """The samples that are kept."""
         self._runner, self._runs = FreeRunner(vehicle, batch=_AT_ONCE), RunMemory()
         self._first_ns: int | None = None
         self._done = 0
         self._push = PushTest()
         self._pending: tuple[str, str, int, int] | None = None
         self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
-        self._told: dict[tuple[str, str], int] = {}
+        self._reported: dict[tuple[str, str], int] = {}
         self.latest: Consistency | None = None
-        """What the latest stretch said, for those who show it."""
-
-    @property
-    def recorder(self) -> MotionRecorder:
-        """The samples that are kept."""
-        return self._recorder
+        """The consistency of the latest stretch, for display."""
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Judge a model of other parameters from now on; what was about to be said is forgotten."""
@@ -74,17 +70,16 @@ class Judge:
         stamp_ns = getattr(message, "stamp_ns", None)
         if stamp_ns is None:
             return None
-        newest = self._recorder.newest_stamp_ns
+        newest = self.recorder.newest_stamp_ns
         if newest is not None and stamp_ns < newest - 2_000_000_000:
             return None  # the clock ran back: what is kept would no longer be one motion
-        self._recorder.handle(channel, message)
+        self.recorder.handle(channel, message)
         if isinstance(message, GnssFix):
             self._fixes.append((stamp_ns, np.inf if message.std_m is None else message.std_m))
-        newest = self._recorder.newest_stamp_ns
+        newest = self.recorder.newest_stamp_ns
         if newest is None:
             return None
-        if self._first_ns is None:
-            self._first_ns = newest
+        self._first_ns = newest if self._first_ns is None else self._first_ns
         due = (newest - round(_LATEST_S * 1e9) - self._first_ns) // _EVERY_NS
         if due <= self._done:
             return None
@@ -93,11 +88,14 @@ class Judge:
         from_ns = max(self._first_ns, to_ns - round(WINDOW_S * 1e9))
         if to_ns - from_ns < 1.5e9:
             return None
-        record = without_manual_commands(self._recorder.record(from_ns, to_ns))
+        record = without_manual_commands(self.recorder.record(from_ns, to_ns))
         pairs = pairs_of(
-            record, self._runner, antenna_ahead_m=self._ahead_m,
-            precise_positions=self._precise(), memory=self._runs,
-        )  # fmt: skip
+            record,
+            self._runner,
+            antenna_ahead_m=self._ahead_m,
+            precise_positions=self._precise(),
+            memory=self._runs,
+        )
         self.latest = consistency_of(pairs)
         pushed = self._push.handle(pairs.pushes)
         found = _found_in(pairs, self.latest)
@@ -117,17 +115,17 @@ class Judge:
         return apart_s <= _DENSE_S and float(np.median(table[:, 1])) <= _PRECISE_M
 
     def _weigh(self, findings: Sequence[Finding], to_ns: int) -> Verdict | None:
-        for key, seen_ns in list(self._told.items()):
+        for key, seen_ns in list(self._reported.items()):
             if to_ns - seen_ns > _FORGOTTEN_S * 1e9:
-                del self._told[key]
+                del self._reported[key]
         if not findings:
             self._pending = None
         by_key = {(str(one.culprit), one.cause): one for one in findings}
-        self._told |= {key: to_ns for key in by_key if key in self._told}
-        untold = [key for key in by_key if key not in self._told]
-        if not untold:
+        self._reported |= {key: to_ns for key in by_key if key in self._reported}
+        unreported = [key for key in by_key if key not in self._reported]
+        if not unreported:
             return None
-        key, found = untold[0], by_key[untold[0]]
+        key, found = unreported[0], by_key[unreported[0]]
         before = self._pending
         if before is None or before[0] != found.culprit:
             self._pending = (*key, 1, found.since_ns)
@@ -136,7 +134,7 @@ class Judge:
         if self._pending[2] < _IN_A_ROW:
             return None
         since_ns = self._pending[3]
-        self._told[key] = to_ns
+        self._reported[key] = to_ns
         return Verdict(
             vehicle_id=self._vehicle_id,
             stamp_ns=to_ns,
@@ -149,7 +147,7 @@ class Judge:
         )
 
 
-def _found_in(pairs: Pairs, seen: Consistency) -> Finding | None:
+def _found_in(pairs: SignalPairs, seen: Consistency) -> Finding | None:
     found = findings_of(seen)
     if found is None:
         return None
@@ -166,7 +164,7 @@ def _confidence(found: Finding) -> float:
 
 
 def without_manual_commands(record: MotionRecord) -> MotionRecord:
-    """Return the record without commands where a human drives: nobody carries them out then."""
+    """Return the record without commands where a human drives: they are not carried out then."""
     if not record.manual.any():
         return record
     names = ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")

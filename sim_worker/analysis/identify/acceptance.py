@@ -23,12 +23,19 @@ HALF_OF_95 = 1.96
 """Standard deviations to either side that hold 95 % of a Gaussian."""
 MUCH_WIDER = 1.5
 """Times the standard deviation before: what is known so much worse is no news. Chosen."""
-_STIFFNESS = "front_cornering_stiffness_npr"
+STIFFNESS = "front_cornering_stiffness_npr"
 
 
 def is_acceptable(estimate: ParameterEstimate) -> bool:
     """Return whether an estimate has a value and nothing speaks against it."""
     return estimate.value is not None and not estimate.reason
+
+
+def std_of(estimate: ParameterEstimate) -> float:
+    """Return the standard deviation of an estimate that has a value."""
+    assert estimate.high is not None
+    assert estimate.low is not None
+    return (estimate.high - estimate.low) / (2.0 * HALF_OF_95)
 
 
 def front_stiffness(vehicle: VehicleParameters, gradient_rad_per_mps2: float) -> float:
@@ -47,41 +54,38 @@ def front_stiffness(vehicle: VehicleParameters, gradient_rad_per_mps2: float) ->
 
 
 def accepted(
-    told: Identification,
+    result: Identification,
     vehicle: VehicleParameters,
     *,
     pinned: Collection[str] = (),
     source: str = "identified",
 ) -> tuple[VehicleParameters, tuple[ParameterChange, ...]]:
-    """Return `vehicle` with what may be taken of `told`, and each change.
+    """Return `vehicle` with what may be taken of `result`, and each change.
 
     An understeer gradient becomes the front axle's cornering stiffness, `pinned` under either
     name. What would make no vehicle (a negative drag), or an implausible one, is passed over.
     """
     changes: list[ParameterChange] = []
-    for estimate in told.estimates:
+    for estimate in result.estimates:
         if not is_acceptable(estimate) or estimate.name in pinned:
             continue
         assert estimate.value is not None
-        assert estimate.low is not None
-        assert estimate.high is not None
-        std = (estimate.high - estimate.low) / (2.0 * HALF_OF_95)
-        name, value = estimate.name, estimate.value
+        name, value, std = estimate.name, estimate.value, std_of(estimate)
         if name == UNDERSTEER_GRADIENT:
-            if _STIFFNESS in pinned:
+            if STIFFNESS in pinned:
                 continue
             try:
                 stiffness = front_stiffness(vehicle, value)
                 softer = front_stiffness(vehicle, value + std)
             except ValueError:
                 continue
-            name, value, std = _STIFFNESS, stiffness, abs(stiffness - softer)
+            name, value, std = STIFFNESS, stiffness, abs(stiffness - softer)
         before = getattr(vehicle, name).value
         low, high = PLAUSIBLE[name]
         if not low <= value <= high:
             continue
         changed = msgspec.structs.replace(
-            vehicle, **{name: Parameter(value, std, f"{source}, {told.excited_s:.0f} s")}
+            vehicle, **{name: Parameter(value, std, f"{source}, {result.excited_s:.0f} s")}
         )
         try:
             vehicle = check_vehicle(changed)
@@ -89,10 +93,15 @@ def accepted(
             continue
         changes.append(
             ParameterChange(
-                vehicle_id=told.vehicle_id, stamp_ns=told.stamp_ns, name=name, before=before,
-                value=value, std=std, origin="identified",
+                vehicle_id=result.vehicle_id,
+                stamp_ns=result.stamp_ns,
+                name=name,
+                before=before,
+                value=value,
+                std=std,
+                origin="identified",
             )
-        )  # fmt: skip
+        )
     return vehicle, tuple(changes)
 
 
@@ -118,6 +127,15 @@ def in_force(vehicle: VehicleParameters, name: str) -> float:
     if not isinstance(parameter, Parameter):
         raise UserError(f"{name} is no parameter of a vehicle")
     return float(parameter.value)
+
+
+def with_priors(result: Identification, vehicle: VehicleParameters) -> Identification:
+    """Return an identification whose estimates stand beside the values of `vehicle`."""
+    estimates = tuple(
+        msgspec.structs.replace(found, prior=in_force(vehicle, found.name))
+        for found in result.estimates
+    )
+    return msgspec.structs.replace(result, estimates=estimates)
 
 
 def is_left_open(vehicle: VehicleParameters, name: str, value: float) -> bool:

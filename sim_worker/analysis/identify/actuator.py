@@ -8,14 +8,20 @@ near the greatest rate of the actuator are left out: there the rate says nothing
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.regression import Fit, fit_linear
-from foretwin.sim_worker.analysis.identify.smoothing import delayed, smoothed
+from foretwin.sim_worker.analysis.identify.regression import (
+    Fit,
+    delayed,
+    fit_linear,
+    smoothed,
+    smoothed_and_rate,
+)
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
 WIDTH_S = 0.05
@@ -32,15 +38,21 @@ class FollowingFit(NamedTuple):
     delay_half_s: float
     lag_s: float
     lag_half_s: float
-    gain: float
-    gain_half: float
-    """Measured over commanded angle at rest; 1 where the actuator does as it is told."""
     moving_s: float
     """Seconds in which the command moved."""
 
 
-def best_delay(errors: list[float]) -> float:
-    """Return the delay with the least of errors on a grid of 0.02 s, between its points."""
+def best_delay(columns_at: Callable[[float], Array], target: Array) -> float:
+    """Return the delay with which columns (N, K) explain `target` (N,) best.
+
+    That is the least of errors on a grid of 0.02 s, between its points.
+    """
+    errors = []
+    for delay_s in delays():
+        columns = columns_at(float(delay_s))
+        gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
+        left = target - columns @ np.linalg.solve(gram, columns.T @ target)
+        errors.append(float(np.mean(np.square(left))))
     index = int(np.argmin(errors))
     if not 0 < index < len(errors) - 1:
         return index * _GRID_S
@@ -82,8 +94,7 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     fastest = vehicle.max_tire_rate_radps.value
     fastest *= abs(vehicle.steering_ratio.value) if at_wheel else 1.0
     period_s = float(record.time_s[1])
-    angle = smoothed(measured, period_s=period_s, width_s=WIDTH_S)
-    rate = smoothed(measured, period_s=period_s, width_s=WIDTH_S, derivative=True)
+    angle, rate = smoothed_and_rate(measured, period_s=period_s, width_s=WIDTH_S)
     # A held command lies half its period later than its stamps say once it is smoothed.
     blur_s = _blur_s(measured, period_s=period_s)
     asked = smoothed(command, period_s=period_s, width_s=math.hypot(WIDTH_S, blur_s))
@@ -93,42 +104,36 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     free = np.isfinite(angle) & np.isfinite(rate) & driving & ~record.manual
     free &= np.abs(rate) < _RATE_SHARE * fastest
     free[: round((MAX_DELAY_S + 0.2) / period_s)] = False
-    late = [delayed(asked, period_s=period_s, delay_s=delay_s) for delay_s in delays()]
-    free &= np.isfinite(late[-1]) & np.isfinite(late[0])
+    for delay_s in delays()[[0, -1]]:
+        free &= np.isfinite(delayed(asked, period_s=period_s, delay_s=delay_s))
     used = np.flatnonzero(free)
     moving_s = float(np.sum(np.abs(asking[used]) > 0.1 * fastest / 4.0) * period_s)
     if len(used) < 100:
         raise ValueError("the car did not steer by command")
     w, dw = angle[used], rate[used]
-    errors = []
-    for candidate in late:
-        columns = np.stack([candidate[used], np.ones_like(w), -w], axis=1)
-        solved = np.linalg.solve(columns.T @ columns + 1e-9 * np.eye(3), columns.T @ dw)
-        errors.append(float(np.mean(np.square(dw - columns @ solved))))
-    delay_s = best_delay(errors)
+
+    def plain(delay_s: float) -> Array:
+        due = delayed(asked, period_s=period_s, delay_s=delay_s)[used]
+        return np.stack([due, np.ones_like(w), -w], axis=1)
+
+    delay_s = best_delay(plain, dw)
     fit: Fit | None = None
     for _ in range(4):
-        due = delayed(asked, period_s=period_s, delay_s=delay_s)[used]
         changing = delayed(asking, period_s=period_s, delay_s=delay_s)[used]
-        plain = np.stack([due, np.ones_like(w), -w], axis=1)
-        start = np.linalg.lstsq(plain, dw, rcond=None)[0] if fit is None else fit.values[:3]
-        columns = np.column_stack([plain, -start[0] * changing])
+        columns = plain(delay_s)
+        start = np.linalg.lstsq(columns, dw, rcond=None)[0] if fit is None else fit.values[:3]
+        columns = np.column_stack([columns, -start[0] * changing])
         fit = fit_linear(columns, dw, record.time_s[used])
         delay_s = float(np.clip(delay_s + fit.values[3], 0.0, MAX_DELAY_S))
     assert fit is not None
-    follows, rate_ps = float(fit.values[0]), float(fit.values[2])
-    lag_s, gain = 1.0 / rate_ps, follows / rate_ps
+    lag_s = 1.0 / float(fit.values[2])
     # A blur of s looks like s²/2τ more lag and less delay. It is s on the average alone: how the
     # samples fall upon the steps of the command repeats, and may make nothing of it or double it.
     step_half_s = fit.quantile * blur_s**2 / (2.0 * lag_s)
-    slope = np.array([1.0 / rate_ps, 0.0, -gain / rate_ps, 0.0])
-    gain_std = float(np.sqrt(slope @ fit.covariance @ slope))
     return FollowingFit(
         delay_s=delay_s,
         delay_half_s=math.hypot(fit.half_width(3), step_half_s[3]),
         lag_s=lag_s,
         lag_half_s=math.hypot(fit.half_width(2) * lag_s**2, step_half_s[2]),
-        gain=gain,
-        gain_half=float(fit.quantile[0]) * gain_std,
         moving_s=moving_s,
     )

@@ -5,6 +5,8 @@ the command u of `accel_delay_s` ago, drive and brake gains G, drag c and rollin
 Acceleration is the slope of the measured speed: an accelerometer would feel the body's pitch. In a
 bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town. What is
 left is noise of the measured speed: over 6 s it averages out as white noise does.
+
+The road's grade along a drive follows from measured altitude.
 """
 
 from __future__ import annotations
@@ -17,13 +19,17 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.actuator import best_delay, delays
-from foretwin.sim_worker.analysis.identify.regression import Fit, fit_linear
-from foretwin.sim_worker.analysis.identify.single_track import SLOWEST_MPS, sideways
-from foretwin.sim_worker.analysis.identify.smoothing import delayed, smoothed
+from foretwin.sim_worker.analysis.identify.regression import (
+    Fit,
+    delayed,
+    fit_linear,
+    smoothed,
+    smoothed_and_rate,
+)
+from foretwin.sim_worker.analysis.identify.steering_signals import SLOWEST_MPS, WIDTH_S, sideways
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 
-WIDTH_S = 0.1
 DRIVE, BRAKE, DRAG, ROLLING, DELAY = range(5)
 _DRIVES_MPS2 = 0.3
 LEAST_DRIVING_S, LEAST_BRAKING_S, _LEAST_S = 4.0, 3.0, 1.0
@@ -61,11 +67,9 @@ def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Arra
     if not record.has("yaw_rate_radps"):
         return np.zeros(len(speed_mps))
     period_s = float(record.time_s[1])
-    rate = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
-    turning = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S, derivative=True)
+    rate, turning = smoothed_and_rate(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
     base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
-    side = sideways(vehicle, speed_mps=speed_mps, yaw_rate_radps=rate, yaw_accel_radps2=turning,
-                    period_s=period_s)  # fmt: skip
+    side = sideways(vehicle, speed_mps, rate, turning, period_s=period_s)
     ahead = np.arctan2(side.speed_mps + (base - rear) * rate, np.maximum(speed_mps, SLOWEST_MPS))
     slip = side.front_mps2 * vehicle.mass_kg.value / vehicle.front_cornering_stiffness_npr.value
     return np.asarray(side.front_mps2 * np.sin(ahead + slip) - rate * side.speed_mps)
@@ -94,8 +98,7 @@ def fit_longitudinal(
     if grade is None:
         raise ValueError("the road's grade is unknown: 5 % of it is more than drag")
     period_s = float(record.time_s[1])
-    speed = smoothed(record.speed_mps, period_s=period_s, width_s=WIDTH_S)
-    accel = smoothed(record.speed_mps, period_s=period_s, width_s=WIDTH_S, derivative=True)
+    speed, accel = smoothed_and_rate(record.speed_mps, period_s=period_s, width_s=WIDTH_S)
     climbing = smoothed(np.sin(np.arctan(grade)), period_s=period_s, width_s=WIDTH_S)
     lags = (vehicle.drive_lag_s.value, vehicle.brake_lag_s.value)
     parts = []
@@ -123,40 +126,34 @@ def fit_longitudinal(
     effective = vehicle.wheel_inertia_mass_factor.value
     target = effective * accel[used] + bends[used] + GRAVITY_MPS2 * climbing[used]
     v = speed[used]
-    steady = [-np.square(v), -np.ones_like(v)]
-
     slopes = [np.gradient(part, period_s) for part in parts]
     slow_s = _spinning_s(vehicle, v)
 
-    def acting(delay_s: float) -> list[Array]:
-        return [
+    def acting(delay_s: float) -> Array:
+        pushes = [
             delayed(part, period_s=period_s, delay_s=delay_s)[used]
             - slow_s * delayed(slope, period_s=period_s, delay_s=delay_s)[used]
             for part, slope in zip(parts, slopes, strict=True)
         ]
+        return np.stack([*pushes, -np.square(v), -np.ones_like(v)], axis=1)
 
-    errors = []
-    for delay_s in delays():
-        columns = np.stack([*acting(float(delay_s)), *steady], axis=1)
-        gram = columns.T @ columns + 1e-9 * np.eye(4)
-        solved = np.linalg.solve(gram, columns.T @ target)
-        errors.append(float(np.mean(np.square(target - columns @ solved))))
-    delay_s = best_delay(errors)
-    mass = vehicle.mass_kg.value
-    centre = np.array(
-        [vehicle.drive_gain.value, vehicle.brake_gain.value, vehicle.drag_npv2.value / mass,
-         vehicle.rolling_resistance_n.value / mass, 0.0]
-    )  # fmt: skip
-    spread = np.array(
-        [np.inf, np.inf, 2.0 * (vehicle.drag_npv2.std or 0.4) / mass,
-         2.0 * (vehicle.rolling_resistance_n.std or 130.0) / mass, np.inf]
-    )  # fmt: skip
+    delay_s = best_delay(acting, target)
+    mass, drag, rolling = vehicle.mass_kg.value, vehicle.drag_npv2, vehicle.rolling_resistance_n
+    # The dead time is a step from the last one; the file tells the losses alone.
+    priors = (
+        (vehicle.drive_gain.value, np.inf),
+        (vehicle.brake_gain.value, np.inf),
+        (drag.value / mass, 2.0 * (drag.std or 0.4) / mass),
+        (rolling.value / mass, 2.0 * (rolling.std or 130.0) / mass),
+        (0.0, np.inf),
+    )
+    centre, spread = np.array(priors).T
     gains = centre[:2]
     fit: Fit | None = None
     for _ in range(4):
         changing = [delayed(slope, period_s=period_s, delay_s=delay_s)[used] for slope in slopes]
         moved = -(gains[0] * changing[0] + gains[1] * changing[1])
-        columns = np.stack([*acting(delay_s), *steady, moved], axis=1)
+        columns = np.column_stack([acting(delay_s), moved])
         fit = fit_linear(
             columns, target, record.time_s[used], prior=centre, prior_std=spread, brief=True
         )
@@ -166,3 +163,45 @@ def fit_longitudinal(
     values = fit.values.copy()
     values[DELAY] = delay_s
     return LongitudinalFit(fit._replace(values=values), driving_s, braking_s)
+
+
+_REACH_M = 25.0
+"""Roads keep their grade over such lengths; half of the fit's window."""
+_LEAST_M = 10.0
+_ENOUGH_STD = 0.005
+"""Half a per cent of grade is 0.05 m/s²: a thirtieth of ordinary braking."""
+
+
+def grade_from_altitude(record: MotionRecord) -> Array:
+    """Return rise over run (N,), a line through the altitudes within 25 m of way either side.
+
+    Raises ValueError where altitude is absent, zero throughout, or too noisy to tell half a per
+    cent of grade.
+    """
+    if not record.has("altitude_m") or not record.has("speed_mps"):
+        raise ValueError("the road's grade is unknown: no altitude was measured")
+    if not np.any(np.nan_to_num(record.altitude_m)):
+        raise ValueError("the road's grade is unknown: altitude is zero throughout, so not told")
+    period_s = float(record.time_s[1])
+    way_m = np.cumsum(np.abs(np.nan_to_num(record.speed_mps))) * period_s
+    known = np.isfinite(record.altitude_m)
+    spacing_m = 1.0
+    at = np.arange(way_m[0], way_m[-1] + spacing_m, spacing_m)
+    if len(at) < 2 * _LEAST_M:
+        raise ValueError(f"the road's grade is unknown: the car drove {len(at)} m only")
+    cell = np.clip(np.searchsorted(at, way_m[known]) - 1, 0, len(at) - 1)
+    weight = np.bincount(cell, minlength=len(at)).astype(np.float64)
+    height = np.bincount(cell, weights=record.altitude_m[known], minlength=len(at))
+    filled = np.interp(at, at[weight > 0.0], height[weight > 0.0] / weight[weight > 0.0])
+    reach = np.arange(-_REACH_M, _REACH_M + 1.0)
+    padded = np.pad(filled, int(_REACH_M), mode="reflect", reflect_type="odd")
+    square = float(np.sum(np.square(reach)))
+    slope = np.convolve(padded, -reach / square, mode="valid") / spacing_m
+    # Heights with the slope taken out of them scatter as the receiver does, from metre to metre.
+    rough = np.diff(filled - np.cumsum(slope) * spacing_m)
+    std = float(np.std(rough)) / np.sqrt(2.0 * square)
+    if std > _ENOUGH_STD:
+        raise ValueError(
+            f"the road's grade is unknown: altitude tells it to ± {196.0 * std:.1f} % only"
+        )
+    return np.asarray(np.interp(way_m, at, slope))

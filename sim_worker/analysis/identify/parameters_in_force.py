@@ -14,16 +14,15 @@ from foretwin.contracts.tuning import (
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.analysis.identify.acceptance import (
-    HALF_OF_95,
     MUCH_WIDER,
+    STIFFNESS,
     accepted,
     in_force,
     is_acceptable,
+    std_of,
 )
 from foretwin.sim_worker.vehicle.parameters import check_vehicle
 from foretwin.sim_worker.vehicle.plausible import check_plausible
-
-STIFFNESS = "front_cornering_stiffness_npr"
 
 
 class ParametersInForce:
@@ -42,14 +41,14 @@ class ParametersInForce:
     def _is_pinned(self, name: str) -> bool:
         return name in self.pinned or (name == UNDERSTEER_GRADIENT and STIFFNESS in self.pinned)
 
-    def take(self, told: Identification) -> tuple[ParameterChange, ...]:
-        """Let what `told` says count, save where it is pinned or known better; the changes."""
+    def take(self, result: Identification) -> tuple[ParameterChange, ...]:
+        """Let what `result` says count, save where it is pinned or known better; the changes."""
         better = [
             found
-            for found in told.estimates
+            for found in result.estimates
             if is_acceptable(found) and not self._is_pinned(found.name) and self._is_news(found)
         ]
-        chosen = msgspec.structs.replace(told, estimates=tuple(better))
+        chosen = msgspec.structs.replace(result, estimates=tuple(better))
         previous = self.vehicle
         self.vehicle, changes = accepted(chosen, self.vehicle)
         names = {change.name for change in changes}
@@ -67,9 +66,7 @@ class ParametersInForce:
     def set(self, name: str, value: float, *, stamp_ns: int) -> ParameterChange:
         """Set a parameter by hand and pin it; UserError for a name or value that is none."""
         self.check_set(name, value)
-        change = self._replace(name, Parameter(value, None, "set by hand"), "set", stamp_ns, True)
-        self.pinned.add(name)
-        return change
+        return self._replace(name, Parameter(value, None, "set by hand"), "set", stamp_ns)
 
     def check_set(self, name: str, value: float) -> None:
         """Raise UserError, in one line, where `set` would."""
@@ -96,9 +93,8 @@ class ParametersInForce:
         """Go back to the value before the last change, and pin it; UserError where none is."""
         self.check_rollback(name)
         earlier = self._before[name][-1]
-        change = self._replace(name, earlier, "rolled_back", stamp_ns, True)
+        change = self._replace(name, earlier, "rolled_back", stamp_ns)
         del self._before[name][-2:]
-        self.pinned.add(name)
         return change
 
     def check_rollback(self, name: str) -> None:
@@ -108,7 +104,7 @@ class ParametersInForce:
             raise UserError(f"{name} has not changed: there is nothing to roll back to")
 
     def _replace(
-        self, name: str, parameter: Parameter, origin: ParameterOrigin, stamp_ns: int, pinned: bool
+        self, name: str, parameter: Parameter, origin: ParameterOrigin, stamp_ns: int
     ) -> ParameterChange:
         before: Parameter = getattr(self.vehicle, name)
         try:
@@ -116,6 +112,7 @@ class ParametersInForce:
         except ValueError as error:
             raise UserError(str(error)) from error
         self._before.setdefault(name, []).append(before)
+        self.pinned.add(name)
         self._given = msgspec.structs.replace(self._given, **{name: parameter})
         self._taken.pop(UNDERSTEER_GRADIENT if name == STIFFNESS else name, None)
         return ParameterChange(
@@ -126,12 +123,5 @@ class ParametersInForce:
             value=parameter.value,
             std=parameter.std,
             origin=origin,
-            pinned=pinned,
+            pinned=True,
         )
-
-
-def std_of(found: ParameterEstimate) -> float:
-    """Return the standard deviation of an estimate that has a value."""
-    assert found.high is not None
-    assert found.low is not None
-    return (found.high - found.low) / (2.0 * HALF_OF_95)

@@ -10,15 +10,16 @@ from matplotlib.figure import Figure
 
 from foretwin.contracts.tuning import Identification
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.steering import GYRO_BIAS, fit_steering
+from foretwin.sim_worker.analysis.identify.steering import fit_steering
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
 _TAKEN, _LEFT = "#1f77b4", "#b0b0b0"
 
 
-def draw_estimates(told: Identification, file: Path) -> None:
+def draw_estimates(result: Identification, file: Path) -> None:
     """Write a PNG: each parameter's interval, blue where it is taken, and the value in force."""
-    shown = [found for found in told.estimates if found.value is not None]
+    shown = [found for found in result.estimates if found.value is not None]
     if not shown:
         return
     columns = min(4, len(shown))
@@ -52,7 +53,7 @@ def draw_steering(record: MotionRecord, vehicle: VehicleParameters, file: Path) 
     used = fit.signals.used
     time_s = record.time_s[used]
     values = fit.fit.values
-    measured = fit.signals.yaw_rate_radps[used] - values[GYRO_BIAS]
+    measured = fit.signals.yaw_rate_radps[used] - values[Theta.GYRO_BIAS]
     explained = measured - fit.signals.unexplained(values).yaw_rate_radps
     # A stop between two instants would else be drawn as a line.
     jumps = np.flatnonzero(np.diff(used) > 1) + 1

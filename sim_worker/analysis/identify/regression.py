@@ -10,6 +10,8 @@ bend tells has no other to vouch for it, and its interval says so.
 Leaving out is exact for residuals that last as long as a stretch, and exaggerates by a stretch's
 leverage where they do not; what is known to be brief is corrected by the root of it instead (CV2,
 Bell and McCaffrey, 2002).
+
+All signals of a regression pass one zero-phase filter, so that linear relations stay true.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+from scipy import ndimage, special
 
 from foretwin.contracts.arrays import Array
 
@@ -29,13 +31,12 @@ _GAUSSIAN_KURTOSIS = 3.0
 
 
 class Fit(NamedTuple):
-    """Estimates of K parameters: `values` (K,), `covariance` (K, K), and the residuals (N,)."""
+    """Estimates of K parameters: `values` (K,) and `covariance` (K, K)."""
 
     values: Array
     covariance: Array
     quantile: Array
     """Half the width of a 95 % interval, in standard deviations, for each parameter (K,)."""
-    residuals: Array
 
     def half_width(self, index: int) -> float:
         """Return half the 95 % interval of one parameter."""
@@ -114,7 +115,6 @@ def fit_linear(
         values=values * scale,
         covariance=np.asarray(spread * scale[:, None] * scale),
         quantile=np.asarray(special.stdtrit(freedom, 0.975)),
-        residuals=np.asarray(residuals),
     )
 
 
@@ -154,3 +154,32 @@ def _by_root(normal: Array, grams: Array, moments: Array) -> Array:
     weights = 1.0 / np.sqrt(np.maximum(1.0 - weights, 1e-6))
     turned = np.einsum("gji,gj->gi", axes, moments @ root.T) * weights
     return np.asarray(np.einsum("gij,gj->gi", axes, turned) @ root)
+
+
+def smoothed(values: Array, *, period_s: float, width_s: float, derivative: bool = False) -> Array:
+    """Blur (N,) by a Gaussian of standard deviation `width_s`, or differentiate what it gives.
+
+    NaN wherever a value within three widths is unknown, so that nothing invented enters.
+    """
+    sigma = width_s / period_s
+    known = np.isfinite(values)
+    filled = np.where(known, values, 0.0)
+    order = 1 if derivative else 0
+    result = ndimage.gaussian_filter1d(filled, sigma, order=order, mode="nearest", truncate=4.0)
+    if derivative:
+        result /= period_s
+    unknown = np.concatenate([[True], ~known, [True]])
+    near = ndimage.binary_dilation(unknown, iterations=max(1, round(3.0 * sigma)))[1:-1]
+    return np.asarray(np.where(near, np.nan, result))
+
+
+def smoothed_and_rate(values: Array, *, period_s: float, width_s: float) -> tuple[Array, Array]:
+    """Return what `smoothed` makes of (N,), and its derivative."""
+    plain = smoothed(values, period_s=period_s, width_s=width_s)
+    return plain, smoothed(values, period_s=period_s, width_s=width_s, derivative=True)
+
+
+def delayed(values: Array, *, period_s: float, delay_s: float) -> Array:
+    """Return what (N,) was `delay_s` ago, between instants linearly; NaN before the beginning."""
+    at = np.arange(len(values)) - delay_s / period_s
+    return np.asarray(np.interp(at, np.arange(len(values)), values, left=np.nan, right=np.nan))

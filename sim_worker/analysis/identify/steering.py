@@ -2,35 +2,30 @@
 
 The model is that of `steering_signals`; the gyro's bias is estimated along, from standstill most
 of all.
+
+The steering map is the steering wheel over the effective tyre angle, binned by speed.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.tuning import SteeringMapBin
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.regression import Fit, fit_linear
 from foretwin.sim_worker.analysis.identify.steering_signals import (
     ALIKE_S,
-    GYRO_BIAS,
-    INVERSE_RATIO,
-    LAG,
-    OFFSET,
-    PULL_BRAKED,
-    PULL_DRIVEN,
-    TURNING,
-    UNDERSTEER,
     SteeringSignals,
+    Theta,
     steering_signals,
 )
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient
-
-__all__ = ["GYRO_BIAS", "INVERSE_RATIO", "OFFSET", "UNDERSTEER", "SteeringFit", "fit_steering"]
 
 _WEAK = 3.0
 """Priors count with as many times their standard deviation: what the file says carries what the
@@ -66,8 +61,8 @@ class SteeringFit(NamedTuple):
 
     def ratio(self) -> tuple[float, float, float]:
         """Return value, low and high of the steering ratio."""
-        inverse = float(self.fit.values[INVERSE_RATIO])
-        half = float(self.half_widths[INVERSE_RATIO])
+        inverse = float(self.fit.values[Theta.INVERSE_RATIO])
+        half = float(self.half_widths[Theta.INVERSE_RATIO])
         size, sign = abs(inverse), math.copysign(1.0, inverse)
         # Errors in a regressor only ever flatten its slope.
         most = size / (1.0 - self.hidden_share) + half
@@ -108,17 +103,20 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     signals = steering_signals(record, vehicle)
     used, per_m = signals.used, signals.per_m
     inverse = 1.0 / vehicle.steering_ratio.value
-    centre = np.array(
-        [inverse, vehicle.steering_offset_rad.value, understeer_gradient(vehicle),
-         turning_s2(vehicle), signals.gyro_bias_radps, 0.0, 0.0, 0.0]
-    )  # fmt: skip
-    spread = np.array(
-        [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, _WEAK * understeer_std(vehicle),
-         turning_s2(vehicle), min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS),
-         _LAG_STD_S * inverse,
-         _PULL_STD_RAD_PER_MPS2, _PULL_STD_RAD_PER_MPS2]
-    )  # fmt: skip
-    gaining = signals.given[PULL_DRIVEN, used] + signals.given[PULL_BRAKED, used]
+    turning = turning_s2(vehicle)
+    bias_std = min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS)
+    priors = {
+        Theta.INVERSE_RATIO: (inverse, _inverse_ratio_std(vehicle)),
+        Theta.OFFSET: (vehicle.steering_offset_rad.value, _OFFSET_STD_RAD),
+        Theta.UNDERSTEER: (understeer_gradient(vehicle), _WEAK * understeer_std(vehicle)),
+        Theta.TURNING: (turning, turning),
+        Theta.GYRO_BIAS: (signals.gyro_bias_radps, bias_std),
+        Theta.LAG: (0.0, _LAG_STD_S * inverse),
+        Theta.PULL_DRIVEN: (0.0, _PULL_STD_RAD_PER_MPS2),
+        Theta.PULL_BRAKED: (0.0, _PULL_STD_RAD_PER_MPS2),
+    }
+    centre, spread = np.array([priors[index] for index in Theta]).T.copy()
+    gaining = signals.given[Theta.PULL_DRIVEN, used] + signals.given[Theta.PULL_BRAKED, used]
     weights = 1.0 / np.hypot(1.0, signals.speed_mps[used] / _ANGLES_BELOW_MPS)
     weights /= np.hypot(1.0, gaining / _ROLLING_MPS2)
     # Play lasts: instants within the reach of the smoothing share it.
@@ -128,9 +126,15 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
 
     def fitted(values: Array, *, least_std: float, brief: bool) -> Fit:
         apart, slopes = signals.unexplained(values)
-        return fit_linear((slopes * weights).T, (apart + values @ slopes) * weights,
-                          record.time_s[used], prior=centre, prior_std=spread,
-                          least_std=least_std, brief=brief)  # fmt: skip
+        return fit_linear(
+            (slopes * weights).T,
+            (apart + values @ slopes) * weights,
+            record.time_s[used],
+            prior=centre,
+            prior_std=spread,
+            least_std=least_std,
+            brief=brief,
+        )
 
     values = centre
     for _ in range(4):
@@ -143,23 +147,26 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     # other speeds differ: few, each of which errs in its own way.
     brief = fitted(values, least_std=of_bends, brief=True)
     half_widths = brief.half_widths()
-    half_widths[UNDERSTEER] = fit.half_width(UNDERSTEER)
+    half_widths[Theta.UNDERSTEER] = fit.half_width(Theta.UNDERSTEER)
     # The straights tell the offset, where tyres have nothing to be unexplained.
     straight = fitted(values, least_std=play, brief=True)
-    values[OFFSET], half_widths[OFFSET] = straight.values[OFFSET], straight.half_width(OFFSET)
+    values[Theta.OFFSET], half_widths[Theta.OFFSET] = (
+        straight.values[Theta.OFFSET],
+        straight.half_width(Theta.OFFSET),
+    )
     # What is measured is wheelbase over ratio: the doubt of the first is the second's too.
     base = vehicle.wheelbase_m
-    doubt = values[INVERSE_RATIO] * (base.std or 0.0) / base.value
-    half_widths[INVERSE_RATIO] = math.hypot(
-        half_widths[INVERSE_RATIO], brief.quantile[INVERSE_RATIO] * doubt
+    doubt = values[Theta.INVERSE_RATIO] * (base.std or 0.0) / base.value
+    half_widths[Theta.INVERSE_RATIO] = math.hypot(
+        half_widths[Theta.INVERSE_RATIO], brief.quantile[Theta.INVERSE_RATIO] * doubt
     )
     covariance = fit.covariance.copy()
     # How readily the car turns in, and when, every bend's beginning tells, whatever its radius.
-    for index in (TURNING, LAG):
+    for index in (Theta.TURNING, Theta.LAG):
         narrower = math.sqrt(min(straight.covariance[index, index] / covariance[index, index], 1.0))
         covariance[index] *= narrower
         covariance[:, index] *= narrower
-    covariance[INVERSE_RATIO, INVERSE_RATIO] += doubt**2
+    covariance[Theta.INVERSE_RATIO, Theta.INVERSE_RATIO] += doubt**2
     varied = float(np.var(signals.wheel_rad[used] * per_m * weights)) / angles
     return SteeringFit(
         fit=fit._replace(covariance=covariance),
@@ -167,3 +174,45 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
         half_widths=half_widths,
         hidden_share=min(PLAY_RAD**2 / (varied + 1e-12), 0.9),
     )
+
+
+EDGES_MPS = (2.0, 5.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0)
+_LEAST_TYRE_RAD = 0.01
+_LEAST_S, _ALIKE_S = 2.0, 0.5
+
+
+def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin, ...]:
+    """Return the ratio in each range of speeds with 2 s of turning at least.
+
+    A ratio that falls with speed in spite of the fitted understeer tells of variable-ratio
+    steering; `fit` is that of the same `record`.
+    """
+    period_s = float(record.time_s[1])
+    signals, values = fit.signals, fit.fit.values
+    at = signals.used
+    speed, wheel = signals.speed_mps[at], signals.late_wheel_rad(values)[at]
+    tyre = signals.steered_rad(values)[at]
+    bins = []
+    for low, high in itertools.pairwise(EDGES_MPS):
+        inside = (speed >= low) & (speed < high) & (np.abs(tyre) > _LEAST_TYRE_RAD)
+        if inside.sum() * period_s < _LEAST_S:
+            continue
+        time_s = record.time_s[at][inside]
+        try:
+            line = fit_linear(wheel[inside][:, None], tyre[inside], time_s, length_s=_ALIKE_S)
+        except ValueError:
+            continue
+        inverse, half = float(line.values[0]), line.half_width(0)
+        if inverse <= half:
+            continue
+        bins.append(
+            SteeringMapBin(
+                from_mps=low,
+                to_mps=high,
+                ratio=1.0 / inverse,
+                low=1.0 / (inverse + half),
+                high=1.0 / (inverse - half),
+                samples=int(inside.sum()),
+            )
+        )
+    return tuple(bins)

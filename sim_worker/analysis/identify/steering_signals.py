@@ -8,32 +8,41 @@ with steering wheel w, ratio i, offset δ0 at the tyre, understeer gradient K (G
 6-15), T = I_z/L (1/C_f + 1/C_r) for what the tyres need to turn the body, τ by which the tyres (or
 the gyro's samples) come after the steering wheel, and p± by which the car pulls to a side when it
 is driven or braked.
+
+Sideways acceleration is v r only as long as the car does not begin or end to slide sideways: on the
+way into a bend it differs by a tenth. Slips follow from the forces that the axles must bear, and
+those from the acceleration, so that two rounds are enough (Gillespie 1992, chapter 6).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.single_track import SLOWEST_MPS, sideways
-from foretwin.sim_worker.analysis.identify.smoothing import smoothed
+from foretwin.sim_worker.analysis.identify.regression import smoothed_and_rate
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
-Indices = np.ndarray[Any, np.dtype[np.int64]]
 WIDTH_S = 0.1
 ALIKE_S = 2.0 * math.sqrt(math.pi) * WIDTH_S
 """For so long, smoothed white noise says one thing only."""
+SLOWEST_MPS = 2.0
+"""Below it, slips are lost in noise."""
 _LEAST_STOOD = 4.0
 _MAX_LATERAL_MPS2 = 4.0
 """Beyond it, tyres are no longer linear."""
 _LEAST_FEED = 0.2
 """Of 1 + K v²/L, which is zero at the speed where an oversteering car loses its stability."""
-INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING, GYRO_BIAS, LAG, PULL_DRIVEN, PULL_BRAKED = range(8)
-"""The parameters θ: 1/i, δ0, K, T, the gyro's bias, τ/i, p⁺, p⁻."""
+
+
+class Theta(IntEnum):
+    """The parameters θ: 1/i, δ0, K, T, the gyro's bias, τ/i, p⁺, p⁻."""
+
+    INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING, GYRO_BIAS, LAG, PULL_DRIVEN, PULL_BRAKED = range(8)
 
 
 class Unexplained(NamedTuple):
@@ -70,25 +79,29 @@ class SteeringSignals(NamedTuple):
         front = np.clip(values @ asked - slip, -1.2, 1.2)
         slope = per_m * (1.0 + np.square(np.tan(front)))
         # Measured yaw rate stands on both sides: solved for, its noise no longer weighs K.
-        feeds = np.maximum(1.0 + slope * values[UNDERSTEER] * speed, _LEAST_FEED)
-        apart = self.yaw_rate_radps[used] - per_m * (np.tan(front) + slip) - values[GYRO_BIAS]
+        feeds = np.maximum(1.0 + slope * values[Theta.UNDERSTEER] * speed, _LEAST_FEED)
+        apart = self.yaw_rate_radps[used] - per_m * (np.tan(front) + slip) - values[Theta.GYRO_BIAS]
         apart /= feeds
         slopes = asked * slope
-        slopes[UNDERSTEER] += slope * speed * apart
-        slopes[GYRO_BIAS] = 1.0
+        slopes[Theta.UNDERSTEER] += slope * speed * apart
+        slopes[Theta.GYRO_BIAS] = 1.0
         return Unexplained(apart, slopes / feeds)
 
     def steered_rad(self, values: Array) -> Array:
         """Return the tyre angle (N,) that the motion asks the steering wheel for."""
-        turned = self.wheelbase_m * (self.yaw_rate_radps - values[GYRO_BIAS])
+        turned = self.wheelbase_m * (self.yaw_rate_radps - values[Theta.GYRO_BIAS])
         turned /= np.maximum(self.speed_mps, SLOWEST_MPS)
         tyre = np.arctan(turned - self.rear_slip_rad) + self.rear_slip_rad
-        by_wheel = values[INVERSE_RATIO] * self.wheel_rad - values[LAG] * self.wheel_radps
+        by_wheel = (
+            values[Theta.INVERSE_RATIO] * self.wheel_rad - values[Theta.LAG] * self.wheel_radps
+        )
         return np.asarray(tyre - (values @ self.given - by_wheel))
 
     def late_wheel_rad(self, values: Array) -> Array:
         """Return the steering wheel (N,) as the tyres follow it, τ before."""
-        return np.asarray(self.wheel_rad - values[LAG] / values[INVERSE_RATIO] * self.wheel_radps)
+        return np.asarray(
+            self.wheel_rad - values[Theta.LAG] / values[Theta.INVERSE_RATIO] * self.wheel_radps
+        )
 
 
 def _mean(values: Array, *, alike: float) -> tuple[float, float]:
@@ -110,16 +123,11 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
             raise ValueError(f"no {told} was measured for half of the time")
     period_s = float(record.time_s[1])
 
-    def smooth(values: Array, *, derivative: bool = False) -> Array:
-        return smoothed(values, period_s=period_s, width_s=WIDTH_S, derivative=derivative)
-
-    speed, rate, wheel = map(smooth, (record.speed_mps, record.yaw_rate_radps, record.wheel_rad))
-    gaining, turning, steering = (
-        smooth(values, derivative=True)
-        for values in (record.speed_mps, record.yaw_rate_radps, record.wheel_rad)
+    (speed, gaining), (rate, turning), (wheel, steering) = (
+        smoothed_and_rate(getattr(record, name), period_s=period_s, width_s=WIDTH_S)
+        for name in ("speed_mps", "yaw_rate_radps", "wheel_rad")
     )
-    side = sideways(vehicle, speed_mps=speed, yaw_rate_radps=rate, yaw_accel_radps2=turning,
-                    period_s=period_s)  # fmt: skip
+    side = sideways(vehicle, speed, rate, turning, period_s=period_s)
     known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
     moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
     if not moving.any():
@@ -127,6 +135,16 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
     used = np.flatnonzero(moving)
     base = vehicle.wheelbase_m.value
     standing = np.isfinite(rate) & (np.abs(speed) < 1e-3)
+    given = {
+        Theta.INVERSE_RATIO: wheel,
+        Theta.OFFSET: np.ones_like(wheel),
+        Theta.UNDERSTEER: -side.accel_mps2,
+        Theta.TURNING: -turning,
+        Theta.GYRO_BIAS: np.zeros_like(wheel),
+        Theta.LAG: -steering,
+        Theta.PULL_DRIVEN: np.maximum(gaining, 0.0),
+        Theta.PULL_BRAKED: np.minimum(gaining, 0.0),
+    }
     bias, bias_std = _mean(rate[standing], alike=ALIKE_S / period_s)
     return SteeringSignals(
         time_s=record.time_s,
@@ -137,12 +155,41 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         wheel_radps=steering,
         rear_slip_rad=side.rear_slip_rad,
         lateral_mps2=side.accel_mps2,
-        given=np.stack(
-            [wheel, np.ones_like(wheel), -side.accel_mps2, -turning, np.zeros_like(wheel),
-             -steering, np.maximum(gaining, 0.0), np.minimum(gaining, 0.0)]
-        ),
+        given=np.stack([given[parameter] for parameter in Theta]),
         per_m=speed[used] / base,
         wheelbase_m=base,
         gyro_bias_radps=bias,
         gyro_bias_std_radps=bias_std,
-    )  # fmt: skip
+    )
+
+
+class Sideways(NamedTuple):
+    """A car's sideways motion at N instants, of its centre of gravity, positive to the left."""
+
+    accel_mps2: Array
+    speed_mps: Array
+    rear_slip_rad: Array
+    front_mps2: Array
+    """The front axle's force over the car's mass."""
+
+
+def sideways(
+    vehicle: VehicleParameters,
+    speed_mps: Array,
+    yaw_rate_radps: Array,
+    yaw_accel_radps2: Array,
+    *,
+    period_s: float,
+) -> Sideways:
+    """Return the sideways motion (N,) of the file's car that turns so; NaN where that is NaN."""
+    base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
+    mass, stiffness = vehicle.mass_kg.value, vehicle.rear_cornering_stiffness_npr.value
+    fast = np.maximum(speed_mps, SLOWEST_MPS)
+    turning = vehicle.yaw_inertia_kgm2.value / mass * yaw_accel_radps2
+    accel = speed_mps * yaw_rate_radps
+    slip = speed = np.zeros_like(accel)
+    for _ in range(2):
+        slip = ((base - rear) * accel - turning) / base * mass / stiffness
+        speed = rear * yaw_rate_radps - fast * slip
+        accel = speed_mps * yaw_rate_radps + np.gradient(speed, period_s)
+    return Sideways(accel, speed, slip, (rear * accel + turning) / base)

@@ -14,13 +14,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.identify.acceptance import MUCH_WIDER
 from foretwin.sim_worker.analysis.identify.steering import PLAY_RAD, SteeringFit
-from foretwin.sim_worker.analysis.identify.steering_signals import (
-    INVERSE_RATIO,
-    OFFSET,
-    TURNING,
-    UNDERSTEER,
-    SteeringSignals,
-)
+from foretwin.sim_worker.analysis.identify.steering_signals import SteeringSignals, Theta
 
 STRETCH_S, _LEAST_TURNING_S = 2.0, 1.0
 _LEAST_STRETCHES = 4
@@ -33,7 +27,7 @@ _TELLS = 1.0 / 5.0
 """A stretch tells how readily the car turns in if it leaves no more of that open than this."""
 TURNING_MPS2 = 0.5
 """Sideways acceleration from which the car counts as turning."""
-_CANDIDATES = (INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING)
+_CANDIDATES = (Theta.INVERSE_RATIO, Theta.OFFSET, Theta.UNDERSTEER, Theta.TURNING)
 
 
 class BendsBefore(NamedTuple):
@@ -50,8 +44,8 @@ class BendsBefore(NamedTuple):
     def knows_less(self, other: BendsBefore) -> bool:
         """Return whether it leaves much more open of the understeer gradient than another."""
         mine, known = (
-            self.covariance[UNDERSTEER, UNDERSTEER],
-            other.covariance[UNDERSTEER, UNDERSTEER],
+            self.covariance[Theta.UNDERSTEER, Theta.UNDERSTEER],
+            other.covariance[Theta.UNDERSTEER, Theta.UNDERSTEER],
         )
         return bool(mine > (MUCH_WIDER**2) * known)
 
@@ -59,7 +53,7 @@ class BendsBefore(NamedTuple):
 class Step(NamedTuple):
     """Which parameter departed, from what to about what."""
 
-    parameter: int
+    parameter: Theta
     before: float
     after: float
     sure: bool
@@ -88,9 +82,9 @@ def _stretches(signals: SteeringSignals, values: Array) -> _Stretches:
     period_s = float(signals.time_s[1])
     turns = np.abs(signals.lateral_mps2[signals.used]) > TURNING_MPS2
     number = np.floor(time_s / STRETCH_S).astype(np.int64)
-    told = np.bincount(number, weights=turns) * period_s >= _LEAST_TURNING_S
+    bends = np.bincount(number, weights=turns) * period_s >= _LEAST_TURNING_S
     begins, moments, grams = [], [], []
-    for index in np.flatnonzero(told):
+    for index in np.flatnonzero(bends):
         inside = turns & (number == index)
         begins.append(index * STRETCH_S)
         moments.append(slopes[:, inside] @ apart[inside])
@@ -104,60 +98,62 @@ def _stretches(signals: SteeringSignals, values: Array) -> _Stretches:
 
 def bends_before(fit: SteeringFit) -> BendsBefore | None:
     """Return how the bends that were fitted scatter; None where they are too few to tell."""
-    told = _stretches(fit.signals, fit.fit.values)
-    if len(told.begin_s) < _LEAST_STRETCHES:
+    bends = _stretches(fit.signals, fit.fit.values)
+    if len(bends.begin_s) < _LEAST_STRETCHES:
         return None
-    noise = np.sqrt(np.sum(told.explained(), axis=0) / (len(told.begin_s) - 1))
+    noise = np.sqrt(np.sum(bends.explained(), axis=0) / (len(bends.begin_s) - 1))
     return BendsBefore(fit.fit.values, fit.fit.covariance, noise)
 
 
 def find_step(signals: SteeringSignals, before: BendsBefore) -> Step | None:
     """Return the step that the newest stretch of bends, or the newest two, tell of, if any."""
-    told = _stretches(signals, before.values)
-    stds = _stds(told, before)
-    sides = told.departures / stds
-    newest = np.arange(len(told.begin_s))
+    bends = _stretches(signals, before.values)
+    stds = _stds(bends, before)
+    sides = bends.departures / stds
+    newest = np.arange(len(bends.begin_s))
     for count in (2, 1):
         departed = np.all(np.abs(sides[-count:]) > _STDS, axis=0)
         departed &= np.abs(np.sum(np.sign(sides[-count:]), axis=0)) == count
-        if len(newest) >= count and (found := _step(told, before, newest[-count:], departed)):
+        if len(newest) >= count and (found := _step(bends, before, newest[-count:], departed)):
             return found
-        if found := _softened(told, before, stds, count):
+        if found := _softened(bends, before, stds, count):
             return found
     return None
 
 
-def _stds(told: _Stretches, before: BendsBefore) -> Array:
+def _stds(bends: _Stretches, before: BendsBefore) -> Array:
     """Return how far each departure may be from zero without a step (M, 8)."""
-    open_std = np.sqrt(np.einsum("mji,ik,mjk->mj", told.slopes, before.covariance, told.slopes))
+    open_std = np.sqrt(np.einsum("mji,ik,mjk->mj", bends.slopes, before.covariance, bends.slopes))
     # However alike bends were: the tyres need not stand as the steering wheel says.
-    play_std = np.abs(told.slopes[:, :, OFFSET] * (PLAY_RAD * before.values[INVERSE_RATIO]))
-    noise_std = before.noise / np.sqrt(told.squares)
+    play_std = np.abs(
+        bends.slopes[:, :, Theta.OFFSET] * (PLAY_RAD * before.values[Theta.INVERSE_RATIO])
+    )
+    noise_std = before.noise / np.sqrt(bends.squares)
     return np.asarray(np.hypot(np.hypot(noise_std, open_std), play_std))
 
 
-def _softened(told: _Stretches, before: BendsBefore, stds: Array, count: int) -> Step | None:
+def _softened(bends: _Stretches, before: BendsBefore, stds: Array, count: int) -> Step | None:
     """Return the step in how readily the car turns in that the newest two that tell speak of.
 
     With `count` 1, that either of them speaks of.
     """
-    tells = np.flatnonzero(stds[:, TURNING] < _TELLS * before.values[TURNING])[-2:]
-    sides = told.departures[tells, TURNING] / stds[tells, TURNING]
+    tells = np.flatnonzero(stds[:, Theta.TURNING] < _TELLS * before.values[Theta.TURNING])[-2:]
+    sides = bends.departures[tells, Theta.TURNING] / stds[tells, Theta.TURNING]
     if count == 1:
         tells, sides = tells[np.abs(sides) > _STDS][-1:], sides[np.abs(sides) > _STDS][-1:]
     elif np.any(np.abs(sides) < _SEEN_STDS) or abs(float(sides.sum())) < 2.0**0.5 * _TOGETHER_STDS:
         return None
     if len(tells) < count:
         return None
-    found = _step(told, before, tells, np.ones(len(before.values), dtype=np.bool_))
-    return found if found is not None and found.parameter == TURNING else None
+    found = _step(bends, before, tells, np.ones(len(before.values), dtype=np.bool_))
+    return found if found is not None and found.parameter == Theta.TURNING else None
 
 
 def _step(
-    told: _Stretches, before: BendsBefore, which: np.ndarray, departed: np.ndarray
+    bends: _Stretches, before: BendsBefore, which: np.ndarray, departed: np.ndarray
 ) -> Step | None:
     """Return the step of the parameter that explains most, of those that `departed` (8,)."""
-    explained = np.sum(told.explained()[which], axis=0)
+    explained = np.sum(bends.explained()[which], axis=0)
     candidates = [index for index in _CANDIDATES if departed[index]]
     if not candidates:
         return None
@@ -166,7 +162,7 @@ def _step(
     return Step(
         parameter=most,
         before=value,
-        after=value + float(np.mean(told.departures[which, most])),
+        after=value + float(np.mean(bends.departures[which, most])),
         sure=len(which) > 1,
-        after_s=float(told.begin_s[which[0]]) + STRETCH_S,
+        after_s=float(bends.begin_s[which[0]]) + STRETCH_S,
     )

@@ -10,7 +10,6 @@ from typing import Any
 
 import msgspec
 
-from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.tuning import (
     UNDERSTEER_GRADIENT,
@@ -19,18 +18,14 @@ from foretwin.contracts.tuning import (
     ParameterOrigin,
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
-from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable
-from foretwin.sim_worker.analysis.identify.parameters_in_force import (
+from foretwin.sim_worker.analysis.identify.acceptance import (
     STIFFNESS,
-    ParametersInForce,
+    is_acceptable,
     std_of,
+    with_priors,
 )
-from foretwin.sim_worker.analysis.identify.steering_signals import (
-    INVERSE_RATIO,
-    OFFSET,
-    UNDERSTEER,
-    steering_signals,
-)
+from foretwin.sim_worker.analysis.identify.parameters_in_force import ParametersInForce
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta, steering_signals
 from foretwin.sim_worker.analysis.identify.step import BendsBefore, Step, bends_before, find_step
 from foretwin.sim_worker.analysis.identify.window import examine
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
@@ -58,31 +53,21 @@ class Tuner(ParametersInForce):
         *,
         vehicle: VehicleParameters,
         vehicle_id: str,
-        frame: LocalFrame | None = None,
+        frame: LocalFrame,
         window_s: float = 60.0,
         every_s: float = 10.0,
     ) -> None:
-        """Without a `frame`, samples count from the first position on, around which it is laid."""
         super().__init__(vehicle=vehicle, vehicle_id=vehicle_id)
         self._window_ns, self._every_ns = round(window_s * 1e9), round(every_s * 1e9)
-        self._recorder: MotionRecorder | None = None
-        if frame is not None:
-            self._recorder = self._new_recorder(frame)
+        self._recorder = MotionRecorder(frame=frame, keep_s=window_s + 5.0)
         self._from_ns: int | None = None
         self._due_ns = self._check_ns = self._begun_ns = 0
         self._doubted = False
         self._bends: BendsBefore | None = None
         self._known: BendsBefore | None = None
 
-    def _new_recorder(self, frame: LocalFrame) -> MotionRecorder:
-        return MotionRecorder(frame=frame, keep_s=self._window_ns * 1e-9 + 5.0)
-
     def handle(self, channel: str, message: Any) -> Identification | None:
         """Take one sample; return what the window tells where one is due, else None."""
-        if self._recorder is None:
-            if not isinstance(message, GnssFix):
-                return None
-            self._recorder = self._new_recorder(LocalFrame(message.position))
         self._recorder.handle(channel, message)
         newest_ns = self._recorder.newest_stamp_ns
         if newest_ns is None:
@@ -101,28 +86,21 @@ class Tuner(ParametersInForce):
             return None
         self._due_ns = newest_ns + self._every_ns
         self._from_ns = max(self._from_ns, newest_ns - self._window_ns)
-        told = self._examined(newest_ns)
-        noticed = self._steps(told)
+        result = self._examined(newest_ns)
+        noticed = self._steps(result)
         if not noticed:
-            return told
+            return result
         # What came before the step is of another car.
-        return self._anew(told, noticed, since_ns=newest_ns - self._every_ns)
+        return self._anew(result, noticed, since_ns=newest_ns - self._every_ns)
 
     def _examined(self, newest_ns: int) -> Identification:
-        assert self._recorder is not None
         record = self._recorder.record(self._from_ns, newest_ns, period_s=_PERIOD_S)
-        told, steering = examine(record, self._given, vehicle_id=self._vehicle_id)
+        result, steering = examine(record, self._given, vehicle_id=self._vehicle_id)
         self._bends = None if steering is None else bends_before(steering)
-        return msgspec.structs.replace(
-            told,
-            estimates=tuple(
-                msgspec.structs.replace(found, prior=in_force(self.vehicle, found.name))
-                for found in told.estimates
-            ),
-        )
+        return with_priors(result, self.vehicle)
 
     def _find_step(self, newest_ns: int) -> Step | None:
-        if self._known is None or self._recorder is None or self._from_ns is None:
+        if self._known is None or self._from_ns is None:
             return None
         self._begun_ns = max(self._from_ns, newest_ns - _LOOK_BACK_NS)
         record = self._recorder.record(self._begun_ns, newest_ns, period_s=_PERIOD_S)
@@ -139,7 +117,7 @@ class Tuner(ParametersInForce):
         return self._anew(self._examined(newest_ns), _in_words(step), since_ns=self._from_ns)
 
     def _anew(
-        self, told: Identification, noticed: dict[str, str], *, since_ns: int
+        self, result: Identification, noticed: dict[str, str], *, since_ns: int
     ) -> Identification:
         self._from_ns = since_ns
         self._due_ns = since_ns + round(_LEAST_S * 1e9)
@@ -151,19 +129,19 @@ class Tuner(ParametersInForce):
         for name in names:
             self._taken.pop(name, None)
         return msgspec.structs.replace(
-            told,
+            result,
             estimates=tuple(
                 msgspec.structs.replace(found, reason="it has just changed: more driving is needed")
                 if found.name in names
                 else found
-                for found in told.estimates
+                for found in result.estimates
             ),
             step_noticed="; ".join(noticed.values()),
         )
 
-    def _steps(self, told: Identification) -> dict[str, str]:
+    def _steps(self, result: Identification) -> dict[str, str]:
         noticed = {}
-        for found in told.estimates:
+        for found in result.estimates:
             before = self._taken.get(found.name)
             if before is None or not is_acceptable(found) or self._is_pinned(found.name):
                 continue
@@ -176,9 +154,9 @@ class Tuner(ParametersInForce):
                 )
         return noticed
 
-    def take(self, told: Identification) -> tuple[ParameterChange, ...]:
-        """Let what `told` says count; later bends are compared with those that it is of."""
-        changes = super().take(told)
+    def take(self, result: Identification) -> tuple[ParameterChange, ...]:
+        """Let what `result` says count; later bends are compared with those that it is of."""
+        changes = super().take(result)
         bends, known = self._bends, self._known
         steered = any(change.name in _STEERING or change.name == STIFFNESS for change in changes)
         if steered and bends is not None and (known is None or not bends.knows_less(known)):
@@ -186,25 +164,30 @@ class Tuner(ParametersInForce):
         return changes
 
     def _replace(
-        self, name: str, parameter: Parameter, origin: ParameterOrigin, stamp_ns: int, pinned: bool
+        self, name: str, parameter: Parameter, origin: ParameterOrigin, stamp_ns: int
     ) -> ParameterChange:
-        change = super()._replace(name, parameter, origin, stamp_ns, pinned)
+        change = super()._replace(name, parameter, origin, stamp_ns)
         # Bends were told by a car of other given parameters.
         self._known = None
         return change
 
 
+_NAMES = {
+    Theta.INVERSE_RATIO: "steering_ratio",
+    Theta.OFFSET: "steering_offset_rad",
+    Theta.UNDERSTEER: UNDERSTEER_GRADIENT,
+}
+
+
 def _in_words(step: Step) -> dict[str, str]:
     """Return by name what a step changed, in words."""
     before, after = step.before, step.after
-    if step.parameter == INVERSE_RATIO:
-        return {
-            "steering_ratio": f"steering_ratio went from {1 / before:.4g} to about {1 / after:.4g}"
-        }
-    name = {OFFSET: "steering_offset_rad", UNDERSTEER: UNDERSTEER_GRADIENT}.get(step.parameter)
-    if name is None:
+    if step.parameter not in _NAMES:
         return {
             UNDERSTEER_GRADIENT: "the tyres' stiffness: the tyre angle that turning needs went "
             f"from {before:.4g} to about {after:.4g} rad per rad/s²"
         }
+    if step.parameter == Theta.INVERSE_RATIO:
+        before, after = 1 / before, 1 / after
+    name = _NAMES[step.parameter]
     return {name: f"{name} went from {before:.4g} to about {after:.4g}"}

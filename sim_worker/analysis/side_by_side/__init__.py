@@ -1,1 +1,1 @@
-"""What the driving software planned beside what the human who drove did instead."""
+"""What the driving software planned beside what the human driver did instead."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 from typing import NamedTuple
 
@@ -38,12 +38,8 @@ class Limits:
 
     def lowered(self) -> Limits:
         """Return the limits below which a disagreement is over."""
-        return Limits(
-            beside_m=self.release * self.beside_m, lane_m=self.lane_m,
-            turn_rad=self.turn_rad, along_m=self.release * self.along_m,
-            speed_mps=self.release * self.speed_mps, stands_mps=self.stands_mps,
-            goes_mps=self.release * self.goes_mps, release=self.release,
-        )  # fmt: skip
+        eased = ("beside_m", "along_m", "speed_mps", "goes_mps")
+        return replace(self, **{name: self.release * getattr(self, name) for name in eased})
 
 
 class Departure(NamedTuple):
@@ -103,7 +99,7 @@ def pace_kind(found: Departure, limits: Limits) -> DisagreementKind | None:
 def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
     """Return the greatest offset and angle of the planned way from the driven, as far as both go.
 
-    Ways, not instants: who stops on a lane's middle departs in pace, not in way.
+    Ways, not instants: a stop on a lane's middle departs in pace, not in way.
     """
     moved = _moved(driven)
     if len(moved) < 2 or len(_moved(planned)) < 2:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 from msgspec.structs import replace
@@ -19,13 +19,11 @@ BEGIN_NS = 400_000_000
 """Plans must be departed from for so long: one alone is a whim."""
 END_NS = 1_000_000_000
 """A disagreement is over once plans have been followed, or been missing, for so long."""
-_GRAVEST: tuple[DisagreementKind, ...] = (
-    "ads_turns_elsewhere", "ads_in_another_lane", "ads_beside",
-    "ads_stops", "human_stops", "ads_faster", "ads_slower",
-)  # fmt: skip
+_GRAVEST: tuple[DisagreementKind, ...] = get_args(DisagreementKind)
+_FIGURES = ("lateral_m", "along_m", "speed_mps")
 
 
-class Place(NamedTuple):
+class DrivePlace(NamedTuple):
     """Where the car was: `junction_id` it was at or had before it, `route_m` along its route."""
 
     position: GeoPoint
@@ -39,18 +37,18 @@ class Waiting(NamedTuple):
     stamp_ns: int
     stamps_ns: Array
     planned: Array
-    place: Place
+    place: DrivePlace
 
 
 @dataclass(slots=True)
-class Course:
+class AspectWatch:
     """One aspect of a segment: whether human and ADS disagree, with hysteresis."""
 
     vehicle_id: str
     segment: int
     aspect: Aspect
     _now: Disagreement | None = None
-    _told: bool = False
+    _reported: bool = False
     _last_over_ns: int = 0
 
     def take(
@@ -59,52 +57,51 @@ class Course:
         kind: DisagreementKind | None,
         within: bool,
         found: Departure,
-        place: Place,
+        place: DrivePlace,
     ) -> list[Disagreement]:
         """Take one compared plan; `within` says that it lies below the lowered limits, too."""
         ended = []
         if self._now is not None and stamp_ns - self._last_over_ns > END_NS:
             ended = self.finish()
         if kind is None and (self._now is None or within):
-            if self._now is not None and not self._told:
+            if self._now is not None and not self._reported:
                 self._now = None  # departed from for too short a time
             return ended
         self._last_over_ns = stamp_ns
         self._now = self._joined(stamp_ns, kind, found, place)
-        if not self._told and stamp_ns - self._now.stamp_ns >= BEGIN_NS:
-            self._told = True
+        if not self._reported and stamp_ns - self._now.stamp_ns >= BEGIN_NS:
+            self._reported = True
             return [*ended, self._now]
         return ended
 
     def finish(self) -> list[Disagreement]:
-        """End what lasts; return it if it was told of."""
-        now, told = self._now, self._told
-        self._now, self._told = None, False
-        if now is None or not told:
+        """End what lasts; return it if it was reported."""
+        now, reported = self._now, self._reported
+        self._now, self._reported = None, False
+        if now is None or not reported:
             return []
         return [replace(now, over=True)]
 
     def _joined(
-        self, stamp_ns: int, kind: DisagreementKind | None, found: Departure, place: Place
+        self, stamp_ns: int, kind: DisagreementKind | None, found: Departure, place: DrivePlace
     ) -> Disagreement:
-        old = self._now
+        old, figures = self._now, {name: getattr(found, name) for name in _FIGURES}
         if old is None:
             assert kind is not None
             return Disagreement(
-                vehicle_id=self.vehicle_id, segment=self.segment, aspect=self.aspect, kind=kind,
-                stamp_ns=stamp_ns, end_stamp_ns=stamp_ns, over=False, position=place.position,
-                junction_id=place.junction_id, route_m=place.route_m, lateral_m=found.lateral_m,
-                along_m=found.along_m, speed_mps=found.speed_mps,
-            )  # fmt: skip
+                vehicle_id=self.vehicle_id,
+                segment=self.segment,
+                aspect=self.aspect,
+                kind=kind,
+                stamp_ns=stamp_ns,
+                end_stamp_ns=stamp_ns,
+                over=False,
+                **place._asdict(),
+                **figures,
+            )
         graver = kind is not None and _GRAVEST.index(kind) < _GRAVEST.index(old.kind)
-        return replace(
-            old,
-            kind=kind if graver else old.kind,
-            end_stamp_ns=stamp_ns,
-            lateral_m=max(old.lateral_m, found.lateral_m, key=abs),
-            along_m=max(old.along_m, found.along_m, key=abs),
-            speed_mps=max(old.speed_mps, found.speed_mps, key=abs),
-        )
+        farthest = {name: max(getattr(old, name), here, key=abs) for name, here in figures.items()}
+        return replace(old, kind=kind if graver else old.kind, end_stamp_ns=stamp_ns, **farthest)
 
 
 @dataclass(slots=True)
@@ -114,7 +111,7 @@ class Segment:
     number: int
     mode: ControlMode
     from_ns: int
-    courses: tuple[Course, Course]
+    aspects: tuple[AspectWatch, AspectWatch]
     until_ns: int | None = None
     """The takeover that ended it."""
     waiting: deque[Waiting] = field(default_factory=deque)
@@ -122,21 +119,26 @@ class Segment:
     too_short: int = 0
     disagreements: int = 0
     last_ns: int = 0
-    _peaks: list[tuple[float, float, float]] = field(default_factory=list)
+    _peaks: list[list[float]] = field(default_factory=list)
 
     def count(self, found: Departure) -> None:
         """Count one compared plan."""
-        self._peaks.append((abs(found.lateral_m), abs(found.along_m), abs(found.speed_mps)))
+        self._peaks.append([abs(getattr(found, name)) for name in _FIGURES])
 
     def record(self) -> DrivenSegment:
         """Return what is known of it so far."""
-        figures: list[float | None] = [None, None, None]
+        figures: dict[str, float | None] = dict.fromkeys(_FIGURES)
         if self._peaks:
-            figures = [float(v) for v in np.percentile(self._peaks, 95.0, axis=0)]
-        lateral, along, speed = figures
+            greatest = np.percentile(self._peaks, 95.0, axis=0)
+            figures = dict(zip(_FIGURES, greatest.tolist(), strict=True))
         return DrivenSegment(
-            number=self.number, control_mode=self.mode, from_stamp_ns=self.from_ns,
+            number=self.number,
+            control_mode=self.mode,
+            from_stamp_ns=self.from_ns,
             to_stamp_ns=self.last_ns if self.until_ns is None else self.until_ns,
-            plans=len(self._peaks), cut=self.cut, too_short=self.too_short, lateral_m=lateral,
-            along_m=along, speed_mps=speed, disagreements=self.disagreements,
-        )  # fmt: skip
+            plans=len(self._peaks),
+            cut=self.cut,
+            too_short=self.too_short,
+            disagreements=self.disagreements,
+            **figures,
+        )

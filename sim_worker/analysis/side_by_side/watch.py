@@ -20,23 +20,30 @@ from foretwin.sim_worker.analysis.side_by_side.departure import (
     pace_kind,
     way_kind,
 )
-from foretwin.sim_worker.analysis.side_by_side.segment import Course, Place, Segment, Waiting
+from foretwin.sim_worker.analysis.side_by_side.segment import (
+    AspectWatch,
+    DrivePlace,
+    Segment,
+    Waiting,
+)
+from foretwin.sim_worker.metrics.comparison import MAX_GAP_S
+from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS
 
 HORIZON_S = 4.0
-"""How much of a plan is compared: beyond, both have seen what nobody knew."""
+"""How much of a plan is compared: beyond, both have seen what was not known."""
 _STEP_S = 0.1
 _EVERY_NS = 200_000_000
 """Plans come ten times a second and hardly differ: every second one tells all."""
 _LEAST_S = 1.0
 _KEEP_NS = round((HORIZON_S + 3.0) * 1e9)
-_LONGEST_HOLE_NS = 1_500_000_000
+_LONGEST_HOLE_NS = round(MAX_GAP_S * 1e9)
 
 
 class SideBySide:
     """Compares each plan with what was driven from its stamp on, up to the next takeover.
 
-    A segment lasts as long as the control mode stays what it is; a status that does not say who
-    drives changes nothing. Figures are kept of every segment, disagreements of those in which a
+    A segment lasts as long as the control mode stays what it is; a status of unknown
+    mode changes nothing. Figures are kept of every segment, disagreements of those in which a
     human drives. `place` says where the car is as a plan comes in.
     """
 
@@ -45,7 +52,7 @@ class SideBySide:
         frame: LocalFrame,
         *,
         vehicle_id: str,
-        place: Callable[[], Place],
+        place: Callable[[], DrivePlace],
         limits: Limits | None = None,
     ) -> None:
         self._frame = frame
@@ -64,7 +71,7 @@ class SideBySide:
         return [segment.record() for segment in (*self._done, *self._open)]
 
     def take_status(self, status: VehicleStatus) -> None:
-        """Take who drives; another than before is a takeover."""
+        """Take the control mode; another than before is a takeover."""
         mode = status.control_mode
         if mode == "unknown" or (self._open and self._open[-1].mode == mode):
             return
@@ -111,7 +118,7 @@ class SideBySide:
         if not state.yaw_valid or self._last_plan_ns is None:
             return []  # what was driven before the first plan is compared with nothing
         if self._driven and state.stamp_ns <= self._driven[-1][0]:
-            if state.stamp_ns < self._driven[-1][0] - 1_000_000_000:
+            if state.stamp_ns < self._driven[-1][0] - STEP_BACK_NS:
                 return self._clock_stepped_back()
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
@@ -135,8 +142,8 @@ class SideBySide:
 
     def _begin(self, mode: ControlMode, stamp_ns: int) -> None:
         number = len(self._done) + len(self._open)
-        way = Course(self._vehicle_id, number, "way")
-        pace = Course(self._vehicle_id, number, "pace")
+        way = AspectWatch(self._vehicle_id, number, "way")
+        pace = AspectWatch(self._vehicle_id, number, "pace")
         self._open.append(Segment(number, mode, stamp_ns, (way, pace), last_ns=stamp_ns))
 
     def _settle(self, now_ns: int) -> list[Disagreement]:
@@ -172,10 +179,10 @@ class SideBySide:
         if segment.mode != "manual":
             return []
         told: list[Disagreement] = []
-        for course, kind_of in zip(segment.courses, (way_kind, pace_kind), strict=True):
+        for aspect, kind_of in zip(segment.aspects, (way_kind, pace_kind), strict=True):
             kind = kind_of(found, self._limits)
             within = kind_of(found, self._lowered) is None
-            told += course.take(plan.stamp_ns, kind, within, found, plan.place)
+            told += aspect.take(plan.stamp_ns, kind, within, found, plan.place)
         segment.disagreements += sum(one.over for one in told)
         return told
 
@@ -210,7 +217,7 @@ class SideBySide:
 
 
 def _ended(segment: Segment) -> list[Disagreement]:
-    found = [one for course in segment.courses for one in course.finish()]
+    found = [one for aspect in segment.aspects for one in aspect.finish()]
     segment.disagreements += len(found)
     return found
 

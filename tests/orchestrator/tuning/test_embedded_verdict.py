@@ -6,7 +6,7 @@ import pytest
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.orchestrator.routing.standin_path import standin_path
-from foretwin.sim_worker.analysis.gap.verdict import Judge
+from foretwin.sim_worker.analysis.gap.verdict import FaultDetector
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
@@ -29,7 +29,7 @@ def test_the_embedded_drive_accuses_nobody(found: dict[str, float]) -> None:
     path = DrivenPath(way.lat_deg, way.lon_deg, way.speed_mps, driver=parameters.driver)
     source = StandinSource(path, parameters, vehicle_id="ego")
     frame = LocalFrame(GeoPoint(float(way.lat_deg[0]), float(way.lon_deg[0])))
-    judge = Judge(source.info, altered(load_vehicle(), **found), frame=frame)
+    detector = FaultDetector(source.info, altered(load_vehicle(), **found), frame=frame)
     samples = source.advance(START_STAMP_NS + 200_000_000_000)
-    assert [verdict for sample in samples if (verdict := judge.handle(*sample))] == []
+    assert [verdict for sample in samples if (verdict := detector.handle(*sample))] == []
     assert source.ended

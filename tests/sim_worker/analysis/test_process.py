@@ -39,10 +39,14 @@ class Watched:
         self.bus = MemoryBus()
         self._inbox, self.answers, info = Mailbox(100_000), Mailbox(16), Mailbox(16)
         setup = TuningSetup(
-            run_id="r1", process_id="tuning", vehicle_id="standin", log_file="",
-            bus=BusSetup(endpoint="tcp/127.0.0.1:1", lossless=True), vehicle=vehicle,
+            run_id="r1",
+            process_id="tuning",
+            vehicle_id="standin",
+            log_file="",
+            bus=BusSetup(endpoint="tcp/127.0.0.1:1", lossless=True),
+            vehicle=vehicle,
             drive_frame=FRAME,
-        )  # fmt: skip
+        )
         self._worker = TuningWorker(setup, self.bus, self._inbox)
         for channel in ("tune", "use_vehicle"):
             self.bus.serve(channel, self._inbox, **IDS)

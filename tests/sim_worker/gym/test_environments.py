@@ -13,10 +13,19 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 from foretwin.contracts.errors import UserError
-from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
-from foretwin.sim_worker.gym.registration import ID
+from foretwin.sim_worker.gym import ID, JunctionEnv, JunctionVectorEnv
 from foretwin.sim_worker.gym.rows import StepFacts
 from tests.sim_worker.scenarios.worlds import cross, ring
+
+COVERS = (
+    "foretwin.sim_worker.gym",
+    "foretwin.sim_worker.gym.course",
+    "foretwin.sim_worker.gym.env",
+    "foretwin.sim_worker.gym.picture",
+    "foretwin.sim_worker.gym.rows",
+    "foretwin.sim_worker.gym.spaces",
+    "foretwin.sim_worker.gym.vector_env",
+)
 
 ROWS = 5
 

@@ -24,6 +24,8 @@ from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import box, crossroads, happening, job, state_at, straight_path
 
+COVERS = ("foretwin.sim_worker.gym.episodes",)
+
 KEEP = np.zeros(1, np.float32)
 STATES = (state_at(-50.0, -1.5, speed=8.0), state_at(-40.0, -1.3, speed=7.0, yaw=0.02))
 
@@ -46,9 +48,14 @@ def test_an_episode_begins_as_the_recorded_state_was() -> None:
 
 def test_a_scenario_meets_the_recorded_car() -> None:
     env = JunctionEnv(
-        crossroads(), states=STATES, path=straight_path(), scenario="scp", control="along_path",
-        cases=4, early_or_late_s=0.0,
-    )  # fmt: skip
+        crossroads(),
+        states=STATES,
+        path=straight_path(),
+        scenario="scp",
+        control="along_path",
+        cases=4,
+        early_or_late_s=0.0,
+    )
     assert len(env.course.rows.playable) == 8
     for case in range(8):
         seen, _ = env.reset(options={"case": case})

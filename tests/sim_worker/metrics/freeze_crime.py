@@ -48,14 +48,16 @@ SCENES = {
     "slow_bicycle": {"ego": (0, 0, 0, 8.3, 0), "other": (18, 0, 0, 4.2, 0, 1.8, 0.6)},
     "motorway": {"ego": (0, 0, 0, 33, 0), "other": (70, 0, 0, 22, 0, 4.5, 1.8)},
     "crosses_behind": {
-        "ego": (-20, 0, 0, 10, 0), "other": (0, -36, math.pi / 2, 9, 0, 4.2, 2.0),
+        "ego": (-20, 0, 0, 10, 0),
+        "other": (0, -36, math.pi / 2, 9, 0, 4.2, 2.0),
         "crossing": True,
     },
     "crosses_before": {
-        "ego": (-45, 0, 0, 11, 0), "other": (0, -18, math.pi / 2, 8, 0, 5.0, 2.2),
+        "ego": (-45, 0, 0, 11, 0),
+        "other": (0, -18, math.pi / 2, 8, 0, 5.0, 2.2),
         "crossing": True,
     },
-}  # fmt: skip
+}
 
 
 def main(out: Path) -> None:
@@ -126,9 +128,16 @@ def lane(number: int, begin: np.ndarray, end: np.ndarray, width: float) -> Lanel
 
 
 def vehicle(
-    number: int, x: float, y: float, yaw: float, speed: float, accel: float, length: float,
-    width: float, network: LaneletNetwork,
-) -> DynamicObstacle:  # fmt: skip
+    number: int,
+    x: float,
+    y: float,
+    yaw: float,
+    speed: float,
+    accel: float,
+    length: float,
+    width: float,
+    network: LaneletNetwork,
+) -> DynamicObstacle:
     shape = Rectangle(length, width)
     states = []
     for step in range(round(UNTIL_S / STEP_S) + 1):
@@ -139,9 +148,11 @@ def vehicle(
             {
                 "time_step": step,
                 "position": np.array([x + way * math.cos(yaw), y + way * math.sin(yaw)]),
-                "orientation": yaw, "velocity": along, "acceleration": accel,
+                "orientation": yaw,
+                "velocity": along,
+                "acceleration": accel,
             }
-        )  # fmt: skip
+        )
     first = InitialState(**states[0], yaw_rate=0.0, slip_angle=0.0)
     trajectory = Trajectory(1, [CustomState(**state) for state in states[1:]])
     lanes = {

@@ -14,8 +14,8 @@ from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.world import Arm, Conflict, StopLine, World, WorldJunction
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.rollout import Context
 from foretwin.sim_worker.metrics.route_rules import RouteRules
-from foretwin.sim_worker.metrics.scene import Context
 from tests.sim_worker.places import crossroads, straight_path
 
 GREEN_S, AMBER_S, ALL_RED_S = 10.0, 3.0, 2.0
@@ -49,24 +49,29 @@ def junction(*, lights: bool) -> World:
     )
     conflicts = tuple(
         Conflict(
-            first_id=min("east", other), second_id=max("east", other), kind="crossing",
-            point=np.array([x, -1.5]), yields_id="east", rule="priority_road", source="tagged",
+            first_id=min("east", other),
+            second_id=max("east", other),
+            kind="crossing",
+            point=np.array([x, -1.5]),
+            yields_id="east",
+            rule="priority_road",
+            source="tagged",
             area=np.array([[x - 1, -2.5], [x + 1, -2.5], [x + 1, -0.5], [x - 1, -0.5]]),
         )
         for other, x in (("north", 1.5), ("south", -1.5))
-    )  # fmt: skip
+    )
     line = StopLine(
-        id="stop", lane_id="from_east", ends=np.array([[STOP_X, 0.0], [STOP_X, -3.0]]),
+        id="stop",
+        lane_id="from_east",
+        ends=np.array([[STOP_X, 0.0], [STOP_X, -3.0]]),
         control=Choice("signal" if lights else "give_way", "tagged"),
-    )  # fmt: skip
+    )
     whole = WorldJunction(
         summary=plain.intersection,
-        arms=(
-            Arm(id="a", name="", osm_ways=(1,), bearing_rad=0.0, lanes_in=1, lanes_out=1),
-        ),
+        arms=(Arm(id="a", name="", osm_ways=(1,), bearing_rad=0.0, lanes_in=1, lanes_out=1),),
         area=None,
         plan=PLAN if lights else None,
-    )  # fmt: skip
+    )
     return msgspec.structs.replace(
         plain, connections=connections, conflicts=conflicts, stop_lines=(line,), junctions=(whole,)
     )

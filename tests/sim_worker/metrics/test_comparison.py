@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import PlannedTrajectory
 from foretwin.contracts.frames import geo_from_local, geo_from_local_yaw
 from foretwin.contracts.futures import Trajectory
-from foretwin.sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from foretwin.sim_worker.metrics.comparison import (
     ActualTrack,
     NominalTrack,
     compare_nominal,
     compare_plan,
+    constant_turn_rate,
+    constant_velocity,
 )
 from foretwin.sim_worker.metrics.displacement import distinct_count, horizon_error
 from tests.sim_worker.places import FRAME, straight_path
@@ -104,9 +105,13 @@ def _plan(*, left_m: float, stamp_ns: int = 0) -> PlannedTrajectory:
     xy = np.column_stack([-50.0 + 8.0 * time_s, 0 * time_s - 1.5 + left_m])
     geo = geo_from_local(FRAME, xy)
     return PlannedTrajectory(
-        stamp_ns=stamp_ns, time_from_stamp_s=time_s, lat_deg=geo[:, 0], lon_deg=geo[:, 1],
-        yaw_rad=geo_from_local_yaw(FRAME, 0 * time_s, xy), speed_mps=0 * time_s + 8.0,
-    )  # fmt: skip
+        stamp_ns=stamp_ns,
+        time_from_stamp_s=time_s,
+        lat_deg=geo[:, 0],
+        lon_deg=geo[:, 1],
+        yaw_rad=geo_from_local_yaw(FRAME, 0 * time_s, xy),
+        speed_mps=0 * time_s + 8.0,
+    )
 
 
 def _trajectory(stamp_ns: int) -> Trajectory:
@@ -119,9 +124,12 @@ def _trajectory(stamp_ns: int) -> Trajectory:
 @pytest.mark.parametrize("left_m", [1.0, -0.5])
 def test_a_shifted_plan_is_reported_as_that_shift(left_m: float) -> None:
     found = compare_plan(
-        _plan(left_m=left_m), _trajectory(400_000_000), straight_path(),
-        world_frame=FRAME, round_id=1,
-    )  # fmt: skip
+        _plan(left_m=left_m),
+        _trajectory(400_000_000),
+        straight_path(),
+        world_frame=FRAME,
+        round_id=1,
+    )
     assert found is not None
     assert found.difference.lateral_m == pytest.approx(left_m, abs=1e-3)
     assert found.difference.ade_m == pytest.approx(abs(left_m), abs=1e-3)
@@ -132,11 +140,14 @@ def test_a_shifted_plan_is_reported_as_that_shift(left_m: float) -> None:
 def test_a_plan_of_another_time_is_not_compared() -> None:
     assert (
         compare_plan(
-            _plan(left_m=0.0), _trajectory(60_000_000_000), straight_path(),
-            world_frame=FRAME, round_id=1,
+            _plan(left_m=0.0),
+            _trajectory(60_000_000_000),
+            straight_path(),
+            world_frame=FRAME,
+            round_id=1,
         )
         is None
-    )  # fmt: skip
+    )
 
 
 def test_distinct_ends_are_counted_once() -> None:

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics import compiled_pairs, encroachment, following
-from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.scene import Scene
-from foretwin.sim_worker.metrics.time_to_collision import Pairs, meeting, ttc_series
+from foretwin.sim_worker.metrics.rollout import Rollout, RolloutView
+from foretwin.sim_worker.metrics.time_to_collision import meeting, ttc_series
 from tests.sim_worker.metrics.motions import VEHICLE, times
 
 FUTURES, USERS = 3, 4
@@ -18,7 +17,7 @@ seeds = st.integers(0, 2**32 - 1)
 drawn = settings(deadline=None, max_examples=30)
 
 
-def scene(seed: int) -> Scene:
+def scene(seed: int) -> RolloutView:
     """Everybody in bends and at every angle within 40 m; somebody comes, and somebody goes."""
     random, time_s = np.random.default_rng(seed), times(4.0)
 
@@ -35,15 +34,17 @@ def scene(seed: int) -> Scene:
     nothing = np.zeros_like(x)
     users = np.stack(motions(FUTURES, USERS), axis=-1).transpose(0, 2, 1, 3)
     users[:, : len(time_s) // 2, 0, :3] = users[:, len(time_s) // 2 :, 1, :3] = np.nan
-    return Scene(
+    return RolloutView(
         Rollout(
             time_s=time_s,
             states=np.stack([x, y, yaw, speed, nothing, rate, nothing, nothing], axis=-1),
-            users=users[..., :3], user_speed_mps=users[..., 3],
+            users=users[..., :3],
+            user_speed_mps=users[..., 3],
             user_size_m=random.uniform(0.4, 9.0, (FUTURES, USERS, 2)),
-            valid=np.ones(FUTURES, dtype=bool), vehicle=VEHICLE,
+            valid=np.ones(FUTURES, dtype=bool),
+            vehicle=VEHICLE,
         )
-    )  # fmt: skip
+    )
 
 
 @drawn
@@ -51,12 +52,7 @@ def scene(seed: int) -> Scene:
 def test_time_to_collision_is_that_of_all_pairs_to_the_bit(seed: int) -> None:
     driven = scene(seed)
     seen = driven.relative
-    touch = meeting(
-        Pairs(
-            seen.ahead_m, seen.left_m, seen.ahead_mps, seen.left_mps, seen.cos, seen.sin,
-            (driven.half_length_m, driven.half_width_m), driven.user_half_m,
-        )
-    )  # fmt: skip
+    touch = meeting(seen[:6], driven.half_m, driven.user_half_m)
     until = np.maximum(touch.from_s, 0.0)
     until[touch.until_s < until] = np.inf
     assert (ttc_series(driven).values == until.min(axis=2)).all()
@@ -105,9 +101,15 @@ def test_a_stay_on_a_strip_lasts_while_a_corner_is_on_it(seed: int) -> None:
     stay = np.empty((2, len(met.user)))
 
     compiled_pairs.stays_on_strips(
-        (x, y, yaw), length, width, met.future, met.user, met.user_step, met.point_m, met.ego_way,
-        strip_half, driven.time_s, stay,
-    )  # fmt: skip
+        (x, y, yaw),
+        (length, width),
+        (met.future, met.user, met.user_step),
+        met.point_m,
+        met.ego_way,
+        strip_half,
+        driven.time_s,
+        stay,
+    )
 
     normal = np.stack([-met.ego_way[:, 1:], met.ego_way[:, :1]])
     track_x, track_y, angle = (values[met.future, :, met.user] for values in (x, y, yaw))

@@ -11,12 +11,12 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foretwin.sim_worker.metrics.curves import cheapest_walks
 from foretwin.sim_worker.metrics.displacement import (
+    cheapest_walks,
     displacements,
     relative_pose_error,
 )
-from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.rollout import Context
 from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import Mover, rollout, steady_poses, times
 
@@ -85,9 +85,10 @@ def test_a_future_that_is_ahead_and_to_the_left_is_told_so() -> None:
     reference[:, 1] = driven.states[0, :, 1] - 0.5 * time_s
 
     found = evaluate(
-        driven, ("ade", "fde", "lateral", "longitudinal", "heading"),
+        driven,
+        ("ade", "fde", "lateral", "longitudinal", "heading"),
         context=Context(reference=reference),
-    )  # fmt: skip
+    )
 
     shown = {name: measure.values[0] for name, measure in found.items()}
     cos, sin = np.cos(np.pi / 2 + 0.1), np.sin(np.pi / 2 + 0.1)

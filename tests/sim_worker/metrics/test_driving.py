@@ -14,12 +14,20 @@ from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import comfort
 from foretwin.sim_worker.metrics.ground import DrivableGround
-from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.table import METRICS, computable, evaluate
 from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
 from tests.sim_worker.places import box, crossroads, turning_path
+
+COVERS = (
+    "foretwin.sim_worker.metrics.comfort",
+    "foretwin.sim_worker.metrics.ground",
+    "foretwin.sim_worker.metrics.progress",
+    "foretwin.sim_worker.metrics.score",
+    "foretwin.sim_worker.metrics.table",
+    "foretwin.sim_worker.metrics.violations",
+)
 
 HALF_M = LENGTH_M / 2
 
@@ -193,9 +201,11 @@ def test_the_score_weighs_progress_and_is_closed_by_a_collision() -> None:
     crashes = rollout(Mover(-50, -1.5, 0, 10), Mover(0, -1.5))
     together = fast._replace(
         states=np.concatenate([fast.states, slow.states]),
-        users=np.zeros((2, 81, 0, 3)), user_speed_mps=np.zeros((2, 81, 0)),
-        user_size_m=np.zeros((2, 0, 2)), valid=np.ones(2, dtype=bool),
-    )  # fmt: skip
+        users=np.zeros((2, 81, 0, 3)),
+        user_speed_mps=np.zeros((2, 81, 0)),
+        user_size_m=np.zeros((2, 0, 2)),
+        valid=np.ones(2, dtype=bool),
+    )
 
     score = evaluate(together, ("driving_score",), context=given)["driving_score"].values
 

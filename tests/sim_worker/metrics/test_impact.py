@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.geometry.rectangles import Rectangles, clearance
-from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
@@ -19,9 +18,14 @@ MASS_KG = VEHICLE.mass_kg.value
 
 def values(driven: Rollout, mass_kg: float = MASS_KG) -> dict[str, float]:
     names = (
-        "collided", "at_fault_collision", "collision_time", "impact_speed", "closing_speed",
-        "delta_v", "min_clearance",
-    )  # fmt: skip
+        "collided",
+        "at_fault_collision",
+        "collision_time",
+        "impact_speed",
+        "closing_speed",
+        "delta_v",
+        "min_clearance",
+    )
     masses = np.full(driven.user_size_m.shape[:2], mass_kg)
     found = evaluate(driven, names, context=Context(user_mass_kg=masses))
     return {name: float(measure.values[0]) for name, measure in found.items()}

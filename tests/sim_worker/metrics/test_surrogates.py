@@ -18,6 +18,13 @@ from foretwin.sim_worker.metrics.rollout import Rollout
 from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
+COVERS = (
+    "foretwin.sim_worker.metrics.encroachment",
+    "foretwin.sim_worker.metrics.following",
+    "foretwin.sim_worker.metrics.rollout",
+    "foretwin.sim_worker.metrics.time_to_collision",
+)
+
 FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/crime.json").read_text())
 HALF_M = LENGTH_M / 2
 speeds = st.floats(2.0, 25.0)
@@ -51,9 +58,14 @@ def test_following_in_any_direction(
     gaps = gap - closing * times(0.1)
 
     found = values(
-        driven, "thw", "ttc", "drac", "required_deceleration", "required_lateral_acceleration",
+        driven,
+        "thw",
+        "ttc",
+        "drac",
+        "required_deceleration",
+        "required_lateral_acceleration",
         "required_acceleration",
-    )  # fmt: skip
+    )
 
     assert found["thw"] == pytest.approx(gaps.min() / speed, abs=1e-6)
     if closing > 1e-3:
@@ -72,9 +84,13 @@ def test_following_in_any_direction(
 @settings(max_examples=60)
 @given(speeds, speeds, st.floats(15.0, 70.0), st.floats(15.0, 70.0), sizes, yaws)
 def test_crossing_at_right_angles(
-    speed: float, other_mps: float, away: float, other_away: float, size: tuple[float, float],
+    speed: float,
+    other_mps: float,
+    away: float,
+    other_away: float,
+    size: tuple[float, float],
     yaw: float,
-) -> None:  # fmt: skip
+) -> None:
     ego, other = Mover(-away, 0, 0, speed), Mover(0, -other_away, math.pi / 2, other_mps, *size)
     time_s = times(60.0, 0.25)
     driven = rollout(turned(ego, yaw), turned(other, yaw), time_s=time_s)
@@ -104,9 +120,12 @@ def test_time_to_collision_is_when_outlines_come_to_touch(
     """Whatever the angle: a standing ego, and who comes from 30 m away past its middle."""
     away = 30.0
     other = Mover(
-        -away * math.cos(yaw) - aim * math.sin(yaw), -away * math.sin(yaw) + aim * math.cos(yaw),
-        yaw, speed, *size,
-    )  # fmt: skip
+        -away * math.cos(yaw) - aim * math.sin(yaw),
+        -away * math.sin(yaw) + aim * math.cos(yaw),
+        yaw,
+        speed,
+        *size,
+    )
     found = evaluate(rollout(Mover(0, 0), other, time_s=times(0.1)), ("ttc_series",))
     ttc = found["ttc_series"].values[0, 0]
     ego = Rectangles(np.zeros(2), np.zeros(()), LENGTH_M, WIDTH_M)
@@ -147,8 +166,9 @@ def test_ten_scenes_are_what_commonroad_crime_finds(name: str, scene: dict[str, 
         # There theirs is the time with constant accelerations. Below it enters rounded.
         assert value(driven, "ttc") == pytest.approx(expected["TTC"], abs=0.0051)
         for ours, theirs in (
-            ("required_lateral_acceleration", "ALatReq"), ("required_acceleration", "AReq"),
-        ):  # fmt: skip
+            ("required_lateral_acceleration", "ALatReq"),
+            ("required_acceleration", "AReq"),
+        ):
             assert value(driven, ours) == pytest.approx(expected[theirs], abs=0.0071)
 
 

@@ -12,13 +12,15 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.roles import FollowLimits, UseRoles
 from foretwin.contracts.simulation import MirrorSample
-from foretwin.sim_worker.mirror.cast import Cast
-from foretwin.sim_worker.mirror.member import CastMember
+from foretwin.sim_worker.mirror.member import GroupMember
 from foretwin.sim_worker.mirror.mirror import Mirror
+from foretwin.sim_worker.mirror.vehicle_group import VehicleGroup
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
-from tests.sim_worker.mirror.test_cast import TICK_NS, weaving
+from tests.sim_worker.mirror.test_vehicle_group import TICK_NS, weaving
 from tests.sim_worker.places import FRAME, crossroads, state_at
+
+COVERS = ("foretwin.sim_worker.mirror.role_manager",)
 
 CAR = load_vehicle()
 LIMITS = FollowLimits()
@@ -27,20 +29,22 @@ TICKS = 820
 
 @settings(max_examples=4, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
-    along=st.floats(-3.0, 3.0), across=st.floats(-2.0, 2.0), yaw=st.sampled_from([0.0, 0.1]),
+    along=st.floats(-3.0, 3.0),
+    across=st.floats(-2.0, 2.0),
+    yaw=st.sampled_from([0.0, 0.1]),
     speed=st.sampled_from([0.0, 3.0, 12.0]),
-)  # fmt: skip
+)
 def test_a_gap_closes_within_the_bounds_and_without_overshoot(
     along: float, across: float, yaw: float, speed: float
 ) -> None:
-    cast = Cast(None, FRAME, (CastMember("car", CAR),), limits=LIMITS)
-    cast.set_roles({"car": "twin"})
-    cast.correction = "follow"
-    member = cast.members["car"]
+    group = VehicleGroup(None, FRAME, (GroupMember("car", CAR),), limits=LIMITS)
+    group.set_roles({"car": "twin"})
+    group.correction = "follow"
+    member = group.members["car"]
     gaps, accels = [], []
     for k in range(650):
-        cast.take_state("car", state_at(speed * k / 50.0, 0.0, 0.0, speed, stamp_ns=k * TICK_NS))
-        cast.advance(k * TICK_NS)
+        group.take_state("car", state_at(speed * k / 50.0, 0.0, 0.0, speed, stamp_ns=k * TICK_NS))
+        group.advance(k * TICK_NS)
         if k == 5:
             member.body.nudge(np.array([along, across, yaw]))
         if k >= 5:
@@ -150,15 +154,15 @@ def test_other_parameters_do_not_move_a_following_twin() -> None:
 
 
 def test_a_twin_that_is_lost_starts_anew() -> None:
-    cast = Cast(None, FRAME, (CastMember("car", CAR),), limits=LIMITS)
-    cast.set_roles({"car": "twin"})
-    cast.correction = "follow"
+    group = VehicleGroup(None, FRAME, (GroupMember("car", CAR),), limits=LIMITS)
+    group.set_roles({"car": "twin"})
+    group.correction = "follow"
     for k in range(100):
         jumped = 0.0 if k < 50 else 30.0
         state = state_at(8.0 * k / 50.0 + jumped, 0.0, stamp_ns=k * TICK_NS)
-        cast.take_state("car", state)
-        cast.advance(k * TICK_NS)
-    assert cast.members["car"].twin().pose[0] == pytest.approx(8.0 * 99 / 50 + 30.0, abs=0.5)
+        group.take_state("car", state)
+        group.advance(k * TICK_NS)
+    assert group.members["car"].twin().pose[0] == pytest.approx(8.0 * 99 / 50 + 30.0, abs=0.5)
 
 
 def test_a_clock_that_steps_back_lets_everything_begin_anew() -> None:

@@ -43,10 +43,17 @@ class Drive:
             self.bus.subscribe(channel, self._inbox, vehicle="ego")
         self.bus.subscribe("mirror", self._out, run="r")
         setup = WorkerSetup(
-            run_id="r", process_id="mirror", vehicle_id="ego", log_file=str(folder / "log.jsonl"),
-            bus=BusSetup(endpoint="tcp/127.0.0.1:1", lossless=lossless), role="mirror",
-            worlds_dir=str(folder), vehicle=CAR, drive_frame=FRAME, commands_recorded=True,
-        )  # fmt: skip
+            run_id="r",
+            process_id="mirror",
+            vehicle_id="ego",
+            log_file=str(folder / "log.jsonl"),
+            bus=BusSetup(endpoint="tcp/127.0.0.1:1", lossless=lossless),
+            role="mirror",
+            worlds_dir=str(folder),
+            vehicle=CAR,
+            drive_frame=FRAME,
+            commands_recorded=True,
+        )
         self._mirror = MirrorWorker(setup, self.bus)
         sends = ("gnss", "speed", "heading")
         self._estimator = StateEstimator(

@@ -8,19 +8,15 @@ import msgspec
 import pytest
 
 from foretwin.contracts.mailbox import Mailbox, Received, Request
-from foretwin.contracts.roles import (
-    CastVehicle,
-    MirrorCast,
-    OtherVehicle,
-    OtherVehicles,
-    UseRoles,
-)
+from foretwin.contracts.roles import CastVehicle, MirrorCast, OtherVehicle, OtherVehicles, UseRoles
 from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.sim_worker.mirror.process import MirrorWorker
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import FRAME, state_at
+
+COVERS = ("foretwin.sim_worker.mirror.process",)
 
 VAN = CastVehicle(vehicle_id="van", vehicle=load_vehicle("vw_vanagon"))
 TICK_NS = 100_000_000
@@ -32,11 +28,17 @@ class Ground:
     def __init__(self, folder: Path, *, lossless: bool) -> None:
         self.bus = MemoryBus()
         setup = WorkerSetup(
-            run_id="r", process_id="mirror", vehicle_id="ego", role="mirror",
+            run_id="r",
+            process_id="mirror",
+            vehicle_id="ego",
+            role="mirror",
             bus=BusSetup(endpoint="tcp/127.0.0.1:7447", lossless=lossless),
-            log_file=str(folder / "log"), worlds_dir=str(folder), vehicle=load_vehicle(),
-            drive_frame=FRAME, mirror_cast=MirrorCast(others=(VAN,)),
-        )  # fmt: skip
+            log_file=str(folder / "log"),
+            worlds_dir=str(folder),
+            vehicle=load_vehicle(),
+            drive_frame=FRAME,
+            mirror_cast=MirrorCast(others=(VAN,)),
+        )
         self.worker = MirrorWorker(setup, self.bus)
         self._inbox, self._said = Mailbox(256), Mailbox(256)
         self.bus.subscribe("state", self._inbox, vehicle="ego")

@@ -6,7 +6,7 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Stage
-from foretwin.sim_worker.mirror.mirror_world import MirrorWorld
+from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.vehicle.lag import ForceLag, lags_of_force
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, drive, seed, states
@@ -70,24 +70,32 @@ def test_tyres_turn_with_the_steering_lag_after_the_delay(lag: float) -> None:
     assert tire == pytest.approx(wanted, abs=0.01 * 0.1 + 0.05 * 0.1)
 
 
+def braked(world: RoleWorld, *, ticks: int, accel_mps2: float) -> float:
+    """Command the car's twin for some ticks; return its speed."""
+    twin = world.twins["car"]
+    for _ in range(ticks):
+        twin.command(accel_mps2=accel_mps2, tire_angle_rad=0.0)
+        world.step()
+        twin.read()
+    return float(twin.state[3])
+
+
 def test_the_twin_brakes_with_the_lag_of_its_vehicle() -> None:
     car = altered(CAR, brake_lag_s=0.3, wheel_inertia_mass_factor=1.0)
-    late, prompt = MirrorWorld(None, car), MirrorWorld(None, car, steering_delay_s=0.0)
-    for twin in (late, prompt):
-        twin.seed_twin(states(1, speed=15.0)[0])
-        for _ in range(100):
-            twin.step(accel_mps2=-4.0, tire_angle_rad=0.0)
+    speeds_mps = []
+    for commanded in (frozenset({"car"}), frozenset[str]()):
+        world = RoleWorld(None, {"car": car}, commanded=commanded)
+        world.twins["car"].seed(states(1, speed=15.0)[0])
+        speeds_mps.append(braked(world, ticks=100, accel_mps2=-4.0))
     won = 4.0 * 0.3 * (1 - np.exp(-1.0 / 0.3))
-    assert prompt.twin_state[3] == pytest.approx(11.0, abs=0.01)
-    assert late.twin_state[3] == pytest.approx(11.0 + won, abs=0.01)
+    assert speeds_mps == pytest.approx([11.0 + won, 11.0], abs=0.01)
 
 
 def test_a_twin_put_back_forgets_the_brakes_it_was_on() -> None:
     car = altered(CAR, brake_lag_s=0.5, wheel_inertia_mass_factor=1.0)
-    twin = MirrorWorld(None, car)
+    world = RoleWorld(None, {"car": car}, commanded=frozenset({"car"}))
     for _ in range(2):
-        twin.seed_twin(states(1, speed=15.0)[0])
-        twin.step(accel_mps2=0.0, tire_angle_rad=0.0)
-        assert twin.twin_state[3] == pytest.approx(15.0)
-        for _ in range(50):
-            twin.step(accel_mps2=-8.0, tire_angle_rad=0.0)
+        world.reset()
+        world.twins["car"].seed(states(1, speed=15.0)[0])
+        assert braked(world, ticks=1, accel_mps2=0.0) == pytest.approx(15.0)
+        braked(world, ticks=50, accel_mps2=-8.0)

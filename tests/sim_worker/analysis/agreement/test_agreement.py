@@ -15,7 +15,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.analysis.agreement.criteria import (
     CRITERIA,
     LEAST_CLEARANCE_M,
-    Court,
+    CriteriaEvaluator,
     Heard,
     Users,
     Window,
@@ -36,6 +36,12 @@ from tests.sim_worker.metrics.motions import (
     times,
 )
 from tests.sim_worker.places import straight_path
+
+COVERS = (
+    "foretwin.sim_worker.analysis.agreement.criteria",
+    "foretwin.sim_worker.analysis.agreement.flip",
+    "foretwin.sim_worker.analysis.agreement.tally",
+)
 
 TIME_S = times(8.0)
 NOBODY = Users(np.zeros((81, 0, 3)), np.zeros((81, 0)), np.zeros((0, 2)))
@@ -64,20 +70,28 @@ def case(
     sign: bool = False,
     heard: dict[str, Heard] | None = None,
     **known: Any,
-) -> tuple[Window, Court]:
+) -> tuple[Window, CriteriaEvaluator]:
     world = junction(lights=lights)
     if sign:
         line = msgspec.structs.replace(world.stop_lines[0], control=Choice("stop", "tagged"))
         world = msgspec.structs.replace(world, stop_lines=(line,))
     path = straight_path().xy_m
     window = Window(
-        round_id=1, stamp_ns=0, junction_id="j", world_id=world.id, time_s=TIME_S,
-        simulated=simulated, simulated_users=users, driven=driven,
-        driven_users=users if driven_users is None else driven_users, path_xy_m=path,
-        heard=heard or {}, **{"known_users": True, "position_std_m": 0.02, **known},
-    )  # fmt: skip
+        round_id=1,
+        stamp_ns=0,
+        junction_id="j",
+        world_id=world.id,
+        time_s=TIME_S,
+        simulated=simulated,
+        simulated_users=users,
+        driven=driven,
+        driven_users=users if driven_users is None else driven_users,
+        path_xy_m=path,
+        heard=heard or {},
+        **{"known_users": True, "position_std_m": 0.02, **known},
+    )
     rules = RouteRules(world, FrenetPath(path))
-    return window, Court(window, rules, DrivableGround(world), VEHICLE)
+    return window, CriteriaEvaluator(window, rules, DrivableGround(world), VEHICLE)
 
 
 def judge(**given: Any) -> Judged:
@@ -122,13 +136,14 @@ def test_the_growth_that_touches_a_parked_car_is_that_of_the_closed_form() -> No
 def test_the_growth_that_leaves_the_road_is_that_of_the_closed_form() -> None:
     """A steady offset to the right, without any turning, up to the road's edge."""
     driven = along(Mover(-50.0, -1.6, 0.0, 5.0))
-    window, court = case(along(STRAIGHT), driven)
+    window, evaluator = case(along(STRAIGHT), driven)
     edge_m = next(
-        y for y in np.arange(0.0, 6.0, 0.001)
-        if not court._ground.contains(np.array([-30.0]), np.array([-1.5 - y]))[0]
-    )  # fmt: skip
+        y
+        for y in np.arange(0.0, 6.0, 0.001)
+        if not evaluator._ground.contains(np.array([-30.0]), np.array([-1.5 - y]))[0]
+    )
     assert edge_m > WIDTH_M / 2 + TOLERANCE_M
-    one = judged(window, court)
+    one = judged(window, evaluator)
     factor, gap_m = flip(one, "across")
     assert gap_m == pytest.approx(edge_m - WIDTH_M / 2, abs=FINE_M + 0.002)
     assert factor == pytest.approx((edge_m - WIDTH_M / 2) / 0.1, rel=0.02)
@@ -169,9 +184,13 @@ def test_in_a_bend_a_gap_along_keeps_to_the_way() -> None:
 
 @pytest.mark.parametrize(
     ("simulated_y", "driven_y", "outcome"),
-    [(-1.5, -1.5, "agree_pass"), (-1.5, -6.0, "too_optimistic"),
-     (-6.0, -1.5, "too_pessimistic"), (-6.0, -6.0, "agree_fail")],
-)  # fmt: skip
+    [
+        (-1.5, -1.5, "agree_pass"),
+        (-1.5, -6.0, "too_optimistic"),
+        (-6.0, -1.5, "too_pessimistic"),
+        (-6.0, -6.0, "agree_fail"),
+    ],
+)
 def test_the_four_outcomes(simulated_y: float, driven_y: float, outcome: str) -> None:
     one = judge(
         simulated=along(Mover(-50.0, simulated_y, 0.0, 5.0)),
@@ -192,13 +211,15 @@ def test_a_line_crossed_at_a_red_that_was_heard() -> None:
     driven = along(Mover(front - 10.0 * 3.0, -1.5, 0.0, 10.0))
     stamps = np.arange(9, dtype=np.int64) * 1_000_000_000 - 500_000_000
     heard = Heard(stamps, ("green", "green", "amber", *(["red"] * 6)))  # type: ignore[arg-type]
-    window, court = case(simulated, driven, lights=True, heard={"ew": heard})
-    found = verdicts(window, court)
+    window, evaluator = case(simulated, driven, lights=True, heard={"ew": heard})
+    found = verdicts(window, evaluator)
     assert failed(found.simulated) == []
     assert failed(found.driven) == ["red_light"]
     assert failed(case(simulated, driven, lights=True)[1].observable) == [
-        "clearance", "drivable_area", "comfort",
-    ]  # fmt: skip
+        "clearance",
+        "drivable_area",
+        "comfort",
+    ]
 
 
 def test_a_stop_sign_wants_a_car_to_stand() -> None:
@@ -227,16 +248,16 @@ def test_the_gap_as_measured_leads_from_the_simulation_to_the_drive() -> None:
 
 def test_what_reality_does_not_show_is_not_judged() -> None:
     off = along(Mover(-50.0, -6.0, 0.0, 5.0))
-    window, court = case(
+    window, evaluator = case(
         off, off, users=standing(-30.0, -6.0), known_users=False, position_std_m=2.0
     )
-    found = verdicts(window, court)
+    found = verdicts(window, evaluator)
     assert failed(found.observable) == ["comfort"]
     assert found.simulated_passes
     assert found.driven_passes
     gap = gap_between(window.simulated, along(Mover(-50.0, -5.0, 0.0, 5.0)))
     told = flips(
-        court, window.simulated, window.simulated_users, gap, found.observable, passes=True
+        evaluator, window.simulated, window.simulated_users, gap, found.observable, passes=True
     )
     assert [one.factor for one in told] == [None, None, None]
 

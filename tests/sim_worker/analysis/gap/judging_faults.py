@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
 from foretwin.contracts.gap import Verdict
-from foretwin.sim_worker.analysis.gap.verdict import Judge
+from foretwin.sim_worker.analysis.gap.verdict import FaultDetector
 from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.sim_worker.faulty_standin import (
     CAR_FAULTS,
@@ -31,10 +31,10 @@ def verdicts_of(
     """Return what is said of a drive; with `until_first` the first verdict alone."""
     drive = drive_with(fault, seed=seed, end_s=end_s)
     model = model_with(fault if fault in MODEL_FAULTS else None)
-    judge = Judge(drive.info, model, frame=FRAME)
+    detector = FaultDetector(drive.info, model, frame=FRAME)
     told = []
     for channel, message in drive.samples:
-        verdict = judge.handle(channel, message)
+        verdict = detector.handle(channel, message)
         if verdict is not None:
             told.append(verdict)
             if until_first:

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.sim_worker.analysis.gap.errors import GapMeter
+from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -62,8 +61,9 @@ def measured_gap(*, seed: int, mapped: bool) -> Gap:
     samples = meter.samples(record, motion, horizons_s=(HORIZON_S,))
     limits = GapLimits()
     alarms = sum(alarm.over for sample in samples for alarm in limits.handle(sample))
-    across, along = (np.array([getattr(sample, name) for sample in samples])
-                     for name in ("across_m", "along_m"))  # fmt: skip
+    across, along = (
+        np.array([getattr(sample, name) for sample in samples]) for name in ("across_m", "along_m")
+    )
     return Gap(float(np.sqrt(np.mean(across**2))), float(np.sqrt(np.mean(along**2))), alarms)
 
 

@@ -1,4 +1,4 @@
-"""Every drive of the data folder, of cars of which nobody knows a fault, put before the judge."""
+"""Every drive of the data folder, of cars without a known fault, put before the detector."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.gap import Verdict
-from foretwin.sim_worker.analysis.gap.verdict import Judge
+from foretwin.sim_worker.analysis.gap.verdict import FaultDetector
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs.geojson import geojson_lines
 from foretwin.telemetry.logs.mcity import read_mcity
@@ -33,8 +33,8 @@ def accused_in(data: Path) -> Iterator[tuple[str, float, list[Verdict]]]:
     """Yield each drive, its seconds and its verdicts but "undecided", which accuses nobody."""
     for name, info, samples in (*_logs(data), *_hannover(data), *_mcity(data)):
         place = next(m.position for _, m in samples if isinstance(m, GnssFix))
-        judge = Judge(info, load_vehicle(), frame=LocalFrame(place))
-        said = [judge.handle(*sample) for sample in samples]
+        detector = FaultDetector(info, load_vehicle(), frame=LocalFrame(place))
+        said = [detector.handle(*sample) for sample in samples]
         seconds = (samples[-1][1].stamp_ns - samples[0][1].stamp_ns) * 1e-9
         yield name, seconds, [one for one in said if one and one.culprit != "undecided"]
 
@@ -51,10 +51,7 @@ def _hannover(data: Path) -> Iterator[tuple[str, VehicleInfo, Samples]]:
     for name in HANNOVER:
         for number, line in enumerate(geojson_lines(data / "drives-hannover" / name)):
             samples: Samples = [
-                (
-                    "gnss",
-                    GnssFix(stamp_ns=START_NS + k * PERIOD_NS, position=GeoPoint(lat, lon)),
-                )
+                ("gnss", GnssFix(stamp_ns=START_NS + k * PERIOD_NS, position=GeoPoint(lat, lon)))
                 for k, (lon, lat, _) in enumerate(line.positions)
             ]
             yield f"drives-hannover/{name} {number}", _positions_alone(name), samples
@@ -66,10 +63,16 @@ def _mcity(data: Path) -> Iterator[tuple[str, VehicleInfo, Samples]]:
         instants = read_mcity(file)
         for name in sorted({one.user_id for _, seen in instants for one in seen}):
             samples: Samples = [
-                ("gnss", GnssFix(stamp_ns=stamp, position=GeoPoint(one.lat_deg, one.lon_deg),
-                                 std_m=0.02))
-                for stamp, seen in instants for one in seen if one.user_id == name
-            ]  # fmt: skip
+                (
+                    "gnss",
+                    GnssFix(
+                        stamp_ns=stamp, position=GeoPoint(one.lat_deg, one.lon_deg), std_m=0.02
+                    ),
+                )
+                for stamp, seen in instants
+                for one in seen
+                if one.user_id == name
+            ]
             yield f"traffic-mcity-rtk/{file.name} {name}", _positions_alone(name), samples
 
 

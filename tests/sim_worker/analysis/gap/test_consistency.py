@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks
 from foretwin.sim_worker.analysis.gap.consistency import consistency_of
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.findings import findings_of
-from foretwin.sim_worker.analysis.gap.pairs import Pairs
+from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
+from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
+
+COVERS = ("foretwin.sim_worker.analysis.gap.pairs",)
 
 TIME_S = np.arange(301) * PERIOD_S
 TYRES_RAD = 0.12 * np.sin(1.3 * TIME_S)
@@ -25,24 +26,32 @@ def shifted(values: Array, seconds: float) -> Array:
 
 def turning(
     *, real_pm: Array, model_pm: Array, asked_rad: Array = TYRES_RAD, model_rad: Array | None = None
-) -> Pairs:
+) -> SignalPairs:
     """Six seconds of an obedient car at 5 m/s, whose gyro is right."""
     unknown = np.full(len(TIME_S), np.nan)
     speed = np.full(len(TIME_S), 5.0)
-    return Pairs(
+    return SignalPairs(
         stamp_ns=np.round(TIME_S * 1e9).astype(np.int64),
         moves=np.ones(len(TIME_S), dtype=np.bool_),
         excited=np.abs(asked_rad) > 0.01,
-        course_radps=speed * real_pm, gyro_radps=speed * real_pm,
-        ground_mps=speed, wheel_mps=speed, asked_rad=asked_rad, done_rad=shifted(asked_rad, 0.1),
-        arc_rad=unknown, speed_mps=speed, curvature_pm=real_pm, by_measured_pm=model_pm,
-        by_command_pm=model_pm, commanded_rad=asked_rad,
+        course_radps=speed * real_pm,
+        gyro_radps=speed * real_pm,
+        ground_mps=speed,
+        wheel_mps=speed,
+        asked_rad=asked_rad,
+        done_rad=shifted(asked_rad, 0.1),
+        arc_rad=unknown,
+        speed_mps=speed,
+        curvature_pm=real_pm,
+        by_measured_pm=model_pm,
+        by_command_pm=model_pm,
+        commanded_rad=asked_rad,
         model_tire_rad=shifted(asked_rad, 0.1) if model_rad is None else model_rad,
         pushes=PushBlocks(*np.zeros((6, 0))),
-    )  # fmt: skip
+    )
 
 
-def into_a_bend(*, offset_pm: float) -> Pairs:
+def into_a_bend(*, offset_pm: float) -> SignalPairs:
     """Out of one bend, straight on, and the first second of the next, ever tighter.
 
     As in the embedded drive 53 s after its beginning, where the car's offset of 0.23° at the tyres
@@ -117,5 +126,5 @@ def test_a_stretch_is_broken_where_steering_was_lost_but_not_where_the_car_stood
     assert not pairs._replace(asked_rad=np.full(len(TIME_S), np.nan)).broken
 
 
-def _found(pairs: Pairs) -> Finding | None:
+def _found(pairs: SignalPairs) -> Finding | None:
     return findings_of(consistency_of(pairs))

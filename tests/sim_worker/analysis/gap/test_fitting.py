@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foretwin.sim_worker.analysis.gap.fitting import follower, line_through
+from foretwin.sim_worker.analysis.gap.fitting import delayed_line, line_through
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 TIME_S = np.arange(400) * PERIOD_S
@@ -23,7 +23,7 @@ ASKED = 0.2 * np.sin(1.7 * TIME_S) + 0.1 * np.sin(0.6 * TIME_S + 1.0)
 def test_gain_offset_and_delay_are_found(gain: float, shift: int, offset: float) -> None:
     done = np.full(len(ASKED), np.nan)
     done[shift:] = gain * ASKED[: len(ASKED) - shift] + offset
-    pair = follower(ASKED, done)
+    pair = delayed_line(ASKED, done)
     assert pair is not None
     assert pair.line.gain == pytest.approx(gain, rel=1e-6)
     assert pair.line.offset == pytest.approx(offset, abs=1e-6)
@@ -32,10 +32,10 @@ def test_gain_offset_and_delay_are_found(gain: float, shift: int, offset: float)
 
 
 def test_a_plateau_below_what_is_asked_is_saturation_and_a_small_gain_is_none() -> None:
-    clipped = follower(ASKED, np.clip(ASKED, -0.12, 0.12))
+    clipped = delayed_line(ASKED, np.clip(ASKED, -0.12, 0.12))
     assert clipped is not None
     assert clipped.saturated_at == pytest.approx(0.12, rel=0.02)
-    weak = follower(ASKED, 0.5 * ASKED)
+    weak = delayed_line(ASKED, 0.5 * ASKED)
     assert weak is not None
     assert np.isnan(weak.saturated_at)
 
@@ -54,4 +54,4 @@ def test_deviations_hold_what_noise_does_to_a_line() -> None:
 def test_what_does_not_vary_has_no_line() -> None:
     assert line_through(np.ones(50), np.ones(50), independent=20.0) is None
     assert line_through(np.arange(50.0), np.arange(50.0), independent=2.0) is None
-    assert follower(np.full(300, np.nan), np.full(300, np.nan)) is None
+    assert delayed_line(np.full(300, np.nan), np.full(300, np.nan)) is None

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.sim_worker.analysis.gap.joint_fit import joint_fit
+from foretwin.sim_worker.analysis.gap.fitting import joint_fit
 
 ASKED = np.array([1.4, 1.2, 0.6, 0.0, 0.0, 0.8, 1.4, 0.3])
 LOSS = -np.array([0.2, 0.4, 0.6, 0.8, 0.7, 0.7, 0.9, 1.0])
@@ -36,9 +36,11 @@ def test_a_cause_held_by_its_prior_leaves_what_another_must_explain() -> None:
 
 def test_deviations_shrink_with_more_blocks_and_alike_causes_are_survived() -> None:
     twice = joint_fit(
-        np.zeros(16), np.tile(COLUMNS, (2, 1)),
-        variance=np.full(16, 0.01), prior_std=np.full(2, np.inf),
-    )  # fmt: skip
+        np.zeros(16),
+        np.tile(COLUMNS, (2, 1)),
+        variance=np.full(16, 0.01),
+        prior_std=np.full(2, np.inf),
+    )
     once = joint_fit(np.zeros(8), COLUMNS, variance=VARIANCE, prior_std=np.full(2, np.inf))
     assert twice.std == pytest.approx(once.std / np.sqrt(2.0))
     alike = np.stack([ASKED, ASKED], axis=1)

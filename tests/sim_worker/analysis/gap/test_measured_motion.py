@@ -13,10 +13,18 @@ from tests.sim_worker.places import FRAME, state_at
 def test_what_a_map_has_moved_the_position_by_is_no_motion() -> None:
     """A car drives east at 10 m/s; after a second the map finds it 3 m further north."""
     states = [
-        state_at(0.5 * k, 0.0, 0.0, 10.0, stamp_ns=k * 50_000_000 + 1, yaw_rate=0.0,
-                 tire_angle=None, accel=0.0)
+        state_at(
+            0.5 * k,
+            0.0,
+            0.0,
+            10.0,
+            stamp_ns=k * 50_000_000 + 1,
+            yaw_rate=0.0,
+            tire_angle=None,
+            accel=0.0,
+        )
         for k in range(41)
-    ]  # fmt: skip
+    ]
     for k in range(20, 41):
         place = states[k].position
         north = GeoPoint(place.lat_deg + 3.0 / 111_266.0, place.lon_deg)

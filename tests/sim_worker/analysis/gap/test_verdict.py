@@ -12,7 +12,7 @@ import pytest
 
 from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample
 from foretwin.contracts.frames import GeoPoint
-from foretwin.sim_worker.analysis.gap.verdict import Judge
+from foretwin.sim_worker.analysis.gap.verdict import FaultDetector
 from tests.sim_worker.analysis.gap.judging_faults import (
     IN_TIME_S,
     NAMES,
@@ -27,13 +27,22 @@ from tests.sim_worker.driving import altered
 from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
 from tests.telemetry.standin_drive import FRAME
 
+COVERS = ("foretwin.sim_worker.analysis.gap.findings",)
+
 SEED, END_S = 2, 12.0
 """Of the fast tests: one drive simulated once."""
 FOUND = (
-    "steering_read_in_degrees", "steering_commanded_in_degrees", "steering_sign",
-    "offset_steering_sensor", "scaled_gyro", "offset_speed", "steering_ratio", "steering_delay",
-    "friction", "drive_gain",
-)  # fmt: skip
+    "steering_read_in_degrees",
+    "steering_commanded_in_degrees",
+    "steering_sign",
+    "offset_steering_sensor",
+    "scaled_gyro",
+    "offset_speed",
+    "steering_ratio",
+    "steering_delay",
+    "friction",
+    "drive_gain",
+)
 
 
 def test_a_car_and_a_model_that_agree_are_left_alone() -> None:
@@ -56,7 +65,7 @@ def test_a_fault_that_begins_while_driving_is_dated(fault: str) -> None:
     """The drive of a sound car goes over into that of one whose commands or gyro are off."""
     begin_ns = drive_of(SEED, end_s=END_S).info.start_stamp_ns + 8_000_000_000
     drive = drive_of(SEED, end_s=END_S)
-    judge = Judge(drive.info, model_with(None), frame=FRAME)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
     told = []
     for channel, message in drive.samples:
         if message.stamp_ns >= begin_ns:
@@ -66,7 +75,7 @@ def test_a_fault_that_begins_while_driving_is_dated(fault: str) -> None:
             if fault == "weaker" and isinstance(message, ControlCommand):
                 wheel = (message.steering_wheel_rad or 0.0) / 0.4
                 message = msgspec.structs.replace(message, steering_wheel_rad=wheel)
-        told.append(judge.handle(channel, message))
+        told.append(detector.handle(channel, message))
     (first, *_) = [verdict for verdict in told if verdict]
     assert first.culprit == "vehicle"
     assert first.cause == ("gyro_sensor" if fault == "gyro" else "steering_gain")
@@ -77,8 +86,10 @@ def test_a_fault_that_begins_while_driving_is_dated(fault: str) -> None:
 def test_without_commands_a_wrong_ratio_is_nobodys_but_degrees_are_the_cars() -> None:
     def told(fault: str) -> list[str]:
         drive = drive_with(fault, seed=SEED, end_s=END_S)
-        judge = Judge(drive.info, model_with(fault if fault in MODEL_FAULTS else None), frame=FRAME)
-        verdicts = [judge.handle(*sample) for sample in drive.samples if sample[0] != "control"]
+        detector = FaultDetector(
+            drive.info, model_with(fault if fault in MODEL_FAULTS else None), frame=FRAME
+        )
+        verdicts = [detector.handle(*sample) for sample in drive.samples if sample[0] != "control"]
         return [f"{verdict.culprit} {verdict.cause}" for verdict in verdicts if verdict]
 
     assert told("steering_ratio")[:1] == ["undecided steering_ratio"]
@@ -88,13 +99,13 @@ def test_without_commands_a_wrong_ratio_is_nobodys_but_degrees_are_the_cars() ->
 def test_a_model_whose_steering_lags_as_the_cars_does_is_left_alone() -> None:
     """What was measured has the lag in it already: it must not act twice."""
     drive = drive_of(SEED, end_s=END_S)
-    judge = Judge(drive.info, altered(model_with(None), steering_lag_s=0.2), frame=FRAME)
+    detector = FaultDetector(drive.info, altered(model_with(None), steering_lag_s=0.2), frame=FRAME)
     lags = []
     for sample in drive.samples[: round(0.75 * len(drive.samples))]:
-        verdict = judge.handle(*sample)
+        verdict = detector.handle(*sample)
         assert verdict is None or verdict.cause == "steering_delay"
-        if judge.latest is not None and judge.latest.motion_lag is not None:
-            lags.append(judge.latest.motion_lag.seconds)
+        if detector.latest is not None and detector.latest.motion_lag is not None:
+            lags.append(detector.latest.motion_lag.seconds)
     assert max(lags) <= 0.04
 
 
@@ -108,29 +119,29 @@ def test_late_lost_doubled_and_reordered_samples_accuse_nobody() -> None:
         for _ in range(random.choice([0, 1, 2], p=[0.2, 0.75, 0.05]))
     ]
     came.sort(key=lambda one: one[0])
-    judge = Judge(drive.info, model_with(None), frame=FRAME)
-    assert not any(judge.handle(channel, message) for _, channel, message in came)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+    assert not any(detector.handle(channel, message) for _, channel, message in came)
 
 
 def test_a_telephones_positions_accuse_no_sensor_and_confirm_none() -> None:
     drive = drive_of(SEED, end_s=END_S)
     told = []
     for fault in (None, "steering_ratio"):
-        judge = Judge(drive.info, model_with(fault), frame=FRAME)
+        detector = FaultDetector(drive.info, model_with(fault), frame=FRAME)
         for channel, message in drive.samples:
             if isinstance(message, GnssFix):
                 message = msgspec.structs.replace(message, std_m=3.0)
-            told.append(judge.handle(channel, message))
+            told.append(detector.handle(channel, message))
     assert [verdict.culprit for verdict in told if verdict] == ["undecided"]
 
 
 def test_no_verdict_without_excitation() -> None:
     """Creeping straight on under a wrong ratio shows nothing."""
     drive = drive_of(SEED, end_s=END_S)
-    judge = Judge(drive.info, model_with("steering_ratio"), frame=FRAME)
+    detector = FaultDetector(drive.info, model_with("steering_ratio"), frame=FRAME)
     start_ns = drive.info.start_stamp_ns
     quiet = [s for s in drive.samples if s[1].stamp_ns < start_ns + 3_000_000_000]
-    assert not any(judge.handle(*sample) for sample in quiet)
+    assert not any(detector.handle(*sample) for sample in quiet)
 
 
 def _dirty(samples: list[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
@@ -150,11 +161,11 @@ def _dirty(samples: list[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
 
 def test_dirty_samples_are_survived_and_accuse_nobody() -> None:
     drive = drive_of(SEED, end_s=END_S)
-    judge = Judge(drive.info, model_with(None), frame=FRAME)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
     with np.errstate(invalid="raise"):
-        told = [judge.handle(*sample) for sample in _dirty(drive.samples)]
+        told = [detector.handle(*sample) for sample in _dirty(drive.samples)]
     assert not any(told)
-    judge.handle("speed", msgspec.UNSET)  # a message without a stamp is passed over
+    detector.handle("speed", msgspec.UNSET)  # a message without a stamp is passed over
 
 
 @pytest.mark.judge

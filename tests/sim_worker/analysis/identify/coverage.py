@@ -35,9 +35,11 @@ from tests.telemetry.standin_drive import FRAME
 
 RELATIVE = {"steering_ratio": 0.02, "drive_gain": 0.03, "brake_gain": 0.03}
 ABSOLUTE = {
-    "steering_offset_rad": math.radians(0.2), UNDERSTEER_NAME: 0.0003,
-    "steering_delay_s": 0.010, "accel_delay_s": 0.010,
-}  # fmt: skip
+    "steering_offset_rad": math.radians(0.2),
+    UNDERSTEER_NAME: 0.0003,
+    "steering_delay_s": 0.010,
+    "accel_delay_s": 0.010,
+}
 """What a minute in town should tell a parameter to."""
 
 
@@ -126,8 +128,11 @@ def own_gradient() -> float:
     """
     car = msgspec.structs.replace(
         read_parameters().car,
-        steering_offset_rad=0.0, drag_npv2=0.0, rolling_resistance_n=0.0, drive_gain=1.0,
-    )  # fmt: skip
+        steering_offset_rad=0.0,
+        drag_npv2=0.0,
+        rolling_resistance_n=0.0,
+        drive_gain=1.0,
+    )
     vehicle = load_vehicle()
     base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
     soft = vehicle.mass_kg.value * (base - rear) / base

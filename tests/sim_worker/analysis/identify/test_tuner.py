@@ -11,9 +11,9 @@ import pytest
 from foretwin.contracts.drive import ImuSample, SteeringSample
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.tuning import Identification
-from foretwin.sim_worker.analysis.identify.smoothing import smoothed
+from foretwin.sim_worker.analysis.identify.regression import smoothed
 from foretwin.sim_worker.analysis.identify.steering import fit_steering
-from foretwin.sim_worker.analysis.identify.steering_signals import TURNING, steering_signals
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta, steering_signals
 from foretwin.sim_worker.analysis.identify.step import bends_before, find_step
 from foretwin.sim_worker.analysis.identify.tuner import Tuner
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
@@ -31,12 +31,17 @@ from tests.sim_worker.standin_drives import (
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.known_standin import KnownStandin
 
+COVERS = (
+    "foretwin.sim_worker.analysis.identify.steering_signals",
+    "foretwin.sim_worker.analysis.identify.step",
+)
+
 CAR = read_parameters().car
 Sample = tuple[str, Any]
 
 
 def tuner(**options: float) -> Tuner:
-    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", **options)  # type: ignore[arg-type]
+    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", frame=FRAME, **options)  # type: ignore[arg-type]
 
 
 def through(taken: Tuner, samples: list[Sample]) -> list[Identification]:
@@ -54,8 +59,13 @@ def test_parameters_count_as_soon_as_the_driving_tells_them() -> None:
     taken = tuner()
     told = through(taken, city_drive().samples)
     assert [round((found.stamp_ns - START_STAMP_NS) * 1e-9) for found in told] == [
-        20, 30, 40, 50, 60, 70,
-    ]  # fmt: skip
+        20,
+        30,
+        40,
+        50,
+        60,
+        70,
+    ]
     assert taken.vehicle.steering_ratio.value == pytest.approx(15.3, rel=0.02)
     assert taken.vehicle.brake_gain.value == pytest.approx(1.06, rel=0.03)
     assert taken.vehicle.steering_delay_s.value == pytest.approx(0.1, abs=0.01)
@@ -153,7 +163,7 @@ def test_softer_tyres_on_both_axles_show_where_bends_begin_and_end() -> None:
     other = find_step(steering_signals(record._replace(wheel_rad=softer), load_vehicle()), before)
     assert alike is None
     assert other is not None
-    assert other.parameter == TURNING
+    assert other.parameter == Theta.TURNING
     assert other.after - other.before == pytest.approx(0.006, rel=0.3)
 
 

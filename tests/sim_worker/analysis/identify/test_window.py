@@ -16,6 +16,13 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
 from tests.sim_worker.standin_drives import city_minute, estimate, straight_minute
 
+COVERS = (
+    "foretwin.sim_worker.analysis.identify.actuator",
+    "foretwin.sim_worker.analysis.identify.longitudinal",
+    "foretwin.sim_worker.analysis.identify.steering_signals",
+    "foretwin.sim_worker.analysis.identify.steering",
+)
+
 CAR = read_parameters().car
 TOLD = (
     ("steering_ratio", CAR.steering_ratio, 0.02 * CAR.steering_ratio),

@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
-from foretwin.contracts.frames import (
-    GeoPoint,
-    LocalFrame,
-    geo_from_local,
-    geo_from_local_yaw,
-)
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
-from foretwin.sim_worker.analysis.side_by_side.segment import Place
+from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import HORIZON_S, SideBySide
+
+COVERS = (
+    "foretwin.sim_worker.analysis.side_by_side.departure",
+    "foretwin.sim_worker.analysis.side_by_side.segment",
+)
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 START_NS = 7_000_000_000
@@ -43,20 +43,26 @@ def stopping(time_s: Array) -> Array:
 def plan_at(at_s: float, rows: Array, time_s: Array) -> PlannedTrajectory:
     geo = geo_from_local(FRAME, rows[:, :2])
     return PlannedTrajectory(
-        stamp_ns=START_NS + round(at_s * 1e9), time_from_stamp_s=time_s,
-        lat_deg=geo[:, 0].copy(), lon_deg=geo[:, 1].copy(),
-        yaw_rad=geo_from_local_yaw(FRAME, rows[:, 2], rows[:, :2]), speed_mps=rows[:, 3].copy(),
-    )  # fmt: skip
+        stamp_ns=START_NS + round(at_s * 1e9),
+        time_from_stamp_s=time_s,
+        lat_deg=geo[:, 0].copy(),
+        lon_deg=geo[:, 1].copy(),
+        yaw_rad=geo_from_local_yaw(FRAME, rows[:, 2], rows[:, :2]),
+        speed_mps=rows[:, 3].copy(),
+    )
 
 
 def state_at(at_s: float, row: Array) -> VehicleState:
     geo = geo_from_local(FRAME, row[:2])
     return VehicleState(
-        vehicle_id="ego", stamp_ns=START_NS + round(at_s * 1e9),
+        vehicle_id="ego",
+        stamp_ns=START_NS + round(at_s * 1e9),
         position=GeoPoint(float(geo[0]), float(geo[1])),
         yaw_rad=float(geo_from_local_yaw(FRAME, float(row[2]), row[None, :2])[0]),
-        speed_mps=float(row[3]), yaw_rate_radps=0.0, accel_mps2=0.0,
-    )  # fmt: skip
+        speed_mps=float(row[3]),
+        yaw_rate_radps=0.0,
+        accel_mps2=0.0,
+    )
 
 
 def side_by_side(
@@ -67,9 +73,9 @@ def side_by_side(
     until_s: float = 20.0,
 ) -> tuple[list[Disagreement], list[DrivenSegment]]:
     """Drive a course at 10 Hz; `planned` gives the rows of the plan made at a time."""
-    here = Place(GeoPoint(0.0, 0.0))
+    here = DrivePlace(GeoPoint(0.0, 0.0))
 
-    def place() -> Place:
+    def place() -> DrivePlace:
         return here
 
     watch = SideBySide(FRAME, vehicle_id="ego", place=place)
@@ -82,7 +88,7 @@ def side_by_side(
             status = VehicleStatus(stamp_ns=START_NS + round(at_s * 1e9), control_mode=modes[at_s])
             watch.take_status(status)
         state = state_at(at_s, driven(np.array([at_s]))[0])
-        here = Place(state.position, "junction", 100.0 + at_s)
+        here = DrivePlace(state.position, "junction", 100.0 + at_s)
         watch.take_plan(plan_at(at_s, planned(at_s, ahead), ahead))
         found += watch.take_state(state)
     return [one for one in found + watch.finish() if one.over], watch.segments

@@ -11,24 +11,28 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.roles import FollowLimits, Role
-from foretwin.sim_worker.mirror.cast import Cast
-from foretwin.sim_worker.mirror.member import CastMember, Member
-from foretwin.sim_worker.mirror.track import Measured
+from foretwin.sim_worker.mirror.member import GroupMember, Member
+from foretwin.sim_worker.mirror.track import MeasuredPose
+from foretwin.sim_worker.mirror.vehicle_group import VehicleGroup
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import FRAME, box, crossroads, state_at
+
+COVERS = ("foretwin.sim_worker.mirror.member",)
 
 CAR, VAN = load_vehicle(), load_vehicle("vw_vanagon")
 TICK_NS = 20_000_000
 LIMITS = FollowLimits()
 
 
-def pair(car: Role, van: Role) -> Cast:
-    cast = Cast(None, FRAME, (CastMember("car", CAR), CastMember("van", VAN)), limits=LIMITS)
-    cast.set_roles({"car": car, "van": van})
-    return cast
+def pair(car: Role, van: Role) -> VehicleGroup:
+    group = VehicleGroup(
+        None, FRAME, (GroupMember("car", CAR), GroupMember("van", VAN)), limits=LIMITS
+    )
+    group.set_roles({"car": car, "van": van})
+    return group
 
 
-def meet(cast: Cast, *, van_speed: float = 0.0, until_s: float = 6.0) -> Cast:
+def meet(group: VehicleGroup, *, van_speed: float = 0.0, until_s: float = 6.0) -> VehicleGroup:
     """Let the car be measured driving at 8 m/s through where the van is measured, 25 m ahead."""
     for k in range(round(until_s * 50)):
         t = k / 50.0
@@ -36,13 +40,13 @@ def meet(cast: Cast, *, van_speed: float = 0.0, until_s: float = 6.0) -> Cast:
             ("van", state_at(25.0 - van_speed * t, 0.0, 0.0, -van_speed, stamp_ns=k * TICK_NS)),
             ("car", state_at(8.0 * t, 0.0, stamp_ns=k * TICK_NS)),
         ):
-            cast.take_state(name, state)
-        cast.advance(k * TICK_NS)
-    return cast
+            group.take_state(name, state)
+        group.advance(k * TICK_NS)
+    return group
 
 
-def x_of(cast: Cast, name: str) -> float:
-    return float(cast.members[name].twin().pose[0])
+def x_of(group: VehicleGroup, name: str) -> float:
+    return float(group.members[name].twin().pose[0])
 
 
 @pytest.mark.parametrize(
@@ -60,58 +64,58 @@ def x_of(cast: Cast, name: str) -> float:
     ],
 )
 def test_who_meets_whom_is_a_matter_of_roles(car: Role, van: Role, touch: bool) -> None:
-    cast = meet(pair(car, van))
-    assert cast.touches == ({("car", "van")} if touch else set())
+    group = meet(pair(car, van))
+    assert group.touches == ({("car", "van")} if touch else set())
     if car in ("twin", "all"):
         # Where it meets the van, which nothing moves or only a push, it does not come by.
-        assert (x_of(cast, "car") > 40.0) != touch
+        assert (x_of(group, "car") > 40.0) != touch
     if (car, van) == ("shadow", "twin"):
-        assert x_of(cast, "van") > 26.0  # pushed along
+        assert x_of(group, "van") > 26.0  # pushed along
 
 
 def test_roles_may_change_until_just_before_and_count_at_once() -> None:
-    cast = meet(pair("twin", "ghost"), until_s=1.5)
-    cast.set_roles({"van": "shadow"})
-    assert meet_on(cast, 1.5, 6.0).touches == {("car", "van")}
+    group = meet(pair("twin", "ghost"), until_s=1.5)
+    group.set_roles({"van": "shadow"})
+    assert meet_on(group, 1.5, 6.0).touches == {("car", "van")}
     gone = meet(pair("twin", "shadow"), until_s=1.5)
     gone.set_roles({"van": "ghost"})
     assert meet_on(gone, 1.5, 6.0).touches == set()
     assert x_of(gone, "car") > 40.0
 
 
-def meet_on(cast: Cast, from_s: float, until_s: float) -> Cast:
+def meet_on(group: VehicleGroup, from_s: float, until_s: float) -> VehicleGroup:
     for k in range(round(from_s * 50), round(until_s * 50)):
-        cast.take_state("van", state_at(25.0, 0.0, 0.0, 0.0, stamp_ns=k * TICK_NS))
-        cast.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
-        cast.advance(k * TICK_NS)
-    return cast
+        group.take_state("van", state_at(25.0, 0.0, 0.0, 0.0, stamp_ns=k * TICK_NS))
+        group.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
+        group.advance(k * TICK_NS)
+    return group
 
 
 def test_a_wall_stops_a_twin_and_is_named() -> None:
     world = crossroads(buildings=(box(20.0, 0.0, 3.0, 3.0),))
-    cast = Cast(world, FRAME, (CastMember("car", CAR),), limits=LIMITS)
-    cast.set_roles({"car": "twin"})
-    cast.correction = "follow"
+    group = VehicleGroup(world, FRAME, (GroupMember("car", CAR),), limits=LIMITS)
+    group.set_roles({"car": "twin"})
+    group.correction = "follow"
     for k in range(200):
-        cast.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
-        cast.advance(k * TICK_NS)
-    assert cast.touches == {("car", "world")}
+        group.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
+        group.advance(k * TICK_NS)
+    assert group.touches == {("car", "world")}
     # The correction does not push it on through what physics stops it at.
-    nose_m = x_of(cast, "car") + CAR.length_m.value - CAR.rear_overhang_m.value
+    nose_m = x_of(group, "car") + CAR.length_m.value - CAR.rear_overhang_m.value
     assert nose_m < 17.0 + 0.3
 
 
 def test_who_is_not_measured_any_more_is_gone_and_comes_back() -> None:
-    cast = meet(pair("twin", "shadow"), until_s=1.0)
+    group = meet(pair("twin", "shadow"), until_s=1.0)
     for k in range(50, 300):
-        cast.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
-        cast.advance(k * TICK_NS)
-    assert not cast.members["van"].present
-    assert cast.touches == set()
-    cast.take_state("van", state_at(60.0, 0.0, 0.0, 0.0, stamp_ns=300 * TICK_NS))
-    cast.take_state("car", state_at(48.0, 0.0, stamp_ns=300 * TICK_NS))
-    cast.advance(300 * TICK_NS)
-    assert cast.members["van"].present
+        group.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
+        group.advance(k * TICK_NS)
+    assert not group.members["van"].present
+    assert group.touches == set()
+    group.take_state("van", state_at(60.0, 0.0, 0.0, 0.0, stamp_ns=300 * TICK_NS))
+    group.take_state("car", state_at(48.0, 0.0, stamp_ns=300 * TICK_NS))
+    group.advance(300 * TICK_NS)
+    assert group.members["van"].present
 
 
 def weaving(k: int, *, side_m: float = 0.0) -> VehicleState:
@@ -120,11 +124,12 @@ def weaving(k: int, *, side_m: float = 0.0) -> VehicleState:
     yaw = 0.25 * math.sin(0.6 * t)
     x = 10.0 * t
     y = -(2.5 / 0.6) * (math.cos(0.6 * t) - 1.0) + side_m
-    return state_at(x, y, yaw, 10.0, stamp_ns=k * TICK_NS, yaw_rate=0.15 * math.cos(0.6 * t),
-                    tire_angle=None)  # fmt: skip
+    return state_at(
+        x, y, yaw, 10.0, stamp_ns=k * TICK_NS, yaw_rate=0.15 * math.cos(0.6 * t), tire_angle=None
+    )
 
 
-def shown(member: Member, stamp_ns: int) -> Measured:
+def shown(member: Member, stamp_ns: int) -> MeasuredPose:
     """Where a vehicle is in its role, and how it moves."""
     return member.twin() if member.has_twin else member.box(member.track.at(stamp_ns))
 
@@ -141,38 +146,38 @@ SINGLE: list[Role] = ["twin", "shadow", "ghost"]
 def test_a_change_of_role_keeps_pose_and_speed(
     roles: list[Role], gap_m: tuple[float, float], follow: bool
 ) -> None:
-    cast = Cast(None, FRAME, (CastMember("car", CAR),), limits=LIMITS)
-    cast.set_roles({"car": "twin"})
-    cast.correction = "follow" if follow else "free"
-    member = cast.members["car"]
+    group = VehicleGroup(None, FRAME, (GroupMember("car", CAR),), limits=LIMITS)
+    group.set_roles({"car": "twin"})
+    group.correction = "follow" if follow else "free"
+    member = group.members["car"]
     k = 0
     for number, role in enumerate(["twin", *roles]):
         for _ in range(40):
-            cast.take_state("car", weaving(k))
-            cast.advance(k * TICK_NS)
+            group.take_state("car", weaving(k))
+            group.advance(k * TICK_NS)
             k += 1
         if number == 0:
             member.body.nudge(np.array([*gap_m, 0.03]))
-        stamp_ns = cast.stamp_ns
+        stamp_ns = group.stamp_ns
         assert stamp_ns is not None
         before = shown(member, stamp_ns)
-        cast.set_roles({"car": role})
+        group.set_roles({"car": role})
         after = shown(member, stamp_ns)
         assert after.pose == pytest.approx(before.pose, abs=1e-9)
         assert after.rate == pytest.approx(before.rate, abs=1e-9)
 
 
 def test_a_shadow_that_was_a_twin_drifts_to_its_vehicle_within_the_limits() -> None:
-    cast = Cast(None, FRAME, (CastMember("car", CAR),), limits=LIMITS)
-    cast.set_roles({"car": "twin"})
-    member = cast.members["car"]
+    group = VehicleGroup(None, FRAME, (GroupMember("car", CAR),), limits=LIMITS)
+    group.set_roles({"car": "twin"})
+    member = group.members["car"]
     offsets = []
     for k in range(1200):
-        cast.take_state("car", weaving(k))
-        cast.advance(k * TICK_NS)
+        group.take_state("car", weaving(k))
+        group.advance(k * TICK_NS)
         if k == 50:
             member.body.nudge(np.array([1.0, -1.0, 0.05]))
-            cast.set_roles({"car": "shadow"})
+            group.set_roles({"car": "shadow"})
         if k > 50:
             offsets.append([*member.offset, *member.settling.acceleration])
     course = np.array(offsets)

@@ -13,17 +13,20 @@ from foretwin.contracts.frames import LocalFrame, target_from_source
 from foretwin.contracts.roles import Correction, FollowLimits, Role
 from foretwin.contracts.world import World
 from foretwin.geometry.rectangles import Rectangles, overlapping
-from foretwin.sim_worker.mirror.member import STEP_NS, CastMember, Member
+from foretwin.sim_worker.mirror.member import STEP_NS, GroupMember, Member
 from foretwin.sim_worker.mirror.role_world import RoleWorld
-from foretwin.sim_worker.mirror.track import Measured
+from foretwin.sim_worker.mirror.track import MeasuredPose
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Touches = frozenset[tuple[str, str]]
 """Sorted pairs of vehicle ids; `world` stands for what does not move."""
 
+LONGEST_SILENCE_NS = 8_000_000_000
+"""Over a longer one nothing is simulated, and a twin that follows starts anew as well."""
 
-class Cast:
-    """Steps twins, moves boxes, and finds who touches whom; no clock, no bus.
+
+class VehicleGroup:
+    """Steps twins, moves boxes, and finds which touch; no clock, no bus.
 
     States must come in time order, others' before `advance` to a stamp at or after theirs.
     """
@@ -32,19 +35,19 @@ class Cast:
         self,
         world: World | None,
         frame: LocalFrame,
-        crew: Sequence[CastMember],
+        specs: Sequence[GroupMember],
         *,
         limits: FollowLimits,
     ) -> None:
-        self._crew, self._frame, self._limits = tuple(crew), frame, limits
+        self._specs, self._frame, self._limits = tuple(specs), frame, limits
         self._world = RoleWorld(
             world,
-            {who.vehicle_id: who.vehicle for who in crew},
-            commanded=frozenset(who.vehicle_id for who in crew if who.commanded),
+            {spec.vehicle_id: spec.vehicle for spec in specs},
+            commanded=frozenset(spec.vehicle_id for spec in specs if spec.commanded),
         )
         self.members = {
-            who.vehicle_id: Member(who, self._world.twins[who.vehicle_id], frame, limits)
-            for who in crew
+            spec.vehicle_id: Member(spec, self._world.twins[spec.vehicle_id], frame, limits)
+            for spec in specs
         }
         self.correction: Correction = "free"
         self.touches: Touches = frozenset()
@@ -52,13 +55,13 @@ class Cast:
         self.stamp_ns: int | None = None
 
     def carried_to(
-        self, world: World | None, frame: LocalFrame, *, crew: Sequence[CastMember] | None = None
-    ) -> Cast:
+        self, world: World | None, frame: LocalFrame, *, specs: Sequence[GroupMember] | None = None
+    ) -> VehicleGroup:
         """Return the same vehicles in another World, in the same places and roles.
 
-        `crew` are the same with other parameters.
+        `specs` are the same with other parameters.
         """
-        new = Cast(world, frame, crew or self._crew, limits=self._limits)
+        new = VehicleGroup(world, frame, specs or self._specs, limits=self._limits)
         new.correction, new.stamp_ns, new.touches = self.correction, self.stamp_ns, self.touches
         for name, old in self.members.items():
             member = new.members[name]
@@ -88,7 +91,7 @@ class Cast:
         self.members[vehicle_id].track.take(state)
 
     def take_command(self, vehicle_id: str, command: ControlCommand) -> None:
-        """Take what a vehicle was told."""
+        """Take a command of a vehicle."""
         self.members[vehicle_id].take_command(command)
 
     def set_roles(self, roles: Mapping[str, Role]) -> None:
@@ -107,9 +110,9 @@ class Cast:
 
     def advance(self, stamp_ns: int) -> None:
         """Step up to `stamp_ns`, in whole physics steps."""
-        if self.stamp_ns is None or stamp_ns - self.stamp_ns > _LONGEST_ADVANCE_NS:
+        if self.stamp_ns is None or stamp_ns - self.stamp_ns > LONGEST_SILENCE_NS:
             self.stamp_ns = stamp_ns
-        self._who_is_there(stamp_ns)
+        self._update_presence(stamp_ns)
         found: set[tuple[str, str]] = set()
         while self.stamp_ns + STEP_NS <= stamp_ns:
             found |= self._step(self.stamp_ns)
@@ -117,14 +120,16 @@ class Cast:
         for member in self.members.values():
             member.commands.forget_before(stamp_ns)
             if member.present:
-                self._world.place(member.who.vehicle_id, member.box(member.track.at(stamp_ns)).pose)
+                self._world.place(
+                    member.spec.vehicle_id, member.box(member.track.at(stamp_ns)).pose
+                )
         self.touches |= found | self._overlaps(stamp_ns)
 
     def forget_touches(self) -> None:
         """Begin to collect touches anew."""
         self.touches = frozenset()
 
-    def _who_is_there(self, stamp_ns: int) -> None:
+    def _update_presence(self, stamp_ns: int) -> None:
         for name, member in self.members.items():
             there = member.track.known(stamp_ns)
             if there and not member.present:
@@ -138,14 +143,14 @@ class Cast:
             self._world.set_role(name, member.role if member.present else None)
 
     def _step(self, now_ns: int) -> set[tuple[str, str]]:
-        measured: dict[str, Measured] = {}
+        measured: dict[str, MeasuredPose] = {}
         for name, member in self.members.items():
             if member.present:
                 measured[name] = member.track.at(now_ns + STEP_NS)
                 member.settle()
                 self._world.place(name, member.box(measured[name]).pose)
                 if member.has_twin:
-                    member.tell_twin(now_ns)
+                    member.command_twin(now_ns)
         self._world.step()
         touches = self._world.contacts()
         touching = {name for pair in touches for name in pair}
@@ -171,11 +176,7 @@ class Cast:
         }
 
 
-_LONGEST_ADVANCE_NS = 8_000_000_000
-"""Over a longer silence nothing is simulated."""
-
-
 def _outline(member: Member, pose: Array) -> Rectangles:
-    vehicle = member.who.vehicle
+    vehicle = member.spec.vehicle
     ahead = box_centre_from_base_m(vehicle) * np.array([np.cos(pose[2]), np.sin(pose[2])])
     return Rectangles(pose[:2] + ahead, pose[2], vehicle.length_m.value, vehicle.width_m.value)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks, PushTest
-from foretwin.sim_worker.analysis.gap.change import change_index
-from foretwin.sim_worker.analysis.gap.finding import Finding
+from foretwin.sim_worker.analysis.gap.consistency import change_index
+from foretwin.sim_worker.analysis.gap.findings import Finding
 
 BLOCK_NS = 200_000_000
 
@@ -112,7 +112,7 @@ def driven(
         ({}, {"drag": 1.0, "drive": 1.7}, {("model", "drive_gain"), ("model", "drag")}),
         ({"drive": 0.88, "brake": 1.15, "drag": 0.1, "roll": 0.15}, {}, set()),
     ],
-)  # fmt: skip
+)
 def test_of_several_departures_each_is_named_and_nothing_beside_them(
     car: dict[str, float], model: dict[str, float], said: set[tuple[str, str]]
 ) -> None:

@@ -1,4 +1,4 @@
-"""When a car's mirror needs a cast: another role than all three, a correction, other vehicles."""
+"""When a mirror needs a group: for another role than all three, a correction, other vehicles."""
 
 from __future__ import annotations
 
@@ -14,13 +14,10 @@ from foretwin.contracts.roles import Correction, MirrorCast, OtherVehicle, Role,
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.mirror.cast import Cast
-from foretwin.sim_worker.mirror.member import CastMember
-from foretwin.sim_worker.mirror.samples import with_cast
+from foretwin.sim_worker.mirror.member import GroupMember
+from foretwin.sim_worker.mirror.samples import with_group
+from foretwin.sim_worker.mirror.vehicle_group import LONGEST_SILENCE_NS, VehicleGroup
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory
-
-_LOST_NS = 8_000_000_000
-"""After a longer silence a twin that follows starts anew as well."""
 
 
 class FreeTwin(NamedTuple):
@@ -30,16 +27,16 @@ class FreeTwin(NamedTuple):
     stamp_ns: int
 
 
-class Casting:
-    """Holds the cast beside a mirror's free twin; without need there is none, at no cost.
+class RoleManager:
+    """Holds the group beside a mirror's free twin; without need there is none, at no cost.
 
     Calls for one state of the car come in the order `change_world`, `before`, `start_anew` where
-    the free twin does, `advance`, `told`.
+    the free twin does, `advance`, `completed`.
     """
 
     def __init__(
         self,
-        car: CastMember,
+        car: GroupMember,
         settings: MirrorCast,
         *,
         drive_frame: LocalFrame,
@@ -47,12 +44,12 @@ class Casting:
     ) -> None:
         """`commands` are the car's, which the free twin takes too."""
         others = [
-            CastMember(other.vehicle_id, other.vehicle, other.commands_recorded)
+            GroupMember(other.vehicle_id, other.vehicle, other.commands_recorded)
             for other in settings.others
         ]
         self._car = car.vehicle_id
         self._commands = commands
-        self._crew = (car, *others)
+        self._members = (car, *others)
         self._limits = settings.limits
         self._drive_frame = self._frame = drive_frame
         self._world: World | None = None
@@ -62,17 +59,17 @@ class Casting:
         self._pending: list[UseRoles] = []
         self._last: VehicleState | None = None
         self._lost = False
-        self._cast: Cast | None = self._new_cast() if others else None
+        self._group: VehicleGroup | None = self._new_group() if others else None
 
-    def _new_cast(self) -> Cast:
-        cast = Cast(self._world, self._frame, self._crew, limits=self._limits)
-        cast.members[self._car].commands = self._commands
-        cast.set_roles(self._roles)
-        return cast
+    def _new_group(self) -> VehicleGroup:
+        group = VehicleGroup(self._world, self._frame, self._members, limits=self._limits)
+        group.members[self._car].commands = self._commands
+        group.set_roles(self._roles)
+        return group
 
     @property
     def _needed(self) -> bool:
-        alone = len(self._crew) == 1
+        alone = len(self._members) == 1
         return not alone or self._roles[self._car] != "all" or self._correction != "free"
 
     def set_roles(self, use: UseRoles) -> None:
@@ -82,24 +79,24 @@ class Casting:
     def take_other(self, other: OtherVehicle) -> None:
         """Take another vehicle's state and commands; of an unknown one, nothing."""
         name = other.state.vehicle_id
-        if self._cast is None or name not in self._cast.members or name == self._car:
+        if self._group is None or name not in self._group.members or name == self._car:
             return
         for command in other.commands:
-            self._cast.take_command(name, command)
-        self._cast.take_state(name, other.state)
+            self._group.take_command(name, command)
+        self._group.take_state(name, other.state)
 
     def change_world(self, world: World | None, frame: LocalFrame) -> None:
         """Go on in another World."""
         self._world, self._frame = world, frame
-        if self._cast is not None:
-            self._cast = self._cast.carried_to(world, frame)
+        if self._group is not None:
+            self._group = self._group.carried_to(world, frame)
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Go on with other parameters of the car."""
-        car, *others = self._crew
-        self._crew = (car._replace(vehicle=vehicle), *others)
-        if self._cast is not None:
-            self._cast = self._cast.carried_to(self._world, self._frame, crew=self._crew)
+        car, *others = self._members
+        self._members = (car._replace(vehicle=vehicle), *others)
+        if self._group is not None:
+            self._group = self._group.carried_to(self._world, self._frame, specs=self._members)
 
     def before(self, state: VehicleState, free_twin: Callable[[], FreeTwin | None]) -> None:
         """Make the changes that are due at a state of the car, and take the state."""
@@ -113,54 +110,50 @@ class Casting:
             self._correction = use.correction
         if due:
             self._apply(free_twin)
-        self._lost = self._last is None or state.stamp_ns - self._last.stamp_ns > _LOST_NS
+        self._lost = self._last is None or state.stamp_ns - self._last.stamp_ns > LONGEST_SILENCE_NS
         self._last = state
-        if self._cast is not None:
-            self._cast.take_state(self._car, state)
+        if self._group is not None:
+            self._group.take_state(self._car, state)
 
     def _begin_anew(self, stamp_ns: int) -> None:
         """Forget what was by the old clock; roles that were to come by it are due."""
         self._pending = [msgspec.structs.replace(use, stamp_ns=stamp_ns) for use in self._pending]
         self._last = None
-        if self._cast is not None:
-            self._cast = self._new_cast()
-            self._cast.correction = self._correction
+        if self._group is not None:
+            self._group = self._new_group()
+            self._group.correction = self._correction
 
     def _apply(self, free_twin: Callable[[], FreeTwin | None]) -> None:
-        if self._cast is None:
+        if self._group is None:
             if not self._needed:
                 return
-            self._cast = self._new_cast()
+            self._group = self._new_group()
             twin = free_twin()
             if twin is not None and self._last is not None:
-                self._cast.take_state(self._car, self._last)
-                self._cast.begin_with_twin(self._car, twin.state, twin.stamp_ns)
-        self._cast.correction = self._correction
-        self._cast.set_roles(self._roles)
+                self._group.take_state(self._car, self._last)
+                self._group.begin_with_twin(self._car, twin.state, twin.stamp_ns)
+        self._group.correction = self._correction
+        self._group.set_roles(self._roles)
 
     def start_anew(self, stamp_ns: int) -> None:
         """Follow the free twin that starts anew, unless a correction makes that needless."""
-        if self._cast is None or not (self._correction == "free" or self._lost):
+        if self._group is None or not (self._correction == "free" or self._lost):
             return
-        self._cast.start_anew(stamp_ns)
-        if not self._needed and self._cast.members[self._car].plain:
-            self._cast = None
+        self._group.start_anew(stamp_ns)
+        if not self._needed and self._group.members[self._car].plain:
+            self._group = None
 
     def advance(self, stamp_ns: int) -> None:
-        """Step the cast up to a state of the car."""
-        if self._cast is not None:
-            self._cast.advance(stamp_ns)
+        """Step the group up to a state of the car."""
+        if self._group is not None:
+            self._group.advance(stamp_ns)
 
-    def told(self, sample: MirrorSample) -> MirrorSample:
-        """Return the free twin's sample with what the cast has to say."""
-        if self._cast is None:
+    def completed(self, sample: MirrorSample) -> MirrorSample:
+        """Return the free twin's sample with what the group adds to it."""
+        if self._group is None:
             return sample
-        told = with_cast(
-            sample,
-            self._cast,
-            self._car,
-            drive_frame=self._drive_frame,
-            world_frame=self._frame,
+        completed = with_group(
+            sample, self._group, self._car, drive_frame=self._drive_frame, world_frame=self._frame
         )
-        self._cast.forget_touches()
-        return told
+        self._group.forget_touches()
+        return completed

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.run_memory import Rows, RunMemory
+from foretwin.contracts.arrays import Array, Indices
+from foretwin.sim_worker.analysis.gap.free_run import RunMemory
 
 
 class Runs:
@@ -16,15 +16,18 @@ class Runs:
         self._memory = RunMemory()
 
     def ask(self, stamps: list[int], held: list[bool], settled: list[bool]) -> Array:
-        def run(rows: Rows) -> Array:
+        def run(rows: Indices) -> Array:
             self.made += [stamps[row] for row in rows]
             began = np.array([[stamps[row], held[row]] for row in rows], dtype=np.float64)
             return np.repeat(began[:, None], 3, axis=1)
 
         return self._memory.states(
-            stamp_ns=np.array(stamps), held=np.array(held), settled=np.array(settled),
-            from_stamp_ns=stamps[0], run=run,
-        )  # fmt: skip
+            stamp_ns=np.array(stamps),
+            held=np.array(held),
+            settled=np.array(settled),
+            from_stamp_ns=stamps[0],
+            run=run,
+        )
 
 
 def test_runs_come_in_the_order_asked_for_and_settled_ones_are_made_once() -> None:
