@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.job_identity import job_bytes
+from foretwin.contracts.futures import Job
+from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.placement import WorldPlaces
-from foretwin.contracts.runner import Runner, answers, job_task, place_task
+from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
@@ -144,12 +145,18 @@ class _counting:  # noqa: N801
 
 def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner) -> None:
     """Play jobs and write their rows as they come."""
-    jobs = [(one, job := maker.job(one), job_bytes(job)) for one in left]
-    by_name = {named.sha256: (one, job, named) for one, job, named in jobs}
-    tasks = [job_task(job, named, wanted="rows") for _, job, named in jobs]
+    at_work: dict[str, tuple[SweepJob, Job, JobBytes]] = {}
+
+    def tasks() -> Iterator[Task]:
+        for one in left:
+            job = maker.job(one)
+            named = job_bytes(job)
+            at_work[named.sha256] = one, job, named
+            yield job_task(job, named, wanted="rows")
+
     with progress_bar(sum(len(one.cells) for one in left), "futures") as (advance, say):
-        for answer in answers(runner, tasks):
-            one, job, named = by_name[answer.task.key]
+        for answer in answers(runner, tasks()):
+            one, job, named = at_work.pop(answer.task.key)
             if answer.message is None:
                 say(f"failed: job {one.number}: {answer.failure}")
             parts.write(cell_rows(one, job, answer), job, named)

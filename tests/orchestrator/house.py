@@ -166,7 +166,7 @@ class Worker(Process):
             )
             return
         self.jobs += 1
-        job = message.job
+        job = message.decoded()
         world = read_message(self.plan.worlds_dir / f"{job.world_id}.world", World)
         futures = straight_futures(job, world, self.process_id)
         if self.remark:

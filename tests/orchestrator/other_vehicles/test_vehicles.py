@@ -279,7 +279,7 @@ def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, 
     house.send(car)
     house.settle()
     assert house.conductor.start_round()
-    jobs = [request.message().job for worker in house.workers for request in worker.take()]
+    jobs = [request.message().decoded() for worker in house.workers for request in worker.take()]
     assert {user.length_m for job in jobs for user in job.road_users} == {
         VAN.length_m.value for _ in met
     }
