@@ -9,7 +9,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, target_from_source_m
-from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.futures import PATH_BEHIND_M, PathAhead
 from foretwin.contracts.world import World
 from foretwin.orchestrator.routing.arrival import DrivingPace, predict_arrivals
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
@@ -29,7 +29,6 @@ from foretwin.world_gen.roads.road_graph import RoadGraph
 FAR_AHEAD_M = 3000.0
 ALTERNATIVES_M = 300.0
 """How far ahead other turns than the predicted ones are looked down."""
-PATH_BEHIND_M = 10.0
 PATH_SPARE_M = 60.0
 MIN_PATH_M = 20.0
 

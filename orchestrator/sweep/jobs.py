@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.futures import Future, Job
+from foretwin.contracts.futures import RESULT_STEP_S, Future, Job
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
 from foretwin.contracts.runner import Answer
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob
 from foretwin.orchestrator.sweep.road_users import NOBODY, others_at
-from foretwin.orchestrator.sweep.spec import STEP_S, Loaded
+from foretwin.orchestrator.sweep.spec import Loaded
 from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_bytes
 
 
@@ -44,7 +44,7 @@ class JobMaker:
             world_id=planned.world_id,
             futures=tuple(_future(i, cell, planned.planner) for i, cell in enumerate(cells)),
             horizon_s=planned.horizon_s,
-            step_s=STEP_S,
+            step_s=RESULT_STEP_S,
             seed=spec.seed,
             scenarios=tuple(self._scenarios[name] for name in names),
             lights_by_plan=spec.lights_by_plan,

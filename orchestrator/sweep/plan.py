@@ -14,9 +14,10 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.placement import AS_RECORDED, PlacedHere, WorldPlaces
 from foretwin.contracts.scenario import FAULTS, Scenario
-from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, STEP_S, Loaded, SweepSpec
+from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 
@@ -95,7 +96,7 @@ def planners_for(scenario: Scenario, spec: SweepSpec) -> tuple[str, ...]:
 def horizon_of(scenario: Scenario, spec: SweepSpec) -> float:
     """Return how long a scenario is played, in whole steps of the results."""
     wished = scenario.horizon_s if spec.horizon_s is None else spec.horizon_s
-    return round(round(wished / STEP_S) * STEP_S, 6)
+    return round(round(wished / RESULT_STEP_S) * RESULT_STEP_S, 6)
 
 
 def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:

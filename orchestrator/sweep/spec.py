@@ -8,6 +8,7 @@ from typing import Literal
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.scenario import Scenario
@@ -27,7 +28,6 @@ DEFAULT_METRICS = (
     "max_deceleration", "max_lateral_acceleration", "max_jerk", "comfortable", "off_road_share",
     "red_light_violations", "right_of_way_violations", "driving_score",
 )  # fmt: skip
-STEP_S = 0.1
 JUST_RECORDED = Scenario(
     id=AS_RECORDED, title="As recorded", source="the drive",
     shows="The ego drives on from where the car was, among those who were there.",
@@ -144,7 +144,7 @@ def worlds_folder(spec: SweepSpec) -> Path | None:
 def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
     sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
     steps = 1.0 / (spec.control_hz * TIMESTEP_S) if spec.control_hz > 0.0 else 0.0
-    ticks = STEP_S * spec.control_hz
+    ticks = RESULT_STEP_S * spec.control_hz
     horizon = spec.horizon_s
     return (
         (len(sources) == 1,
@@ -163,19 +163,22 @@ def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
          f"planners: {REMOTE} asks a stack over the bus of a drive; a sweep has none to join yet"),
         (len(spec.vehicles) > 0, "vehicles: at least one name"),
         (len(set(spec.vehicles)) == len(spec.vehicles), "vehicles: each only once"),
-        (horizon is None or (1.0 <= horizon <= 60.0
-                             and abs(horizon / STEP_S - round(horizon / STEP_S)) < 1e-6),
-         f"horizon_s {horizon}: 1 to 60 seconds, in steps of {STEP_S:g}"),
-        (steps >= 1.0 and abs(steps - round(steps)) < 1e-6,
+        (horizon is None or (1.0 <= horizon <= 60.0 and _whole(horizon / RESULT_STEP_S)),
+         f"horizon_s {horizon}: 1 to 60 seconds, in steps of {RESULT_STEP_S:g}"),
+        (steps >= 1.0 and _whole(steps),
          f"control_hz {spec.control_hz:g}: must divide {1.0 / TIMESTEP_S:g} evenly"),
-        (ticks >= 1.0 - 1e-9 and abs(ticks - round(ticks)) < 1e-6,
-         f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / STEP_S:g}"),
+        (ticks >= 1.0 - 1e-9 and _whole(ticks),
+         f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / RESULT_STEP_S:g}"),
         (spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"),
         (spec.recorded is None or spec.recorded.every_s > 0.0, "recorded.every_s: above 0"),
         (spec.recorded is None or spec.recorded.longest_gap_s > 0.0,
          "recorded.longest_gap_s: above 0"),
         (spec.seed >= 0, f"seed {spec.seed}: not negative"),
     )  # fmt: skip
+
+
+def _whole(number: float) -> bool:
+    return abs(number - round(number)) < 1e-6
 
 
 def _check_metrics(names: tuple[str, ...]) -> None:

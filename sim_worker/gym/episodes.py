@@ -14,11 +14,12 @@ from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
-from foretwin.contracts.futures import Future, Job, PathAhead
+from foretwin.contracts.futures import RESULT_STEP_S, Future, Job, PathAhead
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import UNKNOWN_LIMIT_MPS
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places
@@ -31,7 +32,6 @@ BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""
 _LATE = ".arrives_after_s"
 _PLANNER = "pure_pursuit_idm"
-_DEFAULT_SPEED_MPS = 8.3
 
 
 class Episodes(NamedTuple):
@@ -102,9 +102,9 @@ def episodes_of_scenario(
         path=PathAhead(xy_m=at.ego.xy_m, speed_limit_mps=at.ego.speed_limit_mps),
         futures=tuple(futures),
         horizon_s=scenario.horizon_s,
-        step_s=0.1,
+        step_s=RESULT_STEP_S,
         seed=cases_seed,
-        cruise_speed_mps=_DEFAULT_SPEED_MPS,
+        cruise_speed_mps=UNKNOWN_LIMIT_MPS,
         scenarios=(scenario,),
         starts=np.array(starts),
         lights_by_plan=True,
@@ -170,7 +170,7 @@ def episodes_of_states(
         path=path,
         futures=futures,
         horizon_s=8.0,
-        step_s=0.1,
+        step_s=RESULT_STEP_S,
         seed=cases_seed,
         cruise_speed_mps=cruise,
         scenarios=() if scenario is None else (scenario,),
