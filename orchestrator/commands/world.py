@@ -76,6 +76,12 @@ def write_worlds(request: WorldRequest) -> int:
     _check_place(request)
     many = request.everything or request.route is not None
     _check_out(request.out, many=many)
+    if (
+        request.out.exists()
+        and request.map_file.exists()
+        and request.out.samefile(request.map_file)
+    ):
+        raise UserError(f"--out {request.out}: is the map itself; name another file")
     format_ = _format(request.file_format, None if many else request.out)
     options = _options(request, format_)
     if request.bbox is not None:

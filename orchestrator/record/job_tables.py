@@ -29,6 +29,26 @@ VEHICLES, REPEATED = "vehicles", "repeated"
 """Folders of a run or sweep: parameters that jobs name, and pictures of futures played again."""
 
 
+SWEPT_TABLES = {"road_users": "road_users", "jobs": "jobs", "futures": "rows"}
+"""Folders of the parts of a sweep's tables; whose futures are there is done, so these are written
+last."""
+METRICS_FILE = "metrics.parquet"
+"""A sweep's table of what its metrics mean."""
+
+
+def table_at(folder: Path, table: str) -> Path:
+    """Return the file of a run's or sweep's table, or the folder of a sweep's.
+
+    Raises FileNotFoundError where there is none.
+    """
+    swept = {"metrics": METRICS_FILE, **SWEPT_TABLES}.get(table)
+    places = [folder / "results" / f"{table}.parquet", *([folder / swept] if swept else [])]
+    for path in places:
+        if path.exists():
+            return path
+    raise FileNotFoundError(f"{folder}: holds no table of {table}, neither of a run nor a sweep")
+
+
 def _schema(**columns: type) -> pa.Schema:
     return pa.schema([(name, _TYPES[kind]) for name, kind in columns.items()])
 

@@ -18,7 +18,7 @@ from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.placement import RecordedStart
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
-from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
@@ -118,12 +118,7 @@ def _states(
     """Return the states that the drive had, estimated from what was recorded as it was then, and
     who was detected."""
     recorded = open_log(file)
-    estimator = StateEstimator(
-        recorded.info,
-        wheelbase_m=vehicle.wheelbase_m.value,
-        steering_ratio=vehicle.steering_ratio.value,
-        steering_offset_rad=vehicle.steering_offset_rad.value,
-    )
+    estimator = estimator_of(recorded.info, vehicle)
     states, seen = [], []
     for channel, message in recorded.samples():
         if isinstance(message, RoadUsers):
