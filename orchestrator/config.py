@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,11 +12,13 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.roles import Correction, FollowLimits, Role
-from foretwin.orchestrator.tuning.choice import Tuning, TuningChoice, choose_tuning, processors
+from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning, processors
 
 View = Literal["auto", "native", "web", "none"]
 MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
+MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
+"""Of a World around its junction."""
 
 
 class ConfigError(UserError):
@@ -141,7 +144,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
                 self.end_s is None or self.end_s > self.start_s,
                 f"--end {self.end_s}: after --start {self.start_s}",
             ),
-            (20.0 <= self.radius_m <= 2000.0, f"radius_m {self.radius_m}: 20 to 2000"),
+            (
+                MIN_RADIUS_M <= self.radius_m <= MAX_RADIUS_M,
+                f"radius_m {self.radius_m}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}",
+            ),
             (5.0 <= self.look_ahead_s <= 600.0, f"look_ahead_s {self.look_ahead_s}: 5 to 600"),
             (
                 self.source != "log" or self.log is not None,
@@ -284,3 +290,10 @@ def parse_speed(value: object) -> float | None:
         return float(str(value))
     except ValueError:
         raise ConfigError(f"--speed {value}: a number above 0, or max") from None
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    if sys.platform in ("darwin", "win32"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -18,8 +18,8 @@ from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.instructions import LatestReports
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.analysis.agreement.criteria import Court, Heard, Users, Window
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
 from foretwin.sim_worker.metrics.ground import DrivableGround

@@ -128,6 +128,8 @@ def _vulkan() -> CheckResult:
 
 
 def _display() -> CheckResult:
+    from foretwin.orchestrator.config import has_display
+
     if has_display():
         return CheckResult("display", "ok", "--view auto opens the native viewer")
     return CheckResult("display", "note", "none: --view auto writes monitor.rrd alone")
@@ -143,13 +145,6 @@ def _data() -> CheckResult:
     if folder and Path(folder).is_dir():
         return CheckResult("FORETWIN_DATA", "ok", "set: real-data tests run")
     return CheckResult("FORETWIN_DATA", "note", "not set: real-data tests skip (drives need none)")
-
-
-def has_display() -> bool:
-    """Whether a window can be opened here."""
-    if sys.platform in ("darwin", "win32"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 CHECKS: tuple[Callable[[], CheckResult], ...] = (

@@ -13,6 +13,7 @@ import numpy as np
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.world_files import write_each, write_report
+from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.worlds.choice import (
     FARTHEST_M,
     junction_by_id,
@@ -43,7 +44,6 @@ from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 _Word = TypeVar("_Word", bound=str)
-MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,20 +16,20 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
+from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
+from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.runtime_configuration import roles
 from foretwin.orchestrator.runtime_configuration.handler import RuntimeConfiguration
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
-from foretwin.orchestrator.tuning.link import FINDINGS, TuningLink
-from foretwin.orchestrator.worlds.handler import WorldHandler
 
 log = logging.getLogger(ORCHESTRATOR)
 

@@ -22,17 +22,18 @@ from foretwin.orchestrator.drive.intake import unannounced
 from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.lock_step import LockStepLoop
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import DrivePlan, make_plan, read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine
+from foretwin.orchestrator.drive.run_record import reserve_record, run_record, write_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
-from foretwin.orchestrator.drive.supervisor import FreshInterpreter, Supervisor, fold_stderr
+from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.orchestrator.record.run_record import reserve_record, run_record, write_record
-from foretwin.orchestrator.record.summary import summary_text
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, fold_stderr
 
 log = logging.getLogger(ORCHESTRATOR)
 

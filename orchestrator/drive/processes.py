@@ -17,9 +17,9 @@ from foretwin.contracts.setup import (
     ViewerSetup,
     WorkerSetup,
 )
-from foretwin.orchestrator.drive.plan import Beside, DrivePlan
-from foretwin.orchestrator.drive.supervisor import WhenDead
+from foretwin.orchestrator.plan import Beside, DrivePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
+from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"

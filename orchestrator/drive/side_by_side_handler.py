@@ -14,8 +14,8 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.side_by_side import Disagreement, DisagreementKind, DrivenSegment
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.sim_worker.analysis.side_by_side.segment import Place
 from foretwin.sim_worker.analysis.side_by_side.watch import SideBySide

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from foretwin.orchestrator.drive.conductor import Conductor
-from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.routing.junctions_ahead import encounters
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.junctions.intersections import Junction

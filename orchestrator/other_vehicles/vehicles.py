@@ -15,13 +15,12 @@ from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleIn
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.drive.plan import Beside, DrivePlan
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import LatestReports, Tell
 from foretwin.orchestrator.other_vehicles.detected import DetectedBeside, moved_ahead
 from foretwin.orchestrator.other_vehicles.live import LiveBeside
 from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
 from foretwin.orchestrator.other_vehicles.recorded import LogBeside
+from foretwin.orchestrator.plan import Beside, DrivePlan
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 SAME_WITHIN_M = 2.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.simulation import Comparison, HorizonError, PlanComparison
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.futures.future_rows import Row, future_rows
 from foretwin.sim_worker.metrics.displacement import distinct_count
 

@@ -16,7 +16,7 @@ from foretwin.contracts.frames import (
     target_from_source,
 )
 from foretwin.contracts.simulation import HORIZONS_S, Comparison
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
 LEAD_NS = 1_000_000_000

@@ -24,8 +24,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.instructions import RoundIntent
+from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.seen_users import near_car
 from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures

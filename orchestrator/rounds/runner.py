@@ -16,9 +16,8 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows
-from foretwin.orchestrator.drive.intake import LatestReports, LatestState
-from foretwin.orchestrator.drive.plan import DrivePlan
-from foretwin.orchestrator.instructions import RoundIntent, Tell
+from foretwin.orchestrator.instructions import LatestReports, LatestState, RoundIntent, Tell
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
 from foretwin.orchestrator.record.result_rows import (
@@ -30,10 +29,10 @@ from foretwin.orchestrator.record.result_rows import (
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
-from foretwin.orchestrator.rounds.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
+from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.sim_worker.metrics.comparison import compare_plan
 
 log = logging.getLogger("orchestrator")

@@ -13,7 +13,7 @@ from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
+from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, read_drive
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS

@@ -11,7 +11,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines, judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows, judge_in
-from foretwin.orchestrator.drive.intake import LatestReports
+from foretwin.orchestrator.instructions import LatestReports
 from foretwin.sim_worker.analysis.agreement.tally import Judged
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.futures_rounds import round_done, straight

@@ -22,9 +22,9 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, loca
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.orchestrator.config import VehicleBeside
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.drive.plan import Beside
+from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
+from foretwin.orchestrator.plan import Beside
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs.write_mcap import create

@@ -8,9 +8,9 @@ from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
 from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import MIRROR, TUNING
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.findings import Findings

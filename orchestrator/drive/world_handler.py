@@ -11,9 +11,9 @@ from foretwin.contracts.bus import Bus, Mailbox, Reply
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
 from foretwin.contracts.world import World
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import BUILDER
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
 
 log = logging.getLogger("orchestrator")
 

@@ -10,10 +10,10 @@ import msgspec
 
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.plan import DrivePlan
-from foretwin.orchestrator.drive.supervisor import Supervisor
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.runner.supervisor import Supervisor
 
 RESERVED_BYTES = 65536
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from foretwin.orchestrator.drive.supervisor import FreshInterpreter, Supervisor
-from foretwin.orchestrator.record.run_record import run_record, versions, write_record
-from foretwin.orchestrator.record.summary import summary_text
+from foretwin.orchestrator.drive.run_record import run_record, versions, write_record
+from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor
 from tests.orchestrator.house import House
 
 PROMISED = {
