@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.bus import Reply
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState
 from foretwin.contracts.runner import Answer
 from foretwin.contracts.simulation import Comparison
@@ -16,8 +16,8 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows
+from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports, LatestState, RoundIntent, Tell
-from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
 from foretwin.orchestrator.record.result_rows import (
@@ -26,7 +26,6 @@ from foretwin.orchestrator.record.result_rows import (
     round_futures,
     round_row,
 )
-from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
@@ -57,29 +56,25 @@ class RoundRunner:
 
     def __init__(
         self,
-        plan: DrivePlan,
-        bus: Bus,
-        mailbox: Mailbox,
-        tables: ResultTables,
+        context: DriveContext,
         *,
         world_of: Callable[[str], World],
         on_round: Callable[[str, int], None],
-        tell: Callable[[Tell], None],
     ) -> None:
         self.open = OpenRounds()
-        self.dispatcher = BusDispatcher(bus, mailbox, run_id=plan.run_id, refusals=_REFUSALS)
+        plan = context.plan
+        self.dispatcher = BusDispatcher(
+            context.bus, context.mailbox, run_id=plan.run_id, refusals=_REFUSALS
+        )
         self.futures = FuturesCount()
         self.comparisons = ComparisonCount()
         self.plans = PlanCount()
         self.rtf: dict[str, float] = {}
         self.failed_jobs = 0
         self.start_stamp_ns = 0
-        self._plan = plan
-        self._bus = bus
-        self._tables = tables
-        self._world_of = world_of
-        self._on_round = on_round
-        self._tell = tell
+        self._context, self._plan = context, plan
+        self._tables, self._tell = context.tables, context.tell
+        self._world_of, self._on_round = world_of, on_round
         self._open_comparisons = OpenComparisons(plan.drive_frame, plan.config.horizon_s)
         self.windows = OpenWindows(plan.vehicle, horizon_s=plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
@@ -228,7 +223,7 @@ class RoundRunner:
         )
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame)
-        self._bus.publish("round", view, run=self._plan.run_id)
+        self._context.publish("round", view)
         self._tell_of_planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state)
@@ -273,9 +268,9 @@ class RoundRunner:
         if compared is not None:
             self.plans.take(compared)
             self._tables.add("plan_comparisons", [plan_row(compared)])
-            self._bus.publish("plan_comparison", compared, run=self._plan.run_id)
+            self._context.publish("plan_comparison", compared)
 
     def _keep(self, comparison: Comparison) -> None:
         self.comparisons.take(comparison)
         self._tables.add("comparisons", [comparison_row(comparison)])
-        self._bus.publish("comparison", comparison, run=self._plan.run_id)
+        self._context.publish("comparison", comparison)
