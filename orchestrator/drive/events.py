@@ -9,6 +9,7 @@ from foretwin.contracts.bus import Bus
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import ResultTables
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -45,10 +46,4 @@ class EventHandler:
         log.log(_LEVELS[event.level], "%s: %s", event.source, event.text)
         if self.on_event is not None:
             self.on_event(event)
-        row = {
-            "stamp_ns": event.stamp_ns,
-            "level": event.level,
-            "source": event.source,
-            "text": event.text,
-        }
-        self._tables.add("events", [row])
+        self._tables.add("events", [row_of(event)])

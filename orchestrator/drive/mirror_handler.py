@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
-from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import MIRROR, MIRRORED, ResultTables
 
 _APART_NS = 2_000_000_000
 """Who touches again sooner is not told of again."""
@@ -30,11 +30,13 @@ class MirrorHandler:
         """Keep a sample, and tell of touches that begin."""
         self.stamp_ns = sample.stamp_ns
         self.independent = sample.independent
-        self._tables.add("mirror", [mirror_row(sample)])
+        at = {"stamp_ns": sample.stamp_ns}
+        self._tables.add("mirror", [row_of(sample, MIRROR)])
         if sample.others:
-            self._tables.add("mirrored", mirrored_rows(sample))
+            self._tables.add("mirrored", [at | row_of(other, MIRRORED) for other in sample.others])
         if sample.touches:
-            self._tables.add("touches", touch_rows(sample))
+            touches = [at | {"one": one, "other": other} for one, other in sample.touches]
+            self._tables.add("touches", touches)
         for pair in sample.touches:
             last_ns = self._touched_ns.get(pair)
             self._touched_ns[pair] = sample.stamp_ns

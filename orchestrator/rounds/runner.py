@@ -19,9 +19,9 @@ from foretwin.orchestrator.agreement.windows import OpenWindows
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports, LatestState, RoundIntent, Tell
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
+from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
 from foretwin.orchestrator.record.result_rows import (
-    comparison_row,
     plan_row,
     round_futures,
     round_row,
@@ -272,5 +272,5 @@ class RoundRunner:
 
     def _keep(self, comparison: Comparison) -> None:
         self.comparisons.take(comparison)
-        self._tables.add("comparisons", [comparison_row(comparison)])
+        self._tables.add("comparisons", [row_of(comparison)])
         self._context.publish("comparison", comparison)

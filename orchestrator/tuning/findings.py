@@ -13,7 +13,8 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import GAP, ResultTables
 from foretwin.orchestrator.tuning.parameter_versions import departs
 from foretwin.orchestrator.tuning.words import alarm_text, found_text, verdict_text
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable, is_left_open
@@ -53,7 +54,7 @@ class Findings:
             case Identification():
                 self._identification(found)
             case GapSample():
-                self._tables.add("gaps", [_row(found)])
+                self._tables.add("gaps", [row_of(found, GAP)])
                 self._independent = self._independent and found.independent
                 if abs(found.horizon_s - HORIZON_S) < 1e-9:
                     self._gaps[found.manoeuvre].append(
@@ -64,7 +65,7 @@ class Findings:
                 self._tell(Tell("warning" if found.over else "info", alarm_text(found)))
             case Verdict():
                 self._verdicts.append(found)
-                row = _row(found)
+                row = row_of(found)
                 row["evidence"] = "; ".join(
                     f"{one.name} {one.value:.4g} ± {one.std:.2g}, expected {one.expected:.4g}"
                     for one in found.evidence
@@ -129,12 +130,6 @@ class Findings:
                 for one in self._latest.values()
             ],
         }  # fmt: skip
-
-
-def _row(found: GapSample | Verdict) -> dict[str, Any]:
-    row: dict[str, Any] = msgspec.to_builtins(found)
-    del row["vehicle_id"]
-    return row
 
 
 def _rms(rows: list[tuple[float, ...]]) -> dict[str, float] | None:

@@ -17,6 +17,8 @@ from foretwin.contracts.tuning import (
     UseVehicle,
 )
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import PARAMETER
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable
 from foretwin.sim_worker.analysis.identify.parameters_in_force import ParametersInForce
 
@@ -134,8 +136,7 @@ def departs(found: ParameterEstimate, counts: float) -> bool:
 
 def change_row(change: ParameterChange, *, version: int) -> dict[str, Any]:
     """Return the row of the table `parameters`."""
-    row: dict[str, Any] = msgspec.to_builtins(change)
-    return {"version": version, **{k: v for k, v in row.items() if k != "vehicle_id"}}
+    return {"version": version, **row_of(change, PARAMETER)}
 
 
 def change_text(change: ParameterChange) -> str:
