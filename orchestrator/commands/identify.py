@@ -15,6 +15,7 @@ from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.tuning import Identification
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
 from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
@@ -66,8 +67,7 @@ def identify_log(
         with contextlib.suppress(ValueError):
             draw_steering(record, vehicle, out / "steering.png")
     if as_json:
-        body = msgspec.json.encode(as_object(told))
-        print(msgspec.json.format(body, indent=1).decode())
+        print_json(as_object(told))
     else:
         print("\n".join(as_lines(told)))
         if out is not None:
