@@ -29,7 +29,7 @@ from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.runtime_configuration import roles
-from foretwin.orchestrator.runtime_configuration.handler import RuntimeConfiguration
+from foretwin.orchestrator.runtime_configuration.handler import ChangeHandler, RuntimeConfiguration
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -81,7 +81,7 @@ class Conductor:
             tell=lambda message: self.questions.ask(MIRROR, "use_roles", message),
         )
         self.tuning = TuningLink(context, intake=self.intake, rounds=self.rounds, alive=self.alive)
-        handlers = {
+        handlers: dict[str, ChangeHandler] = {
             "role": roles.RoleHandler(self.roles),
             "correction": roles.CorrectionHandler(self.roles),
             "vehicle": VehicleHandler(self.tuning.parameters),

@@ -6,6 +6,7 @@ A message within a message fills one column for each of its own fields, named af
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin
 
 import msgspec
@@ -24,7 +25,7 @@ _ARROW = {
 _WORDS = {kind.__name__: kind for kind in _ARROW}
 
 
-def schema(columns: Columns) -> pa.Schema:
+def schema(columns: Mapping[str, type]) -> pa.Schema:
     """Return columns as Arrow has them, in their order."""
     return pa.schema([(name, _ARROW[kind]) for name, kind in columns.items()])
 

@@ -20,9 +20,12 @@ def place_request(loaded: Loaded, world_id: str) -> PlaceRequest:
     vehicle = next(iter(loaded.vehicles.values()))
     starts = tuple((n, one) for n, one in enumerate(loaded.starts) if one.world_id == world_id)
     return PlaceRequest(
-        world_id=world_id, scenarios=loaded.scenarios, vehicle=vehicle_digest(vehicle),
-        most=loaded.spec.places, starts=starts,
-    )  # fmt: skip
+        world_id=world_id,
+        scenarios=loaded.scenarios,
+        vehicle=vehicle_digest(vehicle),
+        most=loaded.spec.places,
+        starts=starts,
+    )
 
 
 class JobMaker:
