@@ -119,7 +119,7 @@ def test_a_given_route_is_foreseen_round_its_corners() -> None:
     now = driver.progress[-1]
 
     assert now is not None
-    assert now.source == "given"
+    assert not now.off_route
     assert driver.ahead(400.0)[:3] == [("n102", 40), ("n202", 140), ("n203", 240)]
 
 
@@ -137,8 +137,8 @@ def test_leaving_a_given_route_is_told_and_rejoining_it_too() -> None:
 
     assert off is not None
     assert back is not None
-    assert (off.off_route, off.source) == (True, "predicted")
-    assert (back.off_route, back.source) == (False, "given")
+    assert off.off_route
+    assert not back.off_route
     assert driver.names == ["n102", "n103", "n203"]
 
 
@@ -174,7 +174,7 @@ def test_a_route_given_while_driving_counts_from_where_the_car_is_on_it() -> Non
     driver.follower.give((along((4, False), (5, False), (23, False)),))
     driver.go([(151, 100), (160, 100)])
     assert driver.progress[-1] is not None
-    assert (driver.progress[-1].source, driver.progress[-1].off_route) == ("given", False)
+    assert not driver.progress[-1].off_route
     assert driver.ahead(300.0)[:2] == [("n103", 40), ("n203", 140)]
     # One that lies elsewhere is given all the same, and told of as left.
     driver.follower.give(
