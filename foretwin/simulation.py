@@ -96,10 +96,14 @@ def state_on(
         speed_mps = limit if np.isfinite(limit) else UNKNOWN_LIMIT_MPS
     lat, lon = geo_from_local(world.frame, xy)
     return VehicleState(
-        vehicle_id="ego", stamp_ns=0, position=GeoPoint(float(lat), float(lon)),
+        vehicle_id="ego",
+        stamp_ns=0,
+        position=GeoPoint(float(lat), float(lon)),
         yaw_rad=float(geo_from_local_yaw(world.frame, float(pose.yaw_rad[0]), xy)),
-        speed_mps=speed_mps, yaw_rate_radps=0.0, accel_mps2=0.0,
-    )  # fmt: skip
+        speed_mps=speed_mps,
+        yaw_rate_radps=0.0,
+        accel_mps2=0.0,
+    )
 
 
 def run_futures(
@@ -132,11 +136,22 @@ def run_futures(
         count=count, seed=seed, planners=(planner,), scenarios=known
     )
     job = Job(
-        round_id=0, job_index=0, world_id=world.id, state=state, path=_path(world, way, state),
-        futures=mix, horizon_s=horizon_s, step_s=RESULT_STEP_S, seed=seed,
-        cruise_speed_mps=state.speed_mps, scenarios=known, lights_by_plan=True,
-        metrics=ROW_METRICS, accidents=True, vehicle=vehicle_digest(car),
-    )  # fmt: skip
+        round_id=0,
+        job_index=0,
+        world_id=world.id,
+        state=state,
+        path=_path(world, way, state),
+        futures=mix,
+        horizon_s=horizon_s,
+        step_s=RESULT_STEP_S,
+        seed=seed,
+        cruise_speed_mps=state.speed_mps,
+        scenarios=known,
+        lights_by_plan=True,
+        metrics=ROW_METRICS,
+        accidents=True,
+        vehicle=vehicle_digest(car),
+    )
     result = run_alone(job, world, car)
     rows = future_rows(job, result, job_sha256=job_bytes(job).sha256)
     return Futures(job, result, rows)

@@ -98,11 +98,9 @@ def _worlds(who: dict[str, Any]) -> str:
 
 
 def _who(run: JudgedRun) -> dict[str, Any]:
-    return {
-        "run": str(run.folder), "map": run.record["map"]["file"],
-        "vehicle": run.record["config"]["vehicle"],
-        "worlds": run.record["config"].get("worlds"),
-    }  # fmt: skip
+    config = run.record["config"]
+    corrected = {"vehicle": config["vehicle"], "worlds": config.get("worlds")}
+    return {"run": str(run.folder), "map": run.record["map"]["file"], **corrected}
 
 
 def _both(before: JudgedRun, after: JudgedRun, of: Any) -> dict[str, Any]:

@@ -147,6 +147,5 @@ def _data() -> CheckResult:
     return CheckResult("FORETWIN_DATA", "note", "not set: real-data tests skip (drives need none)")
 
 
-CHECKS: tuple[Callable[[], CheckResult], ...] = (
-    _python, _cores, _tuning, _packages, _bus, _clock, _vulkan, _display, _disk, _data,
-)  # fmt: skip
+_MACHINE = _python, _cores, _tuning, _packages, _bus, _clock
+CHECKS: tuple[Callable[[], CheckResult], ...] = (*_MACHINE, _vulkan, _display, _disk, _data)

@@ -11,11 +11,14 @@ from foretwin.sim_worker.analysis.gap.errors import GapRow
 WIDTH = 80
 _DEGREES = 57.29578
 _COLUMNS = (
-    ("position_m", "place", "m", 1.0), ("along_m", "along", "m", 1.0),
-    ("across_m", "across", "m", 1.0), ("yaw_rad", "head.", "°", _DEGREES),
-    ("yaw_rate_radps", "rate", "°/s", _DEGREES), ("speed_mps", "speed", "m/s", 1.0),
+    ("position_m", "place", "m", 1.0),
+    ("along_m", "along", "m", 1.0),
+    ("across_m", "across", "m", 1.0),
+    ("yaw_rad", "head.", "°", _DEGREES),
+    ("yaw_rate_radps", "rate", "°/s", _DEGREES),
+    ("speed_mps", "speed", "m/s", 1.0),
     ("accel_mps2", "accel", "m/s²", 1.0),
-)  # fmt: skip
+)
 
 
 def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
@@ -75,7 +78,6 @@ def verdict_lines(
 
 
 def _wrapped(text: str, *, indent: str = "") -> list[str]:
-    return textwrap.wrap(
-        text, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent),
-        break_long_words=False,
-    )  # fmt: skip
+    then = " " * len(indent)
+    wrapper = textwrap.TextWrapper(WIDTH, indent, then, break_long_words=False)
+    return wrapper.wrap(text)

@@ -119,12 +119,8 @@ def _recorder(place: GeoPoint, waiting: list[tuple[str, Any]]) -> MotionRecorder
 
 def as_object(told: Identification) -> dict[str, Any]:
     """Return `{parameter: {value, low, high, reason}}`; value, low and high may be None."""
-    return {
-        found.name: {
-            "value": found.value, "low": found.low, "high": found.high, "reason": found.reason
-        }
-        for found in told.estimates
-    }  # fmt: skip
+    names = ("value", "low", "high", "reason")
+    return {found.name: {name: getattr(found, name) for name in names} for found in told.estimates}
 
 
 def as_lines(told: Identification) -> list[str]:
@@ -136,10 +132,8 @@ def as_lines(told: Identification) -> list[str]:
         name, unit, scale = _SHOWN[found.name]
         interval = "" if found.low is None else _interval(found.low, found.high, scale)
         taken = "*" if is_acceptable(found) else ""
-        lines.append(
-            _ROW.format(name, _number(found.value, scale), interval, unit,
-                        _number(found.prior, scale), taken).rstrip()
-        )  # fmt: skip
+        value, prior = _number(found.value, scale), _number(found.prior, scale)
+        lines.append(_ROW.format(name, value, interval, unit, prior, taken).rstrip())
         if found.reason:
             lines += textwrap.wrap(
                 found.reason, _WIDTH, initial_indent="    ", subsequent_indent="    "

@@ -113,11 +113,10 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
     if len(kept) < len(was.vehicles):
         gone = ", ".join(one.id for one in was.vehicles if one.live)
         _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
-    return msgspec.structs.replace(
-        was, log=str(run / DRIVE), source="log", map=map_file, route=route,
-        speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
-        vehicles=kept,
-    ).validate()  # fmt: skip
+    inputs = {"log": str(run / DRIVE), "source": "log", "map": map_file, "route": route}
+    alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
+    no_car = {"endpoint": None, "ros2": None, "towards_vehicle": False}
+    return msgspec.structs.replace(was, **inputs, **alone, **no_car).validate()
 
 
 def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:

@@ -33,9 +33,8 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
         raise UserError(f"{future_id}: was not played: {reason}")
     result, after = play_again(recorded)
     if as_json:
-        told = {"future": future_id, "recorded_sha256": before, "sha256": after,
-                "equal": before == after}  # fmt: skip
-        print(json.dumps(told))
+        hashes = {"recorded_sha256": before, "sha256": after}
+        print(json.dumps({"future": future_id, **hashes, "equal": before == after}))
     elif before == after:
         print(f"{future_id}: the same again, sha256 {after}")
     else:

@@ -95,11 +95,9 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         started_s = time.monotonic()
         left = [job for job in plan.jobs if job.number not in there]
         _play(left, JobMaker(loaded, plan.worlds), parts, runner)
-        return folder.summarise(
-            _summary(loaded, plan, places, parts)
-            | {"jobs_played": len(plan.jobs) - len(there),
-               "playing_s": round(time.monotonic() - started_s, 3)}
-        )  # fmt: skip
+        playing_s = round(time.monotonic() - started_s, 3)
+        now = {"jobs_played": len(plan.jobs) - len(there), "playing_s": playing_s}
+        return folder.summarise(_summary(loaded, plan, places, parts) | now)
 
 
 def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPlaces:

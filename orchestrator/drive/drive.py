@@ -173,19 +173,13 @@ class _Drive:
 
     def _start_processes(self) -> None:
         for row in PROCESSES:
-            if row.runs(self._plan):
-                for process_id in process_ids(row, self._plan):
-                    setup = row.setup(self._plan, process_id)
-                    self._supervisor.start(row_of(row, self._plan), setup)
+            for process_id in process_ids(row, self._plan):
+                setup = row.setup(self._plan, process_id)
+                self._supervisor.start(row_of(row, self._plan), setup)
 
     def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
         """Wait until every process is there and the vehicle has introduced itself."""
-        expected = {
-            process_id
-            for row in PROCESSES
-            if row.runs(self._plan)
-            for process_id in process_ids(row, self._plan)
-        }
+        expected = {one for row in PROCESSES for one in process_ids(row, self._plan)}
         deadline = time.monotonic() + START_TIMEOUT_S
         while not expected <= conductor.alive:
             if self._stop():
@@ -279,11 +273,10 @@ class _Drive:
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")
-        now_s = time.monotonic()
+        now_s, restarted = time.monotonic(), self._supervisor.restarted
         record = run_record(
-            plan, conductor, self._mission, self._supervisor, exit_word=exit_word,
-            wall_s=now_s - started_s, mono_s=now_s,
-        )  # fmt: skip
+            conductor, restarted, exit_word=exit_word, wall_s=now_s - started_s, mono_s=now_s
+        )
         write_record(record, plan.folder / "run.json")
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of

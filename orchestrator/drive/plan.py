@@ -77,10 +77,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         index = RoadIndex(graph)
         routes, route_source = _routes(config, graph, index, given)
     if config.worlds is not None:
-        check_given_worlds(
-            Path(config.worlds), map_sha256=osm.sha256, junctions=junctions,
-            radius_m=config.radius_m,
-        )  # fmt: skip
+        check_given_worlds(Path(config.worlds), osm, junctions, radius_m=config.radius_m)
     standin = None
     if source == "standin":
         standin = standin_path(osm, graph, routes[0])

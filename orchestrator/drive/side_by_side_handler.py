@@ -117,7 +117,5 @@ def disagreement_row(one: Disagreement) -> dict[str, Any]:
     row: dict[str, Any] = msgspec.to_builtins(one)
     position = one.position
     del row["position"], row["over"]
-    return row | {
-        "lat_deg": position.lat_deg, "lon_deg": position.lon_deg,
-        "duration_s": (one.end_stamp_ns - one.stamp_ns) / 1e9,
-    }  # fmt: skip
+    place = {"lat_deg": position.lat_deg, "lon_deg": position.lon_deg}
+    return row | place | {"duration_s": (one.end_stamp_ns - one.stamp_ns) / 1e9}

@@ -43,10 +43,8 @@ class Parts:
 
     def write(self, rows: list[Row], job: Job, recorded: JobBytes) -> None:
         """Write a job, the road users in it, and the rows of its futures."""
-        tables = {
-            "road_users": road_user_rows(job, recorded.sha256), "jobs": [job_row(job, recorded)],
-            "futures": rows,
-        }  # fmt: skip
+        users = road_user_rows(job, recorded.sha256)
+        tables = {"road_users": users, "jobs": [job_row(job, recorded)], "futures": rows}
         for table in SWEPT_TABLES:
             self._write(table, self._part(table, job.job_index), tables[table])
 

@@ -80,14 +80,9 @@ class Findings:
                 self.take(found)
 
     def _identification(self, told: Identification) -> None:
-        self._tables.add(
-            "identifications",
-            [
-                {"stamp_ns": told.stamp_ns, "from_stamp_ns": told.from_stamp_ns,
-                 "taken": is_acceptable(found), **msgspec.to_builtins(found)}
-                for found in told.estimates
-            ],
-        )  # fmt: skip
+        span = row_of(told, "stamp_ns from_stamp_ns")
+        rows = [span | row_of(found) | {"taken": is_acceptable(found)} for found in told.estimates]
+        self._tables.add("identifications", rows)
         self._latest |= {found.name: found for found in told.estimates}
         if told.step_noticed:
             self._tell(Tell("warning", f"the vehicle has changed: {told.step_noticed}"))
@@ -118,18 +113,21 @@ class Findings:
                 }
                 for one in self._verdicts
             ],
-            "parameters": [
-                {
-                    "name": one.name, "in_use": in_force(self._vehicle(), one.name),
-                    "identified": one.value, "low": one.low, "high": one.high,
-                    "departs": departs(one, in_force(self._vehicle(), one.name)),
-                    "left_open": one.value is not None
-                    and is_left_open(self._vehicle(), one.name, one.value),
-                    "reason": one.reason,
-                }
-                for one in self._latest.values()
-            ],
-        }  # fmt: skip
+            "parameters": [self._parameter(one) for one in self._latest.values()],
+        }
+
+    def _parameter(self, one: ParameterEstimate) -> dict[str, Any]:
+        vehicle = self._vehicle()
+        in_use = in_force(vehicle, one.name)
+        return {
+            "name": one.name,
+            "in_use": in_use,
+            "identified": one.value,
+            **row_of(one, "low high"),
+            "departs": departs(one, in_use),
+            "left_open": one.value is not None and is_left_open(vehicle, one.name, one.value),
+            "reason": one.reason,
+        }
 
 
 def _rms(rows: list[tuple[float, ...]]) -> dict[str, float] | None:

@@ -141,9 +141,8 @@ def change_row(change: ParameterChange, *, version: int) -> dict[str, Any]:
 
 def change_text(change: ParameterChange) -> str:
     """Return a change in the engineer's words."""
-    how = {
-        "identified": "as the driving says", "set": "set by hand", "rolled_back": "rolled back",
-        "file": "of the vehicle file",
-    }[change.origin]  # fmt: skip
+    by_hand = {"set": "set by hand", "rolled_back": "rolled back"}
+    found = {"identified": "as the driving says", "file": "of the vehicle file"}
+    how = (by_hand | found)[change.origin]
     spread = "" if change.std is None else f" ± {1.96 * change.std:.2g}"
     return f"{change.name} {change.before:.5g} -> {change.value:.5g}{spread}, {how}"

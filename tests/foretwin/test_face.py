@@ -15,6 +15,13 @@ from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 
+COVERS = (
+    "foretwin",
+    "foretwin.maps",
+    "foretwin.recordings",
+    "foretwin.simulation",
+)
+
 LATE = {"orchestrator", "sim_worker", "world_gen", "viewer", "telemetry"}
 
 

@@ -17,6 +17,8 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along, town_world
 
+COVERS = ("foretwin.orchestrator.agreement.verdict_rows",)
+
 VEHICLE = load_vehicle()
 WORLD = town_world("n4")
 FROM_X, Y = -60.0, -1.6

@@ -34,6 +34,13 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 
+COVERS = (
+    "foretwin.orchestrator.other_vehicles.detected",
+    "foretwin.orchestrator.other_vehicles.live",
+    "foretwin.orchestrator.other_vehicles.measured",
+    "foretwin.orchestrator.rounds.seen_users",
+)
+
 VAN = load_vehicle("vw_vanagon")
 INFO = VehicleInfo(vehicle_id="ego", time_base="utc", start_stamp_ns=START_NS)
 ORIGIN = GeoPoint(52.5, 13.4)

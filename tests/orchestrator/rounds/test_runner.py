@@ -13,6 +13,8 @@ from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
+COVERS = ("foretwin.orchestrator.rounds.jobs",)
+
 
 @pytest.mark.parametrize(("futures", "size"), [(6, 3), (7, 3), (1, 32), (64, 32)])
 def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) -> None:

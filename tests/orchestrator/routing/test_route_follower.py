@@ -10,6 +10,13 @@ from foretwin.orchestrator.routing.route_follower import RouteFollower, RoutePro
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import drive, grid, headings, junctions
 
+COVERS = (
+    "foretwin.orchestrator.routing.given_routes",
+    "foretwin.orchestrator.routing.junctions_ahead",
+    "foretwin.orchestrator.routing.other_turns",
+    "foretwin.orchestrator.routing.turning",
+)
+
 TOWN = grid(5, 4)
 JUNCTIONS = junctions(TOWN)
 INDEX = RoadIndex(TOWN)
