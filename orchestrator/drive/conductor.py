@@ -135,7 +135,7 @@ class Conductor:
     # Messages.
 
     def handle(self, item: object) -> None:
-        """Take one item of the mailbox."""
+        """Take one item of the mailbox; None, where nothing came, changes nothing."""
         match item:
             case Received():
                 self._on_message.get(item.channel, _nothing)(item)

@@ -191,9 +191,7 @@ class _Drive:
                 raise DriveError(f"cannot be started: {dead}; see log.jsonl")
             if time.monotonic() > deadline:
                 raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
-            item = conductor.mailbox.take(0.1)
-            if item is not None:
-                conductor.handle(item)
+            conductor.handle(conductor.mailbox.take(0.1))
         return self._ask_info(bus, conductor, deadline)
 
     def _ask_info(self, bus: ZenohBus, conductor: Conductor, deadline: float) -> bool:

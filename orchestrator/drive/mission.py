@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.world import World
-from foretwin.orchestrator.drive.visits import VisitBook
+from foretwin.orchestrator.drive.visits import Moment, VisitBook
 from foretwin.orchestrator.instructions import (
     BuildWorld,
     Instruction,
@@ -74,10 +74,11 @@ class Mission:
 
     def before_start(self, junctions: Iterable[Junction], *, mono_s: float) -> list[Instruction]:
         """Ask for the Worlds where a given route begins, before the car moves."""
+        at = Moment(mono_s, 0.0)
         return [
             BuildWorld(junction.summary.id, load=True)
             for junction in junctions
-            if self._visits.see(junction, load=True, mono_s=mono_s, drive_time_s=0.0)
+            if self._visits.see(junction, at, load=True)
         ]
 
     def give_route(self, route: Route) -> None:
@@ -100,9 +101,10 @@ class Mission:
             text = "on the map" if self.state == "waiting" else "back on the map"
             told.append(Tell("info", f"{text}: {self._way.road_text}"))
             self.state = "following"
+        at = Moment(mono_s, self.drive_time_s)
         for junction in passed:
-            told += self._arrive(junction, mono_s)
-        told += self._wanted_worlds(mono_s)
+            told += self._arrive(junction, at)
+        told += self._wanted_worlds(at)
         told += self._choose_current()
         told += self._tell_deviations()
         if state.map_shift_m is not None and not self._map_told:
@@ -112,7 +114,7 @@ class Mission:
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
         """A junction's World is built and loaded by the workers."""
-        self._visits.take_world(junction_id, world, mono_s=mono_s, drive_time_s=self.drive_time_s)
+        self._visits.take_world(junction_id, world, Moment(mono_s, self.drive_time_s))
         return self._choose_current()
 
     def on_world_failed(self, junction_id: str) -> None:
@@ -221,18 +223,17 @@ class Mission:
             told.append(UseWorld(None))
         return told
 
-    def _arrive(self, passed: PassedJunction, mono_s: float) -> list[Instruction]:
+    def _arrive(self, passed: PassedJunction, at: Moment) -> list[Instruction]:
         summary = passed.junction.summary
         told: list[Instruction] = []
-        at_s = self.drive_time_s
-        if self._visits.see(passed.junction, load=True, mono_s=mono_s, drive_time_s=at_s):
+        if self._visits.see(passed.junction, at, load=True):
             told.append(BuildWorld(summary.id, load=True))
-        self._visits.arrive(summary.id, mono_s=mono_s, drive_time_s=at_s)
+        self._visits.arrive(summary.id, at)
         self._passed_s_m = passed.centre_s_m
         text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
         return [*told, Tell("info", text)]
 
-    def _wanted_worlds(self, mono_s: float) -> list[Instruction]:
+    def _wanted_worlds(self, at: Moment) -> list[Instruction]:
         soon = set(self._within_look_ahead())
         wanted = [
             (ahead.junction, True)
@@ -240,15 +241,14 @@ class Mission:
             if ahead.junction.summary.id in soon
         ]
         wanted += [(junction, False) for junction in self._way.other_turns]
-        at_s = self.drive_time_s
         told: list[Instruction] = [
             BuildWorld(junction.summary.id, load)
             for junction, load in wanted
-            if self._visits.see(junction, load=load, mono_s=mono_s, drive_time_s=at_s)
+            if self._visits.see(junction, at, load=load)
         ]
         for ahead in self._way.junctions:
             if ahead.distance_m <= self._settings.radius_m:
-                self._visits.enter(ahead.junction.summary.id, mono_s=mono_s, drive_time_s=at_s)
+                self._visits.enter(ahead.junction.summary.id, at)
         return told
 
     def _choose_current(self) -> list[Instruction]:

@@ -46,6 +46,4 @@ def prepare_start(
         if time.monotonic() > began_s + TIMEOUT_S:
             return
         look_after(conductor, time.monotonic())
-        item = conductor.mailbox.take(0.1)
-        if item is not None:
-            conductor.handle(item)
+        conductor.handle(conductor.mailbox.take(0.1))
