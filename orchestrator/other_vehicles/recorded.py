@@ -13,7 +13,7 @@ from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
@@ -39,7 +39,7 @@ class _Over(NamedTuple):
     failed: str | None
 
 
-class LogBeside:
+class LogBeside(OtherVehicleSource):
     """A recorded drive, given as far as the car's own time has come.
 
     Two logs on UTC keep their stamps; otherwise both begin together. `offset_s` says how much of
@@ -60,6 +60,7 @@ class LogBeside:
         waits: bool,
         tell: Callable[[Tell], None],
     ) -> None:
+        super().__init__()
         self._file, self._id, self._vehicle = file, vehicle_id, vehicle
         self._own, self._offset_s = own, offset_s
         self._waits, self._tell = waits, tell
