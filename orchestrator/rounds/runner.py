@@ -166,8 +166,7 @@ class RoundRunner:
                 self._tell(Tell("error", f"{worker_id}: {reply.error}"))
         elif (result := reply.message.result).cpu_seconds > 0.0:
             self.rtf[worker_id] = result.sim_seconds / result.cpu_seconds
-        answer = self.dispatcher.reply(reply)
-        self._take([] if answer is None else [answer])
+        self._take(self.dispatcher.reply(reply))
         self.dispatcher.give_out()
 
     def _take(self, answers: list[Answer]) -> None:

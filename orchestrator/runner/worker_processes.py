@@ -136,8 +136,7 @@ class WorkerProcesses:
 
     def _handle(self, item: object) -> None:
         if isinstance(item, Reply):
-            answer = self._dispatcher.reply(item)
-            self._answers.extend([] if answer is None else [answer])
+            self._answers.extend(self._dispatcher.reply(item))
         elif isinstance(item, Alive):
             worker_id = process_of_alive_key(item.key)
             if item.up:
