@@ -207,10 +207,9 @@ def sweep(
     as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
 ) -> None:
     """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
-    from foretwin.orchestrator.commands.sweep import SweepRequest
     from foretwin.orchestrator.commands.sweep import sweep as run_sweep
 
-    raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
+    raise typer.Exit(run_sweep(spec, out=out, workers=workers, fresh=fresh, as_json=as_json))
 
 
 for about_logs in (convert, identify, gap, judge, repeat):

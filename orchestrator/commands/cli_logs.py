@@ -60,11 +60,10 @@ def judge(
     as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
 ) -> None:
     """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?"""
-    asked = locals()  # named as the fields of JudgeRequest
-    from foretwin.orchestrator.commands.judge import JudgeRequest
+    asked = locals()
     from foretwin.orchestrator.commands.judge import judge as judge_run
 
-    raise typer.Exit(judge_run(JudgeRequest(**asked)))
+    raise typer.Exit(judge_run(**asked))
 
 
 def repeat(

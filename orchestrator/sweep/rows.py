@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -77,18 +75,3 @@ class Parts:
         """Yield all rows in the order of the plan."""
         for job in jobs:
             yield from pq.ParquetFile(self.path_of(job.number)).read().to_pylist()
-
-
-class RowsHash:
-    """SHA-256 over rows in order: what they say, whoever computed them and when."""
-
-    def __init__(self) -> None:
-        self._digest = hashlib.sha256()
-
-    def add(self, row: Row) -> None:
-        """Take one more row in."""
-        self._digest.update(msgspec.msgpack.encode(row))
-
-    def hexdigest(self) -> str:
-        """Return the hash of all rows so far."""
-        return self._digest.hexdigest()
