@@ -38,7 +38,7 @@ def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
         yield ""
 
 
-def nobody_accused(verdicts: Sequence[Verdict], *, commanded: bool) -> str | None:
+def why_undecided(verdicts: Sequence[Verdict], *, commanded: bool) -> str | None:
     """Return why nobody is accused, None where somebody is."""
     if any(verdict.culprit != "undecided" for verdict in verdicts):
         return None
@@ -59,7 +59,7 @@ def verdict_lines(
     raised = [alarm for alarm in alarms if alarm.over]
     kinds = ", ".join(dict.fromkeys(alarm.quantity for alarm in raised))
     yield f"alarms: {len(raised)}{f' ({kinds})' if kinds else ''}"
-    reason = nobody_accused(verdicts, commanded=commanded)
+    reason = why_undecided(verdicts, commanded=commanded)
     if reason is not None and not (commanded and verdicts):
         yield from _wrapped(f"verdict: none: {reason}" if commanded else reason)
     for verdict in verdicts:

@@ -198,8 +198,8 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        said = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
-        self.rounds.start(intent, latest, said, started_mono_ns=started_mono_ns)
+        reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+        self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:

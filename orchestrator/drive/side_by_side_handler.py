@@ -91,13 +91,13 @@ class SideBySideHandler:
         for one in found:
             self._context.publish("disagreement", one)
             if not one.over:
-                self._context.tell(Tell("warning", told(one)))
+                self._context.tell(Tell("warning", disagreement_text(one)))
                 continue
             self._found.append(one)
             self._context.tables.add("disagreements", [disagreement_row(one)])
 
 
-def told(one: Disagreement) -> str:
+def disagreement_text(one: Disagreement) -> str:
     """Return a disagreement in one line, with its place."""
     where = f"{one.position.lat_deg:.6f}, {one.position.lon_deg:.6f}"
     if one.junction_id is not None:

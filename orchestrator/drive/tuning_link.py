@@ -79,7 +79,7 @@ class TuningLink:
         changes = self.parameters.hand_over(
             simulating, watcher=TUNING, stamp_ns=self._intake.now_stamp_ns + 1
         )
-        self._wait_for_no_watcher()
+        self._expect_no_watcher()
         if not changes:
             return
         version, vehicle = self.parameters.version, self.parameters.in_force.vehicle
@@ -94,12 +94,12 @@ class TuningLink:
 
     def process_up(self, process_id: str) -> bool:
         """Tell a process what counts; returns whether its answer must be waited for."""
-        told = self._simulates(process_id) and self.parameters.tell(process_id)
-        self._wait_for_no_watcher()
-        return told
+        awaited = self._simulates(process_id) and self.parameters.tell(process_id)
+        self._expect_no_watcher()
+        return awaited
 
-    def _wait_for_no_watcher(self) -> None:
-        """Live, let no round wait for who only watches: he may be seconds behind."""
+    def _expect_no_watcher(self) -> None:
+        """Live, let no round wait for a process that only watches: it may be seconds behind."""
         if not self._config.lock_step:
             self.parameters.answered(TUNING)
 
@@ -133,9 +133,9 @@ class TuningLink:
             **self.findings.record(),
         }
 
-    def _identified(self, told: Identification) -> None:
+    def _identified(self, found: Identification) -> None:
         if self._config.tuning_choice.mode == "apply":
-            self.parameters.apply(told)
+            self.parameters.apply(found)
 
     def _simulates(self, process_id: str) -> bool:
         return process_id in (MIRROR, TUNING) or process_id.startswith("w")

@@ -36,7 +36,7 @@ class LiveBeside(OtherVehicleSource):
         self._id, self._vehicle = vehicle_id, vehicle
         self._ask_info, self._tell = ask_info, tell
         self._measured: OtherVehicleStates | None = None
-        self._told_apart = False
+        self._clock_reported = False
 
     def take(self, item: Received) -> None:
         """Take a sample from the bus; one of another schema is passed over."""
@@ -66,10 +66,10 @@ class LiveBeside(OtherVehicleSource):
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
         """Return what has come since the last time."""
         heard = super().states_until(own)
-        if heard and not self._told_apart:
+        if heard and not self._clock_reported:
             ahead_ns = heard[-1].state.stamp_ns - own.stamp_ns
             if abs(ahead_ns) > APART_NS:
-                self._told_apart = True
+                self._clock_reported = True
                 text = (
                     f"{self._id} stamps {abs(ahead_ns) / 1e9:.1f} s "
                     f"{'ahead of' if ahead_ns > 0 else 'behind'} the car: it must stamp by the "

@@ -67,7 +67,7 @@ class LogBeside(OtherVehicleSource):
         self._read: Mailbox = Mailbox(AHEAD_SAMPLES, when_full="block")
         self._next: _Read | None = None
         self._newest_ns = own.start_stamp_ns
-        self._over = self._told_behind = False
+        self._over = self._delay_reported = False
         self._stop = threading.Event()
         self._thread = threading.Thread(
             target=self._read_all, name=f"log of {vehicle_id}", daemon=True
@@ -104,8 +104,8 @@ class LogBeside(OtherVehicleSource):
     def _lacks(self, own: VehicleState) -> None:
         if self._waits:
             raise TimeoutError(f"waited {STUCK_AFTER_S:.0f} s for {self._file} of {self._id}")
-        if not self._told_behind and own.stamp_ns - self._newest_ns > BEHIND_NS:
-            self._told_behind = True
+        if not self._delay_reported and own.stamp_ns - self._newest_ns > BEHIND_NS:
+            self._delay_reported = True
             text = f"{self._file} of {self._id} is read too slowly: its states come late"
             self._tell(Tell("warning", text))
 

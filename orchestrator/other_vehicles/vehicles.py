@@ -113,25 +113,27 @@ class VehiclesBeside:
         self._context.publish("other_vehicles", message)
 
     def among(
-        self, said: LatestReports, own: VehicleState, roles: Mapping[str, Role]
+        self, reports: LatestReports, own: VehicleState, roles: Mapping[str, Role]
     ) -> LatestReports:
         """Return what surrounds the car with these vehicles in it, ghosts excepted."""
         if not self._sources:
-            return said
+            return reports
         mine = [
             road_user(state, self._vehicles[name])
             for name, state in self._latest.items()
             if roles.get(name) in ("twin", "shadow")
             and abs(own.stamp_ns - state.stamp_ns) <= FRESH_NS
         ]
-        users = said.road_users
+        users = reports.road_users
         fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
         detected = [
             user
             for user in (users.users if fresh and users is not None else ())
             if user.user_id not in self._seen_as and not any(self._same(user, one) for one in mine)
         ]
-        return said._replace(road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine)))
+        return reports._replace(
+            road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine))
+        )
 
     def _same(self, one: RoadUser, other: RoadUser) -> bool:
         frame = self._frame

@@ -89,7 +89,7 @@ class RoundPlanner:
         round_id: int,
         intent: RoundIntent,
         state: VehicleState,
-        said: LatestReports,
+        reports: LatestReports,
         world: World,
         *,
         start_stamp_ns: int,
@@ -99,9 +99,9 @@ class RoundPlanner:
         config = self._config
         scenarios = self._fitting(world, intent.path)
         futures = some_of(self._futures_with(scenarios), count, turn=round_id)
-        users = near_car(said.road_users, state, world.frame)
-        signals = _signals(said.signals, state)
-        car_plan = _car_plan(said.plan, state, world.frame)
+        users = near_car(reports.road_users, state, world.frame)
+        signals = _signals(reports.signals, state)
+        car_plan = _car_plan(reports.plan, state, world.frame)
         jobs = []
         for index, mine in enumerate(self._cut(futures)):
             named = {future.scenario_id for future in mine}

@@ -87,8 +87,8 @@ class RoundRunner:
         )
         self._next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
-        self._told_slow = False
-        self._told_planners: set[str] = set()
+        self._slow_reported = False
+        self._planners_reported: set[str] = set()
 
     @property
     def short_of(self) -> str:
@@ -103,7 +103,7 @@ class RoundRunner:
         self,
         intent: RoundIntent,
         latest: LatestState,
-        said: LatestReports,
+        reports: LatestReports,
         *,
         started_mono_ns: int,
     ) -> None:
@@ -115,12 +115,12 @@ class RoundRunner:
             round_id,
             intent,
             latest.state,
-            said,
+            reports,
             self._world_of(intent.world_id),
             start_stamp_ns=self.start_stamp_ns,
             count=pace.futures,
         )
-        self._seeds[round_id] = _Seed(latest.state, said.plan, intent, pace)
+        self._seeds[round_id] = _Seed(latest.state, reports.plan, intent, pace)
         order = RoundOrder(
             round_id=round_id,
             stamp_ns=latest.state.stamp_ns,
@@ -223,21 +223,21 @@ class RoundRunner:
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame)
         self._context.publish("round", view)
-        self._tell_of_planners(done)
+        self._report_planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
 
-    def _tell_of_planners(self, done: RoundDone) -> None:
+    def _report_planners(self, done: RoundDone) -> None:
         """Say once of each planner that it failed, or that another one had to act for it."""
         planners = iter(future.planner for future in done.order.futures)
         for result in done.results:
             failures, remarks = result.outcome.failures, result.outcome.remarks
             for place, planner in zip(range(len(result.future_indices)), planners, strict=False):
                 words = (failures[place] if failures else "") or (remarks[place] if remarks else "")
-                if words and planner not in self._told_planners:
-                    self._told_planners.add(planner)
+                if words and planner not in self._planners_reported:
+                    self._planners_reported.add(planner)
                     self._tell(Tell("warning", f"a future driven by {planner}: {words}"))
 
     def _take_time(self, pace: Pace, seconds: float) -> None:
@@ -251,8 +251,8 @@ class RoundRunner:
             f"{self.short_of} from now on: the machine is too slow for all at "
             f"{self._plan.config.rate_hz:g} Hz"
         )
-        self._tell(Tell("info" if self._told_slow else "warning", text))
-        self._told_slow = True
+        self._tell(Tell("info" if self._slow_reported else "warning", text))
+        self._slow_reported = True
 
     def _compare_plans(self, done: RoundDone, seed: _Seed, world: World) -> None:
         if seed.plan is None or seed.state.stamp_ns - seed.plan.stamp_ns > PLAN_FRESH_NS:

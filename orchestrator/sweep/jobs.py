@@ -13,7 +13,7 @@ from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
 from foretwin.contracts.runner import Answer
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob
-from foretwin.orchestrator.sweep.road_users import NOBODY, others_at
+from foretwin.orchestrator.sweep.road_users import NO_OTHERS, others_at
 from foretwin.orchestrator.sweep.spec import Loaded
 from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_bytes
 
@@ -80,7 +80,7 @@ class JobMaker:
         """Return how futures begin where a car was; those who meet it are timed to it."""
         loaded, frame = self._loaded, self._worlds[planned.world_id].frame
         start = loaded.starts[planned.cells[0].start or 0]
-        path, others = start.path(frame), NOBODY
+        path, others = start.path(frame), NO_OTHERS
         if loaded.road_users is not None and loaded.spec.recorded is not None:
             others = others_at(
                 loaded.road_users,

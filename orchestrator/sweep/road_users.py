@@ -38,7 +38,7 @@ class Others(NamedTuple):
     predicted: tuple[SeenRoadUser, ...] = ()
 
 
-NOBODY = Others()
+NO_OTHERS = Others()
 
 
 def others_at(
@@ -58,7 +58,7 @@ def others_at(
             )
         )
     if mode == "none":
-        return NOBODY
+        return NO_OTHERS
     return Others(predicted=near_car(seen_at(log, state.stamp_ns), state, frame))
 
 

@@ -35,7 +35,7 @@ class Findings:
     vehicle: Callable[[], VehicleParameters]
     on_identification: Callable[[Identification], None]
     _latest: dict[str, ParameterEstimate] = field(default_factory=dict)
-    _told: dict[str, float] = field(default_factory=dict)
+    _reported: dict[str, float] = field(default_factory=dict)
     _gaps: dict[str, list[tuple[float, ...]]] = field(default_factory=lambda: defaultdict(list))
     _alarms: int = 0
     _verdicts: list[Verdict] = field(default_factory=list)
@@ -82,8 +82,8 @@ class Findings:
         self.on_identification(told)
         for found in told.estimates:
             counts = in_force(self.vehicle(), found.name)
-            if departs(found, counts) and self._told.get(found.name) != counts:
-                self._told[found.name] = counts
+            if departs(found, counts) and self._reported.get(found.name) != counts:
+                self._reported[found.name] = counts
                 self.tell(Tell("info", found_text(found, counts)))
 
     def record(self) -> dict[str, Any]:
