@@ -29,13 +29,11 @@ PATIENCE_M = 6.0
 class RouteProgress(NamedTuple):
     """Where the car is on its route.
 
-    `route_version` grows whenever what lies ahead has changed; `off_route` says that a route is
-    given and the car is not on it, so that the way ahead is predicted; `passed` are the junctions
-    passed with this update.
+    `off_route` says that a route is given and the car is not on it, so that the way ahead is
+    predicted; `passed` are the junctions passed with this update.
     """
 
     s_m: float
-    route_version: int
     off_route: bool
     passed: tuple[PassedJunction, ...]
 
@@ -60,7 +58,6 @@ class RouteFollower:
         self._place = 0
         self._s_m = 0.0
         self._begun_m = 0.0
-        self._version = 0
         self._on_given = False
         self._direction_known = False
         self._turning = False
@@ -101,7 +98,6 @@ class RouteFollower:
         self._extend()
         return RouteProgress(
             self._s_m,
-            self._version,
             bool(self._given) and not self._on_given,
             self._take_passed(),
         )
@@ -246,7 +242,6 @@ class RouteFollower:
 
     def _set_route(self, route: Route) -> None:
         self._route = extend_most_probable(self._graph, route, until_m=self._s_m + AHEAD_M + 200.0)
-        self._version += 1
         self._encounters = tuple(encounters(self._route, self._junction_at))
 
     def _extend(self) -> None:
