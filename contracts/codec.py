@@ -75,7 +75,9 @@ def decode(data: bytes, kind: type[Message], *, where: str = "message") -> Envel
     )
 
 
-def decode_content(data: bytes | memoryview, kind: type[Message], *, where: str) -> Message:
+def decode_content(
+    data: bytes | memoryview | msgspec.Raw, kind: type[Message], *, where: str
+) -> Message:
     """Return the message of a body alone; raises SchemaMismatch where it does not fit `kind`."""
     decoder = _decoders.get(kind)
     if decoder is None:

@@ -20,6 +20,10 @@ _POSE = ("x_m", "y_m", "yaw_rad")
 STATE_COLUMNS = (*_POSE, "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2")
 
 
+RESULT_STEP_S = 0.1
+"""Between two instants of a result, wherever futures are recorded, shown or learnt from."""
+PATH_BEHIND_M = 10.0
+"""How much of its path lies behind the car."""
 JOB_SCHEMA_VERSION = 1
 """Of `Job`, which is recorded: raised where its bytes mean something else."""
 

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal, NamedTuple, Protocol
 
 import msgspec
 
+from foretwin.contracts.codec import decode_content
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes
 from foretwin.contracts.placement import PlaceRequest
 
 Wanted = Literal["result", "rows"]
+AHEAD = 256
+"""Tasks that a runner holds at once: enough for any machine's workers, and their jobs fit in
+memory."""
 
 
 class JobRequest(msgspec.Struct, frozen=True, kw_only=True):
     """A job, its name, and in which form it is answered, which changes nothing about the job."""
 
-    job: Job
+    job: msgspec.Raw
+    """The bytes of `job_bytes`, as they are recorded."""
     sha256: str
     wanted: Wanted = "result"
+
+    def decoded(self) -> Job:
+        """Return the job; raises SchemaMismatch for bytes that are none."""
+        return decode_content(self.job, Job, where="job")
 
 
 class JobAnswer(msgspec.Struct, frozen=True, kw_only=True):
@@ -74,7 +84,7 @@ class Runner(Protocol):
 
 def job_task(job: Job, named: JobBytes, *, wanted: Wanted = "result") -> Task:
     """Return the task of playing a job."""
-    request = JobRequest(job=job, sha256=named.sha256, wanted=wanted)
+    request = JobRequest(job=msgspec.Raw(named.data), sha256=named.sha256, wanted=wanted)
     return Task(named.sha256, "job", job.world_id, request)
 
 
@@ -83,13 +93,19 @@ def place_task(request: PlaceRequest) -> Task:
     return Task(f"places in {request.world_id}", "place", request.world_id, request)
 
 
-def answers(runner: Runner, tasks: Iterable[Task]) -> Iterator[Answer]:
-    """Have tasks answered by a runner that has no others, and yield the answers as they come."""
-    left = 0
-    for task in tasks:
-        runner.submit(task)
-        left += 1
-    for _ in range(left):
+def answers(runner: Runner, tasks: Iterable[Task], *, ahead: int = AHEAD) -> Iterator[Answer]:
+    """Have tasks answered by a runner that has no others, and yield the answers as they come.
+
+    Tasks are taken as they are needed: the runner holds at most `ahead`.
+    """
+    left, held = iter(tasks), 0
+    while True:
+        for task in itertools.islice(left, ahead - held):
+            runner.submit(task)
+            held += 1
+        if not held:
+            return
         answer = runner.take(None)
         assert answer is not None
+        held -= 1
         yield answer

@@ -32,10 +32,14 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 Weights = npt.NDArray[np.float64]
 
 INPUTS = (
-    "below the speed aimed at", "too fast for the bend", "nearness of who is ahead",
-    "nearness of the line to wait at", "nearness of ground that others cross",
-    "speed there", "nearness of the next road user",
-)  # fmt: skip
+    "below the speed aimed at",
+    "too fast for the bend",
+    "nearness of who is ahead",
+    "nearness of the line to wait at",
+    "nearness of ground that others cross",
+    "speed there",
+    "nearness of the next road user",
+)
 """What the driver weighs; each is 0 where nothing is to be done. The environment shows more."""
 DRIVERS, BEST, CASES_EACH = 40, 6, 8
 ITERATIONS = 13

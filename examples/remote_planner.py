@@ -46,9 +46,14 @@ def plan(scene: PlannerScene) -> PlannedMotions:
     rows = range(len(scene.futures))
     xy, yaw, speed = zip(*(_drive(scene, row, road) for row in rows), strict=True)
     return PlannedMotions(
-        job=scene.job, question=scene.question, futures=scene.futures, time_s=TIME_S,
-        xy_m=np.stack(xy), yaw_rad=np.stack(yaw), speed_mps=np.stack(speed),
-    )  # fmt: skip
+        job=scene.job,
+        question=scene.question,
+        futures=scene.futures,
+        time_s=TIME_S,
+        xy_m=np.stack(xy),
+        yaw_rad=np.stack(yaw),
+        speed_mps=np.stack(speed),
+    )
 
 
 def _drive(scene: PlannerScene, row: int, road: PathProfile) -> tuple[Array, Array, Array]:

@@ -31,10 +31,15 @@ def pedestrian(place: GeoPoint, time_s: float) -> RoadUser:
     north_m = min(driven, 2.0 * WAY_M - driven)
     lat, lon = geo_from_local(LocalFrame(place), np.array([0.0, north_m])).tolist()
     return RoadUser(
-        user_id="walker-1", kind="pedestrian", virtual=True, position=GeoPoint(lat, lon),
-        yaw_rad=math.copysign(math.pi / 2.0, WAY_M - driven), speed_mps=SPEED_MPS,
-        length_m=0.5, width_m=0.6,
-    )  # fmt: skip
+        user_id="walker-1",
+        kind="pedestrian",
+        virtual=True,
+        position=GeoPoint(lat, lon),
+        yaw_rad=math.copysign(math.pi / 2.0, WAY_M - driven),
+        speed_mps=SPEED_MPS,
+        length_m=0.5,
+        width_m=0.6,
+    )
 
 
 def serve(bus: Bus, place: GeoPoint) -> None:

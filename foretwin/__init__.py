@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from foretwin.sim_worker.vehicle.parameters import load_vehicle
     from foretwin.simulation import Futures, run_futures, state_on, ways_through
 
+_READ_AND_WRITTEN = "open_map", "read_world", "save_world"
 _FROM = {
     "foretwin.contracts.drive": ("VehicleState",),
     "foretwin.contracts.errors": ("UserError",),
@@ -46,9 +47,7 @@ _FROM = {
     "foretwin.contracts.scenario": ("Scenario",),
     "foretwin.contracts.vehicle": ("VehicleParameters",),
     "foretwin.contracts.world": ("World",),
-    "foretwin.maps": (
-        "Map", "export_formats", "export_world", "open_map", "read_world", "save_world",
-    ),
+    "foretwin.maps": ("Map", "export_formats", "export_world", *_READ_AND_WRITTEN),
     "foretwin.recordings": ("Recording", "open_run", "open_sweep"),
     "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
     "foretwin.sim_worker.planners.registry": ("planner_names",),
@@ -56,16 +55,14 @@ _FROM = {
     "foretwin.sim_worker.scenarios.ways": ("Way",),
     "foretwin.sim_worker.vehicle.parameters": ("load_vehicle",),
     "foretwin.simulation": ("Futures", "run_futures", "state_on", "ways_through"),
-}  # fmt: skip
+}
 _MODULE_OF = {name: module for module, names in _FROM.items() for name in names}
 
-__all__ = [
-    "Future", "Futures", "Map", "Planner", "PlannerOutput", "PlannerView", "Recording", "Scenario",
-    "UserError", "VehicleParameters", "VehicleState", "Way", "World", "catalogue",
-    "export_formats", "export_world", "find_scenario", "load_vehicle", "open_map", "open_run",
-    "open_sweep", "planner_names", "read_scenario", "read_world", "run_futures", "save_world",
-    "state_on", "ways_through",
-]  # fmt: skip
+__all__ = ["Future", "Futures", "Map", "Planner", "PlannerOutput", "PlannerView", "Recording"]
+__all__ += ["Scenario", "UserError", "VehicleParameters", "VehicleState", "Way", "World"]
+__all__ += ["catalogue", "export_formats", "export_world", "find_scenario", "load_vehicle"]
+__all__ += ["open_map", "open_run", "open_sweep", "planner_names", "read_scenario", "read_world"]
+__all__ += ["run_futures", "save_world", "state_on", "ways_through"]
 
 
 def __getattr__(name: str) -> Any:

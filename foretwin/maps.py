@@ -12,7 +12,7 @@ from foretwin.orchestrator.worlds.choice import junction_by_id, nearest_junction
 from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.orchestrator.worlds.opening import open_map as read_whole
 from foretwin.world_gen.build import DEFAULT_RADIUS_M, build_world
-from foretwin.world_gen.export.formats import FORMATS, ExportOptions
+from foretwin.world_gen.export.formats import FORMATS, ExportOptions, formats_by_suffix
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 
 
@@ -71,7 +71,7 @@ def export_world(world: World, file: Path | str, *, format_name: str | None = No
     Raises UserError where neither says.
     """
     file = Path(file)
-    named = [name for name, known in FORMATS.items() if known.suffix == file.suffix.lower()]
+    named = formats_by_suffix(file.suffix)
     if format_name is None and len(named) != 1:
         wish = f"one of {', '.join(named)}" if named else f"one of {', '.join(FORMATS)}"
         raise UserError(f"{file}: its suffix names no one format; give format_name, {wish}")

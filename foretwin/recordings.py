@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.record.recorded_jobs import table_at
+from foretwin.orchestrator.record.job_tables import table_at
 
 _RUN, _SWEEP = "run.json", "sweep.json"
 
@@ -27,14 +27,13 @@ class Recording:
             raise UserError(f"{folder}: no {record_file} to be read: {error}") from error
 
     def table(self, name: str) -> pa.Table:
-        """Return a table, such as `futures`, `jobs`, or a run's `comparisons`.
+        """Return a table, such as `futures`, `jobs`, `metrics`, or a run's `comparisons`.
 
         Raises UserError where there is none.
         """
-        file = self.folder / "results" / f"{name}.parquet"
         try:
-            return pq.read_table(file if file.is_file() else table_at(self.folder, name))
-        except (OSError, KeyError, pa.ArrowException) as error:
+            return pq.read_table(table_at(self.folder, name))
+        except (OSError, pa.ArrowException) as error:
             raise UserError(f"{self.folder}: no table {name!r} to be read: {error}") from error
 
 

@@ -17,15 +17,22 @@ from foretwin.contracts.frames import (
     geo_from_local_yaw,
     local_from_geo,
 )
-from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
+from foretwin.contracts.futures import (
+    PATH_BEHIND_M,
+    RESULT_STEP_S,
+    Future,
+    FuturesResult,
+    Job,
+    PathAhead,
+)
 from foretwin.contracts.job_identity import job_bytes, vehicle_digest
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.driver_model import UNKNOWN_LIMIT_MPS
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_rows import future_rows
-from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.run_job import run_alone
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.reading import find_scenario
@@ -33,10 +40,6 @@ from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
-STEP_S = 0.1
-DEFAULT_SPEED_MPS = 8.3
-"""Where no speed limit is known."""
-_PATH_BEHIND_M = 10.0
 _NEAR_WAY_M = 10.0
 
 
@@ -83,20 +86,24 @@ def state_on(
     not reach back so far.
     """
     arc_m = way.entry_m - before_m
-    if not _PATH_BEHIND_M <= arc_m < way.path.length_m:
-        most = way.entry_m - _PATH_BEHIND_M
+    if not PATH_BEHIND_M <= arc_m < way.path.length_m:
+        most = way.entry_m - PATH_BEHIND_M
         raise UserError(f"{before_m:g} m before the intersection: way {way.name} has {most:.0f} m")
     pose = way.path.pose_at(np.array([arc_m]))
     xy = way.path.point_at(np.array([arc_m]))[0]
     limit = float(way.path.at_nodes(way.path.speed_limit_mps, np.array([arc_m]))[0])
     if speed_mps is None:
-        speed_mps = limit if np.isfinite(limit) else DEFAULT_SPEED_MPS
+        speed_mps = limit if np.isfinite(limit) else UNKNOWN_LIMIT_MPS
     lat, lon = geo_from_local(world.frame, xy)
     return VehicleState(
-        vehicle_id="ego", stamp_ns=0, position=GeoPoint(float(lat), float(lon)),
+        vehicle_id="ego",
+        stamp_ns=0,
+        position=GeoPoint(float(lat), float(lon)),
         yaw_rad=float(geo_from_local_yaw(world.frame, float(pose.yaw_rad[0]), xy)),
-        speed_mps=speed_mps, yaw_rate_radps=0.0, accel_mps2=0.0,
-    )  # fmt: skip
+        speed_mps=speed_mps,
+        yaw_rate_radps=0.0,
+        accel_mps2=0.0,
+    )
 
 
 def run_futures(
@@ -129,12 +136,23 @@ def run_futures(
         count=count, seed=seed, planners=(planner,), scenarios=known
     )
     job = Job(
-        round_id=0, job_index=0, world_id=world.id, state=state, path=_path(world, way, state),
-        futures=mix, horizon_s=horizon_s, step_s=STEP_S, seed=seed,
-        cruise_speed_mps=state.speed_mps, scenarios=known, lights_by_plan=True,
-        metrics=ROW_METRICS, accidents=True, vehicle=vehicle_digest(car),
-    )  # fmt: skip
-    result = run_job(job, Stage(world, car, nsim=len(mix)))
+        round_id=0,
+        job_index=0,
+        world_id=world.id,
+        state=state,
+        path=_path(world, way, state),
+        futures=mix,
+        horizon_s=horizon_s,
+        step_s=RESULT_STEP_S,
+        seed=seed,
+        cruise_speed_mps=state.speed_mps,
+        scenarios=known,
+        lights_by_plan=True,
+        metrics=ROW_METRICS,
+        accidents=True,
+        vehicle=vehicle_digest(car),
+    )
+    result = run_alone(job, world, car)
     rows = future_rows(job, result, job_sha256=job_bytes(job).sha256)
     return Futures(job, result, rows)
 
@@ -145,6 +163,6 @@ def _path(world: World, way: Way, state: VehicleState) -> PathAhead:
     place = way.path.locate(np.asarray(here)[None])
     if not abs(place.offset_m[0]) <= _NEAR_WAY_M:
         raise UserError(f"the state is {abs(place.offset_m[0]):.0f} m away from way {way.name}")
-    arcs = np.arange(max(place.arc_m[0] - _PATH_BEHIND_M, 0.0), way.path.length_m, 1.0)
+    arcs = np.arange(max(place.arc_m[0] - PATH_BEHIND_M, 0.0), way.path.length_m, 1.0)
     limits = way.path.at_nodes(way.path.speed_limit_mps, arcs)
     return PathAhead(xy_m=way.path.point_at(arcs), speed_limit_mps=np.asarray(limits))

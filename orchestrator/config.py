@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,11 +12,14 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.roles import Correction, FollowLimits, Role
-from foretwin.orchestrator.tuning.choice import Tuning, TuningChoice, choose_tuning, processors
+from foretwin.orchestrator.settings import read_toml, settings_from
+from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning, processors
 
 View = Literal["auto", "native", "web", "none"]
 MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
+MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
+"""Of a World around its junction."""
 
 
 class ConfigError(UserError):
@@ -122,86 +126,55 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     def validate(self) -> DriveConfig:
         """Return self, or raise ConfigError naming the first setting that cannot be used."""
-        checks: tuple[tuple[bool, str], ...] = (
-            (self.workers >= 1, f"--workers {self.workers}: at least 1"),
-            (self.futures >= 1, f"--futures {self.futures}: at least 1"),
-            (
-                self.least_futures is None or 1 <= self.least_futures <= self.futures,
-                f"--least-futures {self.least_futures}: 1 to --futures, which is {self.futures}",
-            ),
-            (self.futures_per_job >= 1, f"futures_per_job {self.futures_per_job}: at least 1"),
-            (0.0 < self.rate_hz <= 50.0, f"--rate {self.rate_hz}: above 0, at most 50"),
-            (1.0 <= self.horizon_s <= 60.0, f"--horizon {self.horizon_s}: 1 to 60 seconds"),
-            (
-                self.speed is None or (math.isfinite(self.speed) and 0.0 < self.speed <= 1000.0),
-                f"--speed {self.speed}: above 0, at most 1000, or max",
-            ),
-            (self.start_s >= 0.0, f"--start {self.start_s}: not negative"),
-            (
-                self.end_s is None or self.end_s > self.start_s,
-                f"--end {self.end_s}: after --start {self.start_s}",
-            ),
-            (20.0 <= self.radius_m <= 2000.0, f"radius_m {self.radius_m}: 20 to 2000"),
-            (5.0 <= self.look_ahead_s <= 600.0, f"look_ahead_s {self.look_ahead_s}: 5 to 600"),
-            (
-                self.source != "log" or self.log is not None,
-                "source log needs --log FILE",
-            ),
-            (
-                self.route != "from-log" or self.log is not None,
-                "--route from-log needs --log FILE",
-            ),
-            (
-                self.route != "live" or self.source == "live",
-                "--route live needs --source live: a car that says where it drives to",
-            ),
-            (
-                self.ros2 is None or self.source == "live",
-                "--ros2 MAPPING needs --source live: its topics are the car's telemetry",
-            ),
-            (
-                self.ros2 is None or self.speed is not None,
-                "--ros2 MAPPING: a live car knows no --speed max",
-            ),
-            (
-                not self.towards_vehicle or self.ros2 is not None,
-                "--towards-vehicle needs --ros2 MAPPING",
-            ),
-            (
-                self.log is None or self.map is not None,
-                "--log needs --map FILE: the embedded map holds no real drive",
-            ),
-            (
-                self.map is None or self.log is not None or self.route is not None
-                or self.source == "live",
-                "--map needs --log FILE (a recorded drive), --route FILE (the stand-in car drives "
-                "it) or --source live",
-            ),
-        )  # fmt: skip
-        for holds, text in (*checks, *self._checks_of_vehicles()):
+        for holds, text in self._checks():
             if not holds:
                 raise ConfigError(text)
         return self
 
-    def _checks_of_vehicles(self) -> list[tuple[bool, str]]:
+    def _checks(self) -> Iterator[tuple[bool, str]]:
+        """Yield what must hold, and what is said where it does not."""
+        yield self.workers >= 1, f"--workers {self.workers}: at least 1"
+        yield self.futures >= 1, f"--futures {self.futures}: at least 1"
+        least = self.least_futures
+        few = f"--least-futures {least}: 1 to --futures, which is {self.futures}"
+        yield least is None or 1 <= least <= self.futures, few
+        yield self.futures_per_job >= 1, f"futures_per_job {self.futures_per_job}: at least 1"
+        yield 0.0 < self.rate_hz <= 50.0, f"--rate {self.rate_hz}: above 0, at most 50"
+        yield 1.0 <= self.horizon_s <= 60.0, f"--horizon {self.horizon_s}: 1 to 60 seconds"
+        # No number, and infinity, is in no range.
+        speed = self.speed is None or 0.0 < self.speed <= 1000.0
+        yield speed, f"--speed {self.speed}: above 0, at most 1000, or max"
+        yield self.start_s >= 0.0, f"--start {self.start_s}: not negative"
+        end = self.end_s is None or self.end_s > self.start_s
+        yield end, f"--end {self.end_s}: after --start {self.start_s}"
+        radius = MIN_RADIUS_M <= self.radius_m <= MAX_RADIUS_M
+        yield radius, f"radius_m {self.radius_m}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"
+        yield 5.0 <= self.look_ahead_s <= 600.0, f"look_ahead_s {self.look_ahead_s}: 5 to 600"
+        log, ros2, live = self.log is not None, self.ros2 is not None, self.source == "live"
+        yield log or self.source != "log", "source log needs --log FILE"
+        yield log or self.route != "from-log", "--route from-log needs --log FILE"
+        goal = "--route live needs --source live: a car that says where it drives to"
+        yield live or self.route != "live", goal
+        topics = "--ros2 MAPPING needs --source live: its topics are the car's telemetry"
+        yield live or not ros2, topics
+        max_speed = "--ros2 MAPPING: a live car knows no --speed max"
+        yield not ros2 or not self.lock_step, max_speed
+        yield ros2 or not self.towards_vehicle, "--towards-vehicle needs --ros2 MAPPING"
+        embedded = "--log needs --map FILE: the embedded map holds no real drive"
+        yield self.map is not None or not log, embedded
+        yield (
+            self.map is None or log or self.route is not None or live,
+            "--map needs --log FILE (a recorded drive), --route FILE (the stand-in car drives "
+            "it) or --source live",
+        )
+        for other in self.vehicles:
+            trouble = other.trouble()
+            yield trouble is None, f"vehicles, {other.id}: {trouble}"
+        yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
-        checks = [
-            (trouble is None, f"vehicles, {other.id}: {trouble}")
-            for other in self.vehicles
-            for trouble in (other.trouble(),)
-        ]
-        return [
-            *checks,
-            (
-                self.follow.trouble() is None,
-                f"follow: {self.follow.trouble()}",
-            ),
-            (len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"),
-            (
-                not (self.lock_step and any(other.live for other in self.vehicles)),
-                "vehicles: a live vehicle knows no --speed max",
-            ),
-        ]
+        yield len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"
+        waiting = self.lock_step and any(other.live for other in self.vehicles)
+        yield not waiting, "vehicles: a live vehicle knows no --speed max"
 
     @property
     def roles(self) -> dict[str, Role]:
@@ -217,11 +190,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     @property
     def tuning_choice(self) -> TuningChoice:
         """What `tuning` means here, and why."""
+        lock_step, workers = self.lock_step, self.workers
         return choose_tuning(
-            self.tuning,
-            lock_step=self.lock_step,
-            workers=self.workers,
-            processors=processors(),
+            self.tuning, lock_step=lock_step, workers=workers, processors=processors()
         )
 
     @property
@@ -252,28 +223,15 @@ def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
 
     `speed` may be a number or `max` in both. Raises FileNotFoundError or ConfigError, one line.
     """
-    values: dict[str, Any] = {}
-    where = "flags"
-    if path is not None:
-        if not path.is_file():
-            raise FileNotFoundError(f"configuration {path}: no such file")
-        where = str(path)
-        try:
-            values = msgspec.toml.decode(path.read_bytes())
-        except msgspec.DecodeError as error:
-            raise ConfigError(f"{path}: not TOML: {error}") from error
-        if "towards_vehicle" in values:
-            # Else one file could hold both switches.
-            raise ConfigError(f"{path}: towards_vehicle: on the command line alone")
+    values = {} if path is None else read_toml(path, "configuration", error=ConfigError)
+    if "towards_vehicle" in values:
+        # Else one file could hold both switches.
+        raise ConfigError(f"{path}: towards_vehicle: on the command line alone")
     values |= {name: value for name, value in overrides.items() if value is not None}
     if "speed" in values:
         values["speed"] = parse_speed(values["speed"])
-    try:
-        config = msgspec.convert(values, DriveConfig)
-    except msgspec.ValidationError as error:
-        known = ", ".join(DriveConfig.__struct_fields__)
-        raise ConfigError(f"{where}: {error} (known settings: {known})") from error
-    return config.validate()
+    where = f"{path or 'flags'}:"
+    return settings_from(values, DriveConfig, where, error=ConfigError).validate()
 
 
 def parse_speed(value: object) -> float | None:
@@ -284,3 +242,10 @@ def parse_speed(value: object) -> float | None:
         return float(str(value))
     except ValueError:
         raise ConfigError(f"--speed {value}: a number above 0, or max") from None
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    if sys.platform in ("darwin", "win32"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

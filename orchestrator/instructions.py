@@ -1,10 +1,11 @@
-"""What the mission tells the shell to do: the words between pure core and processes."""
+"""What the parts of a drive hand on: what the mission wants done, and what the car last said."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
+from foretwin.contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
 from foretwin.contracts.futures import PathAhead
 
 
@@ -58,3 +59,18 @@ class NotReady:
 
     reason: str
     world_late: bool
+
+
+class LatestState(NamedTuple):
+    """The newest state, and when the sample that gave it was received."""
+
+    state: VehicleState
+    receipt_mono_ns: int
+
+
+class LatestReports(NamedTuple):
+    """The newest of what a car says besides its own motion; each with its own stamp."""
+
+    plan: PlannedTrajectory | None
+    road_users: RoadUsers | None
+    signals: tuple[SignalState, ...]

@@ -53,6 +53,8 @@ ALONG_COS = 0.5
 """Whose heading is within 60° of a way drives along it. Chosen."""
 MAX_CLOSING_MPS = 100.0
 """Faster than any two road users approach each other. Chosen: two cars at 180 km/h each."""
+UNKNOWN_LIMIT_MPS = 8.3
+"""Aimed at where no speed limit is known. Chosen: 30 km/h, as beside houses."""
 LEAST_START_MPS = 2.0
 """With this speed a car that stands is taken to set off. Chosen."""
 

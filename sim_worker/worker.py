@@ -130,7 +130,7 @@ class FuturesWorker:
 
     def _job(self, question: msgspec.Struct) -> JobAnswer:
         assert isinstance(question, JobRequest)
-        job = question.job
+        job = question.decoded()
         if job.vehicle_version != self._version:
             raise ValueError(
                 f"job for version {job.vehicle_version} of the vehicle's parameters at a "

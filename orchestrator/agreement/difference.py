@@ -34,8 +34,8 @@ def read_judged(folder: Path) -> JudgedRun:
 def difference_of(before: JudgedRun, after: JudgedRun) -> dict[str, Any]:
     """Return what changes from one run of a drive to another."""
     return {
-        "before": _who(before),
-        "after": _who(after),
+        "before": _run_of(before),
+        "after": _run_of(after),
         "disagreements": _disagreements(before.record, after.record),
         "gap": {
             "nominal_ade_m": _both(before, after, lambda run: run.record["comparison"]["ade_m"]),
@@ -93,16 +93,14 @@ def difference_lines(found: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _worlds(who: dict[str, Any]) -> str:
-    return f", Worlds of {who['worlds']}" if who.get("worlds") else ""
+def _worlds(run: dict[str, Any]) -> str:
+    return f", Worlds of {run['worlds']}" if run.get("worlds") else ""
 
 
-def _who(run: JudgedRun) -> dict[str, Any]:
-    return {
-        "run": str(run.folder), "map": run.record["map"]["file"],
-        "vehicle": run.record["config"]["vehicle"],
-        "worlds": run.record["config"].get("worlds"),
-    }  # fmt: skip
+def _run_of(run: JudgedRun) -> dict[str, Any]:
+    config = run.record["config"]
+    corrected = {"vehicle": config["vehicle"], "worlds": config.get("worlds")}
+    return {"run": str(run.folder), "map": run.record["map"]["file"], **corrected}
 
 
 def _both(before: JudgedRun, after: JudgedRun, of: Any) -> dict[str, Any]:

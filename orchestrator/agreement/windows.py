@@ -6,6 +6,7 @@ Nothing is judged while the drive goes on: that would take time from the rounds.
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +19,8 @@ from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.instructions import LatestReports
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.analysis.agreement.criteria import CriteriaEvaluator, Heard, Users, Window
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
 from foretwin.sim_worker.metrics.ground import DrivableGround
@@ -92,19 +93,16 @@ class OpenWindows:
             return
         self._last_ns = stamp_ns
         others = result.road_users
-        self._waiting.append(
-            _Simulated(
-                done.order.round_id, stamp_ns, done.order.junction_id, world,
-                np.asarray(result.trajectory.time_s, dtype=np.float64),
-                np.asarray(result.trajectory.states[0], dtype=np.float64),
-                Users(
-                    np.asarray(others.poses[0], dtype=np.float64),
-                    np.asarray(others.speed_mps[0], dtype=np.float64),
-                    np.asarray(others.size_m[0], dtype=np.float64),
-                ),
-                path,
+        time_s, states, *users = (
+            np.asarray(values, dtype=np.float64)
+            for values in (
+                result.trajectory.time_s,
+                result.trajectory.states[0],
+                *(others.poses[0], others.speed_mps[0], others.size_m[0]),
             )
-        )  # fmt: skip
+        )
+        what = done.order.round_id, stamp_ns, done.order.junction_id, world
+        self._waiting.append(_Simulated(*what, time_s, states, Users(*users), path))
 
     def finish(self) -> list[Judged]:
         """Judge all windows, World by World."""
@@ -146,21 +144,24 @@ class OpenWindows:
         seen = [s for s in self._seen if stamps[0] - _SEEN_HOLE_NS <= s.stamp_ns]
         told = np.array([stamps[0], *(s.stamp_ns for s in seen), stamps[-1]], dtype=np.int64)
         return Window(
-            round_id=one.round_id, stamp_ns=one.stamp_ns, junction_id=one.junction_id,
-            world_id=one.world.id, time_s=one.time_s, simulated=one.states,
-            simulated_users=one.users, driven=_driven(known, at, stamps, one.world.frame),
-            driven_users=_users(seen, stamps, one.world.frame), path_xy_m=one.path.xy_m,
+            round_id=one.round_id,
+            stamp_ns=one.stamp_ns,
+            junction_id=one.junction_id,
+            world_id=one.world.id,
+            time_s=one.time_s,
+            simulated=one.states,
+            simulated_users=one.users,
+            driven=_driven(known, at, stamps, one.world.frame),
+            driven_users=_users(seen, stamps, one.world.frame),
+            path_xy_m=one.path.xy_m,
             heard={
-                group: Heard(
-                    np.array([stamp for stamp, _ in said], dtype=np.int64),
-                    tuple(colour for _, colour in said),
-                )
+                group: Heard(np.array([ns for ns, _ in said]), tuple(colour for _, colour in said))
                 for group, said in self._heard.items()
                 if said and said[-1][0] >= stamps[0]
             },
             known_users=bool(seen) and bool((np.diff(np.sort(told)) <= _SEEN_HOLE_NS).all()),
             position_std_m=max((s for s in stds if s is not None), default=None),
-        )  # fmt: skip
+        )
 
     def _forget(self, now_ns: int) -> None:
         oldest = now_ns - self._keep_ns
@@ -187,19 +188,23 @@ def _end_ns(one: _Simulated) -> int:
     return one.stamp_ns + round(float(one.time_s[-1]) * 1e9)
 
 
+def _placed(
+    things: Sequence[VehicleState | RoadUser], frame: LocalFrame
+) -> tuple[Array, Array, Array]:
+    """Return positions (N, 2) and headings (N,) without jumps in a frame, and speeds (N,)."""
+    lat, lon, yaw, speed = np.array(
+        [(one.position.lat_deg, one.position.lon_deg, one.yaw_rad, one.speed_mps) for one in things]
+    ).T
+    xy = np.asarray(local_from_geo(frame, lat, lon))
+    return xy, np.unwrap(local_from_geo_yaw(frame, yaw, lat, lon)), speed
+
+
 def _driven(known: list[VehicleState], at: Stamps, stamps: Stamps, frame: LocalFrame) -> Array:
     """Return states (N, 8) of a drive at stamps, in a World's frame."""
-    lat, lon, yaw, speed, rate, tire, accel = np.array(
-        [
-            (
-                s.position.lat_deg, s.position.lon_deg, s.yaw_rad, s.speed_mps,
-                s.yaw_rate_radps, s.tire_angle_rad or 0.0, s.accel_mps2,
-            )
-            for s in known
-        ]
-    ).T  # fmt: skip
-    xy = np.asarray(local_from_geo(frame, lat, lon))
-    heading = np.unwrap(local_from_geo_yaw(frame, yaw, lat, lon))
+    xy, heading, speed = _placed(known, frame)
+    rate, tire, accel = np.array(
+        [(s.yaw_rate_radps, s.tire_angle_rad or 0.0, s.accel_mps2) for s in known]
+    ).T
     columns = (xy[:, 0], xy[:, 1], heading, speed, np.zeros(len(at)), rate, tire, accel)
     since, wanted = at - stamps[0], stamps - stamps[0]
     return np.column_stack([np.interp(wanted, since, column) for column in columns])
@@ -216,16 +221,8 @@ def _users(seen: list[RoadUsers], stamps: Stamps, frame: LocalFrame) -> Users:
     sizes = np.zeros((len(tracks), 2))
     for place, track in enumerate(tracks.values()):
         at = np.array([stamp for stamp, _ in track], dtype=np.int64)
-        lat, lon, yaw, speed, length, width = np.array(
-            [
-                (u.position.lat_deg, u.position.lon_deg, u.yaw_rad, u.speed_mps, u.length_m,
-                 u.width_m)
-                for _, u in track
-            ]
-        ).T  # fmt: skip
-        sizes[place] = np.median(length), np.median(width)
-        xy = np.asarray(local_from_geo(frame, lat, lon))
-        heading = np.unwrap(local_from_geo_yaw(frame, yaw, lat, lon))
+        sizes[place] = np.median([(user.length_m, user.width_m) for _, user in track], axis=0)
+        xy, heading, speed = _placed([user for _, user in track], frame)
         after = np.searchsorted(at, stamps).clip(0, len(at) - 1)
         before = (np.searchsorted(at, stamps, side="right") - 1).clip(0)
         there = (stamps >= at[0]) & (stamps <= at[-1]) & (at[after] - at[before] <= _SEEN_HOLE_NS)

@@ -16,9 +16,8 @@ from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_set import set_value
 
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
-PATH_ERRORS = (
-    FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError,
-)  # fmt: skip
+_NO_FOLDER = IsADirectoryError, NotADirectoryError
+PATH_ERRORS = (FileNotFoundError, FileExistsError, *_NO_FOLDER, PermissionError)
 """What is wrong with a path is the user's to mend."""
 
 app = typer.Typer(
@@ -46,8 +45,8 @@ def drive(
     source: Annotated[
         str | None, typer.Option(help="log, standin, live (a car on the bus), or auto")
     ] = None,
-    start: Annotated[float | None, typer.Option(help="seconds into the log")] = None,
-    end: Annotated[float | None, typer.Option(help="seconds into the log")] = None,
+    start_s: Annotated[float | None, typer.Option("--start", help="seconds into the log")] = None,
+    end_s: Annotated[float | None, typer.Option("--end", help="seconds into the log")] = None,
     speed: Annotated[
         str | None, typer.Option(help="replay speed, or max for lock step [default: 1]")
     ] = None,
@@ -60,8 +59,12 @@ def drive(
             "as many as --futures holds them fixed [default: a quarter]"
         ),
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="rounds per wall second [default: 2]")] = None,
-    horizon: Annotated[float | None, typer.Option(help="seconds ahead [default: 8]")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="rounds per wall second [default: 2]")
+    ] = None,
+    horizon_s: Annotated[
+        float | None, typer.Option("--horizon", help="seconds ahead [default: 8]")
+    ] = None,
     planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the futures [default: 0]")] = None,
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
@@ -90,21 +93,13 @@ def drive(
     ] = False,
 ) -> None:
     """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
+    settings = locals()  # named as the fields of DriveConfig, but for two
+    settings["map"] = settings.pop("map_file")
+    settings["towards_vehicle"] = towards_vehicle or None
     from foretwin.orchestrator.config import load_config
     from foretwin.orchestrator.drive.drive import drive as run_drive
 
-    settings = load_config(
-        config,
-        {
-            "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
-            "end_s": end, "speed": speed, "workers": workers, "futures": futures,
-            "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
-            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning,
-            "map_aiding": map_aiding, "view": view, "out": out, "ros2": ros2,
-            "towards_vehicle": towards_vehicle or None,
-        },
-    )  # fmt: skip
-    raise typer.Exit(run_drive(settings))
+    raise typer.Exit(run_drive(load_config(settings.pop("config"), settings)))
 
 
 @app.command()
@@ -146,7 +141,7 @@ def world(
             "[default: as the suffix of --out says; mjcf for .xml and in a folder]",
         ),
     ] = None,
-    radius: Annotated[float, typer.Option(help="metres around the junction")] = 150.0,
+    radius_m: Annotated[float, typer.Option("--radius", help="metres around the junction")] = 150.0,
     opendrive_version: Annotated[str, typer.Option(help="1.8, or 1.4 for CARLA")] = "1.8",
     simulator: Annotated[
         str, typer.Option(help="sdf: classic (Gazebo Classic with ROS 2) or gazebo (gz-sim)")
@@ -160,19 +155,10 @@ def world(
     ] = False,
 ) -> None:
     """Write Worlds of a map: models, road networks for other simulators, or pictures."""
+    asked = locals()  # named as the fields of WorldRequest
     from foretwin.orchestrator.commands.world import WorldRequest, write_worlds
 
-    raise typer.Exit(
-        write_worlds(
-            WorldRequest(
-                map_file=map_file, out=out, at=at, junction_id=junction_id, bbox=bbox,
-                route=route, everything=everything, service_roads=service_roads,
-                file_format=file_format, radius_m=radius,
-                opendrive_version=opendrive_version, simulator=simulator, vehicles=vehicles,
-                vehicle=vehicle, report=report,
-            )
-        )
-    )  # fmt: skip
+    raise typer.Exit(write_worlds(WorldRequest(**asked)))
 
 
 @maps.command("get", context_settings={"ignore_unknown_options": True})
@@ -221,10 +207,9 @@ def sweep(
     as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
 ) -> None:
     """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
-    from foretwin.orchestrator.commands.sweep import SweepRequest
     from foretwin.orchestrator.commands.sweep import sweep as run_sweep
 
-    raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
+    raise typer.Exit(run_sweep(spec, out=out, workers=workers, fresh=fresh, as_json=as_json))
 
 
 for about_logs in (convert, identify, gap, judge, repeat):

@@ -44,7 +44,7 @@ def identify(
 
 
 def judge(
-    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+    run: Annotated[Path, typer.Argument(help="folder of a run")],
     map_file: Annotated[
         Path | None, typer.Option("--map", help="corrected map [default: the run's own]")
     ] = None,
@@ -60,14 +60,10 @@ def judge(
     as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
 ) -> None:
     """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?"""
-    from foretwin.orchestrator.commands.judge import JudgeRequest
+    asked = locals()
     from foretwin.orchestrator.commands.judge import judge as judge_run
 
-    request = JudgeRequest(
-        run=run_folder, map_file=map_file, vehicle=vehicle, worlds=worlds, out=out,
-        as_json=as_json,
-    )  # fmt: skip
-    raise typer.Exit(judge_run(request))
+    raise typer.Exit(judge_run(**asked))
 
 
 def repeat(

@@ -128,6 +128,8 @@ def _vulkan() -> CheckResult:
 
 
 def _display() -> CheckResult:
+    from foretwin.orchestrator.config import has_display
+
     if has_display():
         return CheckResult("display", "ok", "--view auto opens the native viewer")
     return CheckResult("display", "note", "none: --view auto writes monitor.rrd alone")
@@ -145,13 +147,5 @@ def _data() -> CheckResult:
     return CheckResult("FORETWIN_DATA", "note", "not set: real-data tests skip (drives need none)")
 
 
-def has_display() -> bool:
-    """Whether a window can be opened here."""
-    if sys.platform in ("darwin", "win32"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-CHECKS: tuple[Callable[[], CheckResult], ...] = (
-    _python, _cores, _tuning, _packages, _bus, _clock, _vulkan, _display, _disk, _data,
-)  # fmt: skip
+_MACHINE = _python, _cores, _tuning, _packages, _bus, _clock
+CHECKS: tuple[Callable[[], CheckResult], ...] = (*_MACHINE, _vulkan, _display, _disk, _data)

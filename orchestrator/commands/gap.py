@@ -14,7 +14,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.commands.gap_text import nobody_accused, table_lines, verdict_lines
+from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
@@ -137,7 +137,7 @@ def as_object(report: GapReport) -> dict[str, Any]:
         "vehicle_id": report.info.vehicle_id,
         "independent": _commanded(report),
         "rows": [row._asdict() for row in report.rows],
-        "reason": nobody_accused(report.verdicts, commanded=_commanded(report)),
+        "reason": why_undecided(report.verdicts, commanded=_commanded(report)),
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
         "refused": report.refused,

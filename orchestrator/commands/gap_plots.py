@@ -44,10 +44,13 @@ def write_plots(
     for number, verdict in enumerate(verdicts):
         # In turn one below the other: verdicts may follow each other closely.
         axes[0].annotate(
-            f"{verdict.culprit}: {verdict.cause}", ((verdict.stamp_ns - start_ns) * 1e-9, 1.0),
-            xycoords=("data", "axes fraction"), xytext=(3, -10 - 11 * (number % 4)),
-            textcoords="offset points", fontsize=8,
-        )  # fmt: skip
+            f"{verdict.culprit}: {verdict.cause}",
+            ((verdict.stamp_ns - start_ns) * 1e-9, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, -10 - 11 * (number % 4)),
+            textcoords="offset points",
+            fontsize=8,
+        )
     lines, labels = axes[0].get_legend_handles_labels()
     over_time.legend(lines, labels, title="after", ncols=len(horizons), loc="outside lower center")
     axes[0].set_title("model minus reality")

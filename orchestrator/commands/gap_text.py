@@ -11,11 +11,14 @@ from foretwin.sim_worker.analysis.gap.errors import GapRow
 WIDTH = 80
 _DEGREES = 57.29578
 _COLUMNS = (
-    ("position_m", "place", "m", 1.0), ("along_m", "along", "m", 1.0),
-    ("across_m", "across", "m", 1.0), ("yaw_rad", "head.", "°", _DEGREES),
-    ("yaw_rate_radps", "rate", "°/s", _DEGREES), ("speed_mps", "speed", "m/s", 1.0),
+    ("position_m", "place", "m", 1.0),
+    ("along_m", "along", "m", 1.0),
+    ("across_m", "across", "m", 1.0),
+    ("yaw_rad", "head.", "°", _DEGREES),
+    ("yaw_rate_radps", "rate", "°/s", _DEGREES),
+    ("speed_mps", "speed", "m/s", 1.0),
     ("accel_mps2", "accel", "m/s²", 1.0),
-)  # fmt: skip
+)
 
 
 def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
@@ -35,7 +38,7 @@ def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
         yield ""
 
 
-def nobody_accused(verdicts: Sequence[Verdict], *, commanded: bool) -> str | None:
+def why_undecided(verdicts: Sequence[Verdict], *, commanded: bool) -> str | None:
     """Return why nobody is accused, None where somebody is."""
     if any(verdict.culprit != "undecided" for verdict in verdicts):
         return None
@@ -56,7 +59,7 @@ def verdict_lines(
     raised = [alarm for alarm in alarms if alarm.over]
     kinds = ", ".join(dict.fromkeys(alarm.quantity for alarm in raised))
     yield f"alarms: {len(raised)}{f' ({kinds})' if kinds else ''}"
-    reason = nobody_accused(verdicts, commanded=commanded)
+    reason = why_undecided(verdicts, commanded=commanded)
     if reason is not None and not (commanded and verdicts):
         yield from _wrapped(f"verdict: none: {reason}" if commanded else reason)
     for verdict in verdicts:
@@ -75,7 +78,6 @@ def verdict_lines(
 
 
 def _wrapped(text: str, *, indent: str = "") -> list[str]:
-    return textwrap.wrap(
-        text, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent),
-        break_long_words=False,
-    )  # fmt: skip
+    then = " " * len(indent)
+    wrapper = textwrap.TextWrapper(WIDTH, indent, then, break_long_words=False)
+    return wrapper.wrap(text)

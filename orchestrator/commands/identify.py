@@ -15,6 +15,7 @@ from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.tuning import Identification
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
 from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
@@ -66,8 +67,7 @@ def identify_log(
         with contextlib.suppress(ValueError):
             draw_steering(record, vehicle, out / "steering.png")
     if as_json:
-        body = msgspec.json.encode(as_object(told))
-        print(msgspec.json.format(body, indent=1).decode())
+        print_json(as_object(told))
     else:
         print("\n".join(as_lines(told)))
         if out is not None:
@@ -119,12 +119,8 @@ def _recorder(place: GeoPoint, waiting: list[tuple[str, Any]]) -> MotionRecorder
 
 def as_object(told: Identification) -> dict[str, Any]:
     """Return `{parameter: {value, low, high, reason}}`; value, low and high may be None."""
-    return {
-        found.name: {
-            "value": found.value, "low": found.low, "high": found.high, "reason": found.reason
-        }
-        for found in told.estimates
-    }  # fmt: skip
+    names = ("value", "low", "high", "reason")
+    return {found.name: {name: getattr(found, name) for name in names} for found in told.estimates}
 
 
 def as_lines(told: Identification) -> list[str]:
@@ -136,10 +132,8 @@ def as_lines(told: Identification) -> list[str]:
         name, unit, scale = _SHOWN[found.name]
         interval = "" if found.low is None else _interval(found.low, found.high, scale)
         taken = "*" if is_acceptable(found) else ""
-        lines.append(
-            _ROW.format(name, _number(found.value, scale), interval, unit,
-                        _number(found.prior, scale), taken).rstrip()
-        )  # fmt: skip
+        value, prior = _number(found.value, scale), _number(found.prior, scale)
+        lines.append(_ROW.format(name, value, interval, unit, prior, taken).rstrip())
         if found.reason:
             lines += textwrap.wrap(
                 found.reason, _WIDTH, initial_indent="    ", subsequent_indent="    "

@@ -6,7 +6,6 @@ import contextlib
 import datetime
 import json
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,39 +26,35 @@ RECORD, DRIVE = "run.json", "drive.mcap"
 JUDGED = "judged"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JudgeRequest:
-    """What was asked for on the command line."""
-
-    run: Path
-    map_file: Path | None = None
-    vehicle: str | None = None
-    worlds: Path | None = None
-    out: Path | None = None
-    as_json: bool = False
-
-
-def judge(request: JudgeRequest) -> int:
+def judge(
+    run: Path,
+    *,
+    map_file: Path | None = None,
+    vehicle: str | None = None,
+    worlds: Path | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
+) -> int:
     """Drive a run's recorded drive again in lock step and print what changes; returns 0, or the
     exit code of the drive that did not come to its end.
 
     What it is compared with is the run itself where that was in lock step and of this version;
     else the drive is first driven again as it was, so that nothing but the correction differs.
     """
-    record = _record(request.run)
-    again = _again(request.run, record, out=request.out or request.run / JUDGED)
+    record = _record(run)
+    again = _again(run, record, out=out or run / JUDGED)
     corrected = msgspec.structs.replace(
         again,
-        map=again.map if request.map_file is None else str(request.map_file),
-        vehicle=request.vehicle or again.vehicle,
-        worlds=again.worlds if request.worlds is None else str(request.worlds),
+        map=again.map if map_file is None else str(map_file),
+        vehicle=vehicle or again.vehicle,
+        worlds=again.worlds if worlds is None else str(worlds),
     )
-    if request.worlds is not None:
-        _check_on_way(request.worlds, request.run, record)
+    if worlds is not None:
+        _check_on_way(worlds, run, record)
     read_inputs(corrected)  # what is wrong with them is told before anything long begins
-    before = request.run
+    before = run
     if record["config"].get("speed") is not None or record.get("versions") != versions():
-        _say(f"{request.run}: driven again as it was, in lock step, to compare with")
+        _say(f"{run}: driven again as it was, in lock step, to compare with")
         code, before = _drive(again)
         if code:
             return code
@@ -68,7 +63,7 @@ def judge(request: JudgeRequest) -> int:
     if code:
         return code
     found = difference_of(read_judged(before), read_judged(after))
-    if request.as_json:
+    if as_json:
         print(json.dumps(found, indent=2, ensure_ascii=False))
     else:
         print("\n".join(difference_lines(found)))
@@ -113,11 +108,10 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
     if len(kept) < len(was.vehicles):
         gone = ", ".join(one.id for one in was.vehicles if one.live)
         _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
-    return msgspec.structs.replace(
-        was, log=str(run / DRIVE), source="log", map=map_file, route=route,
-        speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
-        vehicles=kept,
-    ).validate()  # fmt: skip
+    inputs = {"log": str(run / DRIVE), "source": "log", "map": map_file, "route": route}
+    alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
+    no_car = {"endpoint": None, "ros2": None, "towards_vehicle": False}
+    return msgspec.structs.replace(was, **inputs, **alone, **no_car).validate()
 
 
 def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:

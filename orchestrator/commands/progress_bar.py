@@ -30,9 +30,8 @@ def progress_bar(
         console.print(text, soft_wrap=True, markup=False)
 
     if console.is_terminal:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-                   TimeRemainingColumn())  # fmt: skip
-        with Progress(*columns, console=console) as bar:
+        counted = BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        with Progress(TextColumn("{task.description}"), *counted, console=console) as bar:
             task = bar.add_task(what, total=total)
             yield lambda name: bar.update(task, advance=1, description=name), say
         return

@@ -11,9 +11,8 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.orchestrator.record.job_tables import REPEATED
 from foretwin.orchestrator.record.recorded_jobs import RecordedFuture, recorded_future
-from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.future_rows import future_rows
-from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.run_job import run_alone
 from foretwin.sim_worker.planners.registry import in_another_process
 
 DIFFERS = 3
@@ -34,9 +33,8 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
         raise UserError(f"{future_id}: was not played: {reason}")
     result, after = play_again(recorded)
     if as_json:
-        told = {"future": future_id, "recorded_sha256": before, "sha256": after,
-                "equal": before == after}  # fmt: skip
-        print(json.dumps(told))
+        hashes = {"recorded_sha256": before, "sha256": after}
+        print(json.dumps({"future": future_id, **hashes, "equal": before == after}))
     elif before == after:
         print(f"{future_id}: the same again, sha256 {after}")
     else:
@@ -63,10 +61,7 @@ def play_again(recorded: RecordedFuture) -> tuple[FuturesResult, str]:
             "are not recorded"
         )
     job = _without_others(recorded.job)
-    stage = Stage(
-        recorded.world, recorded.vehicle, nsim=len(job.futures), control_hz=job.control_hz
-    )
-    result = run_job(job, stage)
+    result = run_alone(job, recorded.world, recorded.vehicle)
     rows = future_rows(job, result, job_sha256=recorded.row["job_sha256"])
     row = next(row for row in rows if row["index"] == recorded.row["index"])
     return result, row["trajectory_sha256"]

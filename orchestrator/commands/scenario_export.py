@@ -48,10 +48,8 @@ def export_scenario(request: CaseRequest, out: Path) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     vehicle = load_vehicle(request.vehicle)
     found = placed_case(request)
-    roads = write_openscenario(
-        found.played, found.scenario, found.world, out, vehicle=vehicle,
-        written_at=datetime.datetime.now(datetime.UTC),
-    )  # fmt: skip
+    now, case = datetime.datetime.now(datetime.UTC), (found.played, found.scenario, found.world)
+    roads = write_openscenario(*case, out, vehicle=vehicle, written_at=now)
     played = found.played
     print(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
     print(f"{roads}: its roads")

@@ -8,19 +8,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
+from foretwin.orchestrator.commands.output import print_json, print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
-from foretwin.orchestrator.worlds.choice import (
-    FARTHEST_M,
-    junction_by_id,
-    nearest_junction,
-    node_of_id,
-    parse_place,
-)
-from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map
+from foretwin.orchestrator.worlds.choice import choose_junctions
+from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
@@ -65,20 +59,13 @@ def list_scenarios(*, as_json: bool) -> None:
     """Print the catalogue."""
     found = catalogue().values()
     if as_json:
-        _print_json([_described(scenario) for scenario in found])
+        print_json([_described(scenario) for scenario in found])
         return
-    from rich.console import Console
-    from rich.table import Column, Table
+    from rich.table import Column
 
-    table = Table(
-        Column("id", no_wrap=True), "title", "cases", "where", "source", title="scenarios"
-    )
-    for scenario in found:
-        table.add_row(
-            scenario.id, scenario.title, str(len(draw_cases(scenario))),
-            _where(scenario), scenario.source,
-        )  # fmt: skip
-    Console().print(table)
+    columns = (Column("id", no_wrap=True), "title", "cases", "where", "source")
+    rows = [(s.id, s.title, len(draw_cases(s)), _where(s), s.source) for s in found]
+    print_table("scenarios", columns, rows)
 
 
 def check_scenario_file(file: Path) -> None:
@@ -98,7 +85,7 @@ def place_scenarios(request: PlacesAsked, *, as_json: bool) -> int:
     with progress_bar(len(junctions), "junctions") as (advance, _):
         found = placed_on(opened, junctions, chosen, advance=advance)
     if as_json:
-        _print_json(found)
+        print_json(found)
     else:
         _print_table(request.map_file, found)
     return 3 if any(scenario.unplaced for scenario in found) else 0
@@ -108,19 +95,16 @@ def asked_junctions(request: PlacesAsked) -> tuple[OpenMap, tuple[Junction, ...]
     """Open as much of a map as is needed; returns it and the junctions that were asked for."""
     if request.at is not None and request.junction_id is not None:
         raise UserError("name the junction by --at LAT,LON or by --id ID, not by both")
-    if request.at is not None:
-        lat, lon = parse_place(request.at)
-        around = Clip(np.array([[lat, lon]]), RADIUS_M + FARTHEST_M)
-        opened = open_map(request.map_file, clip=around, service_roads=request.service_roads)
-        return opened, (nearest_junction(opened, lat, lon),)
-    if request.junction_id is not None:
-        clip = NodeClip(node_of_id(request.junction_id), RADIUS_M)
-        opened = open_map(request.map_file, clip=clip, service_roads=request.service_roads)
-        return opened, (junction_by_id(opened, request.junction_id),)
-    opened = open_map(request.map_file, service_roads=request.service_roads)
-    if not opened.junctions:
+    opened, junctions = choose_junctions(
+        request.map_file,
+        at=request.at,
+        junction_id=request.junction_id,
+        radius_m=RADIUS_M,
+        service_roads=request.service_roads,
+    )
+    if not junctions:
         raise UserError(f"{opened.file}: no intersection in this map")
-    return opened, tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
+    return opened, junctions
 
 
 def placed_on(
@@ -161,21 +145,17 @@ def placed_on(
 
 
 def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:
-    from rich.console import Console
-    from rich.table import Column, Table
+    from rich.table import Column
 
-    table = Table(
-        Column("id", no_wrap=True), "placed", "applies to", "of", "elsewhere", title=str(map_file)
-    )
+    rows = []
     for row in found:
         reasons = collections.Counter(row.unplaced.values())
         lines = [f"{count} unplaced: {reason}" for reason, count in reasons.most_common()]
         others = sorted(row.does_not_apply.items(), key=lambda item: -item[1])
         lines += [f"{count}: {reason}" for reason, count in others]
-        table.add_row(
-            row.id, str(row.placed), str(row.applies), str(row.looked_at), "\n".join(lines)
-        )
-    Console().print(table)
+        rows.append((row.id, row.placed, row.applies, row.looked_at, "\n".join(lines)))
+    columns = (Column("id", no_wrap=True), "placed", "applies to", "of", "elsewhere")
+    print_table(str(map_file), columns, rows)
 
 
 def _described(scenario: Scenario) -> dict[str, object]:
@@ -201,7 +181,3 @@ def _where(scenario: Scenario) -> str:
     if where.setting != "junction":
         return where.setting.replace("_", " ")
     return ", ".join((*where.kinds, *where.controls)) or "any junction"
-
-
-def _print_json(body: object) -> None:
-    print(msgspec.json.format(msgspec.json.encode(body), indent=1).decode())

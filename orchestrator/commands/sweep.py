@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.job_identity import job_bytes
+from foretwin.contracts.futures import Job
+from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.placement import WorldPlaces
-from foretwin.contracts.runner import Runner, answers, job_task, place_task
+from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
@@ -28,7 +30,7 @@ from foretwin.orchestrator.sweep.folder import (
 )
 from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
 from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, plan_sweep
-from foretwin.orchestrator.sweep.rows import Parts, RowsHash
+from foretwin.orchestrator.sweep.rows import Parts
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from foretwin.orchestrator.sweep.workers import worker_setup
@@ -37,28 +39,20 @@ from foretwin.orchestrator.sweep.worlds import source_digest, sweep_worlds
 SOME_FAILED = 3
 
 
-class SweepRequest(NamedTuple):
-    """What was asked for on the command line."""
-
-    spec: Path
-    out: Path | None = None
-    workers: int = 2
-    fresh: bool = False
-    as_json: bool = False
-
-
-def sweep(request: SweepRequest) -> int:
+def sweep(
+    spec: Path, *, out: Path | None, workers: int = 2, fresh: bool = False, as_json: bool = False
+) -> int:
     """Run a sweep, or go on with it; returns 0, or 3 where futures failed.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
-    if request.workers < 1:
-        raise UserError(f"--workers {request.workers}: at least 1")
-    loaded = load_spec(request.spec)
-    out = request.out or Path("sweeps") / request.spec.stem
-    with workers_for(loaded, out, request.workers) as runner:
-        summary = run_sweep(loaded, out, runner, fresh=request.fresh)
-    if request.as_json:
+    if workers < 1:
+        raise UserError(f"--workers {workers}: at least 1")
+    loaded = load_spec(spec)
+    out = out or Path("sweeps") / spec.stem
+    with workers_for(loaded, out, workers) as runner:
+        summary = run_sweep(loaded, out, runner, fresh=fresh)
+    if as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
         print_summary(out, summary)
@@ -94,17 +88,14 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         started_s = time.monotonic()
         left = [job for job in plan.jobs if job.number not in there]
         _play(left, JobMaker(loaded, plan.worlds), parts, runner)
-        return folder.summarise(
-            _summary(loaded, plan, places, parts)
-            | {"jobs_played": len(plan.jobs) - len(there),
-               "playing_s": round(time.monotonic() - started_s, 3)}
-        )  # fmt: skip
+        playing_s = round(time.monotonic() - started_s, 3)
+        now = {"jobs_played": len(plan.jobs) - len(there), "playing_s": playing_s}
+        return folder.summarise(_summary(loaded, plan, places, parts) | now)
 
 
 def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPlaces:
     """Build or read the Worlds, and find where the scenarios take place in each."""
-    with _counting("Worlds") as advance:
-        worlds = sweep_worlds(loaded.spec, folder.worlds_dir, advance)
+    worlds = sweep_worlds(loaded.spec, folder.worlds_dir, progress_bar)
     found: dict[int, WorldPlaces] = {}
     failures = dict(worlds.failures)
     tasks = [place_task(place_request(loaded, world_id)) for world_id in worlds.ids]
@@ -120,36 +111,20 @@ def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPl
     return folder.save_places(tuple(found[number] for number in sorted(found)), failures)
 
 
-class _counting:  # noqa: N801
-    """A progress bar whose length is known with the first step."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._bar: Any = None
-        self._advance: Any = None
-
-    def __enter__(self) -> Any:
-        return self._count
-
-    def _count(self, name: str, number: int, total: int) -> None:
-        if self._bar is None:
-            self._bar = progress_bar(total, self._what)
-            self._advance, _ = self._bar.__enter__()
-        self._advance(name)
-
-    def __exit__(self, *what: Any) -> None:
-        if self._bar is not None:
-            self._bar.__exit__(*what)
-
-
 def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner) -> None:
     """Play jobs and write their rows as they come."""
-    jobs = [(one, job := maker.job(one), job_bytes(job)) for one in left]
-    by_name = {named.sha256: (one, job, named) for one, job, named in jobs}
-    tasks = [job_task(job, named, wanted="rows") for _, job, named in jobs]
+    at_work: dict[str, tuple[SweepJob, Job, JobBytes]] = {}
+
+    def tasks() -> Iterator[Task]:
+        for one in left:
+            job = maker.job(one)
+            named = job_bytes(job)
+            at_work[named.sha256] = one, job, named
+            yield job_task(job, named, wanted="rows")
+
     with progress_bar(sum(len(one.cells) for one in left), "futures") as (advance, say):
-        for answer in answers(runner, tasks):
-            one, job, named = by_name[answer.task.key]
+        for answer in answers(runner, tasks()):
+            one, job, named = at_work.pop(answer.task.key)
             if answer.message is None:
                 say(f"failed: job {one.number}: {answer.failure}")
             parts.write(cell_rows(one, job, answer), job, named)
@@ -158,9 +133,9 @@ def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runne
 
 
 def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:
-    digest, counted = RowsHash(), Summary(loaded.spec)
+    digest, counted = hashlib.sha256(), Summary(loaded.spec)
     for row in parts.rows(plan.jobs):
-        digest.add(row)
+        digest.update(msgspec.msgpack.encode(row))
         counted.add(row)
     unplaced = [one for world in places.worlds for one in world.unplaced]
     return {

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.world_files import write_each, write_report
-from foretwin.orchestrator.worlds.choice import (
-    FARTHEST_M,
-    junction_by_id,
-    junctions_along,
-    nearest_junction,
-    node_of_id,
-    parse_bbox,
-    parse_place,
-    read_route,
-)
-from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map, region_on_map
+from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
+from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
+from foretwin.orchestrator.worlds.opening import OpenMap, open_map, region_on_map
 from foretwin.world_gen.build import build_region, build_world
 from foretwin.world_gen.export.choices import (
     OPENDRIVE_VERSIONS,
@@ -43,7 +32,6 @@ from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 _Word = TypeVar("_Word", bound=str)
-MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,54 +64,53 @@ def write_worlds(request: WorldRequest) -> int:
     _check_place(request)
     many = request.everything or request.route is not None
     _check_out(request.out, many=many)
+    if (
+        request.out.exists()
+        and request.map_file.exists()
+        and request.out.samefile(request.map_file)
+    ):
+        raise UserError(f"--out {request.out}: is the map itself; name another file")
     format_ = _format(request.file_format, None if many else request.out)
     options = _options(request, format_)
     if request.bbox is not None:
         return _region(request, parse_bbox("--bbox", request.bbox), format_, options)
-    if request.at is not None:
-        lat, lon = parse_place(request.at)
-        opened = _open(request, Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M))
-        return _single(opened, nearest_junction(opened, lat, lon), request, format_, options)
-    if request.junction_id is not None:
-        clip = NodeClip(node_of_id(request.junction_id), request.radius_m)
-        opened = _open(request, clip)
-        junction = junction_by_id(opened, request.junction_id)
-        return _single(opened, junction, request, format_, options)
-    if request.route is not None:
-        line_deg = read_route(request.route)
-        opened = _open(request, Clip(line_deg, request.radius_m))
-        opened, along = junctions_along(opened, request.route, line_deg)
+    opened, junctions = choose_junctions(
+        request.map_file,
+        at=request.at,
+        junction_id=request.junction_id,
+        route=request.route,
+        radius_m=request.radius_m,
+        service_roads=request.service_roads,
+    )
+    if many and not junctions:
+        where = "in this map" if request.route is None else f"along {request.route}"
+        raise UserError(f"{opened.file}: no intersection {where}")
+    index = _index(opened)
+
+    def built(junction: Junction) -> World:
+        radius_m = request.radius_m
+        return build_world(opened.osm, opened.graph, junction, radius_m=radius_m, index=index)
+
+    if not many:
+        return _write_one(built(junctions[0]), request, format_, options)
+    return write_each(
         # A junction that is passed twice is written once.
-        junctions = tuple({junction.summary.id: junction for junction in along}.values())
-    else:
-        opened = _open(request)
-        junctions = tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
-    return _write_many(opened, junctions, request, format_, options)
-
-
-def _open(request: WorldRequest, clip: Clip | NodeClip | LatLonBounds | None = None) -> OpenMap:
-    return open_map(request.map_file, clip=clip, service_roads=request.service_roads)
+        tuple({junction.summary.id: junction for junction in junctions}.values()),
+        built,
+        lambda world, path: format_.write(world, path, options),
+        folder=request.out,
+        suffix=format_.suffix,
+        report=request.report,
+        attribution=opened.osm.attribution,
+    )
 
 
 def _region(
     request: WorldRequest, bounds: LatLonBounds, format_: Format, options: ExportOptions
 ) -> int:
-    opened = _open(request, bounds)
+    opened = open_map(request.map_file, clip=bounds, service_roads=request.service_roads)
     part = region_on_map(opened.file, opened.osm.bounds, bounds)
     world = build_region(opened.osm, opened.graph, part, index=_index(opened))
-    return _write_one(world, request, format_, options)
-
-
-def _single(
-    opened: OpenMap,
-    junction: Junction,
-    request: WorldRequest,
-    format_: Format,
-    options: ExportOptions,
-) -> int:
-    world = build_world(
-        opened.osm, opened.graph, junction, radius_m=request.radius_m, index=_index(opened)
-    )
     return _write_one(world, request, format_, options)
 
 
@@ -131,35 +118,12 @@ def _write_one(world: World, request: WorldRequest, format_: Format, options: Ex
     format_.write(world, request.out, options)
     s = world.intersection
     place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
-    print(f"{request.out}: {place}, {len(world.lanes)} lanes, {len(world.buildings)} buildings, "
-          f"{len(world.notes)} notes. {world.attribution}")  # fmt: skip
+    counts = {"lanes": world.lanes, "buildings": world.buildings, "notes": world.notes}
+    text = ", ".join(f"{len(those)} {name}" for name, those in counts.items())
+    print(f"{request.out}: {place}, {text}. {world.attribution}")
     if request.report:
         write_report(world, request.out, show=True)
     return 0
-
-
-def _write_many(
-    opened: OpenMap,
-    junctions: Sequence[Junction],
-    request: WorldRequest,
-    format_: Format,
-    options: ExportOptions,
-) -> int:
-    if not junctions:
-        where = "in this map" if request.route is None else f"along {request.route}"
-        raise UserError(f"{opened.file}: no intersection {where}")
-    index = _index(opened)
-
-    def built(junction: Junction) -> World:
-        return build_world(
-            opened.osm, opened.graph, junction, radius_m=request.radius_m, index=index
-        )
-
-    return write_each(
-        junctions, built, lambda world, path: format_.write(world, path, options),
-        folder=request.out, suffix=format_.suffix, report=request.report,
-        attribution=opened.osm.attribution,
-    )  # fmt: skip
 
 
 def _index(opened: OpenMap) -> MapIndex:
@@ -167,15 +131,14 @@ def _index(opened: OpenMap) -> MapIndex:
 
 
 def _check_place(request: WorldRequest) -> None:
-    chosen = [
-        name
-        for name, given in (
-            ("--at", request.at is not None), ("--id", request.junction_id is not None),
-            ("--bbox", request.bbox is not None), ("--route", request.route is not None),
-            ("--all", request.everything),
-        )
-        if given
-    ]  # fmt: skip
+    places = {
+        "--at": request.at,
+        "--id": request.junction_id,
+        "--bbox": request.bbox,
+        "--route": request.route,
+        "--all": request.everything or None,
+    }
+    chosen = [name for name, given in places.items() if given is not None]
     if len(chosen) != 1:
         raise UserError(
             "name the place by exactly one of --at LAT,LON, --id ID, --bbox W,S,E,N, "

@@ -12,24 +12,25 @@ from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.simulation import ActiveWorld
 from foretwin.contracts.world import World
+from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
+from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
+from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.runtime_configuration import roles
-from foretwin.orchestrator.runtime_configuration.handler import RuntimeConfiguration
+from foretwin.orchestrator.runtime_configuration.handler import ChangeHandler, RuntimeConfiguration
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
-from foretwin.orchestrator.tuning.link import FINDINGS, TuningLink
-from foretwin.orchestrator.worlds.handler import WorldHandler
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -56,38 +57,37 @@ class Conductor:
             bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
         )
         self.tell = self.events.tell
+        self.context = context = DriveContext(plan, bus, self.mailbox, tables, self.tell)
         self.worlds = WorldHandler(
-            plan, bus, self.mailbox, on_ready=self._world_ready, on_failed=self._world_failed,
-            tell=self.tell,
-        )  # fmt: skip
+            context, on_ready=self._world_ready, on_failed=self._world_failed
+        )
         self.rounds = RoundRunner(
-            plan, bus, self.mailbox, tables, world_of=self.worlds.world, tell=self.tell,
+            context,
+            world_of=self.worlds.world,
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
-        )  # fmt: skip
-        self.ads = SideBySideHandler(plan, bus, tables, self.intake, mission, tell=self.tell)
+        )
+        self.ads = SideBySideHandler(context, self.intake, mission)
         self.alive: set[str] = set()
         self.missed_rounds = 0
         self.spared_rounds = 0
         """Rounds that were not due since the machine is too slow for them."""
         self.unseeded_rounds = 0
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
-        self.questions = Questions(bus, self.mailbox, run_id=plan.run_id, alive=self.alive)
+        self.questions = Questions(context, self.alive)
         self.mirror = MirrorHandler(tables, self.tell)
         self.roles = roles.RolesInForce(
             plan.config.roles,
             plan.config.correction,
             tell=lambda message: self.questions.ask(MIRROR, "use_roles", message),
         )
-        self.tuning = TuningLink(
-            plan, bus, self.mailbox, tables, events=self.events, intake=self.intake,
-            rounds=self.rounds, alive=self.alive,
-        )  # fmt: skip
-        self.changes = RuntimeConfiguration({
+        self.tuning = TuningLink(context, intake=self.intake, rounds=self.rounds, alive=self.alive)
+        handlers: dict[str, ChangeHandler] = {
             "role": roles.RoleHandler(self.roles),
             "correction": roles.CorrectionHandler(self.roles),
             "vehicle": VehicleHandler(self.tuning.parameters),
-        })  # fmt: skip
-        self.beside = VehiclesBeside(plan, bus, self.mailbox, tell=self.tell)
+        }
+        self.changes = RuntimeConfiguration(handlers)
+        self.beside = VehiclesBeside(context)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
@@ -117,8 +117,7 @@ class Conductor:
             for channel in keys.TELEMETRY_CHANNELS:
                 self.bus.subscribe(channel, self.mailbox, vehicle=one)
         self.route.join(self.bus, self.mailbox)
-        for channel in ("mirror", "event"):
-            self.bus.subscribe(channel, self.mailbox, run=run)
+        self.context.subscribe("mirror", "event")
         self.tuning.join()
         self.bus.serve("set", self.mailbox, run=run)
         self.bus.watch_alive(keys.alive_key(run=run, process="*"), self.mailbox)
@@ -136,7 +135,7 @@ class Conductor:
     # Messages.
 
     def handle(self, item: object) -> None:
-        """Take one item of the mailbox."""
+        """Take one item of the mailbox; None, where nothing came, changes nothing."""
         match item:
             case Received():
                 self._on_message.get(item.channel, _nothing)(item)
@@ -199,8 +198,8 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        said = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
-        self.rounds.start(intent, latest, said, started_mono_ns=started_mono_ns)
+        reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+        self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:
@@ -235,7 +234,7 @@ class Conductor:
             return
         self._world_untold = False
         active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
-        self.bus.publish("active_world", active, run=self.plan.run_id)
+        self.context.publish("active_world", active)
         self.questions.ask(MIRROR, "use_world", active)
 
     def _world_ready(self, junction_id: str, world: World) -> None:

@@ -22,17 +22,18 @@ from foretwin.orchestrator.drive.intake import unannounced
 from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.lock_step import LockStepLoop
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import DrivePlan, make_plan, read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine
+from foretwin.orchestrator.drive.run_record import reserve_record, run_record, write_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
-from foretwin.orchestrator.drive.supervisor import FreshInterpreter, Supervisor, fold_stderr
+from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.orchestrator.record.run_record import reserve_record, run_record, write_record
-from foretwin.orchestrator.record.summary import summary_text
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, fold_stderr
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -172,19 +173,13 @@ class _Drive:
 
     def _start_processes(self) -> None:
         for row in PROCESSES:
-            if row.runs(self._plan):
-                for process_id in process_ids(row, self._plan):
-                    setup = row.setup(self._plan, process_id)
-                    self._supervisor.start(row_of(row, self._plan), setup)
+            for process_id in process_ids(row, self._plan):
+                setup = row.setup(self._plan, process_id)
+                self._supervisor.start(row_of(row, self._plan), setup)
 
     def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
         """Wait until every process is there and the vehicle has introduced itself."""
-        expected = {
-            process_id
-            for row in PROCESSES
-            if row.runs(self._plan)
-            for process_id in process_ids(row, self._plan)
-        }
+        expected = {one for row in PROCESSES for one in process_ids(row, self._plan)}
         deadline = time.monotonic() + START_TIMEOUT_S
         while not expected <= conductor.alive:
             if self._stop():
@@ -196,9 +191,7 @@ class _Drive:
                 raise DriveError(f"cannot be started: {dead}; see log.jsonl")
             if time.monotonic() > deadline:
                 raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
-            item = conductor.mailbox.take(0.1)
-            if item is not None:
-                conductor.handle(item)
+            conductor.handle(conductor.mailbox.take(0.1))
         return self._ask_info(bus, conductor, deadline)
 
     def _ask_info(self, bus: ZenohBus, conductor: Conductor, deadline: float) -> bool:
@@ -278,11 +271,10 @@ class _Drive:
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")
-        now_s = time.monotonic()
+        now_s, restarted = time.monotonic(), self._supervisor.restarted
         record = run_record(
-            plan, conductor, self._mission, self._supervisor, exit_word=exit_word,
-            wall_s=now_s - started_s, mono_s=now_s,
-        )  # fmt: skip
+            conductor, restarted, exit_word=exit_word, wall_s=now_s - started_s, mono_s=now_s
+        )
         write_record(record, plan.folder / "run.json")
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import ResultTables
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -16,24 +18,22 @@ log = logging.getLogger(ORCHESTRATOR)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
+@dataclass(slots=True)
 class EventHandler:
     """Tells the orchestrator's own events, and keeps those of all processes."""
 
-    def __init__(
-        self, bus: Bus, tables: ResultTables, *, run_id: str, now_stamp_ns: Callable[[], int]
-    ) -> None:
-        self.on_event: Callable[[Event], None] | None = None
-        self._bus = bus
-        self._tables = tables
-        self._run_id = run_id
-        self._now_stamp_ns = now_stamp_ns
+    bus: Bus
+    tables: ResultTables
+    run_id: str
+    now_stamp_ns: Callable[[], int]
+    on_event: Callable[[Event], None] | None = None
 
     def tell(self, tell: Tell) -> None:
         """Log an event, publish it, and keep it."""
         event = Event(
-            stamp_ns=self._now_stamp_ns(), level=tell.level, source=ORCHESTRATOR, text=tell.text
+            stamp_ns=self.now_stamp_ns(), level=tell.level, source=ORCHESTRATOR, text=tell.text
         )
-        self._bus.publish("event", event, run=self._run_id)
+        self.bus.publish("event", event, run=self.run_id)
         self._keep(event)
 
     def heard(self, event: Event) -> None:
@@ -45,10 +45,4 @@ class EventHandler:
         log.log(_LEVELS[event.level], "%s: %s", event.source, event.text)
         if self.on_event is not None:
             self.on_event(event)
-        row = {
-            "stamp_ns": event.stamp_ns,
-            "level": event.level,
-            "source": event.source,
-            "text": event.text,
-        }
-        self._tables.add("events", [row])
+        self.tables.add("events", [row_of(event)])

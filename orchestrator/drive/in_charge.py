@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.towards_vehicle import Authority
-from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.plan import DrivePlan
 
 EVERY_NS = 20_000_000
 

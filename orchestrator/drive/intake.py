@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -21,24 +21,10 @@ from foretwin.contracts.drive import (
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
 from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
+from foretwin.orchestrator.instructions import LatestReports, LatestState
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
 from foretwin.telemetry.estimator.estimator import StateEstimator, estimator_of
 from foretwin.telemetry.estimator.map_aid import RoadLine
-
-
-class LatestState(NamedTuple):
-    """The newest state, and when the sample that gave it was received."""
-
-    state: VehicleState
-    receipt_mono_ns: int
-
-
-class LatestReports(NamedTuple):
-    """The newest of what a car says besides its own motion; each with its own stamp."""
-
-    plan: PlannedTrajectory | None
-    road_users: RoadUsers | None
-    signals: tuple[SignalState, ...]
 
 
 class Intake:

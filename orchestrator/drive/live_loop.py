@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
@@ -18,6 +19,7 @@ STALE_AFTER_S = 1.0
 """No round starts from a state older than this, in seconds of the drive's clock."""
 
 
+@dataclass(slots=True)
 class LiveLoop:
     """Runs a conductor until the vehicle's drive ends or `stop` says so.
 
@@ -28,34 +30,28 @@ class LiveLoop:
     then makes the rounds after it smaller or rarer, so that a slow machine gives less, not late.
     """
 
-    def __init__(
-        self,
-        conductor: Conductor,
-        *,
-        housekeeping: Callable[[float], None],
-        stop: Callable[[], bool],
-        each_turn: Callable[[], None] = lambda: None,
-    ) -> None:
-        """`each_turn` is called at least every 50 ms, unless the loop itself is held up."""
-        self._conductor = conductor
-        self._housekeeping = housekeeping
-        self._stop = stop
-        self._each_turn = each_turn
-        self._period_s = 1.0 / conductor.plan.config.rate_hz
-        self._speed = conductor.plan.config.speed or 1.0
-        self._started_s = 0.0
+    conductor: Conductor
+    housekeeping: Callable[[float], None]
+    stop: Callable[[], bool]
+    each_turn: Callable[[], None] = lambda: None
+    """Called at least every 50 ms, unless the loop itself is held up."""
+    _started_s: float = 0.0
+
+    @property
+    def _period_s(self) -> float:
+        return 1.0 / self.conductor.plan.config.rate_hz
 
     def run(self) -> bool:
         """Return True where the drive ended by itself, False where it was stopped."""
-        conductor = self._conductor
+        conductor = self.conductor
         next_due_s = time.monotonic()
         next_housekeeping_s = next_due_s
-        while not self._stop():
-            self._each_turn()
+        while not self.stop():
+            self.each_turn()
             conductor.make_changes()
             now_s = time.monotonic()
             if now_s >= next_housekeeping_s:
-                self._housekeeping(now_s)
+                self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             seen = conductor.intake.states
             wake_s = min(next_housekeeping_s, next_due_s + 0.5 * self._period_s, now_s + SILENCE_S)
@@ -84,11 +80,12 @@ class LiveLoop:
 
     def _start_round(self, now_s: float) -> bool:
         """Start a round if one can be; returns whether rounds are due here at all."""
-        conductor = self._conductor
+        conductor = self.conductor
         latest = conductor.intake.latest
         if latest is None:
             return False
-        if (now_s - latest.receipt_mono_ns / 1e9) * self._speed > STALE_AFTER_S:
+        speed = conductor.plan.config.speed or 1.0
+        if (now_s - latest.receipt_mono_ns / 1e9) * speed > STALE_AFTER_S:
             return False
         if conductor.rounds.open:
             conductor.missed_rounds += 1
@@ -103,11 +100,11 @@ class LiveLoop:
         return True
 
     def _telemetry_waits(self) -> bool:
-        return len(self._conductor.mailbox) > 0
+        return len(self.conductor.mailbox) > 0
 
     def _let_finish(self) -> None:
         """Give the last round its time and take what the mirror still has to say."""
-        conductor = self._conductor
+        conductor = self.conductor
         deadline = time.monotonic() + LAST_ROUND_GRACE_S
         while time.monotonic() < deadline and conductor.rounds.open:
             item = conductor.mailbox.take(0.05)

@@ -7,7 +7,9 @@ their stamps, whatever the order in which the network brought them.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from foretwin.contracts.bus import Received, Reply
 from foretwin.contracts.codec import SchemaMismatch
@@ -26,27 +28,21 @@ class LockStepError(RuntimeError):
     """A part of the drive did not answer; the message says which."""
 
 
+@dataclass(slots=True)
 class LockStepLoop:
     """Runs a conductor step by step until the drive ends or `stop` says so."""
 
-    def __init__(
-        self,
-        conductor: Conductor,
-        *,
-        housekeeping: Callable[[float], None],
-        stop: Callable[[], bool],
-    ) -> None:
-        self._conductor = conductor
-        self._housekeeping = housekeeping
-        self._stop = stop
-        self._samples: list[Received] = []
-        self._received: dict[str, int] = dict.fromkeys(TELEMETRY_CHANNELS, 0)
-        self._advanced: AdvanceReply | None = None
-        self._vehicle_failed: str | None = None
+    conductor: Conductor
+    housekeeping: Callable[[float], None]
+    stop: Callable[[], bool]
+    _samples: list[Received] = field(default_factory=list)
+    _received: Counter[str] = field(default_factory=Counter)
+    _advanced: AdvanceReply | None = None
+    _vehicle_failed: str | None = None
 
     def run(self) -> bool:
         """Return True where the drive ended by itself, False where it was stopped."""
-        conductor = self._conductor
+        conductor = self.conductor
         assert conductor.intake.info is not None
         config = conductor.plan.config
         parameters, questions = conductor.tuning.parameters, conductor.questions
@@ -54,7 +50,7 @@ class LockStepLoop:
         until_ns = conductor.intake.start_stamp_ns + round(config.start_s * 1e9)
         while True:
             self._advance(until_ns)
-            if self._stop():
+            if self.stop():
                 return False
             advanced = self._advanced
             assert advanced is not None
@@ -71,7 +67,7 @@ class LockStepLoop:
             conductor.tuning.weigh(advanced.published)
             if not advanced.ended and conductor.start_round():
                 self._wait("the round", lambda: not conductor.rounds.open)
-            if self._stop():
+            if self.stop():
                 return False
             if advanced.ended:
                 self._wait("tuning", lambda: not conductor.tuning.weighing)
@@ -81,14 +77,14 @@ class LockStepLoop:
             until_ns += period_ns
 
     def _advance(self, until_ns: int) -> None:
-        conductor = self._conductor
+        conductor = self.conductor
         self._advanced = None
-        conductor.bus.request(
-            "advance",
+        question, vehicle = (
             AdvanceRequest(until_stamp_ns=until_ns),
-            conductor.mailbox,
-            timeout_s=ADVANCE_TIMEOUT_S,
-            vehicle=conductor.plan.config.vehicle_id,
+            conductor.plan.config.vehicle_id,
+        )
+        conductor.bus.request(
+            "advance", question, conductor.mailbox, timeout_s=ADVANCE_TIMEOUT_S, vehicle=vehicle
         )
         self._wait("the vehicle", self._all_there)
 
@@ -97,12 +93,12 @@ class LockStepLoop:
             raise LockStepError(f"the vehicle's process does not answer: {self._vehicle_failed}")
         advanced = self._advanced
         return advanced is not None and all(
-            self._received.get(channel, 0) >= count for channel, count in advanced.published.items()
+            self._received[channel] >= count for channel, count in advanced.published.items()
         )
 
     def _wait_for_end(self) -> None:
         """Take the vehicle's last word and what the mirror still has to say."""
-        conductor = self._conductor
+        conductor = self.conductor
         last = conductor.intake.now_stamp_ns
         heard_ns, heard_s = conductor.mirror.stamp_ns, time.monotonic()
 
@@ -121,13 +117,13 @@ class LockStepLoop:
 
     def _wait(self, what: str, over: Callable[[], bool]) -> None:
         """Handle what comes until `over`; telemetry is laid aside for its order."""
-        conductor = self._conductor
+        conductor = self.conductor
         deadline = time.monotonic() + STUCK_AFTER_S
         next_housekeeping_s = 0.0
-        while not over() and not self._stop():
+        while not over() and not self.stop():
             now_s = time.monotonic()
             if now_s >= next_housekeeping_s:
-                self._housekeeping(now_s)
+                self.housekeeping(now_s)
                 next_housekeeping_s = now_s + 0.1
             if now_s > deadline:
                 raise LockStepError(f"waited {STUCK_AFTER_S:.0f} s for {what}")

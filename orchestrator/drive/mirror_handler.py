@@ -3,42 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
-from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import MIRROR, MIRRORED, ResultTables
 
 _APART_NS = 2_000_000_000
 """Who touches again sooner is not told of again."""
 
 
+@dataclass(slots=True)
 class MirrorHandler:
     """Takes the mirror's samples in order."""
 
-    def __init__(self, tables: ResultTables, tell: Callable[[Tell], None]) -> None:
-        self.stamp_ns = 0
-        """Of the newest sample."""
-        self.independent: bool | None = None
-        self.touches = 0
-        """Times that two began to touch."""
-        self._tables = tables
-        self._tell = tell
-        self._touched_ns: dict[tuple[str, str], int] = {}
+    tables: ResultTables
+    tell: Callable[[Tell], None]
+    stamp_ns: int = 0
+    """Of the newest sample."""
+    independent: bool | None = None
+    touches: int = 0
+    """Times that two began to touch."""
+    _touched_ns: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def take(self, sample: MirrorSample) -> None:
         """Keep a sample, and tell of touches that begin."""
         self.stamp_ns = sample.stamp_ns
         self.independent = sample.independent
-        self._tables.add("mirror", [mirror_row(sample)])
+        at = {"stamp_ns": sample.stamp_ns}
+        self.tables.add("mirror", [row_of(sample, MIRROR)])
         if sample.others:
-            self._tables.add("mirrored", mirrored_rows(sample))
+            self.tables.add("mirrored", [at | row_of(other, MIRRORED) for other in sample.others])
         if sample.touches:
-            self._tables.add("touches", touch_rows(sample))
+            touches = [at | {"one": one, "other": other} for one, other in sample.touches]
+            self.tables.add("touches", touches)
         for pair in sample.touches:
             last_ns = self._touched_ns.get(pair)
             self._touched_ns[pair] = sample.stamp_ns
             if last_ns is None or sample.stamp_ns - last_ns > _APART_NS:
                 self.touches += 1
                 one, other = ("what stands" if name == "world" else name for name in pair)
-                self._tell(Tell("warning", f"in the mirror, {one} and {other} touch"))
+                self.tell(Tell("warning", f"in the mirror, {one} and {other} touch"))

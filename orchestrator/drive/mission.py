@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.world import World
-from foretwin.orchestrator.drive.visits import VisitBook
+from foretwin.orchestrator.drive.visits import Moment, VisitBook
 from foretwin.orchestrator.instructions import (
     BuildWorld,
     Instruction,
@@ -66,18 +66,19 @@ class Mission:
         self._passed_s_m: float | None = None
         self._car: VehicleState | None = None
         self._last_match_ns: int | None = None
-        self._stretches_told = 0
-        self._off_route_told = False
-        self._map_told = False
+        self._stretches_reported = 0
+        self._off_route_reported = False
+        self._map_reported = False
 
     # What comes in.
 
     def before_start(self, junctions: Iterable[Junction], *, mono_s: float) -> list[Instruction]:
         """Ask for the Worlds where a given route begins, before the car moves."""
+        at = Moment(mono_s, 0.0)
         return [
             BuildWorld(junction.summary.id, load=True)
             for junction in junctions
-            if self._visits.see(junction, load=True, mono_s=mono_s, drive_time_s=0.0)
+            if self._visits.see(junction, at, load=True)
         ]
 
     def give_route(self, route: Route) -> None:
@@ -95,24 +96,25 @@ class Mission:
         if passed is None:
             return self._off_map()
         self.road_line = self._way.road_line(state)
-        told: list[Instruction] = []
+        todo: list[Instruction] = []
         if self.state != "following":
             text = "on the map" if self.state == "waiting" else "back on the map"
-            told.append(Tell("info", f"{text}: {self._way.road_text}"))
+            todo.append(Tell("info", f"{text}: {self._way.road_text}"))
             self.state = "following"
+        at = Moment(mono_s, self.drive_time_s)
         for junction in passed:
-            told += self._arrive(junction, mono_s)
-        told += self._wanted_worlds(mono_s)
-        told += self._choose_current()
-        told += self._tell_deviations()
-        if state.map_shift_m is not None and not self._map_told:
-            self._map_told = True
-            told.append(Tell("info", "position from GNSS and the map"))
-        return told
+            todo += self._arrive(junction, at)
+        todo += self._wanted_worlds(at)
+        todo += self._choose_current()
+        todo += self._deviations()
+        if state.map_shift_m is not None and not self._map_reported:
+            self._map_reported = True
+            todo.append(Tell("info", "position from GNSS and the map"))
+        return todo
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
         """A junction's World is built and loaded by the workers."""
-        self._visits.take_world(junction_id, world, mono_s=mono_s, drive_time_s=self.drive_time_s)
+        self._visits.take_world(junction_id, world, Moment(mono_s, self.drive_time_s))
         return self._choose_current()
 
     def on_world_failed(self, junction_id: str) -> None:
@@ -215,24 +217,23 @@ class Mission:
         if self.state in ("off_map", "waiting"):
             return []
         self.state = "off_map"
-        told: list[Instruction] = [Tell("warning", "off the map: no rounds until the car is back")]
+        todo: list[Instruction] = [Tell("warning", "off the map: no rounds until the car is back")]
         if self._current is not None:
             self._current = None
-            told.append(UseWorld(None))
-        return told
+            todo.append(UseWorld(None))
+        return todo
 
-    def _arrive(self, passed: PassedJunction, mono_s: float) -> list[Instruction]:
+    def _arrive(self, passed: PassedJunction, at: Moment) -> list[Instruction]:
         summary = passed.junction.summary
-        told: list[Instruction] = []
-        at_s = self.drive_time_s
-        if self._visits.see(passed.junction, load=True, mono_s=mono_s, drive_time_s=at_s):
-            told.append(BuildWorld(summary.id, load=True))
-        self._visits.arrive(summary.id, mono_s=mono_s, drive_time_s=at_s)
+        todo: list[Instruction] = []
+        if self._visits.see(passed.junction, at, load=True):
+            todo.append(BuildWorld(summary.id, load=True))
+        self._visits.arrive(summary.id, at)
         self._passed_s_m = passed.centre_s_m
         text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
-        return [*told, Tell("info", text)]
+        return [*todo, Tell("info", text)]
 
-    def _wanted_worlds(self, mono_s: float) -> list[Instruction]:
+    def _wanted_worlds(self, at: Moment) -> list[Instruction]:
         soon = set(self._within_look_ahead())
         wanted = [
             (ahead.junction, True)
@@ -240,16 +241,15 @@ class Mission:
             if ahead.junction.summary.id in soon
         ]
         wanted += [(junction, False) for junction in self._way.other_turns]
-        at_s = self.drive_time_s
-        told: list[Instruction] = [
+        todo: list[Instruction] = [
             BuildWorld(junction.summary.id, load)
             for junction, load in wanted
-            if self._visits.see(junction, load=load, mono_s=mono_s, drive_time_s=at_s)
+            if self._visits.see(junction, at, load=load)
         ]
         for ahead in self._way.junctions:
             if ahead.distance_m <= self._settings.radius_m:
-                self._visits.enter(ahead.junction.summary.id, mono_s=mono_s, drive_time_s=at_s)
-        return told
+                self._visits.enter(ahead.junction.summary.id, at)
+        return todo
 
     def _choose_current(self) -> list[Instruction]:
         """The junction just passed stays current for a while; then the next one within reach."""
@@ -273,19 +273,19 @@ class Mission:
         world = self._visits.latest(chosen).world if chosen else None
         return [UseWorld(world.id if world is not None else None)]
 
-    def _tell_deviations(self) -> list[Instruction]:
-        told: list[Instruction] = []
-        if self._way.off_route != self._off_route_told:
-            self._off_route_told = self._way.off_route
-            if self._off_route_told:
-                told.append(Tell("warning", "left the given route; the way ahead is predicted"))
+    def _deviations(self) -> list[Instruction]:
+        todo: list[Instruction] = []
+        if self._way.off_route != self._off_route_reported:
+            self._off_route_reported = self._way.off_route
+            if self._off_route_reported:
+                todo.append(Tell("warning", "left the given route; the way ahead is predicted"))
             else:
-                told.append(Tell("info", "back on the given route"))
+                todo.append(Tell("info", "back on the given route"))
         stretches = self._way.off_road_stretches
-        if len(stretches) > self._stretches_told:
-            self._stretches_told = len(stretches)
+        if len(stretches) > self._stretches_reported:
+            self._stretches_reported = len(stretches)
             last = stretches[-1]
             ways = ", ".join(str(way) for way in last.way_ids)
             why = _WHY_OFF_ROAD[last.reason]
-            told.append(Tell("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
-        return told
+            todo.append(Tell("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
+        return todo

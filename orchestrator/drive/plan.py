@@ -5,9 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import secrets
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,24 +16,21 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, loca
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.commands.doctor import has_display
-from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside
+from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside, has_display
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
+from foretwin.orchestrator.plan import Beside, DriveInputs, DrivePlan
 from foretwin.orchestrator.rounds.jobs import scenarios_of
 from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
-from foretwin.orchestrator.routing.standin_path import StandinPath, standin_path
+from foretwin.orchestrator.routing.standin_path import standin_path
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
 from foretwin.orchestrator.worlds.opening import Clip, open_map
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
-from foretwin.telemetry.ros2.mapping import MappingFile
 from foretwin.telemetry.standin.parameters import read_parameters
-from foretwin.world_gen.junctions.intersections import Junction
-from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from foretwin.world_gen.roads.service_roads import open_service_roads
 
@@ -45,83 +40,6 @@ NEAR_ROAD_M = 50.0
 
 CORRIDOR_M = 2000.0
 """Of a large map, what lies within this distance of a given route or drive is read."""
-
-
-class Beside(NamedTuple):
-    """A vehicle beside the car, its parameters, and whether its commands are recorded."""
-
-    config: VehicleBeside
-    vehicle: VehicleParameters
-    commands_recorded: bool
-    ros2: MappingFile | None = None
-    """How its own ROS 2 topics are read."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DriveInputs:
-    """Everything read: nothing here has touched the folder of runs yet."""
-
-    config: DriveConfig
-    map_file: Path
-    clip: Clip | None
-    """What of a large map is read: the surroundings of the way known beforehand."""
-    osm: OsmMap
-    graph: RoadGraph
-    index: RoadIndex
-    junctions: tuple[Junction, ...]
-    added_roads: tuple[int, ...]
-    """Indices of service roads that count as car roads in this drive."""
-    routes: tuple[Route, ...]
-    route_source: str
-    drive_frame: LocalFrame
-    vehicle: VehicleParameters
-    beside: tuple[Beside, ...]
-    log_file: Path | None
-    info: VehicleInfo | None
-    standin: StandinPath | None
-    ros2: MappingFile | None = None
-    """How the live car's ROS 2 topics are read, and what goes back."""
-
-    @property
-    def towards_vehicle(self) -> bool:
-        """Whether both switches are on: anything may go out towards the vehicle."""
-        enabled = self.ros2 is not None and self.ros2.mapping.towards_vehicle.enabled
-        return enabled and self.config.towards_vehicle
-
-    @property
-    def commands_recorded(self) -> bool:
-        """Whether the vehicle sends the commands that its automated driving gives."""
-        return self.info is None or "control" in self.info.sends
-
-
-@dataclass(frozen=True, kw_only=True)
-class DrivePlan(DriveInputs):
-    """The inputs with a run's id, its folder and its bus."""
-
-    run_id: str
-    folder: Path
-    bus: BusSetup
-    live_view: str
-
-    @property
-    def worlds_dir(self) -> Path:
-        """Where this run's Worlds lie."""
-        return self.folder / "worlds"
-
-    @property
-    def processes_dir(self) -> Path:
-        """Where the setups of this run's processes lie."""
-        return self.folder / "processes"
-
-    @property
-    def standin_path_file(self) -> Path:
-        """What the stand-in car drives."""
-        return self.processes_dir / "standin_path.json"
-
-    @property
-    def start_stamp_ns(self) -> int:
-        """The stamp of drive time 0."""
-        return 0 if self.info is None else self.info.start_stamp_ns
 
 
 def read_inputs(config: DriveConfig) -> DriveInputs:
@@ -159,10 +77,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         index = RoadIndex(graph)
         routes, route_source = _routes(config, graph, index, given)
     if config.worlds is not None:
-        check_given_worlds(
-            Path(config.worlds), map_sha256=osm.sha256, junctions=junctions,
-            radius_m=config.radius_m,
-        )  # fmt: skip
+        check_given_worlds(Path(config.worlds), osm, junctions, radius_m=config.radius_m)
     standin = None
     if source == "standin":
         standin = standin_path(osm, graph, routes[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
@@ -17,9 +17,9 @@ from foretwin.contracts.setup import (
     ViewerSetup,
     WorkerSetup,
 )
-from foretwin.orchestrator.drive.plan import Beside, DrivePlan
-from foretwin.orchestrator.drive.supervisor import WhenDead
+from foretwin.orchestrator.plan import Beside, DrivePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
+from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"
@@ -35,25 +35,16 @@ class ProcessRow(NamedTuple):
 
     name: str
     module: str
-    runs: Callable[[DrivePlan], bool]
-    count: Callable[[DrivePlan], int]
     when_dead: WhenDead
     setup: Callable[[DrivePlan, str], ProcessSetup]
     nice: int = 0
     """Added to the scheduling niceness: who writes for later gives way to who is waited for."""
-    numbered: bool = False
-    """Whether its ids are its name with a number each."""
+    runs: Callable[[DrivePlan], bool] = lambda _: True
+    how_many: Callable[[DrivePlan], int] | None = None
+    """So many there are, each named with a number; None for the one process of this name."""
 
 
-def _one(_: DrivePlan) -> int:
-    return 1
-
-
-def _always(_: DrivePlan) -> bool:
-    return True
-
-
-def _base(plan: DrivePlan, process_id: str) -> dict[str, object]:
+def _base(plan: DrivePlan, process_id: str) -> dict[str, Any]:
     return {
         "run_id": plan.run_id,
         "process_id": process_id,
@@ -65,7 +56,7 @@ def _base(plan: DrivePlan, process_id: str) -> dict[str, object]:
 
 def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return WorkerSetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         role="mirror" if process_id == MIRROR else "futures",
         worlds_dir=str(plan.worlds_dir),
         vehicle=plan.vehicle,
@@ -88,7 +79,7 @@ def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
 
 def _tuning(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return TuningSetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         vehicle=plan.vehicle,
         drive_frame=plan.drive_frame,
     )
@@ -102,7 +93,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     clip = plan.clip
     near_deg = () if clip is None else tuple((lat, lon) for lat, lon in clip.line_deg.tolist())
     return BuilderSetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         map=str(plan.map_file),
         near_deg=near_deg,
         margin_m=0.0 if clip is None else clip.margin_m,
@@ -115,14 +106,14 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
 
 def _recorder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return RecorderSetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         file=str(plan.folder / "drive.mcap"),
     )
 
 
 def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return ViewerSetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         file=str(plan.folder / "monitor.rrd"),
         worlds_dir=str(plan.worlds_dir),
         drive_frame=plan.drive_frame,
@@ -135,7 +126,7 @@ def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
 
 def _replay(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return ReplaySetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         log=str(plan.log_file),
         start_s=plan.config.start_s,
         end_s=plan.config.end_s,
@@ -145,7 +136,7 @@ def _replay(plan: DrivePlan, process_id: str) -> ProcessSetup:
 
 def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return StandinSetup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         path_file=str(plan.standin_path_file),
         end_s=plan.config.end_s,
         speed=plan.config.speed,
@@ -158,7 +149,7 @@ def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
 def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
     assert plan.ros2 is not None
     return Ros2Setup(
-        **_base(plan, process_id),  # type: ignore[arg-type]
+        **_base(plan, process_id),
         mapping=plan.ros2.text,
         mapping_name=plan.ros2.name,
         drive_frame=plan.drive_frame,
@@ -175,7 +166,7 @@ def _ros2_beside(plan: DrivePlan, process_id: str) -> ProcessSetup:
     one = _ros2_of_others(plan)[int(process_id.removeprefix(ROS2_BESIDE))]
     assert one.ros2 is not None
     return Ros2Setup(
-        **_base(plan, process_id) | {"vehicle_id": one.config.id},  # type: ignore[arg-type]
+        **_base(plan, process_id) | {"vehicle_id": one.config.id},
         mapping=one.ros2.text,
         mapping_name=one.ros2.name,
         drive_frame=plan.drive_frame,
@@ -183,37 +174,32 @@ def _ros2_beside(plan: DrivePlan, process_id: str) -> ProcessSetup:
     )
 
 
-def _speaks_ros2(plan: DrivePlan) -> bool:
-    return plan.ros2 is not None
-
-
 def _source_is(source: str) -> Callable[[DrivePlan], bool]:
     return lambda plan: plan.config.resolved_source == source
 
 
-PROCESSES: tuple[ProcessRow, ...] = (
-    ProcessRow(
-        BUILDER, "orchestrator.worlds.builder_process", _always, _one, "restart", _builder, 10
-    ),
-    ProcessRow(
-        "w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker,
-        numbered=True,
-    ),
-    ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
-    ProcessRow(TUNING, "sim_worker.analysis.process", _tunes, _one, "restart", _tuning, 10),
-    ProcessRow("recorder", "telemetry.processes.recorder", _always, _one, "report", _recorder),
-    ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
-    ProcessRow(
-        VEHICLE, "telemetry.processes.replay", _source_is("log"), _one, "end_drive", _replay
-    ),
-    ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
+_REPLAY, _STANDIN = "telemetry.processes.replay", "telemetry.standin"
+PROCESSES = (
+    ProcessRow(BUILDER, "orchestrator.worlds.builder_process", "restart", _builder, nice=10),
+    ProcessRow("w", "sim_worker", "restart", _worker, how_many=lambda plan: plan.config.workers),
+    ProcessRow(MIRROR, "sim_worker", "restart", _worker),
+    ProcessRow(TUNING, "sim_worker.analysis.process", "restart", _tuning, nice=10, runs=_tunes),
+    ProcessRow("recorder", "telemetry.processes.recorder", "report", _recorder),
+    ProcessRow("viewer", "viewer", "report", _viewer, nice=10),
+    ProcessRow(VEHICLE, _REPLAY, "end_drive", _replay, runs=_source_is("log")),
+    ProcessRow(VEHICLE, _STANDIN, "end_drive", _standin, runs=_source_is("standin")),
     # Never started again: what has stopped towards a vehicle must not resume by itself.
-    ProcessRow("ros2", "telemetry.ros2", _speaks_ros2, _one, "end_drive", _ros2),
     ProcessRow(
-        ROS2_BESIDE, "telemetry.ros2", lambda plan: bool(_ros2_of_others(plan)),
-        lambda plan: len(_ros2_of_others(plan)), "restart", _ros2_beside, numbered=True,
+        "ros2", "telemetry.ros2", "end_drive", _ros2, runs=lambda plan: plan.ros2 is not None
     ),
-)  # fmt: skip
+    ProcessRow(
+        ROS2_BESIDE,
+        "telemetry.ros2",
+        "restart",
+        _ros2_beside,
+        how_many=lambda plan: len(_ros2_of_others(plan)),
+    ),
+)
 """In the order in which they are started; the vehicle waits for the orchestrator's token."""
 
 
@@ -228,7 +214,9 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
 
 
 def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:
-    """Return the ids of a row's processes."""
-    if row.numbered:
-        return tuple(f"{row.name}{index}" for index in range(row.count(plan)))
-    return (row.name,)
+    """Return the ids of a row's processes in a drive."""
+    if not row.runs(plan):
+        return ()
+    if row.how_many is None:
+        return (row.name,)
+    return tuple(f"{row.name}{number}" for number in range(row.how_many(plan)))

@@ -56,9 +56,9 @@ class ProgressLine:
         self._last_s = now_s
         progress = self._progress(now_s)
         conductor = self._conductor
-        conductor.bus.publish("progress", progress, run=conductor.plan.run_id)
+        conductor.context.publish("progress", progress)
         for status in self._workers(progress.stamp_ns):
-            conductor.bus.publish("worker_status", status, run=conductor.plan.run_id)
+            conductor.context.publish("worker_status", status)
         text = self._text(progress)
         if self._status is not None:
             self._status.update(text)

@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import msgspec
 
-from foretwin.contracts.bus import Bus, Mailbox
+from foretwin.orchestrator.context import DriveContext
 
 ANSWER_TIMEOUT_S = 10.0
 
 
+@dataclass(slots=True)
 class Questions:
     """Asks processes that are alive; answers land in the mailbox."""
 
-    def __init__(self, bus: Bus, mailbox: Mailbox, *, run_id: str, alive: Collection[str]) -> None:
-        self.unanswered = 0
-        """In lock step nothing goes on before all are answered."""
-        self._bus, self._mailbox, self._run_id, self._alive = bus, mailbox, run_id, alive
+    context: DriveContext
+    alive: Collection[str]
+    unanswered: int = 0
+    """In lock step nothing goes on before all are answered."""
 
     def ask(self, process_id: str, channel: str, message: msgspec.Struct) -> None:
         """Ask a process, where it is alive."""
-        if process_id not in self._alive:
-            return
-        self.unanswered += 1
-        self._bus.request(
-            channel, message, self._mailbox, timeout_s=ANSWER_TIMEOUT_S, run=self._run_id,
-            process=process_id,
-        )  # fmt: skip
+        if process_id in self.alive:
+            self.unanswered += 1
+            self.context.request(process_id, channel, message, timeout_s=ANSWER_TIMEOUT_S, tag=None)
 
     def answered(self) -> None:
         """Count an answer."""

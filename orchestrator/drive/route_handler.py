@@ -13,8 +13,8 @@ from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import local_from_geo
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route

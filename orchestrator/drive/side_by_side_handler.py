@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import msgspec
 
-from foretwin.contracts.bus import Bus
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState, VehicleStatus
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.side_by_side import Disagreement, DisagreementKind, DrivenSegment
+from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.record.results import ResultTables
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import SideBySide
 
@@ -36,18 +33,9 @@ MOST_LISTED = 1000
 class SideBySideHandler:
     """Feeds the comparison with what came in, and hands on what it finds."""
 
-    def __init__(
-        self,
-        plan: DrivePlan,
-        bus: Bus,
-        tables: ResultTables,
-        intake: Intake,
-        mission: Mission,
-        *,
-        tell: Callable[[Tell], None],
-    ) -> None:
-        self._bus, self._tables, self._run_id, self._tell = bus, tables, plan.run_id, tell
-        self._intake, self._mission = intake, mission
+    def __init__(self, context: DriveContext, intake: Intake, mission: Mission) -> None:
+        self._context, self._intake, self._mission = context, intake, mission
+        plan = context.plan
         self._watch = SideBySide(
             plan.drive_frame, vehicle_id=plan.config.vehicle_id, place=self._place
         )
@@ -70,7 +58,9 @@ class SideBySideHandler:
     def finish(self) -> None:
         """End what lasts at the drive's end, and write the segments."""
         self._keep(self._watch.finish())
-        self._tables.add("driven_segments", [msgspec.to_builtins(s) for s in self._segments])
+        self._context.tables.add(
+            "driven_segments", [msgspec.to_builtins(s) for s in self._segments]
+        )
 
     def record(self) -> dict[str, Any] | None:
         """Return the `side_by_side` part of run.json, None where the car sent no plans."""
@@ -99,15 +89,15 @@ class SideBySideHandler:
 
     def _keep(self, found: list[Disagreement]) -> None:
         for one in found:
-            self._bus.publish("disagreement", one, run=self._run_id)
+            self._context.publish("disagreement", one)
             if not one.over:
-                self._tell(Tell("warning", told(one)))
+                self._context.tell(Tell("warning", disagreement_text(one)))
                 continue
             self._found.append(one)
-            self._tables.add("disagreements", [disagreement_row(one)])
+            self._context.tables.add("disagreements", [disagreement_row(one)])
 
 
-def told(one: Disagreement) -> str:
+def disagreement_text(one: Disagreement) -> str:
     """Return a disagreement in one line, with its place."""
     where = f"{one.position.lat_deg:.6f}, {one.position.lon_deg:.6f}"
     if one.junction_id is not None:
@@ -127,7 +117,5 @@ def disagreement_row(one: Disagreement) -> dict[str, Any]:
     row: dict[str, Any] = msgspec.to_builtins(one)
     position = one.position
     del row["position"], row["over"]
-    return row | {
-        "lat_deg": position.lat_deg, "lon_deg": position.lon_deg,
-        "duration_s": (one.end_stamp_ns - one.stamp_ns) / 1e9,
-    }  # fmt: skip
+    place = {"lat_deg": position.lat_deg, "lon_deg": position.lon_deg}
+    return row | place | {"duration_s": (one.end_stamp_ns - one.stamp_ns) / 1e9}

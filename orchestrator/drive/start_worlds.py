@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from foretwin.orchestrator.drive.conductor import Conductor
-from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.routing.junctions_ahead import encounters
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.junctions.intersections import Junction
@@ -46,6 +46,4 @@ def prepare_start(
         if time.monotonic() > began_s + TIMEOUT_S:
             return
         look_after(conductor, time.monotonic())
-        item = conductor.mailbox.take(0.1)
-        if item is not None:
-            conductor.handle(item)
+        conductor.handle(conductor.mailbox.take(0.1))

@@ -8,17 +8,18 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, wrap_angle
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 
-class DetectedBeside:
+class DetectedBeside(OtherVehicleSource):
     """Who the car itself detects under one id."""
 
     def __init__(self, vehicle_id: str, seen_as: str, vehicle: VehicleParameters) -> None:
+        super().__init__()
         self._id, self._seen_as = vehicle_id, seen_as
         self._ahead_m = box_centre_from_base_m(vehicle)
         self._last: VehicleState | None = None
-        self._heard: list[OtherVehicle] = []
 
     def take(self, users: RoadUsers) -> None:
         """Take what the car detected."""
@@ -47,14 +48,6 @@ class DetectedBeside:
         )
         self._last = state
         self._heard.append(OtherVehicle(state=state))
-
-    def states_until(self, own: VehicleState) -> list[OtherVehicle]:
-        """Return what has been detected since the last time."""
-        heard, self._heard = self._heard, []
-        return heard
-
-    def close(self) -> None:
-        """Hold nothing."""
 
 
 def moved_ahead(position: GeoPoint, yaw_rad: float, ahead_m: float) -> GeoPoint:

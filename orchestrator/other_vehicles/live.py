@@ -10,14 +10,14 @@ from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 
 APART_NS = 1_000_000_000
 """Stamps that differ by more are not by one clock."""
 
 
-class LiveBeside:
+class LiveBeside(OtherVehicleSource):
     """A vehicle that publishes on the bus by the car's own clock.
 
     `ask_info` asks it what it is, once, as its first sample comes; until it answers, and where it
@@ -32,11 +32,11 @@ class LiveBeside:
         ask_info: Callable[[str], None],
         tell: Callable[[Tell], None],
     ) -> None:
+        super().__init__()
         self._id, self._vehicle = vehicle_id, vehicle
         self._ask_info, self._tell = ask_info, tell
         self._measured: OtherVehicleStates | None = None
-        self._heard: list[OtherVehicle] = []
-        self._told_apart = False
+        self._clock_reported = False
 
     def take(self, item: Received) -> None:
         """Take a sample from the bus; one of another schema is passed over."""
@@ -65,11 +65,11 @@ class LiveBeside:
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
         """Return what has come since the last time."""
-        heard, self._heard = self._heard, []
-        if heard and not self._told_apart:
+        heard = super().states_until(own)
+        if heard and not self._clock_reported:
             ahead_ns = heard[-1].state.stamp_ns - own.stamp_ns
             if abs(ahead_ns) > APART_NS:
-                self._told_apart = True
+                self._clock_reported = True
                 text = (
                     f"{self._id} stamps {abs(ahead_ns) / 1e9:.1f} s "
                     f"{'ahead of' if ahead_ns > 0 else 'behind'} the car: it must stamp by the "
@@ -77,6 +77,3 @@ class LiveBeside:
                 )
                 self._tell(Tell("warning", text))
         return heard
-
-    def close(self) -> None:
-        """Hold nothing."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import msgspec
 
 from foretwin.contracts.drive import ControlCommand, VehicleState
@@ -15,14 +13,19 @@ PERIOD_NS = 18_000_000
 FRESH_NS = 500_000_000
 
 
-class OtherVehicleSource(Protocol):
-    """Where a vehicle's states come from."""
+class OtherVehicleSource:
+    """Where a vehicle's states come from: here from what is heard as it comes."""
+
+    def __init__(self) -> None:
+        self._heard: list[OtherVehicle] = []
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
         """Return what is new of it as the car comes to its own new state."""
+        heard, self._heard = self._heard, []
+        return heard
 
     def close(self) -> None:
-        """Let go of files and threads; idempotent."""
+        """Let go of files and threads, where there are any; idempotent."""
 
 
 class OtherVehicleStates:

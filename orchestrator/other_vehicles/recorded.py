@@ -13,7 +13,7 @@ from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
@@ -39,7 +39,7 @@ class _Over(NamedTuple):
     failed: str | None
 
 
-class LogBeside:
+class LogBeside(OtherVehicleSource):
     """A recorded drive, given as far as the car's own time has come.
 
     Two logs on UTC keep their stamps; otherwise both begin together. `offset_s` says how much of
@@ -60,13 +60,14 @@ class LogBeside:
         waits: bool,
         tell: Callable[[Tell], None],
     ) -> None:
+        super().__init__()
         self._file, self._id, self._vehicle = file, vehicle_id, vehicle
         self._own, self._offset_s = own, offset_s
         self._waits, self._tell = waits, tell
         self._read: Mailbox = Mailbox(AHEAD_SAMPLES, when_full="block")
         self._next: _Read | None = None
         self._newest_ns = own.start_stamp_ns
-        self._over = self._told_behind = False
+        self._over = self._delay_reported = False
         self._stop = threading.Event()
         self._thread = threading.Thread(
             target=self._read_all, name=f"log of {vehicle_id}", daemon=True
@@ -103,8 +104,8 @@ class LogBeside:
     def _lacks(self, own: VehicleState) -> None:
         if self._waits:
             raise TimeoutError(f"waited {STUCK_AFTER_S:.0f} s for {self._file} of {self._id}")
-        if not self._told_behind and own.stamp_ns - self._newest_ns > BEHIND_NS:
-            self._told_behind = True
+        if not self._delay_reported and own.stamp_ns - self._newest_ns > BEHIND_NS:
+            self._delay_reported = True
             text = f"{self._file} of {self._id} is read too slowly: its states come late"
             self._tell(Tell("warning", text))
 

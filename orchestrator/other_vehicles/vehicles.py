@@ -5,23 +5,23 @@ Nothing is taken that is later than the car's own newest state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.bus import Received
 from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.drive.plan import Beside, DrivePlan
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.context import DriveContext
+from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.other_vehicles.detected import DetectedBeside, moved_ahead
 from foretwin.orchestrator.other_vehicles.live import LiveBeside
 from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
 from foretwin.orchestrator.other_vehicles.recorded import LogBeside
+from foretwin.orchestrator.plan import Beside
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 SAME_WITHIN_M = 2.0
@@ -46,23 +46,13 @@ def road_user(state: VehicleState, vehicle: VehicleParameters) -> RoadUser:
 class VehiclesBeside:
     """All vehicles beside the car: passes their states on, and shows them to futures."""
 
-    def __init__(
-        self,
-        plan: DrivePlan,
-        bus: Bus,
-        mailbox: Mailbox,
-        *,
-        tell: Callable[[Tell], None],
-    ) -> None:
-        """What a vehicle answers that was asked what it is lands in `mailbox`, for `take_info`."""
-        self._bus, self._mailbox, self._run_id = bus, mailbox, plan.run_id
-        self._crew = crew = plan.beside
+    def __init__(self, context: DriveContext) -> None:
+        """What a vehicle says of itself when it is asked lands in the mailbox, for `take_info`."""
+        plan = context.plan
+        self._context, self._crew, self._frame = context, plan.beside, plan.drive_frame
         self._sources: dict[str, OtherVehicleSource] = {}
-        self._waits = plan.config.lock_step
-        self._tell = tell
-        self._vehicles = {one.config.id: one.vehicle for one in crew}
-        self._seen_as = {one.config.seen_as for one in crew}
-        self._frame = plan.drive_frame
+        self._vehicles = {one.config.id: one.vehicle for one in plan.beside}
+        self._seen_as = {one.config.seen_as for one in plan.beside}
         self._latest: dict[str, VehicleState] = {}
         self._detected_ns: int | None = None
 
@@ -79,15 +69,21 @@ class VehiclesBeside:
         config, vehicle = beside.config, beside.vehicle
         if config.log is not None:
             return LogBeside(
-                Path(config.log), config.id, vehicle, own=own, offset_s=config.log_offset_s,
-                waits=self._waits, tell=self._tell,
-            )  # fmt: skip
+                Path(config.log),
+                config.id,
+                vehicle,
+                own=own,
+                offset_s=config.log_offset_s,
+                waits=self._context.plan.config.lock_step,
+                tell=self._context.tell,
+            )
         if config.seen_as is not None:
             return DetectedBeside(config.id, config.seen_as, vehicle)
-        return LiveBeside(config.id, vehicle, ask_info=self._ask_info, tell=self._tell)
+        return LiveBeside(config.id, vehicle, ask_info=self._ask_info, tell=self._context.tell)
 
     def _ask_info(self, vehicle_id: str) -> None:
-        self._bus.request("info", InfoRequest(), self._mailbox, tag=vehicle_id, vehicle=vehicle_id)
+        bus, mailbox = self._context.bus, self._context.mailbox
+        bus.request("info", InfoRequest(), mailbox, tag=vehicle_id, vehicle=vehicle_id)
 
     def take_sample(self, vehicle_id: str, item: Received) -> None:
         """Take a sample of a vehicle on the bus."""
@@ -114,28 +110,30 @@ class VehiclesBeside:
         heard.sort(key=lambda one: (one.state.stamp_ns, one.state.vehicle_id))
         self._latest |= {one.state.vehicle_id: one.state for one in heard}
         message = OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard))
-        self._bus.publish("other_vehicles", message, run=self._run_id)
+        self._context.publish("other_vehicles", message)
 
     def among(
-        self, said: LatestReports, own: VehicleState, roles: Mapping[str, Role]
+        self, reports: LatestReports, own: VehicleState, roles: Mapping[str, Role]
     ) -> LatestReports:
         """Return what surrounds the car with these vehicles in it, ghosts excepted."""
         if not self._sources:
-            return said
+            return reports
         mine = [
             road_user(state, self._vehicles[name])
             for name, state in self._latest.items()
             if roles.get(name) in ("twin", "shadow")
             and abs(own.stamp_ns - state.stamp_ns) <= FRESH_NS
         ]
-        users = said.road_users
+        users = reports.road_users
         fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
         detected = [
             user
             for user in (users.users if fresh and users is not None else ())
             if user.user_id not in self._seen_as and not any(self._same(user, one) for one in mine)
         ]
-        return said._replace(road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine)))
+        return reports._replace(
+            road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine))
+        )
 
     def _same(self, one: RoadUser, other: RoadUser) -> bool:
         frame = self._frame

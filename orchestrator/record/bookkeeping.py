@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.simulation import Comparison, PlanComparison
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 
 
 def percentile(values: list[float], q: float) -> float | None:

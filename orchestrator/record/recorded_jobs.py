@@ -20,9 +20,9 @@ from foretwin.orchestrator.record.job_tables import (
     RESULT_SCHEMA_VERSION,
     VEHICLES,
     processor,
+    table_at,
 )
 from foretwin.orchestrator.record.versions import versions
-from foretwin.orchestrator.sweep.rows import FOLDERS
 from foretwin.sim_worker.world_file import load_world
 
 _DECIDE = ("python", "foretwin", "mujoco", "numpy", "scipy", "numba")
@@ -36,14 +36,6 @@ class RecordedFuture(NamedTuple):
     job: Job
     world: World
     vehicle: VehicleParameters
-
-
-def table_at(folder: Path, table: str) -> Path:
-    """Return the file of a run's table, or the folder of a sweep's."""
-    for path in (folder / "results" / f"{table}.parquet", folder / FOLDERS[table]):
-        if path.exists():
-            return path
-    raise FileNotFoundError(f"{folder}: holds no table of {table}, neither of a run nor a sweep")
 
 
 def recorded_future(folder: Path, future_id: str) -> RecordedFuture:

@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.simulation import Comparison, HorizonError, PlanComparison
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.contracts.simulation import PlanComparison
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import PLAN
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.futures.future_rows import Row, future_rows
 from foretwin.sim_worker.metrics.displacement import distinct_count
 
@@ -83,30 +85,7 @@ def round_row(
     }
 
 
-def comparison_row(comparison: Comparison) -> dict[str, Any]:
-    """Return the row of one comparison."""
-    row: dict[str, Any] = {
-        "round_id": comparison.round_id,
-        "stamp_ns": comparison.stamp_ns,
-        "intersection_id": comparison.intersection_id,
-        "horizon_s": comparison.horizon_s,
-    }
-    for who in ("nominal", "constant_velocity", "constant_turn_rate"):
-        row |= {f"{who}_{k}": v for k, v in _error(getattr(comparison, who)).items()}
-    return row
-
-
 def plan_row(comparison: PlanComparison) -> dict[str, Any]:
     """Return the row of one comparison of plans."""
-    return {
-        "round_id": comparison.round_id,
-        "stamp_ns": comparison.stamp_ns,
-        "plan_stamp_ns": comparison.plan_stamp_ns,
-        "horizon_s": comparison.horizon_s,
-        "path_offset_m": comparison.path_offset_m,
-        **_error(comparison.difference),
-    }
-
-
-def _error(error: HorizonError) -> dict[str, float]:
-    return {name: getattr(error, name) for name in HorizonError.__struct_fields__}
+    row = row_of(comparison, f"{PLAN} path_offset_m")
+    return row | row_of(comparison.difference)

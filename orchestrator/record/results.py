@@ -14,118 +14,82 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from foretwin.contracts.errors import one_line
+from foretwin.contracts.gap import GapSample
+from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
+from foretwin.contracts.simulation import (
+    Comparison,
+    Event,
+    HorizonError,
+    MirroredVehicle,
+    MirrorSample,
+    PlanComparison,
+)
+from foretwin.contracts.tuning import ParameterChange, ParameterEstimate
+from foretwin.orchestrator.record.columns import columns, columns_of, schema
 from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, played_with
 
 log = logging.getLogger("results")
 
-_F, _I, _S, _B = pa.float64(), pa.int64(), pa.string(), pa.bool_()
-_ERROR = ("ade_m", "fde_m", "lateral_m", "longitudinal_m", "heading_rad")
+PLAN = "round_id stamp_ns plan_stamp_ns horizon_s"
+MIRROR = (
+    "stamp_ns world_id real twin shadow ghost free gap_m gap_along_m gap_across_m gap_yaw_rad "
+    "gap_speed_mps since_reset_s independent role correction"
+)
+MIRRORED = "vehicle_id role real shown correction"
+PARAMETER = "stamp_ns name before value std origin pinned"
+GAP = (
+    "stamp_ns horizon_s manoeuvre along_m across_m yaw_rad yaw_rate_radps speed_mps accel_mps2 "
+    "independent"
+)
+"""Which fields of messages stand in the tables of these names, in this order."""
+_FLIP = "flip_{0}_factor:float flip_{0}_m:float"
 
-_CORRECTION = [(f"correction_{what}", _F) for what in ("along_mps2", "across_mps2", "yaw_radps2")]
-
-
-def _poses(*names: str) -> list[tuple[str, pa.DataType]]:
-    pose = ("x_m", "y_m", "yaw_rad", "speed_mps")
-    return [(f"{name}_{what}", _F) for name in names for what in pose]
-
-
+_COLUMNS = {
+    "comparisons": columns_of(Comparison),
+    "plan_comparisons": {
+        **columns_of(PlanComparison, PLAN),
+        **columns_of(HorizonError),
+        "path_offset_m": float,
+    },
+    "disagreements": {
+        **columns_of(Disagreement, "vehicle_id segment aspect kind stamp_ns end_stamp_ns"),
+        **columns("duration_s:float lat_deg:float lon_deg:float"),
+        **columns_of(Disagreement, "junction_id route_m lateral_m along_m speed_mps"),
+    },
+    "driven_segments": columns_of(DrivenSegment),
+    "agreement": columns(
+        "round_id:int stamp_ns:int drive_time_s:float intersection_id:str outcome:str "
+        "observable:str simulated_fails:str driven_fails:str gap_along_m:float gap_across_m:float "
+        + " ".join(_FLIP.format(direction) for direction in ("along", "across", "both"))
+        + " flip_along_fails:str flip_across_fails:str flip_both_fails:str"
+    ),
+    "mirror": columns_of(MirrorSample, MIRROR),
+    "mirrored": {"stamp_ns": int, **columns_of(MirroredVehicle, MIRRORED)},
+    "touches": columns("stamp_ns:int one:str other:str"),
+    "changes": columns("stamp_ns:int asked_stamp_ns:int key:str before:str value:str"),
+    "parameters": {"version": int, **columns_of(ParameterChange, PARAMETER)},
+    "identifications": {
+        **columns("stamp_ns:int from_stamp_ns:int"),
+        **columns_of(ParameterEstimate),
+        "taken": bool,
+    },
+    "gaps": columns_of(GapSample, GAP),
+    "verdicts": columns(
+        "stamp_ns:int since_stamp_ns:int culprit:str cause:str text:str evidence:str "
+        "confidence:float"
+    ),
+    "events": columns_of(Event),
+}
+_ROUNDS = columns(
+    "round_id:int stamp_ns:int drive_time_s:float intersection_id:str world_id:str futures:int "
+    "distinct:int collided:int cruise_speed_mps:float latency_ms:float sim_seconds:float "
+    "cpu_seconds:float sha256:str vehicle_version:int"
+)
 TABLES: dict[str, pa.Schema] = {
-    "rounds": pa.schema(
-        [
-            ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
-            ("world_id", _S), ("futures", _I), ("distinct", _I), ("collided", _I),
-            ("cruise_speed_mps", _F), ("latency_ms", _F), ("sim_seconds", _F), ("cpu_seconds", _F),
-            ("sha256", _S), ("vehicle_version", _I),
-        ]
-    ),
+    "rounds": schema(_ROUNDS),
     **JOB_TABLES,
-    "comparisons": pa.schema(
-        [("round_id", _I), ("stamp_ns", _I), ("intersection_id", _S), ("horizon_s", _F)]
-        + [
-            (f"{who}_{what}", _F)
-            for who in ("nominal", "constant_velocity", "constant_turn_rate")
-            for what in _ERROR
-        ]
-    ),
-    "plan_comparisons": pa.schema(
-        [("round_id", _I), ("stamp_ns", _I), ("plan_stamp_ns", _I), ("horizon_s", _F)]
-        + [(what, _F) for what in _ERROR]
-        + [("path_offset_m", _F)]
-    ),
-    "disagreements": pa.schema(
-        [
-            ("vehicle_id", _S), ("segment", _I), ("aspect", _S), ("kind", _S), ("stamp_ns", _I),
-            ("end_stamp_ns", _I), ("duration_s", _F), ("lat_deg", _F), ("lon_deg", _F),
-            ("junction_id", _S), ("route_m", _F), ("lateral_m", _F), ("along_m", _F),
-            ("speed_mps", _F),
-        ]
-    ),
-    "driven_segments": pa.schema(
-        [
-            ("number", _I), ("control_mode", _S), ("from_stamp_ns", _I), ("to_stamp_ns", _I),
-            ("plans", _I), ("cut", _I), ("too_short", _I), ("lateral_m", _F), ("along_m", _F),
-            ("speed_mps", _F), ("disagreements", _I),
-        ]
-    ),
-    "agreement": pa.schema(
-        [
-            ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
-            ("outcome", _S), ("observable", _S), ("simulated_fails", _S), ("driven_fails", _S),
-            ("gap_along_m", _F), ("gap_across_m", _F),
-            *((f"flip_{direction}_{what}", _F) for direction in ("along", "across", "both")
-              for what in ("factor", "m")),
-            *((f"flip_{direction}_fails", _S) for direction in ("along", "across", "both")),
-        ]
-    ),
-    "mirror": pa.schema(
-        [
-            ("stamp_ns", _I), ("world_id", _S),
-            *_poses("real", "twin", "shadow", "ghost", "free"),
-            ("gap_m", _F), ("gap_along_m", _F), ("gap_across_m", _F), ("gap_yaw_rad", _F),
-            ("gap_speed_mps", _F), ("since_reset_s", _F), ("independent", _B),
-            ("role", _S), *_CORRECTION,
-        ]
-    ),
-    "mirrored": pa.schema(
-        [
-            ("stamp_ns", _I), ("vehicle_id", _S), ("role", _S), *_poses("real", "shown"),
-            *_CORRECTION,
-        ]
-    ),
-    "touches": pa.schema([("stamp_ns", _I), ("one", _S), ("other", _S)]),
-    "changes": pa.schema(
-        [("stamp_ns", _I), ("asked_stamp_ns", _I), ("key", _S), ("before", _S), ("value", _S)]
-    ),
-    "parameters": pa.schema(
-        [
-            ("version", _I), ("stamp_ns", _I), ("name", _S), ("before", _F), ("value", _F),
-            ("std", _F), ("origin", _S), ("pinned", _B),
-        ]
-    ),
-    "identifications": pa.schema(
-        [
-            ("stamp_ns", _I), ("from_stamp_ns", _I), ("name", _S), ("value", _F), ("low", _F),
-            ("high", _F), ("prior", _F), ("reason", _S), ("taken", _B),
-        ]
-    ),
-    "gaps": pa.schema(
-        [("stamp_ns", _I), ("horizon_s", _F), ("manoeuvre", _S)]
-        + [
-            (what, _F)
-            for what in (
-                "along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2",
-            )
-        ]
-        + [("independent", _B)]
-    ),
-    "verdicts": pa.schema(
-        [
-            ("stamp_ns", _I), ("since_stamp_ns", _I), ("culprit", _S), ("cause", _S), ("text", _S),
-            ("evidence", _S), ("confidence", _F),
-        ]
-    ),
-    "events": pa.schema([("stamp_ns", _I), ("level", _S), ("source", _S), ("text", _S)]),
-}  # fmt: skip
+    **{name: schema(of) for name, of in _COLUMNS.items()},
+}
 """Every table of `results/` with its columns."""
 
 FLUSH_ROWS, FLUSH_JOBS = 2000, 128

@@ -5,10 +5,8 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 
-_PACKAGES = (
-    "foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "numpy", "scipy", "shapely",
-    "numba",
-)  # fmt: skip
+_ARITHMETIC = "numpy", "scipy", "shapely", "numba"
+_PACKAGES = ("foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", *_ARITHMETIC)
 
 
 def versions() -> dict[str, str]:

@@ -16,7 +16,7 @@ from foretwin.contracts.frames import (
     target_from_source,
 )
 from foretwin.contracts.simulation import HORIZONS_S, Comparison
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
 LEAD_NS = 1_000_000_000
@@ -37,7 +37,7 @@ class OpenComparisons:
     horizon_s: float
     _stamps_ns: deque[int] = field(default_factory=deque)
     _poses: deque[Array] = field(default_factory=deque)
-    _waiting: deque[tuple[NominalTrack, str, int, float]] = field(default_factory=deque)
+    _waiting: deque[tuple[NominalTrack, RoundOrder]] = field(default_factory=deque)
 
     @property
     def horizons_s(self) -> tuple[float, ...]:
@@ -59,10 +59,10 @@ class OpenComparisons:
         yaw = float(local_from_geo_yaw(self.frame, state.yaw_rad, lat, lon))
         self._stamps_ns.append(state.stamp_ns)
         self._poses.append(np.array([xy[0], xy[1], yaw]))
+        due_ns = state.stamp_ns - round(max(self.horizons_s) * 1e9)
         done = []
-        while self._waiting and self._due_ns(self._waiting[0]) <= state.stamp_ns:
-            nominal, junction_id, round_id, _ = self._waiting.popleft()
-            done += self._compare(nominal, junction_id, round_id)
+        while self._waiting and self._waiting[0][0].stamp_ns <= due_ns:
+            done += self._compare(*self._waiting.popleft())
         self._forget(state.stamp_ns)
         return done
 
@@ -79,22 +79,16 @@ class OpenComparisons:
             speed_mps=seed.speed_mps,
             yaw_rate_radps=seed.yaw_rate_radps,
         )
-        self._waiting.append(
-            (nominal, done.order.junction_id, done.order.round_id, max(self.horizons_s))
-        )
+        self._waiting.append((nominal, done.order))
 
     def flush(self) -> list[Comparison]:
         """Return what can still be compared over the horizons that the drive has covered."""
         done = []
         while self._waiting:
-            nominal, junction_id, round_id, _ = self._waiting.popleft()
-            done += self._compare(nominal, junction_id, round_id)
+            done += self._compare(*self._waiting.popleft())
         return done
 
-    def _due_ns(self, waiting: tuple[NominalTrack, str, int, float]) -> int:
-        return waiting[0].stamp_ns + round(waiting[3] * 1e9)
-
-    def _compare(self, nominal: NominalTrack, junction_id: str, round_id: int) -> list[Comparison]:
+    def _compare(self, nominal: NominalTrack, order: RoundOrder) -> list[Comparison]:
         # The same stretch whenever this is called: unwrapping angles from another start would
         # change their last digits, and a cut log the results before the cut.
         first = nominal.stamp_ns - LEAD_NS
@@ -107,8 +101,8 @@ class OpenComparisons:
             nominal,
             track,
             horizons_s=self.horizons_s,
-            round_id=round_id,
-            intersection_id=junction_id,
+            round_id=order.round_id,
+            intersection_id=order.junction_id,
         )
 
     def _forget(self, now_ns: int) -> None:

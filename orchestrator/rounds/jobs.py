@@ -10,18 +10,23 @@ import numpy as np
 from foretwin.contracts.drive import PlannedTrajectory, SignalState, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from foretwin.contracts.futures import CarPlan, Future, Job, PathAhead
+from foretwin.contracts.futures import (
+    PATH_BEHIND_M,
+    RESULT_STEP_S,
+    CarPlan,
+    Future,
+    Job,
+    PathAhead,
+)
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.instructions import RoundIntent
+from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.seen_users import near_car
-from foretwin.orchestrator.routing.route_ahead import PATH_BEHIND_M
 from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.scenarios.live import KnownScenarios
@@ -29,7 +34,6 @@ from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 
-STEP_S = 0.1
 HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
 """An older plan of the car is not compared with a new future, nor followed in one."""
@@ -85,7 +89,7 @@ class RoundPlanner:
         round_id: int,
         intent: RoundIntent,
         state: VehicleState,
-        said: LatestReports,
+        reports: LatestReports,
         world: World,
         *,
         start_stamp_ns: int,
@@ -95,9 +99,9 @@ class RoundPlanner:
         config = self._config
         scenarios = self._fitting(world, intent.path)
         futures = some_of(self._futures_with(scenarios), count, turn=round_id)
-        users = near_car(said.road_users, state, world.frame)
-        signals = _signals(said.signals, state)
-        car_plan = _car_plan(said.plan, state, world.frame)
+        users = near_car(reports.road_users, state, world.frame)
+        signals = _signals(reports.signals, state)
+        car_plan = _car_plan(reports.plan, state, world.frame)
         jobs = []
         for index, mine in enumerate(self._cut(futures)):
             named = {future.scenario_id for future in mine}
@@ -110,7 +114,7 @@ class RoundPlanner:
                     path=intent.path,
                     futures=mine,
                     horizon_s=config.horizon_s,
-                    step_s=STEP_S,
+                    step_s=RESULT_STEP_S,
                     seed=config.seed,
                     cruise_speed_mps=intent.cruise_speed_mps,
                     scenarios=tuple(s for s in scenarios if s.id in named),

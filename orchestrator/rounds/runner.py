@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.bus import Reply
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState
 from foretwin.contracts.runner import Answer
 from foretwin.contracts.simulation import Comparison
@@ -16,24 +16,22 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows
-from foretwin.orchestrator.drive.intake import LatestReports, LatestState
-from foretwin.orchestrator.drive.plan import DrivePlan
-from foretwin.orchestrator.instructions import RoundIntent, Tell
+from foretwin.orchestrator.context import DriveContext
+from foretwin.orchestrator.instructions import LatestReports, LatestState, RoundIntent, Tell
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
+from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
 from foretwin.orchestrator.record.result_rows import (
-    comparison_row,
     plan_row,
     round_futures,
     round_row,
 )
-from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
-from foretwin.orchestrator.rounds.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
+from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.sim_worker.metrics.comparison import compare_plan
 
 log = logging.getLogger("orchestrator")
@@ -58,29 +56,25 @@ class RoundRunner:
 
     def __init__(
         self,
-        plan: DrivePlan,
-        bus: Bus,
-        mailbox: Mailbox,
-        tables: ResultTables,
+        context: DriveContext,
         *,
         world_of: Callable[[str], World],
         on_round: Callable[[str, int], None],
-        tell: Callable[[Tell], None],
     ) -> None:
         self.open = OpenRounds()
-        self.dispatcher = BusDispatcher(bus, mailbox, run_id=plan.run_id, refusals=_REFUSALS)
+        plan = context.plan
+        self.dispatcher = BusDispatcher(
+            context.bus, context.mailbox, run_id=plan.run_id, refusals=_REFUSALS
+        )
         self.futures = FuturesCount()
         self.comparisons = ComparisonCount()
         self.plans = PlanCount()
         self.rtf: dict[str, float] = {}
         self.failed_jobs = 0
         self.start_stamp_ns = 0
-        self._plan = plan
-        self._bus = bus
-        self._tables = tables
-        self._world_of = world_of
-        self._on_round = on_round
-        self._tell = tell
+        self._context, self._plan = context, plan
+        self._tables, self._tell = context.tables, context.tell
+        self._world_of, self._on_round = world_of, on_round
         self._open_comparisons = OpenComparisons(plan.drive_frame, plan.config.horizon_s)
         self.windows = OpenWindows(plan.vehicle, horizon_s=plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
@@ -93,8 +87,8 @@ class RoundRunner:
         )
         self._next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
-        self._told_slow = False
-        self._told_planners: set[str] = set()
+        self._slow_reported = False
+        self._planners_reported: set[str] = set()
 
     @property
     def short_of(self) -> str:
@@ -109,7 +103,7 @@ class RoundRunner:
         self,
         intent: RoundIntent,
         latest: LatestState,
-        said: LatestReports,
+        reports: LatestReports,
         *,
         started_mono_ns: int,
     ) -> None:
@@ -121,12 +115,12 @@ class RoundRunner:
             round_id,
             intent,
             latest.state,
-            said,
+            reports,
             self._world_of(intent.world_id),
             start_stamp_ns=self.start_stamp_ns,
             count=pace.futures,
         )
-        self._seeds[round_id] = _Seed(latest.state, said.plan, intent, pace)
+        self._seeds[round_id] = _Seed(latest.state, reports.plan, intent, pace)
         order = RoundOrder(
             round_id=round_id,
             stamp_ns=latest.state.stamp_ns,
@@ -172,8 +166,7 @@ class RoundRunner:
                 self._tell(Tell("error", f"{worker_id}: {reply.error}"))
         elif (result := reply.message.result).cpu_seconds > 0.0:
             self.rtf[worker_id] = result.sim_seconds / result.cpu_seconds
-        answer = self.dispatcher.reply(reply)
-        self._take([] if answer is None else [answer])
+        self._take(self.dispatcher.reply(reply))
         self.dispatcher.give_out()
 
     def _take(self, answers: list[Answer]) -> None:
@@ -229,22 +222,22 @@ class RoundRunner:
         )
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame)
-        self._bus.publish("round", view, run=self._plan.run_id)
-        self._tell_of_planners(done)
+        self._context.publish("round", view)
+        self._report_planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
 
-    def _tell_of_planners(self, done: RoundDone) -> None:
+    def _report_planners(self, done: RoundDone) -> None:
         """Say once of each planner that it failed, or that another one had to act for it."""
         planners = iter(future.planner for future in done.order.futures)
         for result in done.results:
             failures, remarks = result.outcome.failures, result.outcome.remarks
             for place, planner in zip(range(len(result.future_indices)), planners, strict=False):
                 words = (failures[place] if failures else "") or (remarks[place] if remarks else "")
-                if words and planner not in self._told_planners:
-                    self._told_planners.add(planner)
+                if words and planner not in self._planners_reported:
+                    self._planners_reported.add(planner)
                     self._tell(Tell("warning", f"a future driven by {planner}: {words}"))
 
     def _take_time(self, pace: Pace, seconds: float) -> None:
@@ -258,8 +251,8 @@ class RoundRunner:
             f"{self.short_of} from now on: the machine is too slow for all at "
             f"{self._plan.config.rate_hz:g} Hz"
         )
-        self._tell(Tell("info" if self._told_slow else "warning", text))
-        self._told_slow = True
+        self._tell(Tell("info" if self._slow_reported else "warning", text))
+        self._slow_reported = True
 
     def _compare_plans(self, done: RoundDone, seed: _Seed, world: World) -> None:
         if seed.plan is None or seed.state.stamp_ns - seed.plan.stamp_ns > PLAN_FRESH_NS:
@@ -274,9 +267,9 @@ class RoundRunner:
         if compared is not None:
             self.plans.take(compared)
             self._tables.add("plan_comparisons", [plan_row(compared)])
-            self._bus.publish("plan_comparison", compared, run=self._plan.run_id)
+            self._context.publish("plan_comparison", compared)
 
     def _keep(self, comparison: Comparison) -> None:
         self.comparisons.take(comparison)
-        self._tables.add("comparisons", [comparison_row(comparison)])
-        self._bus.publish("comparison", comparison, run=self._plan.run_id)
+        self._tables.add("comparisons", [row_of(comparison)])
+        self._context.publish("comparison", comparison)

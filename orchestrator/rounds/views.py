@@ -11,7 +11,7 @@ from foretwin.contracts.frames import LocalFrame, target_from_source
 from foretwin.contracts.futures import COLLISION_WITH
 from foretwin.contracts.simulation import RoundView
 from foretwin.orchestrator.record.result_rows import RoundFutures
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 
 VIEW_POINTS = 25
 SAFE_CLEARANCE_M = 10.0

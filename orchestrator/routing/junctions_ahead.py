@@ -19,7 +19,6 @@ class UpcomingJunction(NamedTuple):
 
     junction: Junction
     distance_m: float
-    centre_s_m: float
 
 
 class PassedJunction(NamedTuple):

@@ -123,9 +123,11 @@ class LaneGuide:
         """Return a path (N, 2) with the route's s (N,) beside it, moved onto the lanes there."""
         self.runs = chain(
             self._lanes.beside(self._route, xy_m, s_m),
-            begin_m=float(s_m[0]), end_m=float(s_m[-1]),
-            car_s_m=self._car_s_m, car_xy_m=self._car_xy_m,
-        )  # fmt: skip
+            begin_m=float(s_m[0]),
+            end_m=float(s_m[-1]),
+            car_s_m=self._car_s_m,
+            car_xy_m=self._car_xy_m,
+        )
         return on_lanes(xy_m, s_m, self.runs, car_s_m=self._car_s_m)
 
     def without_lanes(self, s_m: Array) -> npt.NDArray[np.bool_]:
@@ -149,9 +151,8 @@ def on_lanes(xy_m: Array, s_m: Array, runs: Sequence[LaneRun], *, car_s_m: float
             change_m = max(begin, car_s_m, until_m - 2.0 * BLEND_M)
             weight *= _smooth_step((s_m - change_m) / BLEND_M)
         led += weight[:, None] * (lane - led)
-        for beyond_m, room_m, place in (
-            (begin - s_m, begin - until_m, begin), (s_m - end, upto_m - end, end),
-        ):  # fmt: skip
+        before, after = (begin - s_m, begin - until_m, begin), (s_m - end, upto_m - end, end)
+        for beyond_m, room_m, place in (before, after):
             if room_m > 0.0:
                 at = int(np.abs(s_m - place).argmin())
                 aside_m = float((lane[at] - xy_m[at]) @ left[at])

@@ -11,7 +11,6 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.orchestrator.routing.road_hypotheses import (
     Hypothesis,
-    MatchingWeights,
     first_hypotheses,
     next_hypotheses,
 )
@@ -21,6 +20,7 @@ from foretwin.orchestrator.routing.shortest_paths import ShortestWays
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
 NEAR_ROAD_M = 30.0
+BRIDGE_UP_TO_M = 400.0
 SPACING_M = 8.0
 """Between the points that are matched; points of a standing car fall together."""
 
@@ -45,13 +45,11 @@ def match_line(
     *,
     name: str = "route",
     index: RoadIndex | None = None,
-    weights: MatchingWeights | None = None,
-    bridge_up_to_m: float = 400.0,
 ) -> MatchedRoute:
     """Return the roads along a line (N, 2) of latitudes and longitudes in degrees.
 
     The most probable sequence by Viterbi's algorithm over the whole line. Where no road follows
-    the line for up to `bridge_up_to_m`, the shortest way fills the gap, over pedestrian streets
+    the line for up to `BRIDGE_UP_TO_M`, the shortest way fills the gap, over pedestrian streets
     too if need be. Times and speeds play no part. Raises RouteError naming `name` where the line
     has fewer than two points or lies off the map.
     """
@@ -63,10 +61,9 @@ def match_line(
     if len(xy) < 2:
         raise RouteError(f"{name} is shorter than {SPACING_M:.0f} m: nothing to drive")
     roads = index or RoadIndex(graph)
-    weights = weights or MatchingWeights()
     share = _near_share(roads, xy)
-    pieces = _match_pieces(roads, xy, weights)
-    routes, bridged_m = _join(graph, pieces, bridge_up_to_m)
+    pieces = _match_pieces(roads, xy)
+    routes, bridged_m = _join(graph, pieces)
     if share < 0.05 or not routes:
         raise RouteError(
             f"{name} is off the map: {100 * share:.0f} % of its points lie within "
@@ -104,7 +101,7 @@ class _Piece:
     last: int
 
 
-def _match_pieces(roads: RoadIndex, xy: Array, weights: MatchingWeights) -> list[_Piece]:
+def _match_pieces(roads: RoadIndex, xy: Array) -> list[_Piece]:
     heading = np.gradient(xy, axis=0)
     yaw = np.arctan2(heading[:, 1], heading[:, 0])
     layers: list[list[Hypothesis]] = []
@@ -118,12 +115,11 @@ def _match_pieces(roads: RoadIndex, xy: Array, weights: MatchingWeights) -> list
             continue
         if layers:
             moved = float(np.hypot(*(point - xy[number - 1])))
-            layers.append(
-                next_hypotheses(roads, layers[-1], candidates, float(yaw[number]), moved, weights)
-            )
+            yaw_rad = float(yaw[number])
+            layers.append(next_hypotheses(roads, layers[-1], candidates, yaw_rad, moved))
         else:
             first = number
-            layers.append(first_hypotheses(candidates, float(yaw[number]), weights))
+            layers.append(first_hypotheses(candidates, float(yaw[number])))
     return pieces + _trace(layers, first)
 
 
@@ -154,9 +150,7 @@ def _trace(layers: Sequence[list[Hypothesis]], first: int) -> list[_Piece]:
     return pieces
 
 
-def _join(
-    graph: RoadGraph, pieces: Sequence[_Piece], bridge_up_to_m: float
-) -> tuple[tuple[Route, ...], float]:
+def _join(graph: RoadGraph, pieces: Sequence[_Piece]) -> tuple[tuple[Route, ...], float]:
     routes: list[list[DirectedEdge]] = []
     bridged_m = 0.0
     last = -1
@@ -164,7 +158,7 @@ def _join(
     for piece in pieces:
         gap_m = (piece.first - last) * SPACING_M
         bridge = None
-        if routes and gap_m <= bridge_up_to_m:
+        if routes and gap_m <= BRIDGE_UP_TO_M:
             network = network or ShortestWays(graph)
             bridge = network.between(routes[-1][-1].end_node, piece.edges[0].start_node)
         length = sum(directed.edge.length_m for directed in bridge or ())

@@ -10,13 +10,17 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.orchestrator.routing.road_hypotheses import (
+    BEGIN_RADIUS_M,
+    SEARCH_RADIUS_M,
+    STEP_M,
     Hypothesis,
-    MatchingWeights,
     first_hypotheses,
     next_hypotheses,
 )
 from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, legality, project
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+
+LOST_AFTER_M = 20.0
 
 
 class Match(NamedTuple):
@@ -48,17 +52,8 @@ class OffRoadStretch(NamedTuple):
 class MapMatcher:
     """Follows one car through the road graph, fix by fix."""
 
-    def __init__(
-        self,
-        graph: RoadGraph,
-        *,
-        index: RoadIndex | None = None,
-        weights: MatchingWeights | None = None,
-        lost_after_m: float = 20.0,
-    ) -> None:
+    def __init__(self, graph: RoadGraph, *, index: RoadIndex | None = None) -> None:
         self._index = index or RoadIndex(graph)
-        self._weights = weights or MatchingWeights()
-        self._lost_after_m = lost_after_m
         self._hypotheses: list[Hypothesis] = []
         self.roads_near: list[NearEdge] = []
         """Both directions of all roads near the car where it was matched last, nearest first."""
@@ -79,7 +74,7 @@ class MapMatcher:
     ) -> Match | None:
         """Take the car's position (2,) in the graph's frame; return its match, None off the map.
 
-        Off the map means: no road within `begin_radius_m` for `lost_after_m` of driving.
+        Off the map means: no road within `BEGIN_RADIUS_M` for `LOST_AFTER_M` of driving.
         Positions that are not finite are ignored; a heading that is not valid does not count.
         """
         xy = np.asarray(xy_m, dtype=np.float64)
@@ -91,7 +86,7 @@ class MapMatcher:
         moved = 0.0 if self._step_xy is None else float(np.hypot(*(xy - self._step_xy)))
         if not self._hypotheses:
             self._begin(xy, yaw)
-        elif moved >= self._weights.step_m or (yaw is not None and not self._direction_known):
+        elif moved >= STEP_M or (yaw is not None and not self._direction_known):
             self._step(xy, yaw, moved)
         if self._away_m == 0.0:
             self._road_xy = xy
@@ -104,20 +99,20 @@ class MapMatcher:
         return match._replace(heading_off_rad=float(wrap_angle(yaw - road_rad)))
 
     def _begin(self, xy: Array, yaw: float | None) -> None:
-        candidates = self._index.near(xy, self._weights.begin_radius_m)
+        candidates = self._index.near(xy, BEGIN_RADIUS_M)
         self._step_xy, self.roads_near = xy, candidates
         if candidates:
-            self._hypotheses = first_hypotheses(candidates, yaw, self._weights)
+            self._hypotheses = first_hypotheses(candidates, yaw)
             self._direction_known = yaw is not None
             self._away_m = 0.0
 
     def _step(self, xy: Array, yaw: float | None, moved_m: float) -> None:
-        candidates = self._index.near(xy, self._weights.search_radius_m)
+        candidates = self._index.near(xy, SEARCH_RADIUS_M)
         self._step_xy, self.roads_near = xy, candidates
-        if not candidates or candidates[0].distance_m > self._weights.begin_radius_m:
+        if not candidates or candidates[0].distance_m > BEGIN_RADIUS_M:
             # A single wild fix must not end the match: no step counts for more than 5 m.
             self._away_m += min(moved_m, 5.0)
-            if self._away_m > self._lost_after_m:
+            if self._away_m > LOST_AFTER_M:
                 self._hypotheses = []
                 self._close_stretch()
             if not candidates or not self._hypotheses:
@@ -126,11 +121,11 @@ class MapMatcher:
             self._away_m = 0.0
         if yaw is not None and not self._direction_known:
             # The first heading decides alone: before it both directions were equally likely.
-            self._hypotheses = first_hypotheses(candidates, yaw, self._weights)
+            self._hypotheses = first_hypotheses(candidates, yaw)
             self._direction_known = True
         else:
             self._hypotheses = next_hypotheses(
-                self._index, self._hypotheses, candidates, yaw, moved_m, self._weights
+                self._index, self._hypotheses, candidates, yaw, moved_m
             )
         self._note_legality(moved_m)
 
@@ -148,10 +143,8 @@ class MapMatcher:
             and near.distance_m < 15.0
             and min(rivals, default=math.inf) > 2.0
         )
-        return Match(
-            near.directed_edge, near.s_m, near.lateral_m, near.distance_m, confident,
-            self._direction_known,
-        )  # fmt: skip
+        place = near.directed_edge, near.s_m, near.lateral_m, near.distance_m
+        return Match(*place, confident, self._direction_known)
 
     def _note_legality(self, moved_m: float) -> None:
         edge = self._hypotheses[0].near.directed_edge

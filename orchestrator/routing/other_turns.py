@@ -19,18 +19,18 @@ class OtherTurns:
         self._memory: tuple[tuple[int, bool, float], list[tuple[Junction, float]]] | None = None
 
     def junctions(
-        self, starts: Iterable[tuple[DirectedEdge, float]], *, s_m: float, horizon_m: float
+        self, starts: Iterable[tuple[DirectedEdge, float]], *, horizon_m: float
     ) -> Iterator[UpcomingJunction]:
         """Yield the junctions within `horizon_m`, at every node where they are met.
 
-        `starts` are roads with the distance that the car still has to drive on them; `s_m` is the
-        car's own position on its route. Distances run to the junction's node.
+        `starts` are roads with the distance that the car still has to drive on them. Distances run
+        to the junction's node.
         """
         for start, offset_m in starts:
             for junction, gap_m in self._beyond(start, horizon_m):
                 distance_m = offset_m + gap_m
                 if 0.0 < distance_m <= horizon_m:
-                    yield UpcomingJunction(junction, distance_m, s_m + distance_m)
+                    yield UpcomingJunction(junction, distance_m)
 
     def _beyond(self, start: DirectedEdge, horizon_m: float) -> list[tuple[Junction, float]]:
         """Return the junctions' nodes reached from the end of `start`, with their distances."""

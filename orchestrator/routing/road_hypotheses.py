@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from foretwin.orchestrator.routing.road_index import (
@@ -23,29 +22,23 @@ from foretwin.orchestrator.routing.road_index import (
 )
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatchingWeights:
-    """How strongly each disagreement speaks against a road, as negative log likelihood.
-
-    Weights of a step grow with the way driven since the last one, up to `independent_m`, since
-    fixes near each other err alike; so the result does not depend on the rate of the fixes.
-    """
-
-    search_radius_m: float = 40.0
-    begin_radius_m: float = 25.0
-    """A match begins within this distance, and ends beyond it after a while."""
-    sigma_m: float = 6.0
-    heading: float = 3.0
-    no_car_road: float = 0.4
-    against_one_way: float = 1.5
-    detour_per_m: float = 0.2
-    u_turn: float = 8.0
-    teleport: float = 14.0
-    independent_m: float = 10.0
-    step_m: float = 2.0
-    keep_within: float = 18.0
-    keep_at_most: int = 10
+SEARCH_RADIUS_M = 40.0
+BEGIN_RADIUS_M = 25.0
+"""A match begins within this distance, and ends beyond it after a while."""
+STEP_M = 2.0
+"""A car that has moved less has taken no step."""
+_SIGMA_M = 6.0
+# How strongly each disagreement speaks against a road, as negative log likelihood. The weights of a
+# step grow with the way driven since the last one, up to `_INDEPENDENT_M`, since fixes near each
+# other err alike; so the result does not depend on the rate of the fixes.
+_INDEPENDENT_M = 10.0
+_HEADING = 3.0
+_AGAINST = {"car": 0.0, "no_car_road": 0.4, "against_one_way": 1.5}
+_DETOUR_PER_M = 0.2
+_U_TURN = 8.0
+_TELEPORT = 14.0
+_KEEP_WITHIN = 18.0
+_KEEP_AT_MOST = 10
 
 
 class Hypothesis(NamedTuple):
@@ -62,30 +55,22 @@ class Hypothesis(NamedTuple):
     connected: bool
 
 
-def emission(
-    near: NearEdge, yaw_rad: float | None, weights: MatchingWeights, moved_m: float
-) -> float:
+def emission(near: NearEdge, yaw_rad: float | None, moved_m: float) -> float:
     """Return what speaks against a candidate by itself."""
-    cost = 0.5 * (near.distance_m / weights.sigma_m) ** 2
+    cost = 0.5 * (near.distance_m / _SIGMA_M) ** 2
     if yaw_rad is not None:
-        cost += weights.heading * (1.0 - math.cos(near.heading_rad - yaw_rad))
-    kind = legality(near.directed_edge)
-    if kind == "no_car_road":
-        cost += weights.no_car_road
-    elif kind == "against_one_way":
-        cost += weights.against_one_way
-    return cost * min(1.0, moved_m / weights.independent_m)
+        cost += _HEADING * (1.0 - math.cos(near.heading_rad - yaw_rad))
+    cost += _AGAINST[legality(near.directed_edge)]
+    return cost * min(1.0, moved_m / _INDEPENDENT_M)
 
 
-def first_hypotheses(
-    candidates: Sequence[NearEdge], yaw_rad: float | None, weights: MatchingWeights
-) -> list[Hypothesis]:
+def first_hypotheses(candidates: Sequence[NearEdge], yaw_rad: float | None) -> list[Hypothesis]:
     """Return the hypotheses of a beginning: every candidate by itself, best first."""
     fresh = [
-        Hypothesis(near, emission(near, yaw_rad, weights, weights.independent_m), -1, (), False)
+        Hypothesis(near, emission(near, yaw_rad, _INDEPENDENT_M), -1, (), False)
         for near in candidates
     ]
-    return _best(fresh, weights)
+    return _best(fresh)
 
 
 def next_hypotheses(
@@ -94,23 +79,22 @@ def next_hypotheses(
     candidates: Sequence[NearEdge],
     yaw_rad: float | None,
     moved_m: float,
-    weights: MatchingWeights,
 ) -> list[Hypothesis]:
     """Return the hypotheses after the car has moved by `moved_m`, best first, least cost 0."""
     limit_m = 2.0 * moved_m + 40.0
     reached = [index.reached(old.near.directed_edge, limit_m=limit_m) for old in before]
     fresh: list[Hypothesis] = []
     for near in candidates:
-        own = emission(near, yaw_rad, weights, moved_m)
+        own = emission(near, yaw_rad, moved_m)
         best = Hypothesis(near, math.inf, -1, (), False)
         for parent, old in enumerate(before):
-            arrival = _transition(old.near, near, reached[parent], moved_m, weights)
+            arrival = _transition(old.near, near, reached[parent], moved_m)
             if old.cost + arrival.cost < best.cost:
                 best = Hypothesis(
                     near, old.cost + arrival.cost, parent, arrival.via, arrival.connected
                 )
         fresh.append(best._replace(cost=best.cost + own))
-    return _best(fresh, weights)
+    return _best(fresh)
 
 
 class _Arrival(NamedTuple):
@@ -124,37 +108,34 @@ def _transition(
     new: NearEdge,
     reached: Mapping[EdgeKey, Reached],
     moved_m: float,
-    weights: MatchingWeights,
 ) -> _Arrival:
     """Return the cheapest way from one candidate to the next."""
-    options = [_Arrival(weights.teleport, (), False)]
+    options = [_Arrival(_TELEPORT, (), False)]
     old_edge, new_edge = old.directed_edge, new.directed_edge
     if old_edge.edge.index == new_edge.edge.index:
         if old_edge.reverse == new_edge.reverse:
             ahead = new.s_m - old.s_m
             # Noise moves a slow car backwards by a metre or two; more than that is another lap.
             if ahead > -5.0:
-                options.append(
-                    _Arrival(weights.detour_per_m * abs(max(ahead, 0.0) - moved_m), (), True)
-                )
+                options.append(_Arrival(_DETOUR_PER_M * abs(max(ahead, 0.0) - moved_m), (), True))
         else:
-            options.append(_Arrival(weights.u_turn, (), True))
+            options.append(_Arrival(_U_TURN, (), True))
     found = reached.get(key_of(new_edge))
     if found is not None:
         rest_m = max(0.0, old_edge.edge.length_m - old.s_m)
         driven_m = rest_m + found.gap_m + new.s_m
         effort_m = rest_m + found.effort_m + new.s_m
-        cost = weights.detour_per_m * (abs(driven_m - moved_m) + (effort_m - driven_m) * 0.2)
+        cost = _DETOUR_PER_M * (abs(driven_m - moved_m) + (effort_m - driven_m) * 0.2)
         options.append(_Arrival(cost, found.via, True))
     return min(options, key=lambda option: option.cost)
 
 
-def _best(hypotheses: list[Hypothesis], weights: MatchingWeights) -> list[Hypothesis]:
+def _best(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     # `sorted` is stable and candidates come in a fixed order, so ties do not depend on chance.
     ordered = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
     least = ordered[0].cost
     return [
         hypothesis._replace(cost=hypothesis.cost - least)
-        for hypothesis in ordered[: weights.keep_at_most]
-        if hypothesis.cost - least <= weights.keep_within
+        for hypothesis in ordered[:_KEEP_AT_MOST]
+        if hypothesis.cost - least <= _KEEP_WITHIN
     ]

@@ -19,6 +19,8 @@ NOT_FOR_CARS_FACTOR = 2.0
 AGAINST_ONE_WAY_FACTOR = 4.0
 U_TURN_M = 60.0
 LOOSE_END_M = 12.0
+REACH_M = 80.0
+"""What can be reached within this is remembered."""
 
 
 def key_of(directed: DirectedEdge) -> EdgeKey:
@@ -88,10 +90,9 @@ def project(directed: DirectedEdge, xy_m: Array) -> NearEdge:
 class RoadIndex:
     """A spatial index of a graph's edges and a memory of what is reachable from them."""
 
-    def __init__(self, graph: RoadGraph, *, reach_m: float = 80.0) -> None:
+    def __init__(self, graph: RoadGraph) -> None:
         self.graph = graph
         self._tree = shapely.STRtree([shapely.LineString(edge.xy_m) for edge in graph.edges])
-        self._reach_m = reach_m
         self._reached: dict[EdgeKey, dict[EdgeKey, Reached]] = {}
 
     def near(self, xy_m: Array, radius_m: float) -> list[NearEdge]:
@@ -134,11 +135,11 @@ class RoadIndex:
         self, start: DirectedEdge, *, limit_m: float | None = None
     ) -> dict[EdgeKey, Reached]:
         """Return what can be reached from the end of `start`, without turning round in the road."""
-        if limit_m is not None and limit_m > self._reach_m:
+        if limit_m is not None and limit_m > REACH_M:
             return reach(self.graph, start, limit_m=limit_m)
         key = key_of(start)
         if key not in self._reached:
-            self._reached[key] = reach(self.graph, start, limit_m=self._reach_m)
+            self._reached[key] = reach(self.graph, start, limit_m=REACH_M)
         return self._reached[key]
 
 

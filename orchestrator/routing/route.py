@@ -18,10 +18,9 @@ from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 HEADING_OVER_M = 15.0
 """Headings at a node are measured over this length: nearer, maps draw junctions with kinks."""
 
-_CLASS_RANK = {
-    "motorway": 0, "trunk": 1, "primary": 2, "secondary": 3, "tertiary": 4, "unclassified": 5,
-    "residential": 5, "living_street": 6, "service": 7, "track": 8, "pedestrian": 8,
-}  # fmt: skip
+_LARGE = {"motorway": 0, "trunk": 1, "primary": 2, "secondary": 3, "tertiary": 4}
+_SMALL = {"unclassified": 5, "residential": 5, "living_street": 6, "service": 7}
+_CLASS_RANK = _LARGE | _SMALL | {"track": 8, "pedestrian": 8}
 
 
 class RouteError(UserError):
@@ -120,9 +119,7 @@ def most_probable_next(graph: RoadGraph, before: tuple[DirectedEdge, ...]) -> Di
         degrees = abs(math.degrees(turn_angle(before, option)))
         if last.edge.name and option.edge.name != last.edge.name:
             degrees += 20.0
-        ranks = [_CLASS_RANK.get(e.road_class.removesuffix("_link"), 6) for e in
-                 (last.edge, option.edge)]  # fmt: skip
-        degrees += 8.0 * max(0, ranks[1] - ranks[0])
+        degrees += 8.0 * max(0, _rank(option) - _rank(last))
         if legality(option) == "no_car_road":
             degrees += 60.0
         if degrees > 60.0 + 150.0:
@@ -131,6 +128,10 @@ def most_probable_next(graph: RoadGraph, before: tuple[DirectedEdge, ...]) -> Di
         if best is None or rank < best:
             best, choice = rank, option
     return choice
+
+
+def _rank(directed: DirectedEdge) -> int:
+    return _CLASS_RANK.get(directed.edge.road_class.removesuffix("_link"), 6)
 
 
 def extend_most_probable(graph: RoadGraph, route: Route, *, until_m: float) -> Route:

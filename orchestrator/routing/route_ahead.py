@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, target_from_source_m
-from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.futures import PATH_BEHIND_M, PathAhead
 from foretwin.contracts.world import World
-from foretwin.orchestrator.routing.arrival import DrivingPace, predict_arrivals
+from foretwin.orchestrator.routing.arrival import Arrival, DrivingPace, predict_arrivals
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
 from foretwin.orchestrator.routing.driving_path import SPACING_M, driving_path
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
@@ -29,17 +27,8 @@ from foretwin.world_gen.roads.road_graph import RoadGraph
 FAR_AHEAD_M = 3000.0
 ALTERNATIVES_M = 300.0
 """How far ahead other turns than the predicted ones are looked down."""
-PATH_BEHIND_M = 10.0
 PATH_SPARE_M = 60.0
 MIN_PATH_M = 20.0
-
-
-class JunctionAhead(NamedTuple):
-    """A junction on the way: distance along the route to its centre, and seconds until there."""
-
-    junction: Junction
-    distance_m: float
-    in_s: float
 
 
 class WayAhead:
@@ -67,7 +56,7 @@ class WayAhead:
         self._lanes: WorldLanes | None = None
         self.off_lanes_m = 0.0
         """So much of the latest path is driven in its World along none of its lanes."""
-        self.junctions: tuple[JunctionAhead, ...] = ()
+        self.junctions: tuple[Arrival, ...] = ()
 
     def give(self, route: Route) -> None:
         """Follow this route from the next state on."""
@@ -90,8 +79,9 @@ class WayAhead:
             return None
         self._pace.update(state.stamp_ns, state.speed_mps, self.speed_limit_mps)
         upcoming: tuple[UpcomingJunction, ...] = self._follower.upcoming(FAR_AHEAD_M)
-        arrivals = predict_arrivals(self._follower.route, self._progress.s_m, upcoming, self._pace)
-        self.junctions = tuple(JunctionAhead(a.junction, a.distance_m, a.in_s) for a in arrivals)
+        self.junctions = predict_arrivals(
+            self._follower.route, self._progress.s_m, upcoming, self._pace
+        )
         return self._progress.passed
 
     def road_line(self, state: VehicleState) -> RoadLine | None:
@@ -99,10 +89,8 @@ class WayAhead:
         if self._match is None or self._progress is None or not state.yaw_valid:
             return None
         xy = local_from_geo(self._graph.frame, state.position.lat_deg, state.position.lon_deg)
-        return self._lines.near(
-            state, xy, self._match, self._follower.route, self._progress.s_m,
-            roads_near=self._matcher.roads_near,
-        )  # fmt: skip
+        route, s_m, roads_near = self._follower.route, self._progress.s_m, self._matcher.roads_near
+        return self._lines.near(state, xy, self._match, route, s_m, roads_near=roads_near)
 
     @property
     def s_m(self) -> float:

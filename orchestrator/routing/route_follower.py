@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from foretwin.orchestrator.routing.given_routes import GivenRoutes
 from foretwin.orchestrator.routing.junctions_ahead import (
@@ -21,22 +21,20 @@ from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
 BEHIND_M = 150.0
 """Of the road already driven, what a route keeps."""
-
-SourceOfRoute = Literal["given", "predicted"]
+AHEAD_M = 1200.0
+PATIENCE_M = 6.0
+"""Off its route for so long on one road, a car has left it, however unsure the match."""
 
 
 class RouteProgress(NamedTuple):
     """Where the car is on its route.
 
-    `route_version` grows whenever what lies ahead has changed; `off_route` says that a route is
-    given and the car is not on it, so that the way ahead is predicted; `passed` are the junctions
-    passed with this update.
+    `off_route` says that a route is given and the car is not on it, so that the way ahead is
+    predicted; `passed` are the junctions passed with this update.
     """
 
     s_m: float
-    route_version: int
     off_route: bool
-    source: SourceOfRoute
     passed: tuple[PassedJunction, ...]
 
 
@@ -50,21 +48,16 @@ class RouteFollower:
         given: Sequence[Route] = (),
         *,
         index: RoadIndex | None = None,
-        ahead_m: float = 1200.0,
-        patience_m: float = 6.0,
     ) -> None:
         self._graph = graph
         self._index = index or RoadIndex(graph)
         self._junction_at = {node: junction for junction in junctions for node in junction.nodes}
         self._other_turns = OtherTurns(graph, self._junction_at)
         self._given = GivenRoutes(given)
-        self._ahead_m = ahead_m
-        self._patience_m = patience_m
         self._route: Route | None = None
         self._place = 0
         self._s_m = 0.0
         self._begun_m = 0.0
-        self._version = 0
         self._on_given = False
         self._direction_known = False
         self._turning = False
@@ -79,7 +72,7 @@ class RouteFollower:
 
     @property
     def route(self) -> Route:
-        """The road from 150 m behind the car to at least `ahead_m` ahead, if roads lead on."""
+        """The road from 150 m behind the car to at least `AHEAD_M` ahead, if roads lead on."""
         if self._route is None:
             raise LookupError("no route before the first match")
         return self._route
@@ -105,16 +98,14 @@ class RouteFollower:
         self._extend()
         return RouteProgress(
             self._s_m,
-            self._version,
             bool(self._given) and not self._on_given,
-            "given" if self._on_given else "predicted",
             self._take_passed(),
         )
 
     def upcoming(self, horizon_m: float) -> tuple[UpcomingJunction, ...]:
         """Return the junctions ahead on the route within `horizon_m`, nearest first."""
         return tuple(
-            UpcomingJunction(met.junction, met.centre_s_m - self._s_m, met.centre_s_m)
+            UpcomingJunction(met.junction, met.centre_s_m - self._s_m)
             for met in self._encounters
             if self._s_m < met.centre_s_m <= self._s_m + horizon_m and not self._is_passed(met)
         )
@@ -134,7 +125,7 @@ class RouteFollower:
             starts.append((DirectedEdge(edge.edge, not edge.reverse), edge.edge.length_m - rest_m))
         known = {ahead.junction.summary.id for ahead in self.upcoming(horizon_m)}
         nearest: dict[str, UpcomingJunction] = {}
-        for met in self._other_turns.junctions(starts, s_m=self._s_m, horizon_m=horizon_m):
+        for met in self._other_turns.junctions(starts, horizon_m=horizon_m):
             name = met.junction.summary.id
             if name in known or self._near_passed(name, self._s_m, met.junction.radius_m):
                 continue
@@ -194,7 +185,7 @@ class RouteFollower:
         first = self._doubt
         if first is None or key_of(first.directed_edge) != key_of(match.directed_edge):
             self._doubt = first = match
-        return match.confident or abs(match.s_on_edge_m - first.s_on_edge_m) > self._patience_m
+        return match.confident or abs(match.s_on_edge_m - first.s_on_edge_m) > PATIENCE_M
 
     def _leave(self, match: Match) -> None:
         """Cut the route where the car left it, and predict from its new road."""
@@ -250,10 +241,7 @@ class RouteFollower:
     # --- what lies ahead --------------------------------------------------------------------
 
     def _set_route(self, route: Route) -> None:
-        self._route = extend_most_probable(
-            self._graph, route, until_m=self._s_m + self._ahead_m + 200.0
-        )
-        self._version += 1
+        self._route = extend_most_probable(self._graph, route, until_m=self._s_m + AHEAD_M + 200.0)
         self._encounters = tuple(encounters(self._route, self._junction_at))
 
     def _extend(self) -> None:
@@ -263,10 +251,8 @@ class RouteFollower:
         drop = route.index_at(self._s_m - BEHIND_M)
         drop = min(drop, self._place)
         grown = route
-        if route.end_m < self._s_m + self._ahead_m:
-            grown = extend_most_probable(
-                self._graph, route, until_m=self._s_m + self._ahead_m + 200.0
-            )
+        if route.end_m < self._s_m + AHEAD_M:
+            grown = extend_most_probable(self._graph, route, until_m=self._s_m + AHEAD_M + 200.0)
         if drop:
             grown = Route(grown.edges[drop:], float(grown.start_m[drop]))
             self._place -= drop

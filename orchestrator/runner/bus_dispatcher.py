@@ -56,8 +56,7 @@ class BusDispatcher:
 
     def give_up(self, key: str, reason: str) -> list[Answer]:
         """Try a task no more; returns what that comes to."""
-        given_up = self.dispatch.give_up(key, reason)
-        return self._answers([] if given_up is None else [given_up])
+        return self._answers(self.dispatch.give_up(key, reason))
 
     def give_out(self) -> None:
         """Send waiting tasks to free workers; call it often."""
@@ -78,14 +77,14 @@ class BusDispatcher:
                 process=worker_id,
             )
 
-    def reply(self, reply: Reply) -> Answer | None:
-        """Take what the bus says of a task; returns what became of the task, None if not yet."""
+    def reply(self, reply: Reply) -> list[Answer]:
+        """Take what the bus says of a task; returns what became of the task, nothing if not yet."""
         worker_id, task = reply.tag
         if reply.message is not None:
             if not self.dispatch.answered(worker_id, task.key):
-                return None
+                return []
             self._allowed.pop(task.key, None)
-            return Answer(task, reply.message, "", worker_id, reply.received_mono_ns)
+            return [Answer(task, reply.message, "", worker_id, reply.received_mono_ns)]
         until_s, within_s = self._allowed.get(task.key, (_FOR_EVER_S + time.monotonic(), 0.0))
         if time.monotonic() >= until_s:
             self.dispatch.unanswered(worker_id, task.key)
@@ -94,11 +93,10 @@ class BusDispatcher:
         elif reply.error == NO_ANSWER:
             self.dispatch.unanswered(worker_id, task.key)
             self._silent_since_s.setdefault(worker_id, time.monotonic())
-            return None
+            return []
         else:
             given_up = self.dispatch.refused(worker_id, task.key, reply.error or "")
-        found = self._answers([] if given_up is None else [given_up])
-        return found[0] if found else None
+        return self._answers(given_up)
 
     def _answers(self, given_up: list[GivenUp]) -> list[Answer]:
         for task, _ in given_up:

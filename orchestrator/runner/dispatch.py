@@ -142,18 +142,18 @@ class Dispatch:
         self._no_longer_waits(known)
         return True
 
-    def refused(self, worker_id: str, key: str, reason: str) -> GivenUp | None:
-        """Take note that a worker tried a task and could not."""
+    def refused(self, worker_id: str, key: str, reason: str) -> list[GivenUp]:
+        """Take note that a worker tried a task and could not; returns it where it is given up."""
         self._leaves(worker_id, key)
         known = self._open.get(key)
         if known is None:
             self.late += 1
-            return None
+            return []
         known.refusals += 1
         if known.refusals >= self.refusals:
             return self.give_up(key, reason)
         self._wait_again(key)
-        return None
+        return []
 
     def unanswered(self, worker_id: str, key: str) -> None:
         """Take note that a question ended without an answer: its worker may be dead.
@@ -164,11 +164,11 @@ class Dispatch:
         if worker is not None and any(task.key == key for task in worker.at_work):
             worker.silent.add(key)
 
-    def give_up(self, key: str, reason: str) -> GivenUp | None:
-        """Try a task no more."""
+    def give_up(self, key: str, reason: str) -> list[GivenUp]:
+        """Try a task no more; returns it where it was open."""
         known = self._open.get(key)
         self.cancel(key)
-        return None if known is None else GivenUp(known.task, reason)
+        return [] if known is None else [GivenUp(known.task, reason)]
 
     def _free(self) -> str | None:
         """Return the worker to be given the next task, the idlest first."""

@@ -14,7 +14,8 @@ from foretwin.contracts.keys import alive_key, process_of_alive_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.runner import Answer, Task
 from foretwin.contracts.setup import BusSetup, WorkerSetup
-from foretwin.orchestrator.drive.supervisor import (
+from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
+from foretwin.orchestrator.runner.supervisor import (
     Death,
     FreshInterpreter,
     Launcher,
@@ -22,7 +23,6 @@ from foretwin.orchestrator.drive.supervisor import (
     WhenDead,
     fold_stderr,
 )
-from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
 
 IN_FLIGHT = 2
 """Tasks at a worker: one is played, the next lies there already."""
@@ -136,8 +136,7 @@ class WorkerProcesses:
 
     def _handle(self, item: object) -> None:
         if isinstance(item, Reply):
-            answer = self._dispatcher.reply(item)
-            self._answers.extend([] if answer is None else [answer])
+            self._answers.extend(self._dispatcher.reply(item))
         elif isinstance(item, Alive):
             worker_id = process_of_alive_key(item.key)
             if item.up:

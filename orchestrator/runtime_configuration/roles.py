@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from foretwin.contracts.roles import CORRECTIONS, ROLES, Correction, Role, UseRoles
 from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
@@ -30,39 +31,37 @@ class RolesInForce:
         self._tell(UseRoles(stamp_ns=stamp_ns, roles=dict(self.roles), correction=self.correction))
 
 
+@dataclass(frozen=True)
 class RoleHandler:
     """Makes the changes `role.ID`."""
 
-    keys = "role.ID"
-
-    def __init__(self, in_force: RolesInForce) -> None:
-        self._in_force = in_force
+    in_force: RolesInForce
+    keys: str = "role.ID"
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown vehicle or role."""
-        if name not in self._in_force.roles:
-            known = ", ".join(self._in_force.roles)
+        if name not in self.in_force.roles:
+            known = ", ".join(self.in_force.roles)
             raise RefusedError(f"role.{name}: no such vehicle in this drive; there are: {known}")
-        own = next(iter(self._in_force.roles))
+        own = next(iter(self.in_force.roles))
         choices = [role for role in ROLES if role != "all" or name == own]
         if value not in choices:
             raise RefusedError(f"role.{name}={value}: must be {', '.join(choices)}")
 
     def make(self, name: str, value: str, *, stamp_ns: int) -> Made:
         """Give the vehicle its new role from `stamp_ns` on."""
-        before = self._in_force.roles[name]
-        self._in_force.roles[name] = next(role for role in ROLES if role == value)
-        self._in_force.announce(stamp_ns)
+        before = self.in_force.roles[name]
+        self.in_force.roles[name] = next(role for role in ROLES if role == value)
+        self.in_force.announce(stamp_ns)
         return Made(before, value)
 
 
+@dataclass(frozen=True)
 class CorrectionHandler:
     """Makes the change `correction`."""
 
-    keys = "correction"
-
-    def __init__(self, in_force: RolesInForce) -> None:
-        self._in_force = in_force
+    in_force: RolesInForce
+    keys: str = "correction"
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown correction."""
@@ -73,7 +72,7 @@ class CorrectionHandler:
 
     def make(self, name: str, value: str, *, stamp_ns: int) -> Made:
         """Let twins follow or run free from `stamp_ns` on."""
-        before = self._in_force.correction
-        self._in_force.correction = next(one for one in CORRECTIONS if one == value)
-        self._in_force.announce(stamp_ns)
+        before = self.in_force.correction
+        self.in_force.correction = next(one for one in CORRECTIONS if one == value)
+        self.in_force.announce(stamp_ns)
         return Made(before, value)

@@ -13,12 +13,17 @@ import msgspec
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.placement import WorldPlaces
-from foretwin.orchestrator.record.job_tables import REPEATED, RESULT_SCHEMA_VERSION, VEHICLES
+from foretwin.orchestrator.record.job_tables import (
+    METRICS_FILE,
+    REPEATED,
+    RESULT_SCHEMA_VERSION,
+    SWEPT_TABLES,
+    VEHICLES,
+)
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
-from foretwin.orchestrator.sweep.rows import FOLDERS, METRICS_FILE
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec
 from foretwin.sim_worker.planners.registry import planner_origin
 from foretwin.world_gen.build import GENERATOR_VERSION
@@ -172,5 +177,5 @@ def _clear(path: Path) -> None:
         return
     for name in (SUMMARY, PLAN, LOG, METRICS_FILE):
         (path / name).unlink(missing_ok=True)
-    for name in (*FOLDERS.values(), VEHICLES, WORLDS, REPEATED):
+    for name in (*SWEPT_TABLES.values(), VEHICLES, WORLDS, REPEATED):
         shutil.rmtree(path / name, ignore_errors=True)

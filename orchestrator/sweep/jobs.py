@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.futures import Future, Job
+from foretwin.contracts.futures import RESULT_STEP_S, Future, Job
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
 from foretwin.contracts.runner import Answer
+from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob
-from foretwin.orchestrator.sweep.road_users import NOBODY, others_at
-from foretwin.orchestrator.sweep.spec import STEP_S, Loaded
+from foretwin.orchestrator.sweep.road_users import NO_OTHERS, others_at
+from foretwin.orchestrator.sweep.spec import Loaded
 from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_bytes
 
 
@@ -20,9 +23,12 @@ def place_request(loaded: Loaded, world_id: str) -> PlaceRequest:
     vehicle = next(iter(loaded.vehicles.values()))
     starts = tuple((n, one) for n, one in enumerate(loaded.starts) if one.world_id == world_id)
     return PlaceRequest(
-        world_id=world_id, scenarios=loaded.scenarios, vehicle=vehicle_digest(vehicle),
-        most=loaded.spec.places, starts=starts,
-    )  # fmt: skip
+        world_id=world_id,
+        scenarios=loaded.scenarios,
+        vehicle=vehicle_digest(vehicle),
+        most=loaded.spec.places,
+        starts=starts,
+    )
 
 
 class JobMaker:
@@ -44,7 +50,7 @@ class JobMaker:
             world_id=planned.world_id,
             futures=tuple(_future(i, cell, planned.planner) for i, cell in enumerate(cells)),
             horizon_s=planned.horizon_s,
-            step_s=STEP_S,
+            step_s=RESULT_STEP_S,
             seed=spec.seed,
             scenarios=tuple(self._scenarios[name] for name in names),
             lights_by_plan=spec.lights_by_plan,
@@ -58,58 +64,66 @@ class JobMaker:
     def _staged(self, planned: SweepJob) -> dict[str, Any]:
         """Return how staged futures begin: each where its case says, nobody measured a car."""
         world, first = self._worlds[planned.world_id], planned.cells[0]
-        return {
-            "state": VehicleState(
-                vehicle_id=planned.vehicle, stamp_ns=0, position=world.frame.origin,
-                yaw_rad=0.0, speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
-            ),
-            "path": world.ways[first.ego],
-            "cruise_speed_mps": first.values["ego.speed_mps"],
-        }  # fmt: skip
+        state = VehicleState(
+            vehicle_id=planned.vehicle,
+            stamp_ns=0,
+            position=world.frame.origin,
+            yaw_rad=0.0,
+            speed_mps=0.0,
+            yaw_rate_radps=0.0,
+            accel_mps2=0.0,
+        )
+        cruise_speed_mps = first.values["ego.speed_mps"]
+        return {"state": state, "path": world.ways[first.ego], "cruise_speed_mps": cruise_speed_mps}
 
     def _recorded(self, planned: SweepJob) -> dict[str, Any]:
         """Return how futures begin where a car was; those who meet it are timed to it."""
         loaded, frame = self._loaded, self._worlds[planned.world_id].frame
         start = loaded.starts[planned.cells[0].start or 0]
-        path, others = start.path(frame), NOBODY
+        path, others = start.path(frame), NO_OTHERS
         if loaded.road_users is not None and loaded.spec.recorded is not None:
             others = others_at(
-                loaded.road_users, loaded.spec.recorded.road_users, start.state, frame,
-                horizon_s=planned.horizon_s, way_xy_m=path.xy_m,
-            )  # fmt: skip
+                loaded.road_users,
+                loaded.spec.recorded.road_users,
+                start.state,
+                frame,
+                horizon_s=planned.horizon_s,
+                way_xy_m=path.xy_m,
+            )
         return {
-            "state": start.state, "path": path, "cruise_speed_mps": start.cruise_speed_mps,
-            "drive_time_s": start.drive_time_s, "road_users": others.predicted,
+            "state": start.state,
+            "path": path,
+            "cruise_speed_mps": start.cruise_speed_mps,
+            "drive_time_s": start.drive_time_s,
+            "road_users": others.predicted,
             "replayed": others.replayed,
-        }  # fmt: skip
+        }
 
 
 def _future(index: int, cell: Cell, planner: str) -> Future:
-    drives_on = cell.scenario_id == AS_RECORDED
-    return Future(
-        index=index, name=f"{cell.scenario_id} {cell.case}", planner=planner,
-        numbers=cell.parameters, scenario_id="" if drives_on else cell.scenario_id,
-        values={} if drives_on else cell.values, place_rank=cell.rank,
+    name = f"{cell.scenario_id} {cell.case}"
+    future = Future(index=index, name=name, planner=planner, numbers=cell.parameters)
+    if cell.scenario_id == AS_RECORDED:
+        return msgspec.structs.replace(future, place_rank=cell.rank)
+    return msgspec.structs.replace(
+        future,
+        scenario_id=cell.scenario_id,
+        values=cell.values,
+        place_rank=cell.rank,
         place=cell.place if cell.start is None else "",
-    )  # fmt: skip
+    )
 
 
-def cell_rows(
-    planned: SweepJob,
-    job: Job,
-    answer: Answer,
-) -> list[Row]:
+def cell_rows(planned: SweepJob, job: Job, answer: Answer) -> list[Row]:
     """Return the rows of a job's cells; where it was given up, all say why."""
     if answer.message is None:
         rows = future_rows(job, None, job_sha256=answer.task.key)
     else:
         rows = rows_from_bytes(answer.message.rows, job)
     for row, cell in zip(rows, planned.cells, strict=True):
-        row |= {
-            "cell": cell.number, "case": cell.case, "junction_id": cell.junction_id,
-            "scenario": cell.scenario_id, "place": cell.place, "vehicle": planned.vehicle,
-            "worker_id": None,
-        }  # fmt: skip
+        row |= row_of(cell, "case junction_id place")
+        row |= {"cell": cell.number, "scenario": cell.scenario_id}
+        row |= {"vehicle": planned.vehicle, "worker_id": None}
         if answer.failure:
             row["failure"] = answer.failure
     return rows

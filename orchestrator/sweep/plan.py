@@ -14,9 +14,10 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.placement import AS_RECORDED, PlacedHere, WorldPlaces
 from foretwin.contracts.scenario import FAULTS, Scenario
-from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, STEP_S, Loaded, SweepSpec
+from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 
@@ -25,16 +26,10 @@ BACKWARDS_PLANNER = "reverse_pursuit"
 """Drives where the ego goes backwards, unless the spec names another that does."""
 
 
-class Cell(msgspec.Struct, frozen=True, kw_only=True):
+class Cell(PlacedHere, frozen=True, kw_only=True):
     """One future of a sweep; `number` counts all cells in the order of the plan."""
 
     number: int
-    scenario_id: str
-    junction_id: str
-    place: str
-    ego: str
-    start: int | None
-    rank: int
     case: int
     values: dict[str, float]
     parameters: dict[str, float]
@@ -95,7 +90,7 @@ def planners_for(scenario: Scenario, spec: SweepSpec) -> tuple[str, ...]:
 def horizon_of(scenario: Scenario, spec: SweepSpec) -> float:
     """Return how long a scenario is played, in whole steps of the results."""
     wished = scenario.horizon_s if spec.horizon_s is None else spec.horizon_s
-    return round(round(wished / STEP_S) * STEP_S, 6)
+    return round(round(wished / RESULT_STEP_S) * RESULT_STEP_S, 6)
 
 
 def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
@@ -113,42 +108,32 @@ def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
     if count > MOST_CELLS:
         raise UserError(f"the sweep has {count} cells; at most {MOST_CELLS}: take a sample")
     jobs: list[SweepJob] = []
-    number = 0
+    number = itertools.count()
     for world in worlds:
         for (vehicle, planner, horizon_s), placed in _groups(world, scenarios, spec):
             cells = (
-                (here, case, values, parameters)
+                Cell(
+                    **msgspec.structs.asdict(here),
+                    number=next(number),
+                    case=case,
+                    values=values,
+                    parameters=parameters,
+                )
                 for here in placed
                 for case, values in cases[here.scenario_id]
                 for parameters in sets
             )
-            for batch in _cut(cells):
-                made = tuple(
-                    Cell(
-                        number=number + i, scenario_id=here.scenario_id,
-                        junction_id=here.junction_id, place=here.place, ego=here.ego,
-                        start=here.start,
-                        rank=here.rank, case=case,
-                        values=values, parameters=parameters,
-                    )
-                    for i, (here, case, values, parameters) in enumerate(batch)
-                )  # fmt: skip
-                number += len(made)
-                jobs.append(
-                    SweepJob(
-                        number=len(jobs), world_id=world.world_id, planner=planner,
-                        vehicle=vehicle, horizon_s=horizon_s, cells=made,
-                    )
-                )  # fmt: skip
+            while batch := tuple(itertools.islice(cells, FUTURES_PER_JOB)):
+                job = SweepJob(
+                    number=len(jobs),
+                    world_id=world.world_id,
+                    planner=planner,
+                    vehicle=vehicle,
+                    horizon_s=horizon_s,
+                    cells=batch,
+                )
+                jobs.append(job)
     return SweepPlan(worlds=tuple(worlds), jobs=tuple(jobs))
-
-
-_Cell = tuple[PlacedHere, int, Values, dict[str, float]]
-
-
-def _cut(cells: Iterator[_Cell]) -> Iterator[list[_Cell]]:
-    while batch := list(itertools.islice(cells, FUTURES_PER_JOB)):
-        yield batch
 
 
 def _groups(

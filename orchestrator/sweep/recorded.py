@@ -91,14 +91,17 @@ def _starts(run: Path, states: list[VehicleState], *, every_s: float) -> tuple[R
         if line is None:
             continue
         next_s = row["drive_time_s"] + every_s
+        lat_deg, lon_deg = (tuple(column) for column in line.T.tolist())
+        same = ("round_id", "drive_time_s", "world_id", "cruise_speed_mps")
         starts.append(
             RecordedStart(
-                round_id=row["round_id"], drive_time_s=row["drive_time_s"],
-                world_id=row["world_id"], junction_id=row["intersection_id"],
-                cruise_speed_mps=row["cruise_speed_mps"], state=states[place],
-                lat_deg=tuple(line[:, 0].tolist()), lon_deg=tuple(line[:, 1].tolist()),
+                **{name: row[name] for name in same},
+                junction_id=row["intersection_id"],
+                state=states[place],
+                lat_deg=lat_deg,
+                lon_deg=lon_deg,
             )
-        )  # fmt: skip
+        )
     if not starts:
         raise UserError(f"recorded.run {run}: no round from which the car drove on")
     return tuple(starts)

@@ -38,7 +38,7 @@ class Others(NamedTuple):
     predicted: tuple[SeenRoadUser, ...] = ()
 
 
-NOBODY = Others()
+NO_OTHERS = Others()
 
 
 def others_at(
@@ -58,7 +58,7 @@ def others_at(
             )
         )
     if mode == "none":
-        return NOBODY
+        return NO_OTHERS
     return Others(predicted=near_car(seen_at(log, state.stamp_ns), state, frame))
 
 
@@ -168,12 +168,15 @@ def seen_at(log: RoadUserLog, stamp_ns: int) -> RoadUsers | None:
         length, width = _size_m(track)
         users.append(
             RoadUser(
-                user_id=track.user_id, kind=track.kind,
+                user_id=track.user_id,
+                kind=track.kind,
                 position=GeoPoint(float(track.lat_deg[sample]), float(track.lon_deg[sample])),
-                yaw_rad=float(track.yaw_rad[sample]), speed_mps=float(track.speed_mps[sample]),
-                length_m=length, width_m=width,
+                yaw_rad=float(track.yaw_rad[sample]),
+                speed_mps=float(track.speed_mps[sample]),
+                length_m=length,
+                width_m=width,
             )
-        )  # fmt: skip
+        )
     return RoadUsers(stamp_ns=said_ns, users=tuple(users))
 
 
@@ -197,12 +200,15 @@ def replayed_from(
         gone_after: Any = track.gone_after[samples]
         found.append(
             RecordedRoadUser(
-                user_id=track.user_id, kind=track.kind, size_m=track.size_m,
+                user_id=track.user_id,
+                kind=track.kind,
+                size_m=track.size_m,
                 time_s=np.asarray((track.stamps_ns[samples] - stamp_ns) * 1e-9, np.float64),
-                poses=np.column_stack([xy, yaw]), speed_mps=track.speed_mps[samples],
+                poses=np.column_stack([xy, yaw]),
+                speed_mps=track.speed_mps[samples],
                 gone_after=gone_after,
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 
@@ -225,9 +231,7 @@ def digest_of(log: RoadUserLog) -> str:
     digest = hashlib.sha256(log.stamps_ns.tobytes())
     for track in log.tracks:
         digest.update(repr((track.user_id, track.kind, track.size_m)).encode())
-        for column in (
-            track.stamps_ns, track.lat_deg, track.lon_deg, track.yaw_rad, track.speed_mps,
-            track.gone_after,
-        ):  # fmt: skip
+        where = track.stamps_ns, track.lat_deg, track.lon_deg, track.yaw_rad
+        for column in (*where, track.speed_mps, track.gone_after):
             digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes
 from foretwin.orchestrator.record.job_tables import (
+    METRICS_FILE,
+    SWEPT_TABLES,
     as_table,
     job_row,
     metric_rows,
@@ -22,12 +22,6 @@ from foretwin.orchestrator.record.job_tables import (
 from foretwin.orchestrator.sweep.plan import SweepJob
 from foretwin.sim_worker.futures.future_rows import Row
 
-FOLDERS = {"road_users": "road_users", "jobs": "jobs", "futures": "rows"}
-"""Where the parts of a table lie; whose rows are there is done, so these are written last."""
-
-
-METRICS_FILE = "metrics.parquet"
-
 
 class Parts:
     """The tables of a sweep in its folder: Parquet files for each job that is done, each of which
@@ -35,7 +29,7 @@ class Parts:
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._metadata = folder, played_with()
-        for name in FOLDERS.values():
+        for name in SWEPT_TABLES.values():
             (folder / name).mkdir(parents=True, exist_ok=True)
             for left in (folder / name).glob("*.writing"):
                 left.unlink()
@@ -47,15 +41,13 @@ class Parts:
 
     def write(self, rows: list[Row], job: Job, recorded: JobBytes) -> None:
         """Write a job, the road users in it, and the rows of its futures."""
-        tables = {
-            "road_users": road_user_rows(job, recorded.sha256), "jobs": [job_row(job, recorded)],
-            "futures": rows,
-        }  # fmt: skip
-        for table in FOLDERS:
+        users = road_user_rows(job, recorded.sha256)
+        tables = {"road_users": users, "jobs": [job_row(job, recorded)], "futures": rows}
+        for table in SWEPT_TABLES:
             self._write(table, self._part(table, job.job_index), tables[table])
 
     def _part(self, table: str, job: int) -> Path:
-        return self._folder / FOLDERS[table] / f"job-{job:06d}.parquet"
+        return self._folder / SWEPT_TABLES[table] / f"job-{job:06d}.parquet"
 
     def _write(self, table: str, path: Path, rows: list[Row]) -> None:
         partial = path.with_suffix(".writing")
@@ -83,18 +75,3 @@ class Parts:
         """Yield all rows in the order of the plan."""
         for job in jobs:
             yield from pq.ParquetFile(self.path_of(job.number)).read().to_pylist()
-
-
-class RowsHash:
-    """SHA-256 over rows in order: what they say, whoever computed them and when."""
-
-    def __init__(self) -> None:
-        self._digest = hashlib.sha256()
-
-    def add(self, row: Row) -> None:
-        """Take one more row in."""
-        self._digest.update(msgspec.msgpack.encode(row))
-
-    def hexdigest(self) -> str:
-        """Return the hash of all rows so far."""
-        return self._digest.hexdigest()

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
+from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
+from foretwin.orchestrator.settings import read_toml, settings_from
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, read_drive
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
@@ -22,16 +25,13 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
 from foretwin.telemetry.logs.road_users import RoadUserLog
 
-DEFAULT_METRICS = (
-    "ttc", "pet", "thw", "drac", "required_deceleration", "impact_speed", "delta_v",
-    "max_deceleration", "max_lateral_acceleration", "max_jerk", "comfortable", "off_road_share",
-    "red_light_violations", "right_of_way_violations", "driving_score",
-)  # fmt: skip
-STEP_S = 0.1
-JUST_RECORDED = Scenario(
-    id=AS_RECORDED, title="As recorded", source="the drive",
-    shows="The ego drives on from where the car was, among those who were there.",
-)  # fmt: skip
+_TIMES = "ttc", "pet", "thw"
+_IMPACTS = "drac", "required_deceleration", "impact_speed", "delta_v"
+_COMFORT = "max_deceleration", "max_lateral_acceleration", "max_jerk", "comfortable"
+_RULES = "off_road_share", "red_light_violations", "right_of_way_violations", "driving_score"
+DEFAULT_METRICS = (*_TIMES, *_IMPACTS, *_COMFORT, *_RULES)
+_SHOWS = "The ego drives on from where the car was, among those who were there."
+JUST_RECORDED = Scenario(id=AS_RECORDED, title="As recorded", source="the drive", shows=_SHOWS)
 FUTURES_PER_JOB = 64
 
 
@@ -90,17 +90,7 @@ def load_spec(path: Path) -> Loaded:
 
     Raises FileNotFoundError or UserError, in one line that names the file and the field.
     """
-    if not path.is_file():
-        raise FileNotFoundError(f"sweep {path}: no such file")
-    try:
-        values = msgspec.toml.decode(path.read_bytes())
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: not TOML: {error}") from error
-    try:
-        spec = msgspec.convert(values, SweepSpec)
-    except msgspec.ValidationError as error:
-        known = ", ".join(SweepSpec.__struct_fields__)
-        raise UserError(f"{path}: {error} (known settings: {known})") from error
+    spec = settings_from(read_toml(path, "sweep"), SweepSpec, f"{path}:")
     try:
         return check_spec(spec)
     except FileNotFoundError as error:
@@ -127,11 +117,10 @@ def check_spec(spec: SweepSpec) -> Loaded:
     vehicles = {name: load_vehicle(name) for name in spec.vehicles}
     if spec.recorded is None:
         return Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles)
-    drive = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
+    starts, users = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
     return Loaded(
-        spec=spec, scenarios=scenarios, vehicles=vehicles, starts=drive.starts,
-        road_users=drive.road_users,
-    )  # fmt: skip
+        spec=spec, scenarios=scenarios, vehicles=vehicles, starts=starts, road_users=users
+    )
 
 
 def worlds_folder(spec: SweepSpec) -> Path | None:
@@ -141,41 +130,45 @@ def worlds_folder(spec: SweepSpec) -> Path | None:
     return None if spec.worlds is None else Path(spec.worlds)
 
 
-def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
+def _checks(spec: SweepSpec) -> Iterator[tuple[bool, str]]:
+    """Yield what must hold, and what is said where it does not."""
     sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
-    steps = 1.0 / (spec.control_hz * TIMESTEP_S) if spec.control_hz > 0.0 else 0.0
-    ticks = STEP_S * spec.control_hz
-    horizon = spec.horizon_s
-    return (
-        (len(sources) == 1,
-         f"exactly one of map, worlds and recorded; got {' and '.join(sources) or 'none'}"),
-        (spec.junctions == "all" or len(spec.junctions) > 0,
-         "junctions: at least one id, or \"all\""),
-        (spec.sample is None or spec.sample >= 1, f"sample {spec.sample}: at least 1"),
-        (MIN_RADIUS_M <= spec.radius_m <= MAX_RADIUS_M,
-         f"radius_m {spec.radius_m:g}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"),
-        (spec.places >= 1, f"places {spec.places}: at least 1"),
-        (spec.cases == "all" or spec.cases >= 1, f"cases {spec.cases}: at least 1, or \"all\""),
-        (spec.samples is None or spec.samples >= 1, f"samples {spec.samples}: at least 1"),
-        (len(spec.planners) > 0, "planners: at least one name"),
-        (len(set(spec.planners)) == len(spec.planners), "planners: each only once"),
-        (REMOTE not in spec.planners,
-         f"planners: {REMOTE} asks a stack over the bus of a drive; a sweep has none to join yet"),
-        (len(spec.vehicles) > 0, "vehicles: at least one name"),
-        (len(set(spec.vehicles)) == len(spec.vehicles), "vehicles: each only once"),
-        (horizon is None or (1.0 <= horizon <= 60.0
-                             and abs(horizon / STEP_S - round(horizon / STEP_S)) < 1e-6),
-         f"horizon_s {horizon}: 1 to 60 seconds, in steps of {STEP_S:g}"),
-        (steps >= 1.0 and abs(steps - round(steps)) < 1e-6,
-         f"control_hz {spec.control_hz:g}: must divide {1.0 / TIMESTEP_S:g} evenly"),
-        (ticks >= 1.0 - 1e-9 and abs(ticks - round(ticks)) < 1e-6,
-         f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / STEP_S:g}"),
-        (spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"),
-        (spec.recorded is None or spec.recorded.every_s > 0.0, "recorded.every_s: above 0"),
-        (spec.recorded is None or spec.recorded.longest_gap_s > 0.0,
-         "recorded.longest_gap_s: above 0"),
-        (spec.seed >= 0, f"seed {spec.seed}: not negative"),
-    )  # fmt: skip
+    given = " and ".join(sources) or "none"
+    yield len(sources) == 1, f"exactly one of map, worlds and recorded; got {given}"
+    yield len(spec.junctions) > 0, 'junctions: at least one id, or "all"'
+    radius = MIN_RADIUS_M <= spec.radius_m <= MAX_RADIUS_M
+    yield radius, f"radius_m {spec.radius_m:g}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"
+    for name in ("sample", "places", "samples"):
+        number = getattr(spec, name)
+        yield number is None or number >= 1, f"{name} {number}: at least 1"
+    cases = spec.cases == "all" or spec.cases >= 1
+    yield cases, f'cases {spec.cases}: at least 1, or "all"'
+    for name in ("planners", "vehicles"):
+        names = getattr(spec, name)
+        yield len(names) > 0, f"{name}: at least one name"
+        yield len(set(names)) == len(names), f"{name}: each only once"
+    remote = (
+        f"planners: {REMOTE} asks a stack over the bus of a drive; a sweep has none to join yet"
+    )
+    yield REMOTE not in spec.planners, remote
+    horizon, hz = spec.horizon_s, spec.control_hz
+    in_steps = horizon is None or (1.0 <= horizon <= 60.0 and _whole(horizon / RESULT_STEP_S))
+    yield in_steps, f"horizon_s {horizon}: 1 to 60 seconds, in steps of {RESULT_STEP_S:g}"
+    steps = 1.0 / (hz * TIMESTEP_S) if hz > 0.0 else 0.0
+    divides = steps >= 1.0 and _whole(steps)
+    yield divides, f"control_hz {hz:g}: must divide {1.0 / TIMESTEP_S:g} evenly"
+    ticks = RESULT_STEP_S * hz
+    multiple = ticks >= 1.0 - 1e-9 and _whole(ticks)
+    yield multiple, f"control_hz {hz:g}: must be a multiple of {1.0 / RESULT_STEP_S:g}"
+    yield spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"
+    if spec.recorded is not None:
+        yield spec.recorded.every_s > 0.0, "recorded.every_s: above 0"
+        yield spec.recorded.longest_gap_s > 0.0, "recorded.longest_gap_s: above 0"
+    yield spec.seed >= 0, f"seed {spec.seed}: not negative"
+
+
+def _whole(number: float) -> bool:
+    return abs(number - round(number)) < 1e-6
 
 
 def _check_metrics(names: tuple[str, ...]) -> None:

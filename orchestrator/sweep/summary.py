@@ -11,6 +11,8 @@ from foretwin.orchestrator.sweep.spec import SweepSpec
 from foretwin.sim_worker.futures.future_rows import Row
 
 _SCORE = "metric_driving_score"
+COUNTS = ("cases", "placed", "collided", "failed")
+"""What is counted of each scenario and planner."""
 _PLAIN_WIDTH = 120
 
 
@@ -50,25 +52,22 @@ class Summary:
     def totals(self) -> dict[str, int]:
         """Return the counts of all rows."""
         groups = self._groups.values()
-        return {
-            "rows": sum(group.cases for group in groups),
-            "placed": sum(group.placed for group in groups),
-            "collided": sum(group.collided for group in groups),
-            "failed": sum(group.failed for group in groups),
-        }
+        cases, *others = (sum(getattr(group, name) for group in groups) for name in COUNTS)
+        return {"rows": cases, **dict(zip(COUNTS[1:], others, strict=True))}
 
     def table(self) -> list[dict[str, Any]]:
         """Return one entry for each scenario and planner."""
         return [
             {
-                "scenario": scenario, "planner": planner, "cases": group.cases,
-                "placed": group.placed, "collided": group.collided, "failed": group.failed,
+                "scenario": scenario,
+                "planner": planner,
+                **{name: getattr(group, name) for name in COUNTS},
                 "median_clearance_m": _rounded(group.clearance_m, statistics.median),
                 "mean_score": _rounded(group.scores, statistics.fmean) if self._scored else None,
                 "reasons": dict(group.reasons.most_common(3)),
             }
             for (scenario, planner), group in sorted(self._groups.items())
-        ]  # fmt: skip
+        ]
 
 
 def _rounded(values: list[float], reduce: Any) -> float | None:
@@ -80,19 +79,18 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Column, Table
 
-    columns = ("cases", "placed", "collided", "failed", "clearance", "score")
-    table = Table(
-        Column("scenario", no_wrap=True), Column("planner", no_wrap=True),
-        *(Column(name, justify="right", no_wrap=True) for name in columns),
-    )  # fmt: skip
+    named = (Column(name, no_wrap=True) for name in ("scenario", "planner"))
+    numbers = (*COUNTS, "clearance", "score")
+    table = Table(*named, *(Column(name, justify="right", no_wrap=True) for name in numbers))
     for entry in summary["scenarios"]:
         clearance, score = entry["median_clearance_m"], entry["mean_score"]
         table.add_row(
-            entry["scenario"], entry["planner"],
-            *(str(entry[name]) for name in columns[:4]),
+            entry["scenario"],
+            entry["planner"],
+            *(str(entry[name]) for name in COUNTS),
             "" if clearance is None else f"{clearance:.2f} m",
             "" if score is None else f"{score:.3f}",
-        )  # fmt: skip
+        )
     console = Console()
     if not console.is_terminal:
         console.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.

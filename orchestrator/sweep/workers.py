@@ -15,9 +15,16 @@ def worker_setup(loaded: Loaded, out: Path) -> WorkerSetup:
     """Return the setup of one worker of a sweep into the folder `out`; the bus is still open."""
     vehicles = tuple(loaded.vehicles.values())
     return WorkerSetup(
-        run_id="sweep", process_id="w0", vehicle_id="sweep", bus=BusSetup(endpoint=""),
-        log_file=str(out / LOG), role="futures",
+        run_id="sweep",
+        process_id="w0",
+        vehicle_id="sweep",
+        bus=BusSetup(endpoint=""),
+        log_file=str(out / LOG),
+        role="futures",
         worlds_dir=str(worlds_folder(loaded.spec) or built_worlds(out)),
-        vehicle=vehicles[0], swept_vehicles=vehicles, control_hz=loaded.spec.control_hz,
-        simulations=FUTURES_PER_JOB, kept_worlds=_KEPT_WORLDS,
-    )  # fmt: skip
+        vehicle=vehicles[0],
+        swept_vehicles=vehicles,
+        control_hz=loaded.spec.control_hz,
+        simulations=FUTURES_PER_JOB,
+        kept_worlds=_KEPT_WORLDS,
+    )

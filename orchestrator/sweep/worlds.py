@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -23,8 +24,8 @@ from foretwin.world_gen.world_store import WorldStore, cached_build
 _Choice = TypeVar("_Choice")
 SUFFIX = ".world"
 
-Advance = Callable[[str, int, int], None]
-"""Called with what was just done, how many are done, and how many there are."""
+Progress = Callable[[int, str], AbstractContextManager[tuple[Callable[[str], None], object]]]
+"""Given how many there are of what; in it, what is called first names each that is done."""
 
 
 class SweepWorlds(NamedTuple):
@@ -51,7 +52,7 @@ def source_digest(spec: SweepSpec) -> str:
     return " ".join(path.stem for path in _files(folder))
 
 
-def sweep_worlds(spec: SweepSpec, folder: Path, advance: Advance) -> SweepWorlds:
+def sweep_worlds(spec: SweepSpec, folder: Path, progress: Progress) -> SweepWorlds:
     """Return the Worlds that a spec asks for; those of a map are built into `folder`.
 
     Raises UserError for a junction that is not there, or where none is left.
@@ -74,13 +75,14 @@ def sweep_worlds(spec: SweepSpec, folder: Path, advance: Advance) -> SweepWorlds
     index = index_map(opened.osm, opened.graph, opened.junctions)
     store = WorldStore(folder)
     ids, failures = [], {}
-    for number, junction in enumerate(chosen, start=1):
-        name = junction.summary.id
-        try:
-            ids.append(cached_build(store, index, junction, radius_m=spec.radius_m).world.id)
-        except Exception as error:  # one bad junction never stops the rest
-            failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        advance(name, number, len(chosen))
+    with progress(len(chosen), "Worlds") as (advance, _):
+        for junction in chosen:
+            name = junction.summary.id
+            try:
+                ids.append(cached_build(store, index, junction, radius_m=spec.radius_m).world.id)
+            except Exception as error:  # one bad junction never stops the rest
+                failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            advance(name)
     return SweepWorlds(folder, tuple(ids), failures)
 
 

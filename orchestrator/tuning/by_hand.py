@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
 from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions
@@ -10,17 +12,16 @@ from foretwin.sim_worker.analysis.identify.acceptance import in_force
 _WORDS = ("pin", "unpin", "rollback")
 
 
+@dataclass(frozen=True)
 class VehicleHandler:
     """Makes the changes `vehicle.NAME`."""
 
-    keys = "vehicle.NAME"
-
-    def __init__(self, handler: ParameterVersions) -> None:
-        self._handler = handler
+    parameters: ParameterVersions
+    keys: str = "vehicle.NAME"
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown parameter, a word or a number that cannot be."""
-        parameters = self._handler.in_force
+        parameters = self.parameters.in_force
         try:
             if value == "rollback":
                 parameters.check_rollback(name)
@@ -34,7 +35,7 @@ class VehicleHandler:
     def make(self, name: str, value: str, *, stamp_ns: int) -> Made:
         """Let the parameter count from `stamp_ns` on; raises RefusedError where it cannot."""
         self.check(name, value)
-        parameters = self._handler.in_force
+        parameters = self.parameters.in_force
         before = in_force(parameters.vehicle, name)
         if value == "pin":
             parameters.pin(name)
@@ -46,7 +47,7 @@ class VehicleHandler:
             change = parameters.rollback(name, stamp_ns=stamp_ns)
         else:
             change = parameters.set(name, _number(name, value), stamp_ns=stamp_ns)
-        self._handler.note([change])
+        self.parameters.note([change])
         return Made(f"{before:.6g}", f"{change.value:.6g}, pinned")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
@@ -13,7 +14,8 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import GAP, ResultTables
 from foretwin.orchestrator.tuning.parameter_versions import departs
 from foretwin.orchestrator.tuning.words import alarm_text, found_text, verdict_text
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable, is_left_open
@@ -23,29 +25,21 @@ HORIZON_S = 2.0
 _SQUARES = ("along_m", "across_m", "yaw_rad", "speed_mps")
 
 
+@dataclass(slots=True)
 class Findings:
     """Takes what the process `tuning` says, in the order in which it says it."""
 
-    def __init__(
-        self,
-        tables: ResultTables,
-        *,
-        tell: Callable[[Tell], None],
-        start_stamp_ns: Callable[[], int],
-        vehicle: Callable[[], VehicleParameters],
-        on_identification: Callable[[Identification], None],
-    ) -> None:
-        self._tables = tables
-        self._tell = tell
-        self._start_stamp_ns = start_stamp_ns
-        self._vehicle = vehicle
-        self._on_identification = on_identification
-        self._latest: dict[str, ParameterEstimate] = {}
-        self._told: dict[str, float] = {}
-        self._gaps: dict[str, list[tuple[float, ...]]] = defaultdict(list)
-        self._alarms = 0
-        self._verdicts: list[Verdict] = []
-        self._independent = True
+    tables: ResultTables
+    tell: Callable[[Tell], None]
+    start_stamp_ns: Callable[[], int]
+    vehicle: Callable[[], VehicleParameters]
+    on_identification: Callable[[Identification], None]
+    _latest: dict[str, ParameterEstimate] = field(default_factory=dict)
+    _reported: dict[str, float] = field(default_factory=dict)
+    _gaps: dict[str, list[tuple[float, ...]]] = field(default_factory=lambda: defaultdict(list))
+    _alarms: int = 0
+    _verdicts: list[Verdict] = field(default_factory=list)
+    _independent: bool = True
 
     def take(self, found: Identification | GapSample | GapAlarm | Verdict) -> None:
         """Keep and tell one finding."""
@@ -53,7 +47,7 @@ class Findings:
             case Identification():
                 self._identification(found)
             case GapSample():
-                self._tables.add("gaps", [_row(found)])
+                self.tables.add("gaps", [row_of(found, GAP)])
                 self._independent = self._independent and found.independent
                 if abs(found.horizon_s - HORIZON_S) < 1e-9:
                     self._gaps[found.manoeuvre].append(
@@ -61,16 +55,16 @@ class Findings:
                     )
             case GapAlarm():
                 self._alarms += found.over
-                self._tell(Tell("warning" if found.over else "info", alarm_text(found)))
+                self.tell(Tell("warning" if found.over else "info", alarm_text(found)))
             case Verdict():
                 self._verdicts.append(found)
-                row = _row(found)
+                row = row_of(found)
                 row["evidence"] = "; ".join(
                     f"{one.name} {one.value:.4g} ± {one.std:.2g}, expected {one.expected:.4g}"
                     for one in found.evidence
                 )
-                self._tables.add("verdicts", [row])
-                self._tell(Tell("warning", verdict_text(found)))
+                self.tables.add("verdicts", [row])
+                self.tell(Tell("warning", verdict_text(found)))
 
     def take_all(self, reply: TuneReply) -> None:
         """Keep and tell what one lock step has brought."""
@@ -79,23 +73,18 @@ class Findings:
                 self.take(found)
 
     def _identification(self, told: Identification) -> None:
-        self._tables.add(
-            "identifications",
-            [
-                {"stamp_ns": told.stamp_ns, "from_stamp_ns": told.from_stamp_ns,
-                 "taken": is_acceptable(found), **msgspec.to_builtins(found)}
-                for found in told.estimates
-            ],
-        )  # fmt: skip
+        span = row_of(told, "stamp_ns from_stamp_ns")
+        rows = [span | row_of(found) | {"taken": is_acceptable(found)} for found in told.estimates]
+        self.tables.add("identifications", rows)
         self._latest |= {found.name: found for found in told.estimates}
         if told.step_noticed:
-            self._tell(Tell("warning", f"the vehicle has changed: {told.step_noticed}"))
-        self._on_identification(told)
+            self.tell(Tell("warning", f"the vehicle has changed: {told.step_noticed}"))
+        self.on_identification(told)
         for found in told.estimates:
-            counts = in_force(self._vehicle(), found.name)
-            if departs(found, counts) and self._told.get(found.name) != counts:
-                self._told[found.name] = counts
-                self._tell(Tell("info", found_text(found, counts)))
+            counts = in_force(self.vehicle(), found.name)
+            if departs(found, counts) and self._reported.get(found.name) != counts:
+                self._reported[found.name] = counts
+                self.tell(Tell("info", found_text(found, counts)))
 
     def record(self) -> dict[str, Any]:
         """Return the `gap`, `verdicts` and `parameters` of run.json."""
@@ -112,29 +101,26 @@ class Findings:
             },
             "verdicts": [
                 {
-                    "drive_time_s": round((one.stamp_ns - self._start_stamp_ns()) / 1e9, 2),
+                    "drive_time_s": round((one.stamp_ns - self.start_stamp_ns()) / 1e9, 2),
                     **{k: v for k, v in msgspec.to_builtins(one).items() if k != "vehicle_id"},
                 }
                 for one in self._verdicts
             ],
-            "parameters": [
-                {
-                    "name": one.name, "in_use": in_force(self._vehicle(), one.name),
-                    "identified": one.value, "low": one.low, "high": one.high,
-                    "departs": departs(one, in_force(self._vehicle(), one.name)),
-                    "left_open": one.value is not None
-                    and is_left_open(self._vehicle(), one.name, one.value),
-                    "reason": one.reason,
-                }
-                for one in self._latest.values()
-            ],
-        }  # fmt: skip
+            "parameters": [self._parameter(one) for one in self._latest.values()],
+        }
 
-
-def _row(found: GapSample | Verdict) -> dict[str, Any]:
-    row: dict[str, Any] = msgspec.to_builtins(found)
-    del row["vehicle_id"]
-    return row
+    def _parameter(self, one: ParameterEstimate) -> dict[str, Any]:
+        vehicle = self.vehicle()
+        in_use = in_force(vehicle, one.name)
+        return {
+            "name": one.name,
+            "in_use": in_use,
+            "identified": one.value,
+            **row_of(one, "low high"),
+            "departs": departs(one, in_use),
+            "left_open": one.value is not None and is_left_open(vehicle, one.name, one.value),
+            "reason": one.reason,
+        }
 
 
 def _rms(rows: list[tuple[float, ...]]) -> dict[str, float] | None:

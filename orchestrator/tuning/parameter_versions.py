@@ -17,6 +17,8 @@ from foretwin.contracts.tuning import (
     UseVehicle,
 )
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.results import PARAMETER
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable
 from foretwin.sim_worker.analysis.identify.parameters_in_force import ParametersInForce
 
@@ -134,15 +136,13 @@ def departs(found: ParameterEstimate, counts: float) -> bool:
 
 def change_row(change: ParameterChange, *, version: int) -> dict[str, Any]:
     """Return the row of the table `parameters`."""
-    row: dict[str, Any] = msgspec.to_builtins(change)
-    return {"version": version, **{k: v for k, v in row.items() if k != "vehicle_id"}}
+    return {"version": version, **row_of(change, PARAMETER)}
 
 
 def change_text(change: ParameterChange) -> str:
     """Return a change in the engineer's words."""
-    how = {
-        "identified": "as the driving says", "set": "set by hand", "rolled_back": "rolled back",
-        "file": "of the vehicle file",
-    }[change.origin]  # fmt: skip
+    by_hand = {"set": "set by hand", "rolled_back": "rolled back"}
+    found = {"identified": "as the driving says", "file": "of the vehicle file"}
+    how = (by_hand | found)[change.origin]
     spread = "" if change.std is None else f" ± {1.96 * change.std:.2g}"
     return f"{change.name} {change.before:.5g} -> {change.value:.5g}{spread}, {how}"

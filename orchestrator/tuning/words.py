@@ -16,10 +16,8 @@ _QUANTITIES = {
 }
 _HOW = {"identified": "identified", "set": "set by hand", "rolled_back": "rolled back"}
 _EACH_ITS_LINE = 3
-_CULPRITS = {
-    "vehicle": "the vehicle", "model": "the model", "both": "vehicle and model",
-    "none": "neither", "undecided": "undecided",
-}  # fmt: skip
+_ONE = {"vehicle": "the vehicle", "model": "the model"}
+_CULPRITS = _ONE | {"both": "vehicle and model", "none": "neither", "undecided": "undecided"}
 
 
 def alarm_text(alarm: GapAlarm) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import local_from_geo
-from foretwin.orchestrator.worlds.opening import OpenMap
+from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
@@ -71,14 +71,48 @@ def read_route(route: Path) -> Array:
     return read_line(route).lat_lon_deg
 
 
-class AlongRoute(NamedTuple):
-    """The junctions along a route in driving order, once per passage, and the map they are of."""
+class ChosenJunctions(NamedTuple):
+    """Junctions that a command is about, in its order, and the map they are of."""
 
     opened: OpenMap
     junctions: tuple[Junction, ...]
 
 
-def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute:
+def choose_junctions(
+    map_file: Path,
+    *,
+    at: str | None = None,
+    junction_id: str | None = None,
+    route: Path | None = None,
+    radius_m: float = 0.0,
+    service_roads: bool = False,
+) -> ChosenJunctions:
+    """Open as much of a map as is needed, and choose one junction by a place or id, those along a
+    route in driving order, once per passage, or else all by their ids.
+
+    Of a large map, what lies within `radius_m` is read. Raises UserError where there is none.
+    """
+    clip: Clip | NodeClip | None = None
+    if at is not None:
+        place = parse_place(at)
+        clip = Clip(np.array([place]), radius_m + FARTHEST_M)
+    elif junction_id is not None:
+        clip = NodeClip(node_of_id(junction_id), radius_m)
+    elif route is not None:
+        line_deg = read_route(route)
+        clip = Clip(line_deg, radius_m)
+    opened = open_map(map_file, clip=clip, service_roads=service_roads)
+    if at is not None:
+        return ChosenJunctions(opened, (nearest_junction(opened, *place),))
+    if junction_id is not None:
+        return ChosenJunctions(opened, (junction_by_id(opened, junction_id),))
+    if route is not None:
+        return junctions_along(opened, route, line_deg)
+    everything = sorted(opened.junctions, key=lambda junction: junction.summary.id)
+    return ChosenJunctions(opened, tuple(everything))
+
+
+def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> ChosenJunctions:
     """Return the junctions along a route's line; the service roads that it uses count there."""
     from foretwin.orchestrator.routing.line_matching import match_line
     from foretwin.world_gen.junctions.intersections import junctions_on_route
@@ -92,7 +126,7 @@ def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute
         for stretch in matched.routes
         for passage in junctions_on_route(opened.junctions, stretch.edges)
     )
-    return AlongRoute(opened, junctions)
+    return ChosenJunctions(opened, junctions)
 
 
 def parse_bbox(option: str, bbox: str) -> LatLonBounds:

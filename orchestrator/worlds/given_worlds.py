@@ -10,6 +10,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import with_id
 from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
 
 _SAME_RADIUS_M = 0.5
 
@@ -41,17 +42,17 @@ def read_given_worlds(folder: Path) -> dict[str, World]:
 
 
 def check_given_worlds(
-    folder: Path, *, map_sha256: str, junctions: Iterable[Junction], radius_m: float
+    folder: Path, osm: OsmMap, junctions: Iterable[Junction], *, radius_m: float
 ) -> None:
     """Raise UserError, one line, where a World of a folder is not of this map and these settings;
     and what `read_given_worlds` raises."""
     known = {junction.summary.id for junction in junctions}
     for name, world in read_given_worlds(folder).items():
         where = f"worlds {folder}: that of junction {name}"
-        if world.map_sha256 != map_sha256:
+        if world.map_sha256 != osm.sha256:
             raise UserError(
                 f"{where} was made from another map ({world.map_sha256[:12]}) than the drive's "
-                f"({map_sha256[:12]})"
+                f"({osm.sha256[:12]})"
             )
         if name not in known:
             raise UserError(f"{where}: the drive's map has no such junction")

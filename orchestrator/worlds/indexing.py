@@ -14,10 +14,8 @@ def open_index(map_file: Path, folder: Path | None) -> MapStore:
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    bar = Progress(
-        TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn(),
-        console=console, transient=True, disable=not console.is_terminal,
-    )  # fmt: skip
+    shown = TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn()
+    bar = Progress(*shown, console=console, transient=True, disable=not console.is_terminal)
     with bar:
         task = bar.add_task(f"reading {map_file.name}", total=None)
 

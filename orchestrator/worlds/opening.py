@@ -92,10 +92,9 @@ def region_on_map(file: Path, have: LatLonBounds, wanted: LatLonBounds) -> LatLo
     A World lies in one plane about its middle, so bounds far larger than the map would bend it,
     and those of more than `MAX_REGION_M` a side are refused.
     """
-    part = LatLonBounds(
-        south=max(wanted.south, have.south), west=max(wanted.west, have.west),
-        north=min(wanted.north, have.north), east=min(wanted.east, have.east),
-    )  # fmt: skip
+    south, west = max(wanted.south, have.south), max(wanted.west, have.west)
+    north, east = min(wanted.north, have.north), min(wanted.east, have.east)
+    part = LatLonBounds(south=south, west=west, north=north, east=east)
     if part.west >= part.east or part.south >= part.north:
         raise UserError(f"--bbox {_words(wanted)}: outside {file}, which spans {_words(have)}")
     middle = LocalFrame(GeoPoint((part.south + part.north) / 2, (part.west + part.east) / 2))

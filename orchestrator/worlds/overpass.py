@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import email.utils
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,6 +14,7 @@ import httpx
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.settings import read_toml, settings_from
 
 BUSY = (429, 502, 503, 504)
 """Answers after which asking again later makes sense."""
@@ -46,24 +47,23 @@ class OverpassConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     def validate(self) -> OverpassConfig:
         """Return self, or raise OverpassError naming the first setting that cannot be used."""
-        checks = (
-            (self.endpoint.startswith(("http://", "https://")), "endpoint: an http(s) address"),
-            (bool(self.user_agent.strip()), "user_agent: a contact, such as a mail address"),
-            (
-                self.user_agent.isprintable() and self.user_agent.isascii(),
-                "user_agent: plain ASCII",
-            ),
-            (1.0 <= self.timeout_s <= 3600.0, "timeout_s: 1 to 3600"),
-            (1 <= self.max_bytes <= 1 << 40, "max_bytes: 1 or more"),
-            (0 <= self.retries <= 20, "retries: 0 to 20"),
-            (0.0 <= self.back_off_s <= 600.0, "back_off_s: 0 to 600"),
-            (0.0 <= self.max_wait_s <= 3600.0, "max_wait_s: 0 to 3600"),
-            (0.0 <= self.margin_m <= 10_000.0, "margin_m: 0 to 10000"),
-        )
-        for good, rule in checks:
+        for good, rule in self._checks():
             if not good:
                 raise OverpassError(f"overpass.{rule}")
         return self
+
+    def _checks(self) -> Iterator[tuple[bool, str]]:
+        """Yield what must hold, and what is said where it does not."""
+        agent = self.user_agent
+        yield self.endpoint.startswith(("http://", "https://")), "endpoint: an http(s) address"
+        yield bool(agent.strip()), "user_agent: a contact, such as a mail address"
+        yield agent.isprintable() and agent.isascii(), "user_agent: plain ASCII"
+        yield 1.0 <= self.timeout_s <= 3600.0, "timeout_s: 1 to 3600"
+        yield 1 <= self.max_bytes <= 1 << 40, "max_bytes: 1 or more"
+        yield 0 <= self.retries <= 20, "retries: 0 to 20"
+        yield 0.0 <= self.back_off_s <= 600.0, "back_off_s: 0 to 600"
+        yield 0.0 <= self.max_wait_s <= 3600.0, "max_wait_s: 0 to 3600"
+        yield 0.0 <= self.margin_m <= 10_000.0, "margin_m: 0 to 10000"
 
 
 class _BusyError(Exception):
@@ -79,19 +79,11 @@ def load_overpass_config(path: Path | None) -> OverpassConfig:
     wanted = 'a table [overpass] with endpoint = "https://…/api/interpreter" and user_agent = "…"'
     if path is None:
         raise OverpassError(f"no map server is known: name one by --config FILE, {wanted}")
-    if not path.is_file():
-        raise FileNotFoundError(f"configuration {path}: no such file")
-    try:
-        body = msgspec.toml.decode(path.read_bytes())
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise OverpassError(f"{path}: not TOML: {error}") from error
+    body = read_toml(path, "configuration", error=OverpassError)
     if "overpass" not in body:
         raise OverpassError(f"{path}: lacks {wanted}")
-    try:
-        return msgspec.convert(body["overpass"], OverpassConfig).validate()
-    except msgspec.ValidationError as error:
-        known = ", ".join(OverpassConfig.__struct_fields__)
-        raise OverpassError(f"{path}: [overpass] {error} (known settings: {known})") from error
+    where = f"{path}: [overpass]"
+    return settings_from(body["overpass"], OverpassConfig, where, error=OverpassError).validate()
 
 
 def fetch_map(

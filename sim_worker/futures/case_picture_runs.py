@@ -9,7 +9,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
+from foretwin.contracts.futures import RESULT_STEP_S, Future, FuturesResult, Job, PathAhead
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -20,8 +20,6 @@ from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.roles import StagedCase
-
-STEP_S = 0.1
 
 
 class Run(NamedTuple):
@@ -47,7 +45,7 @@ def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: f
     It ends with the planned impact, where one is planned.
     """
     end_s = played.impact_time_s if played.impact_with else horizon_s
-    time = np.linspace(0.0, end_s, max(2, math.ceil(end_s / STEP_S) + 1))
+    time = np.linspace(0.0, end_s, max(2, math.ceil(end_s / RESULT_STEP_S) + 1))
     path, reverse = FrenetPath(played.place.ego.xy_m), played.place.reverse
     ego = ego_box(vehicle, path, played.ego_speed_mps, played.ego_lateral_m, reverse=reverse)
     others = []
@@ -99,8 +97,8 @@ def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> 
             xy_m=played.place.ego.xy_m, speed_limit_mps=played.place.ego.speed_limit_mps
         ),
         futures=(future,),
-        horizon_s=math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S,
-        step_s=STEP_S,
+        horizon_s=math.ceil(scenario.horizon_s / RESULT_STEP_S - 1e-9) * RESULT_STEP_S,
+        step_s=RESULT_STEP_S,
         seed=0,
         cruise_speed_mps=played.ego_speed_mps,
         scenarios=(scenario,),
@@ -115,7 +113,7 @@ def _result_run(result: FuturesResult, played: StagedCase, vehicle: VehicleParam
     if outcome.collided[0]:
         hit = ("", "a road user", "a building or an island")[int(outcome.collision_with[0])]
         # What follows is the accident's business.
-        end = max(2, math.ceil(hit_s / STEP_S - 1e-6) + 1)
+        end = max(2, math.ceil(hit_s / RESULT_STEP_S - 1e-6) + 1)
     ego = ego_rectangles(vehicle, states[:end])
     poses, sizes = users.poses[0, :end].astype(np.float64), users.size_m[0].tolist()
     others = tuple(

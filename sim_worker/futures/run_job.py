@@ -29,6 +29,8 @@ from foretwin.contracts.futures import (
     RoadUserTracks,
     Trajectory,
 )
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.accident import (
     ACCIDENT_S,
     DELTA_V_WITHIN_S,
@@ -133,6 +135,11 @@ def _play(
     planned = planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s)
     tracks = _tracks(scene, record, sizes, every)
     return _Played(states, tracks, outcome, measured.values, accidents, scene.left_out, planned)
+
+
+def run_alone(job: Job, world: World, vehicle: VehicleParameters) -> FuturesResult:
+    """Simulate a job on a stage made for it alone; raises as `run_job`."""
+    return run_job(job, Stage(world, vehicle, nsim=len(job.futures), control_hz=job.control_hz))
 
 
 def check_job(job: Job, stage: Stage) -> None:

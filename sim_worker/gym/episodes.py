@@ -19,11 +19,12 @@ from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
-from foretwin.contracts.futures import Future, Job, PathAhead
+from foretwin.contracts.futures import RESULT_STEP_S, Future, Job, PathAhead
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import UNKNOWN_LIMIT_MPS
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places
@@ -36,7 +37,6 @@ CASE = "case"
 BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""
 _LATE = ".arrives_after_s"
-_DEFAULT_SPEED_MPS = 8.3
 _LEAST_SPEED_MPS = 4.0
 
 
@@ -132,7 +132,7 @@ def _of_scenario(source: Source, world: World, vehicle: VehicleParameters) -> Ep
         state=_somewhere(world, begun[0][0]),
         path=PathAhead(xy_m=at.ego.xy_m, speed_limit_mps=at.ego.speed_limit_mps),
         horizon_s=scenario.horizon_s,
-        cruise_speed_mps=_DEFAULT_SPEED_MPS,
+        cruise_speed_mps=UNKNOWN_LIMIT_MPS,
     )
     end = at.ego.exit_m if at.ego.exit_m > at.ego.entry_m else at.ego.path.length_m
     return Episodes(world, job, min(end + BEYOND_JUNCTION_M, at.ego.path.length_m), scenes)
@@ -191,7 +191,7 @@ def _job(
             )
             for index, (_, case) in enumerate(begun)
         ),
-        step_s=0.1,
+        step_s=RESULT_STEP_S,
         seed=source.cases_seed,
         scenarios=() if scenario is None else (scenario,),
         starts=np.array([start for start, _ in begun]),

@@ -1,51 +1,90 @@
-"""Tasks and their answers, whoever plays them."""
+"""Questions to a runner: taken as they are needed, answered once each, encoded once."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 
+import msgspec
 import pytest
 
+from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.placement import PlaceRequest
-from foretwin.contracts.runner import Answer, Task, answers, place_task
+from foretwin.contracts.runner import (
+    AHEAD,
+    Answer,
+    JobRequest,
+    Task,
+    answers,
+    job_task,
+    place_task,
+)
+from foretwin.contracts.simulation import PrepareRequest
+from tests.sim_worker.places import job
 
 
-class LastFirst:
-    """A runner that answers what came last first, each task once."""
+class Newest:
+    """A runner that answers the newest task first, and counts how many it holds."""
 
-    capacity = 1
-    workers = ("w0",)
+    capacity, workers = 1, ("newest",)
 
     def __init__(self) -> None:
-        self._tasks: deque[Task] = deque()
+        self.held: deque[Task] = deque()
+        self.most = 0
 
     def submit(self, task: Task) -> None:
-        self._tasks.append(task)
+        self.held.append(task)
+        self.most = max(self.most, len(self.held))
 
     def cancel(self, key: str) -> None:
-        self._tasks = deque(task for task in self._tasks if task.key != key)
+        raise NotImplementedError
 
     def take(self, timeout_s: float | None = 0.0) -> Answer | None:
-        return Answer(self._tasks.pop(), "done") if self._tasks else None
+        return Answer(self.held.pop(), None) if self.held else None
 
 
-def task(world_id: str) -> Task:
-    return place_task(PlaceRequest(world_id=world_id, scenarios=(), vehicle="", most=1))
+def task(number: int) -> Task:
+    return Task(str(number), "prepare", "w", PrepareRequest(world_id="w"))
 
 
-def test_every_task_is_answered_once_in_whatever_order() -> None:
-    given = [task("a"), task("b"), task("c")]
-    found = list(answers(LastFirst(), given))
-    assert [answer.task.world_id for answer in found] == ["c", "b", "a"]
-    assert {answer.message for answer in found} == {"done"}
+@pytest.mark.parametrize(
+    ("count", "ahead"), [(0, 3), (1, 3), (3, 3), (50, 3), (50, 1), (300, AHEAD)]
+)
+def test_tasks_are_made_as_they_are_needed_and_each_is_answered(count: int, ahead: int) -> None:
+    runner, made = Newest(), []
+
+    def tasks() -> Iterator[Task]:
+        for number in range(count):
+            made.append(number)
+            yield task(number)
+
+    answered = []
+    for answer in answers(runner, tasks(), ahead=ahead):
+        answered.append(int(answer.task.key))
+        assert len(made) - len(answered) < max(ahead, 1)
+    assert sorted(answered) == made == list(range(count))
+    assert runner.most == min(count, ahead)
 
 
-@pytest.mark.parametrize("world_id", ["a", "b"])
-def test_a_question_for_places_goes_to_who_has_the_world(world_id: str) -> None:
-    asked = task(world_id)
-    assert (asked.key, asked.channel, asked.world_id) == (
-        f"places in {world_id}",
-        "place",
-        world_id,
-    )
-    assert asked.question == PlaceRequest(world_id=world_id, scenarios=(), vehicle="", most=1)
+def test_a_job_goes_out_as_it_is_recorded() -> None:
+    """What is sent is to the byte the message that holds the job itself."""
+
+    class Whole(msgspec.Struct, frozen=True, kw_only=True):
+        job: object
+        sha256: str
+        wanted: str
+
+    one = job((), horizon_s=1.0)
+    named = job_bytes(one)
+    asked = job_task(one, named, wanted="rows")
+    assert isinstance(asked.question, JobRequest)
+    assert (asked.key, asked.channel, asked.world_id) == (named.sha256, "job", one.world_id)
+    whole = Whole(job=one, sha256=named.sha256, wanted="rows")
+    assert content_bytes(asked.question) == content_bytes(whole)
+    assert job_bytes(asked.question.decoded()) == named
+
+
+def test_a_question_for_places_goes_to_who_has_the_world() -> None:
+    asked = place_task(PlaceRequest(world_id="a", scenarios=(), vehicle="", most=1))
+    assert (asked.key, asked.channel, asked.world_id) == ("places in a", "place", "a")

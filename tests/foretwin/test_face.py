@@ -10,7 +10,17 @@ import numpy as np
 import pytest
 
 import foretwin
+from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.sweep.spec import load_spec
+from tests.orchestrator.sweeps import SMALL, alone, small_sweep
+
+COVERS = (
+    "foretwin",
+    "foretwin.maps",
+    "foretwin.recordings",
+    "foretwin.simulation",
+)
 
 LATE = {"orchestrator", "sim_worker", "world_gen", "viewer", "telemetry"}
 
@@ -97,6 +107,24 @@ def test_a_fault_as_wished_has_its_effect(world: foretwin.World) -> None:
 
     aside = way.path.locate(futures.states[:, -1, :2].astype(float)).offset_m
     assert aside[1] - aside[0] == pytest.approx(0.5, abs=0.15)
+
+
+def test_what_a_sweep_left_is_read(tmp_path: Path) -> None:
+    loaded = load_spec(small_sweep(tmp_path, SMALL.replace("cases = 2", "cases = 1")))
+    summary = run_sweep(loaded, tmp_path / "out", alone(loaded))
+
+    left = foretwin.open_sweep(tmp_path / "out")
+
+    assert left.record["rows_sha256"] == summary["rows_sha256"]
+    assert left.table("futures").num_rows == summary["rows"]
+    assert left.table("jobs").num_rows == summary["jobs"]
+    metrics = {row["name"]: row for row in left.table("metrics").to_pylist()}
+    assert (metrics["ttc"]["unit"], metrics["ttc"]["better"]) == ("s", "higher")
+    for wrong in ("comparisons", "no_such_table"):
+        with pytest.raises(foretwin.UserError, match=f"no table {wrong!r}"):
+            left.table(wrong)
+    with pytest.raises(foretwin.UserError, match=r"no run\.json"):
+        foretwin.open_run(tmp_path / "out")
 
 
 def test_mistakes_are_told_in_one_line(world: foretwin.World) -> None:

@@ -14,7 +14,7 @@ from foretwin.contracts.futures import (
     RoadUserTracks,
     Trajectory,
 )
-from foretwin.orchestrator.rounds.open_rounds import RoundDone, RoundOrder
+from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from tests.orchestrator.trip import START_NS, states_along, town_world
 
 TIME_S = np.arange(81) * 0.1

@@ -20,7 +20,7 @@ from foretwin.contracts.simulation import BuildReply, BuildRequest, PrepareReply
 from foretwin.contracts.world import World
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.world_gen.world_store import WorldStore
@@ -166,7 +166,7 @@ class Worker(Process):
             )
             return
         self.jobs += 1
-        job = message.job
+        job = message.decoded()
         world = read_message(self.plan.worlds_dir / f"{job.world_id}.world", World)
         futures = straight_futures(job, world, self.process_id)
         if self.remark:

@@ -11,15 +11,15 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.world import World
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import DriveInputs, read_inputs
+from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.orchestrator.drive.start_worlds import WITHIN_M, junctions_at_start
-from foretwin.orchestrator.instructions import BuildWorld, Instruction, RoundIntent
+from foretwin.orchestrator.instructions import BuildWorld, Instruction, LatestReports, RoundIntent
+from foretwin.orchestrator.plan import DriveInputs
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
-from foretwin.orchestrator.rounds.open_rounds import RoundDone, RoundOrder
 from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker

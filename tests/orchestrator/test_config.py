@@ -8,6 +8,8 @@ import pytest
 
 from foretwin.orchestrator.config import ConfigError, DriveConfig, load_config, parse_speed
 
+COVERS = ("foretwin.orchestrator.settings",)
+
 
 def test_flags_lie_over_the_file(tmp_path: Path) -> None:
     file = tmp_path / "drive.toml"

@@ -9,6 +9,8 @@ import pytest
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.recordings import convert_log
 
+COVERS = ("foretwin.orchestrator.commands.recordings",)
+
 GOOD = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
 
 

@@ -18,6 +18,11 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 
+COVERS = (
+    "foretwin.orchestrator.embedded",
+    "foretwin.orchestrator.embedded.draw_town",
+)
+
 
 class Town:
     """The embedded map as pyosmium reads it, in metres about its origin."""

@@ -24,8 +24,9 @@ from foretwin.contracts.frames import (
 from foretwin.contracts.world import World
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import DriveInputs, DrivePlan, make_plan, read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, Tell, UseWorld
+from foretwin.orchestrator.plan import DriveInputs, DrivePlan
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.world_gen.build import build_world
 from tests.orchestrator.grid_map import headings

@@ -9,6 +9,11 @@ import pytest
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 from tests.system.foretwin_command import Finished, foretwin
 
+COVERS = (
+    "foretwin.__main__",
+    "foretwin.orchestrator.drive.drive",
+)
+
 BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
 SMALL = ("--speed", "max", "--futures", "36", "--rate", "0.5")
 Drives = tuple[Finished, Finished]

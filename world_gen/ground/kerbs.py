@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.world_gen.lanes.lane_curves import LaneSet
 from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.lane_curves import LaneSet
 from foretwin.world_gen.polygon_areas import cut_out, lines_of
 
 OVERLAP_M = 0.06

@@ -24,6 +24,8 @@ from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.trip import town_world
 from tests.system.foretwin_command import environment, foretwin
 
+COVERS = ("foretwin.orchestrator.commands.judge",)
+
 
 @pytest.mark.parametrize(
     ("files", "said"),

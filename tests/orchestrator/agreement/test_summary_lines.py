@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from foretwin.orchestrator.record.summary import DISAGREEMENTS_SHOWN, side_by_side_lines
+from foretwin.orchestrator.drive.summary import DISAGREEMENTS_SHOWN, side_by_side_lines
 
 
 def test_each_segment_and_each_place_is_a_line_and_many_are_counted() -> None:

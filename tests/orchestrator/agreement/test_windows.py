@@ -11,11 +11,13 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines, judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows, judge_in
-from foretwin.orchestrator.drive.intake import LatestReports
+from foretwin.orchestrator.instructions import LatestReports
 from foretwin.sim_worker.analysis.agreement.tally import Judged
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along, town_world
+
+COVERS = ("foretwin.orchestrator.agreement.verdict_rows",)
 
 VEHICLE = load_vehicle()
 WORLD = town_world("n4")

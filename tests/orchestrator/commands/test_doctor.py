@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.orchestrator import config
 from foretwin.orchestrator.commands import doctor
 from foretwin.orchestrator.commands.doctor import CheckResult, examine
 
@@ -72,9 +73,9 @@ def test_a_display_is_what_the_environment_says(
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    assert not doctor.has_display()
+    assert not config.has_display()
     monkeypatch.setenv(variable, ":0")
-    assert doctor.has_display()
+    assert config.has_display()
 
 
 def test_it_says_whether_a_drive_watches_its_vehicle_here_and_why() -> None:

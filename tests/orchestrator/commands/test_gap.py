@@ -18,6 +18,12 @@ from tests.sim_worker.analysis.gap.test_verdict import END_S, SEED
 from tests.sim_worker.faulty_standin import drive_of
 from tests.telemetry.standin_drive import FRAME
 
+COVERS = (
+    "foretwin.orchestrator.commands.cli_logs",
+    "foretwin.orchestrator.commands.gap_plots",
+    "foretwin.orchestrator.commands.gap_text",
+)
+
 WIDTH = 80
 
 

@@ -18,6 +18,11 @@ from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.map_get import area_filter, get_map
 from foretwin.world_gen.osm.read_osm import read_map
 
+COVERS = (
+    "foretwin.orchestrator.worlds.overpass",
+    "foretwin.orchestrator.worlds.overpass_query",
+)
+
 BOX = "8.0,53.0,8.1,53.1"
 MAP = b"""<?xml version="1.0"?><osm version="0.6" generator="Overpass API">
 <node id="1" lat="53.01" lon="8.01"/><node id="2" lat="53.02" lon="8.02"/>

@@ -16,6 +16,12 @@ from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 
+COVERS = (
+    "foretwin.orchestrator.record.job_tables",
+    "foretwin.orchestrator.record.recorded_jobs",
+    "foretwin.orchestrator.record.versions",
+)
+
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -13,6 +13,13 @@ from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.reading import CATALOGUE, catalogue
 
+COVERS = (
+    "foretwin.orchestrator.commands.cli_options",
+    "foretwin.orchestrator.commands.cli_scenarios",
+    "foretwin.orchestrator.commands.output",
+    "foretwin.orchestrator.commands.scenario_export",
+)
+
 MAP = str(MAP_FILE)
 
 

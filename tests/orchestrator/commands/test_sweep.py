@@ -23,6 +23,14 @@ from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 from tests.sim_worker.planners.installed import install
 from tests.starvation import kept_waiting
 
+COVERS = (
+    "foretwin.orchestrator.sweep.folder",
+    "foretwin.orchestrator.sweep.jobs",
+    "foretwin.orchestrator.sweep.rows",
+    "foretwin.orchestrator.sweep.summary",
+    "foretwin.orchestrator.sweep.workers",
+)
+
 ENDS_WITHIN_S = 3.0
 STARTS_WITHIN_S = 120.0
 

@@ -24,6 +24,12 @@ from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 from tests.world_gen.sketch import Sketch
 
+COVERS = (
+    "foretwin.orchestrator.commands.world_files",
+    "foretwin.orchestrator.worlds.choice",
+    "foretwin.orchestrator.worlds.opening",
+)
+
 MAP = str(MAP_FILE)
 TOWN = "-30.004,44.998,-29.996,45.002"
 """Bounds in the middle of the drawn town."""

@@ -18,6 +18,12 @@ from foretwin.contracts.mailbox import Received
 from foretwin.orchestrator.drive.conductor import Conductor
 from tests.orchestrator.house import INFO, Builder, House, Worker
 
+COVERS = (
+    "foretwin.orchestrator.context",
+    "foretwin.orchestrator.drive.events",
+    "foretwin.orchestrator.drive.world_handler",
+)
+
 
 @pytest.fixture
 def house(tmp_path: Path) -> Iterator[House]:

@@ -12,8 +12,8 @@ import pytest
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.setup import Ros2Setup
 from foretwin.orchestrator.drive.in_charge import InCharge
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import PROCESSES
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.telemetry.ros2.mapping import AUTOWARE, MappingFile, parse_mapping
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town_plan

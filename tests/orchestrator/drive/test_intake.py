@@ -13,6 +13,8 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
 
+COVERS = ("foretwin.orchestrator.drive.telemetry_watch",)
+
 STATES = states_along(town().graph.frame, np.array([[0.0, 0.0], [50.0, 0.0]]))
 FIXES = [GnssFix(stamp_ns=s.stamp_ns, position=s.position) for s in STATES]
 

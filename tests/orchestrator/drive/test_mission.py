@@ -17,6 +17,8 @@ from tests.orchestrator.berlin import berlin
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
 from tests.orchestrator.trip import Trip, states_along, town, town_line, town_world, world_named
 
+COVERS = ("foretwin.orchestrator.instructions",)
+
 GRID = grid(5, 4)
 CORNERS = junctions(GRID)
 INDEX = RoadIndex(GRID)

@@ -20,6 +20,8 @@ from foretwin.world_gen.junctions.intersections import junctions_on_route
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
 from tests.world_gen.sketch import Sketch
 
+COVERS = ("foretwin.orchestrator.plan",)
+
 
 def inputs_for(folder: Path, **settings: object) -> object:
     config = DriveConfig(view="none", out=str(folder / "runs"), **settings)  # type: ignore[arg-type]

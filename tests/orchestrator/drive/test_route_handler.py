@@ -25,6 +25,8 @@ from tests.orchestrator.grid_map import FRAME
 from tests.orchestrator.routing.test_route_to_goal import EAST, NORTH, TOWN, degrees, pose
 from tests.orchestrator.trip import town_plan
 
+COVERS = ("foretwin.orchestrator.drive.ros2_mapping",)
+
 S = 10**9
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
 from foretwin.contracts.frames import geo_from_local, local_from_geo
-from foretwin.orchestrator.drive.side_by_side_handler import told
+from foretwin.orchestrator.drive.side_by_side_handler import disagreement_text
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import town
 
@@ -70,7 +70,7 @@ def test_another_lane_of_the_software_is_listed_with_its_place(house: House) -> 
 
     published = [p for p in house.watched("disagreement") if p.kind == one["kind"]]
     assert [p.over for p in published[-2:]] == [False, True]
-    assert "the ADS would have taken another lane" in told(published[-1])
+    assert "the ADS would have taken another lane" in disagreement_text(published[-1])
     results = house.plan.folder / "results"
     row = pq.read_table(results / "disagreements.parquet").to_pylist()[-1]
     assert row.items() <= one.items()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -22,15 +23,23 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, loca
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.orchestrator.config import VehicleBeside
-from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.drive.plan import Beside
+from foretwin.orchestrator.context import DriveContext
+from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
+from foretwin.orchestrator.plan import Beside
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs.write_mcap import create
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
+
+COVERS = (
+    "foretwin.orchestrator.other_vehicles.detected",
+    "foretwin.orchestrator.other_vehicles.live",
+    "foretwin.orchestrator.other_vehicles.measured",
+    "foretwin.orchestrator.rounds.seen_users",
+)
 
 VAN = load_vehicle("vw_vanagon")
 INFO = VehicleInfo(vehicle_id="ego", time_base="utc", start_stamp_ns=START_NS)
@@ -82,7 +91,9 @@ def crew(folder: Path, *configs: VehicleBeside) -> tuple[VehiclesBeside, list[Ot
     lock_step = msgspec.structs.replace(plan.config, speed=None)
     plan = replace(plan, beside=members, drive_frame=FRAME, config=lock_step)
     bus = HearingBus()
-    beside = VehiclesBeside(plan, bus, Mailbox(8), tell=lambda told: TOLD.append(told.text))
+    tables: Any = None
+    context = DriveContext(plan, bus, Mailbox(8), tables, lambda told: TOLD.append(told.text))
+    beside = VehiclesBeside(context)
     beside.begin(INFO)
     return beside, bus.heard
 
@@ -265,7 +276,7 @@ def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, 
     house = House(tmp_path, futures=2)
     config = VehicleBeside(id="van", seen_as="17", role=role)
     plan = replace(house.plan, beside=(Beside(config, VAN, commands_recorded=False),))
-    house.conductor.beside = VehiclesBeside(plan, house.bus, Mailbox(8), tell=lambda _: None)
+    house.conductor.beside = VehiclesBeside(replace(house.conductor.context, plan=plan))
     house.conductor.beside.begin(INFO)
     house.conductor.roles.roles["van"] = role
     house.drive(25)
@@ -279,7 +290,7 @@ def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, 
     house.send(car)
     house.settle()
     assert house.conductor.start_round()
-    jobs = [request.message().job for worker in house.workers for request in worker.take()]
+    jobs = [request.message().decoded() for worker in house.workers for request in worker.take()]
     assert {user.length_m for job in jobs for user in job.road_users} == {
         VAN.length_m.value for _ in met
     }

@@ -7,20 +7,21 @@ import math
 import numpy as np
 import pytest
 
+from foretwin.contracts.gap import Verdict
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
-from foretwin.orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
+from foretwin.orchestrator.record.columns import columns, columns_of, row_of
 from foretwin.orchestrator.record.result_rows import (
-    comparison_row,
     plan_row,
     round_futures,
     round_row,
 )
-from foretwin.orchestrator.record.results import TABLES
+from foretwin.orchestrator.record.results import MIRROR, MIRRORED, TABLES
 from foretwin.orchestrator.rounds.views import round_view
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, town_world
 from tests.viewer.scene import drive
 
+COVERS = ("foretwin.orchestrator.record.columns",)
 FRAME = town_world("n4").frame
 
 
@@ -69,9 +70,9 @@ def test_rows_have_the_columns_of_their_tables() -> None:
     assert set(future) <= set(TABLES["futures"].names)
     assert set(row) == set(TABLES["rounds"].names)
     assert (row["drive_time_s"], row["futures"]) == (1.0, 1)
-    assert set(comparison_row(watched["comparison"])) == set(TABLES["comparisons"].names)
+    assert set(row_of(watched["comparison"])) == set(TABLES["comparisons"].names)
     assert set(plan_row(watched["plan_comparison"])) == set(TABLES["plan_comparisons"].names)
-    assert set(mirror_row(watched["mirror"])) == set(TABLES["mirror"].names)
+    assert set(row_of(watched["mirror"], MIRROR)) == set(TABLES["mirror"].names)
 
 
 def test_a_mirror_row_keeps_who_is_who() -> None:
@@ -79,34 +80,33 @@ def test_a_mirror_row_keeps_who_is_who() -> None:
         who: PlaneState(float(n), 0.0, 0.0, 0.0)
         for n, who in enumerate(("real", "twin", "shadow", "ghost"))
     }
-    row = mirror_row(
-        MirrorSample(
-            stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
-            gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, **poses,
-        )
+    sample = MirrorSample(
+        stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
+        gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, **poses,
     )  # fmt: skip
+    row = row_of(sample, MIRROR)
 
     assert [row[f"{who}_x_m"] for who in poses] == [0.0, 1.0, 2.0, 3.0]
     assert (row["role"], row["free_x_m"], row["correction_along_mps2"]) == ("all", None, None)
 
 
-def test_vehicles_beside_and_touches_have_rows_of_their_own() -> None:
+def test_a_vehicle_beside_has_a_row_of_its_own() -> None:
     here = PlaneState(1.0, 2.0, 0.0, 3.0)
     other = MirroredVehicle(
         vehicle_id="van", role="twin", real=here, shown=here, length_m=4.5, width_m=1.8,
         height_m=2.0, rear_overhang_m=0.9,
         correction=TwinCorrection(along_mps2=0.5, across_mps2=0.0, yaw_radps2=0.0),
     )  # fmt: skip
-    sample = MirrorSample(
-        stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
-        gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, real=here,
-        twin=here, shadow=here, ghost=here, others=(other,), touches=(("ego", "van"),),
-    )  # fmt: skip
-    (row,) = mirrored_rows(sample)
-    assert set(row) == set(TABLES["mirrored"].names)
+    row = row_of(other, MIRRORED)
+    assert {"stamp_ns", *row} == set(TABLES["mirrored"].names)
     assert (row["role"], row["shown_y_m"], row["correction_along_mps2"]) == ("twin", 2.0, 0.5)
-    assert touch_rows(sample) == [{"stamp_ns": 1, "one": "ego", "other": "van"}]
-    assert {"stamp_ns", "one", "other"} == set(TABLES["touches"].names)
+
+
+def test_columns_are_those_of_a_message_and_of_what_is_in_it() -> None:
+    assert columns_of(MirroredVehicle, "role real") == columns(
+        "role:str real_x_m:float real_y_m:float real_yaw_rad:float real_speed_mps:float"
+    )
+    assert list(columns_of(Verdict))[-2:] == ["evidence", "confidence"]
 
 
 def view_of(**outcome: np.ndarray):

@@ -13,6 +13,8 @@ from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
+COVERS = ("foretwin.orchestrator.rounds.jobs",)
+
 
 @pytest.mark.parametrize(("futures", "size"), [(6, 3), (7, 3), (1, 32), (64, 32)])
 def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) -> None:
@@ -22,7 +24,7 @@ def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) ->
     jobs = []
     while requests := house.workers[0].take() + house.workers[1].take():
         for request in requests:
-            jobs.append(request.message().job)
+            jobs.append(request.message().decoded())
             house.workers[0].answer_one(request)
         house.settle()
     house.tables.close()
@@ -46,7 +48,7 @@ def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) 
         house.workers[0].answer_one(seen[-1])
         house.work()
     house.tables.close()
-    early, late = (request.message().job for request in seen)
+    early, late = (request.message().decoded() for request in seen)
 
     assert early.futures == late.futures
     assert late.state.stamp_ns - early.state.stamp_ns == 2_000_000_000
@@ -80,7 +82,7 @@ def test_a_smaller_round_is_cut_into_jobs_of_one_size(
     house.conductor.rounds.pace.now = Pace(count)
     house.drive(20)
     assert house.conductor.start_round()
-    asked = [r.message().job for worker in house.workers for r in worker.take()]
+    asked = [r.message().decoded() for worker in house.workers for r in worker.take()]
     house.tables.close()
 
     assert [len(job.futures) for job in asked] == [count // jobs] * jobs

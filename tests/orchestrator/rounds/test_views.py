@@ -8,8 +8,8 @@ import pytest
 
 from foretwin.contracts.futures import RoadUserTracks
 from foretwin.orchestrator.record.result_rows import round_futures
-from foretwin.orchestrator.rounds.open_rounds import RoundDone
 from foretwin.orchestrator.rounds.views import round_view
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from tests.orchestrator.futures_rounds import TIME_S, round_done, straight
 from tests.orchestrator.trip import town_world
 

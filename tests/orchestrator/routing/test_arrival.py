@@ -61,7 +61,7 @@ def test_farther_is_later_and_never_negative(speed: float, near: float, more: fl
 
 def test_arrivals_name_the_junctions_in_order() -> None:
     ahead = [
-        UpcomingJunction(junction, 100.0 * number, 100.0 * number)
+        UpcomingJunction(junction, 100.0 * number)
         for number, junction in enumerate(junctions(TOWN)[:3], start=1)
     ]
     arrivals = predict_arrivals(ROUTE, 0.0, ahead, pace_at(8.0))

@@ -82,7 +82,7 @@ def test_cutting_the_log_at_120_s_changes_nothing_before(
 
     def said(replayed: Replayed) -> list[object]:
         return [
-            [(p.s_m, p.route_version) if p else None for p in replayed.progress[:cut]],
+            [p.s_m if p else None for p in replayed.progress[:cut]],
             replayed.upcoming[:cut],
         ]
 

@@ -23,6 +23,8 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 from tests.world_gen.drawn_maps import crossing, world_of
 
+COVERS = ("foretwin.orchestrator.routing.world_lanes",)
+
 WEST, EAST, NORTH, SOUTH = 13, 11, 12, 14
 """The crossing's ways; its western one is driven towards node 0."""
 TWO_LANES = {"highway": "secondary", "name": "Street", "oneway": "yes", "lanes": "2"}

@@ -15,6 +15,12 @@ from foretwin.orchestrator.routing.route import RouteError
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.orchestrator.grid_map import drive, graph_of, grid, headings, road
 
+COVERS = (
+    "foretwin.orchestrator.routing.line_matching",
+    "foretwin.orchestrator.routing.road_hypotheses",
+    "foretwin.orchestrator.routing.road_index",
+)
+
 TOWN = grid(4, 3)
 INDEX = RoadIndex(TOWN)
 

@@ -15,6 +15,8 @@ from foretwin.orchestrator.routing.route_to_goal import WayFinder, away_m
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.orchestrator.grid_map import BLOCK_M, FRAME, graph_of, grid, node, road
 
+COVERS = ("foretwin.orchestrator.routing.shortest_paths",)
+
 EAST, NORTH, WEST = 0.0, math.pi / 2.0, math.pi
 TOWN = grid(4, 3)
 

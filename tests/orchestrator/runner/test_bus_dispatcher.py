@@ -32,7 +32,7 @@ class Bench:
         assert isinstance(found, Request)
         return found
 
-    def reply(self) -> Answer | None:
+    def reply(self) -> list[Answer]:
         found = self.mailbox.take()
         assert isinstance(found, Reply)
         return self.dispatcher.reply(found)
@@ -49,8 +49,7 @@ def test_an_answer_comes_with_its_task_and_who_gave_it(bench: Bench) -> None:
     bench.dispatcher.submit(A)
     message = PrepareReply(world_id="a", worker_id="w0", seconds=1.0)
     bench.question().reply(message)
-    answer = bench.reply()
-    assert answer is not None
+    (answer,) = bench.reply()
     assert (answer.task, answer.message, answer.failure) == (A, message, "")
     assert (answer.worker_id, answer.received_mono_ns > 0) == ("w0", True)
 
@@ -58,9 +57,9 @@ def test_an_answer_comes_with_its_task_and_who_gave_it(bench: Bench) -> None:
 def test_a_refusal_is_the_reason_once_it_was_refused_often_enough(bench: Bench) -> None:
     bench.dispatcher.submit(A)
     bench.question().refuse("no path")
-    assert bench.reply() is None
+    assert bench.reply() == []
     bench.question().refuse("no path")
-    assert bench.reply() == Answer(A, None, "no path")
+    assert bench.reply() == [Answer(A, None, "no path")]
 
 
 def test_a_task_that_is_not_answered_by_its_deadline_is_given_up(bench: Bench) -> None:
@@ -68,7 +67,7 @@ def test_a_task_that_is_not_answered_by_its_deadline_is_given_up(bench: Bench) -
     question = bench.question()
     bench.now_s += 10.0
     question.refuse("Timeout")
-    assert bench.reply() == Answer(A, None, "no answer in 10 s")
+    assert bench.reply() == [Answer(A, None, "no answer in 10 s")]
     # The worker is slow and not dead: it takes what comes next.
     bench.dispatcher.submit(A)
     assert bench.question().message().world_id == "a"
@@ -77,7 +76,7 @@ def test_a_task_that_is_not_answered_by_its_deadline_is_given_up(bench: Bench) -
 def test_who_says_nothing_is_asked_again_when_it_can_be_known_to_live(bench: Bench) -> None:
     bench.dispatcher.submit(A)
     bench.question().refuse(NO_ANSWER)
-    assert bench.reply() is None
+    assert bench.reply() == []
     bench.dispatcher.give_out()
     assert bench.asked.take() is None
     bench.now_s += 1.0

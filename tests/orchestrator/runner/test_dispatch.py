@@ -85,10 +85,9 @@ def test_a_task_that_is_refused_is_tried_elsewhere_so_often_and_then_given_up() 
     dispatch = begun("a", workers=1, refusals=3)
     for _ in range(2):
         assert given_out(dispatch) == [("w0", "a")]
-        assert dispatch.refused("w0", "a", "no path") is None
+        assert dispatch.refused("w0", "a", "no path") == []
     given_out(dispatch)
-    lost = dispatch.refused("w0", "a", "no path")
-    assert lost is not None
+    (lost,) = dispatch.refused("w0", "a", "no path")
     assert (lost.task.key, lost.reason) == ("a", "no path")
     assert dispatch.open == 0
 

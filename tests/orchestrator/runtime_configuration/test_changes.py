@@ -23,6 +23,12 @@ from foretwin.orchestrator.runtime_configuration.handler import (
 from tests.orchestrator.house import House, Process
 from tests.orchestrator.trip import START_NS
 
+COVERS = (
+    "foretwin.orchestrator.drive.questions",
+    "foretwin.orchestrator.runtime_configuration.handler",
+    "foretwin.orchestrator.runtime_configuration.roles",
+)
+
 
 class Mirror(Process):
     """Answers what it is told of roles and Worlds, and remembers it."""

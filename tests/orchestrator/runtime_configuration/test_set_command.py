@@ -11,6 +11,11 @@ from foretwin.contracts.ports import free_endpoint
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
 from foretwin.orchestrator.commands.set import newest_running, running_drive
 
+COVERS = (
+    "foretwin.orchestrator.commands.cli_set",
+    "foretwin.orchestrator.commands.set",
+)
+
 
 def _run(out: Path, name: str, exit_word: str, endpoint: str = "tcp/127.0.0.1:7447") -> Path:
     folder = out / name

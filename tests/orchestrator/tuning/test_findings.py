@@ -16,6 +16,8 @@ from foretwin.orchestrator.tuning.findings import Findings
 from foretwin.orchestrator.tuning.words import summary_lines
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
+COVERS = ("foretwin.orchestrator.tuning.words",)
+
 CAR = load_vehicle()
 
 

@@ -10,6 +10,8 @@ from foretwin.orchestrator.tuning.by_hand import VehicleHandler
 from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions, change_text
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
+COVERS = ("foretwin.orchestrator.tuning.by_hand",)
+
 CAR = load_vehicle()
 EVERYBODY = ("mirror", "tuning", "w0")
 

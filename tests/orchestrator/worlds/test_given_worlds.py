@@ -22,6 +22,8 @@ from foretwin.world_gen.world_store import WorldStore
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town, town_plan, town_world
 
+COVERS = ("foretwin.orchestrator.worlds.builder_process",)
+
 
 def saved(folder: Path, *worlds: World) -> Path:
     store = WorldStore(folder / "given")
@@ -37,9 +39,7 @@ def corrected(world: World) -> World:
 
 def check(folder: Path, *, radius_m: float = 150.0) -> None:
     inputs = town()
-    check_given_worlds(
-        folder, map_sha256=inputs.osm.sha256, junctions=inputs.junctions, radius_m=radius_m
-    )
+    check_given_worlds(folder, inputs.osm, inputs.junctions, radius_m=radius_m)
 
 
 def test_a_corrected_world_is_read_under_the_id_of_what_is_in_it(tmp_path: Path) -> None:

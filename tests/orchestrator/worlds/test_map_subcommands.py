@@ -9,6 +9,8 @@ import pytest
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.embedded import MAP_FILE
 
+COVERS = ("foretwin.orchestrator.worlds.indexing",)
+
 
 def test_a_map_is_indexed_into_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["map", "index", str(MAP_FILE), "--folder", str(tmp_path)]) == 0

@@ -91,6 +91,20 @@ def test_a_folder_that_cannot_be_written_to_is_named_before_the_map_is_read(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("linked", [False, True], ids=["the map", "a link to the map"])
+def test_the_map_itself_is_not_written_over(
+    linked: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    town = tmp_path / "town.osm"
+    town.write_bytes(MAP_FILE.read_bytes())
+    out = tmp_path / "linked.osm" if linked else town
+    if linked:
+        out.symlink_to(town)
+    assert run(["world", str(town), "--at", "45,-30", "--out", str(out)]) == 2
+    assert "is the map itself" in capsys.readouterr().err
+    assert town.read_bytes() == MAP_FILE.read_bytes()
+
+
 def test_a_wrong_map_leaves_no_folder_behind(tmp_path: Path) -> None:
     assert run(["world", "no.osm", "--all", "--out", str(tmp_path / "worlds")]) == 2
     assert not list(tmp_path.iterdir())

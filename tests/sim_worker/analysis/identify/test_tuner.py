@@ -30,6 +30,7 @@ from tests.sim_worker.standin_drives import (
 )
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.known_standin import KnownStandin
+from tests.telemetry.standin_drive import FRAME
 
 COVERS = (
     "foretwin.sim_worker.analysis.identify.steering_signals",

@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.bus import Reply
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
 from foretwin.contracts.world import World
-from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.processes import BUILDER
 from foretwin.orchestrator.instructions import Tell
 
@@ -32,30 +32,18 @@ class _Order:
     asked_again: bool = False
 
 
+@dataclass(slots=True)
 class WorldHandler:
     """Asks builder and workers; a World is ready once every worker that is up has loaded it.
 
     A builder that dies is asked again when it is back; a worker that dies is waited for no more.
     """
 
-    def __init__(
-        self,
-        plan: DrivePlan,
-        bus: Bus,
-        mailbox: Mailbox,
-        *,
-        on_ready: Callable[[str, World], None],
-        on_failed: Callable[[str, str], None],
-        tell: Callable[[Tell], None],
-    ) -> None:
-        self._plan = plan
-        self._bus = bus
-        self._mailbox = mailbox
-        self._on_ready = on_ready
-        self._on_failed = on_failed
-        self._tell = tell
-        self._orders: dict[str, _Order] = {}
-        self._junction_of: dict[str, str] = {}
+    context: DriveContext
+    on_ready: Callable[[str, World], None]
+    on_failed: Callable[[str, str], None]
+    _orders: dict[str, _Order] = field(default_factory=dict)
+    _junction_of: dict[str, str] = field(default_factory=dict)
 
     @property
     def building(self) -> list[str]:
@@ -80,15 +68,9 @@ class WorldHandler:
             self._load(order, order.world, workers)
 
     def _ask_build(self, junction_id: str) -> None:
-        self._bus.request(
-            "build",
-            BuildRequest(intersection_id=junction_id, radius_m=self._plan.config.radius_m),
-            self._mailbox,
-            tag=junction_id,
-            timeout_s=BUILD_TIMEOUT_S,
-            run=self._plan.run_id,
-            process=BUILDER,
-        )
+        radius_m = self.context.plan.config.radius_m
+        question = BuildRequest(intersection_id=junction_id, radius_m=radius_m)
+        self.context.request(BUILDER, "build", question, timeout_s=BUILD_TIMEOUT_S, tag=junction_id)
 
     def builder_up(self) -> None:
         """The builder is back: ask again for what it owes."""
@@ -107,7 +89,7 @@ class WorldHandler:
         if order.world is not None:
             return
         answer = reply.message
-        file = self._plan.worlds_dir / f"{answer.world_id}.world"
+        file = self.context.plan.worlds_dir / f"{answer.world_id}.world"
         try:
             world = read_message(file, World)
         except (OSError, SchemaMismatch) as error:
@@ -129,16 +111,13 @@ class WorldHandler:
             self._ask_build(junction_id)
             return
         order.ready = True  # nothing more will come of it
-        self._on_failed(junction_id, reason)
+        self.on_failed(junction_id, reason)
 
     def _load(self, order: _Order, world: World, workers: tuple[str, ...]) -> None:
         if order.pending is None:
-            notice = WorldNotice(
-                world_id=world.id,
-                intersection_id=self._junction_of[world.id],
-                file=f"{world.id}.world",
-            )
-            self._bus.publish("world", notice, run=self._plan.run_id)
+            junction_id, file = self._junction_of[world.id], f"{world.id}.world"
+            notice = WorldNotice(world_id=world.id, intersection_id=junction_id, file=file)
+            self.context.publish("world", notice)
         order.pending = set(workers)
         for worker_id in sorted(order.pending):
             self.prepare(worker_id, world.id)
@@ -146,15 +125,11 @@ class WorldHandler:
 
     def prepare(self, worker_id: str, world_id: str) -> None:
         """Let one worker load a World."""
-        self._bus.request(
-            "prepare",
+        tag, question = (
+            (worker_id, world_id, time.perf_counter()),
             PrepareRequest(world_id=world_id),
-            self._mailbox,
-            tag=(worker_id, world_id, time.perf_counter()),
-            timeout_s=BUILD_TIMEOUT_S,
-            run=self._plan.run_id,
-            process=worker_id,
         )
+        self.context.request(worker_id, "prepare", question, timeout_s=BUILD_TIMEOUT_S, tag=tag)
 
     def prepare_reply(self, reply: Reply) -> None:
         """Take a worker's answer."""
@@ -164,7 +139,7 @@ class WorldHandler:
             log.info("world %s not loaded by %s beforehand", world_id, worker_id)
         elif reply.message is None:
             text = f"{worker_id} could not load world {world_id}: {reply.error}"
-            self._tell(Tell("warning", text))
+            self.context.tell(Tell("warning", text))
         else:
             taken_s = time.perf_counter() - asked_s
             log.info("world %s loaded by %s in %.2f s", world_id, worker_id, taken_s)
@@ -184,4 +159,4 @@ class WorldHandler:
     def _settle(self, junction_id: str, order: _Order) -> None:
         if order.world is not None and not order.pending and not order.ready:
             order.ready = True
-            self._on_ready(junction_id, order.world)
+            self.on_ready(junction_id, order.world)

@@ -67,7 +67,9 @@ def jobs(house: House) -> list[Job]:
     """What the workers are at."""
     busy = house.conductor.rounds.dispatcher.dispatch.busy
     return [
-        request.job for task in busy.values() if isinstance(request := task.question, JobRequest)
+        request.decoded()
+        for task in busy.values()
+        if isinstance(request := task.question, JobRequest)
     ]
 
 

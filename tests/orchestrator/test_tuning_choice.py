@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.tuning.choice import Tuning, choose_tuning, processors
+from foretwin.orchestrator.tuning_choice import Tuning, choose_tuning, processors
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import pytest
 
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.orchestrator.drive.processes import PROCESSES, ProcessRow, row_of
-from foretwin.orchestrator.drive.supervisor import (
+from foretwin.orchestrator.runner.supervisor import (
     MAX_RESTARTS,
     FreshInterpreter,
     Supervisor,

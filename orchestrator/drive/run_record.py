@@ -9,9 +9,7 @@ from typing import Any
 import msgspec
 
 from foretwin.orchestrator.drive.conductor import Conductor
-from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.plan import DrivePlan
-from foretwin.orchestrator.drive.supervisor import Supervisor
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.versions import versions
 
@@ -19,17 +17,10 @@ RESERVED_BYTES = 65536
 
 
 def run_record(
-    plan: DrivePlan,
-    conductor: Conductor,
-    mission: Mission,
-    supervisor: Supervisor,
-    *,
-    exit_word: str,
-    wall_s: float,
-    mono_s: float,
+    conductor: Conductor, restarted: int, *, exit_word: str, wall_s: float, mono_s: float
 ) -> dict[str, Any]:
-    """Return everything that run.json says."""
-    futures = conductor.rounds.futures
+    """Return everything that run.json says; `restarted` counts processes started again."""
+    plan, mission, futures = conductor.plan, conductor.mission, conductor.rounds.futures
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror.independent
     if independent is None:
@@ -64,7 +55,7 @@ def run_record(
         "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),
         "workers": {
             "started": plan.config.workers,
-            "restarted": supervisor.restarted,
+            "restarted": restarted,
             "requeued_jobs": conductor.rounds.dispatcher.dispatch.requeued,
             "late_results": conductor.rounds.dispatcher.dispatch.late,
         },

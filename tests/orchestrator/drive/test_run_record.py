@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from foretwin.orchestrator.drive.supervisor import FreshInterpreter, Supervisor
-from foretwin.orchestrator.record.run_record import run_record, versions, write_record
-from foretwin.orchestrator.record.summary import summary_text
+from foretwin.orchestrator.drive.run_record import run_record, versions, write_record
+from foretwin.orchestrator.drive.summary import summary_text
 from tests.orchestrator.house import House
+
+COVERS = ("foretwin.orchestrator.drive.summary",)
 
 PROMISED = {
     "run_id", "exit", "versions", "map", "seed", "route_source", "config", "intersections",
@@ -29,15 +30,7 @@ def house(tmp_path: Path) -> Iterator[House]:
 
 
 def record_of(house: House) -> dict[str, Any]:
-    return run_record(
-        house.plan,
-        house.conductor,
-        house.mission,
-        Supervisor(FreshInterpreter(house.plan.processes_dir)),
-        exit_word="completed",
-        wall_s=12.3456,
-        mono_s=1000.0,
-    )
+    return run_record(house.conductor, 0, exit_word="completed", wall_s=12.3456, mono_s=1000.0)
 
 
 def test_the_promised_keys_are_there_and_filled_by_a_drive(house: House) -> None:

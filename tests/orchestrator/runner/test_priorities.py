@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.orchestrator.drive.priorities import gives_way
+from foretwin.orchestrator.runner.priorities import gives_way
 
 WAITS = """
 import threading

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
+from foretwin.contracts.bus import Received, Reply
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
-from foretwin.orchestrator.drive.events import EventHandler
+from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.intake import Intake
-from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import MIRROR, TUNING
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.findings import Findings
 from foretwin.orchestrator.tuning.parameter_versions import (
@@ -30,25 +28,17 @@ class TuningLink:
     """Carries findings to their desks and parameters to workers, mirror and tuning."""
 
     def __init__(
-        self,
-        plan: DrivePlan,
-        bus: Bus,
-        mailbox: Mailbox,
-        tables: ResultTables,
-        *,
-        events: EventHandler,
-        intake: Intake,
-        rounds: RoundRunner,
-        alive: Collection[str],
+        self, context: DriveContext, *, intake: Intake, rounds: RoundRunner, alive: Collection[str]
     ) -> None:
-        self._plan, self._bus, self._mailbox, self._tables = plan, bus, mailbox, tables
-        self._events, self._intake, self._rounds, self._alive = events, intake, rounds, alive
+        plan = context.plan
+        self._context, self._config = context, plan.config
+        self._intake, self._rounds, self._alive = intake, rounds, alive
         self.parameters = ParameterVersions(
             plan.vehicle, vehicle_id=plan.config.vehicle_id, ask=self._ask
         )
         self.findings = Findings(
-            tables,
-            tell=events.tell,
+            context.tables,
+            tell=context.tell,
             start_stamp_ns=lambda: intake.start_stamp_ns,
             vehicle=lambda: self.parameters.in_force.vehicle,
             on_identification=self._identified,
@@ -59,9 +49,8 @@ class TuningLink:
 
     def join(self) -> None:
         """Hear what the process finds."""
-        if not self._plan.config.lock_step:
-            for channel in FINDINGS:
-                self._bus.subscribe(channel, self._mailbox, run=self._plan.run_id)
+        if not self._config.lock_step:
+            self._context.subscribe(*FINDINGS)
 
     def heard(self, item: Received) -> None:
         """Take one finding as it comes."""
@@ -73,12 +62,12 @@ class TuningLink:
             self.weighing = False
             self._weighed = item.message
             if item.message is None and TUNING in self._alive:
-                self._events.tell(Tell("error", f"{TUNING}: {item.error}"))
+                self._context.tell(Tell("error", f"{TUNING}: {item.error}"))
             return ""
         process_id: str = item.tag
         if item.message is None and process_id in self._alive:
             text = f"{process_id} did not take the vehicle's parameters: {item.error}"
-            self._events.tell(Tell("error", text))
+            self._context.tell(Tell("error", text))
         self.parameters.answered(process_id)
         return process_id
 
@@ -90,26 +79,28 @@ class TuningLink:
         changes = self.parameters.hand_over(
             simulating, watcher=TUNING, stamp_ns=self._intake.now_stamp_ns + 1
         )
-        self._wait_for_no_watcher()
+        self._expect_no_watcher()
         if not changes:
             return
         version, vehicle = self.parameters.version, self.parameters.in_force.vehicle
         self._rounds.use_vehicle(vehicle, version)
         self._intake.use_vehicle(vehicle)
         for change in changes:
-            self._events.tell(Tell("info", f"parameters {version}: {change_text(change)}"))
-            self._bus.publish("parameter", change, run=self._plan.run_id)
-        self._tables.add("parameters", [change_row(one, version=version) for one in changes])
+            self._context.tell(Tell("info", f"parameters {version}: {change_text(change)}"))
+            self._context.publish("parameter", change)
+        self._context.tables.add(
+            "parameters", [change_row(one, version=version) for one in changes]
+        )
 
     def process_up(self, process_id: str) -> bool:
         """Tell a process what counts; returns whether its answer must be waited for."""
-        told = self._simulates(process_id) and self.parameters.tell(process_id)
-        self._wait_for_no_watcher()
-        return told
+        awaited = self._simulates(process_id) and self.parameters.tell(process_id)
+        self._expect_no_watcher()
+        return awaited
 
-    def _wait_for_no_watcher(self) -> None:
-        """Live, let no round wait for who only watches: he may be seconds behind."""
-        if not self._plan.config.lock_step:
+    def _expect_no_watcher(self) -> None:
+        """Live, let no round wait for a process that only watches: it may be seconds behind."""
+        if not self._config.lock_step:
             self.parameters.answered(TUNING)
 
     def process_down(self, process_id: str) -> None:
@@ -123,14 +114,8 @@ class TuningLink:
         if TUNING not in self._alive:
             return
         self.weighing = True
-        self._bus.request(
-            "tune",
-            TuneRequest(published=published, states=self._intake.states),
-            self._mailbox,
-            timeout_s=TUNE_TIMEOUT_S,
-            run=self._plan.run_id,
-            process=TUNING,
-        )
+        question = TuneRequest(published=published, states=self._intake.states)
+        self._context.request(TUNING, "tune", question, timeout_s=TUNE_TIMEOUT_S, tag=None)
 
     def take_weighed(self) -> None:
         """Lock step: take what the last answer has brought."""
@@ -141,27 +126,21 @@ class TuningLink:
     def record(self) -> dict[str, object]:
         """Return the `tuning` of run.json."""
         return {
-            "mode": self._plan.config.tuning_choice.mode,
+            "mode": self._config.tuning_choice.mode,
             "version": self.parameters.version,
             "changes": self.parameters.rows(),
             "pinned": sorted(self.parameters.in_force.pinned),
             **self.findings.record(),
         }
 
-    def _identified(self, told: Identification) -> None:
-        if self._plan.config.tuning_choice.mode == "apply":
-            self.parameters.apply(told)
+    def _identified(self, found: Identification) -> None:
+        if self._config.tuning_choice.mode == "apply":
+            self.parameters.apply(found)
 
     def _simulates(self, process_id: str) -> bool:
         return process_id in (MIRROR, TUNING) or process_id.startswith("w")
 
     def _ask(self, process_id: str, message: UseVehicle) -> None:
-        self._bus.request(
-            "use_vehicle",
-            message,
-            self._mailbox,
-            tag=process_id,
-            timeout_s=USE_TIMEOUT_S,
-            run=self._plan.run_id,
-            process=process_id,
+        self._context.request(
+            process_id, "use_vehicle", message, timeout_s=USE_TIMEOUT_S, tag=process_id
         )

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from foretwin.contracts.setup import ProcessSetup, write_setup
-from foretwin.orchestrator.drive.priorities import gives_way
+from foretwin.orchestrator.runner.priorities import gives_way
 
 log = logging.getLogger("orchestrator")
 

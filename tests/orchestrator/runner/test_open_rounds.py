@@ -8,7 +8,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import FuturesResult, Job, Outcome, PathAhead, Trajectory
 from foretwin.contracts.runner import Answer, JobAnswer
-from foretwin.orchestrator.rounds.open_rounds import (
+from foretwin.orchestrator.runner.open_rounds import (
     OpenRounds,
     RoundDone,
     RoundGivenUp,

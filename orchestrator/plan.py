@@ -1,0 +1,98 @@
+"""What a drive is made of: its inputs, all read and checked, and the folder of its run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.config import DriveConfig, VehicleBeside
+from foretwin.orchestrator.routing.road_index import RoadIndex
+from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.standin_path import StandinPath
+from foretwin.orchestrator.worlds.opening import Clip
+from foretwin.telemetry.ros2.mapping import MappingFile
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.road_graph import RoadGraph
+
+
+class Beside(NamedTuple):
+    """A vehicle beside the car, its parameters, and whether its commands are recorded."""
+
+    config: VehicleBeside
+    vehicle: VehicleParameters
+    commands_recorded: bool
+    ros2: MappingFile | None = None
+    """How its own ROS 2 topics are read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveInputs:
+    """Everything read: nothing here has touched the folder of runs yet."""
+
+    config: DriveConfig
+    map_file: Path
+    clip: Clip | None
+    """What of a large map is read: the surroundings of the way known beforehand."""
+    osm: OsmMap
+    graph: RoadGraph
+    index: RoadIndex
+    junctions: tuple[Junction, ...]
+    added_roads: tuple[int, ...]
+    """Indices of service roads that count as car roads in this drive."""
+    routes: tuple[Route, ...]
+    route_source: str
+    drive_frame: LocalFrame
+    vehicle: VehicleParameters
+    beside: tuple[Beside, ...]
+    log_file: Path | None
+    info: VehicleInfo | None
+    standin: StandinPath | None
+    ros2: MappingFile | None = None
+    """How the live car's ROS 2 topics are read, and what goes back."""
+
+    @property
+    def towards_vehicle(self) -> bool:
+        """Whether both switches are on: anything may go out towards the vehicle."""
+        enabled = self.ros2 is not None and self.ros2.mapping.towards_vehicle.enabled
+        return enabled and self.config.towards_vehicle
+
+    @property
+    def commands_recorded(self) -> bool:
+        """Whether the vehicle sends the commands that its automated driving gives."""
+        return self.info is None or "control" in self.info.sends
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrivePlan(DriveInputs):
+    """The inputs with a run's id, its folder and its bus."""
+
+    run_id: str
+    folder: Path
+    bus: BusSetup
+    live_view: str
+
+    @property
+    def worlds_dir(self) -> Path:
+        """Where this run's Worlds lie."""
+        return self.folder / "worlds"
+
+    @property
+    def processes_dir(self) -> Path:
+        """Where the setups of this run's processes lie."""
+        return self.folder / "processes"
+
+    @property
+    def standin_path_file(self) -> Path:
+        """What the stand-in car drives."""
+        return self.processes_dir / "standin_path.json"
+
+    @property
+    def start_stamp_ns(self) -> int:
+        """The stamp of drive time 0."""
+        return 0 if self.info is None else self.info.start_stamp_ns

@@ -1,0 +1,70 @@
+"""Which processes a drive consists of, and what each is started with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+
+from foretwin.contracts.setup import WorkerSetup
+from foretwin.orchestrator.config import VehicleBeside
+from foretwin.orchestrator.drive.processes import PROCESSES, TUNING, process_ids, row_of
+from foretwin.orchestrator.plan import Beside, DrivePlan
+from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
+from tests.orchestrator.trip import town_plan
+
+
+def configured(plan: DrivePlan, **settings: object) -> DrivePlan:
+    return replace(plan, config=msgspec.structs.replace(plan.config, **settings))
+
+
+def ids(plan: DrivePlan) -> list[str]:
+    return [one for row in PROCESSES for one in process_ids(row, plan)]
+
+
+def autoware() -> MappingFile:
+    return read_mapping(Path("autoware"))
+
+
+def test_a_drive_has_its_workers_one_source_and_what_it_is_asked_for(tmp_path: Path) -> None:
+    plan = configured(town_plan(tmp_path), workers=3, tuning="off", source="standin")
+    assert ids(plan) == ["builder", "w0", "w1", "w2", "mirror", "recorder", "viewer", "vehicle"]
+    assert TUNING in ids(configured(plan, tuning="report"))
+    live = configured(plan, source="live")
+    assert "vehicle" not in ids(live)
+    assert "ros2" in ids(replace(live, ros2=autoware()))
+
+
+def test_each_vehicle_beside_with_topics_of_its_own_has_its_gateway(tmp_path: Path) -> None:
+    plan = configured(town_plan(tmp_path), tuning="off")
+    beside = tuple(
+        Beside(VehicleBeside(id=name, live=True), plan.vehicle, True, ros2=topics)
+        for name, topics in (("a", autoware()), ("b", None), ("c", autoware()))
+    )
+    plan = replace(plan, beside=beside)
+    (row,) = (row for row in PROCESSES if row.name == "ros2-beside")
+    setups = [row.setup(plan, one) for one in process_ids(row, plan)]
+    assert [setup.process_id for setup in setups] == ["ros2-beside0", "ros2-beside1"]
+    assert [setup.vehicle_id for setup in setups] == ["a", "c"]
+
+
+def test_every_process_is_started_for_this_run_and_the_mirror_plays_no_futures(
+    tmp_path: Path,
+) -> None:
+    plan = configured(town_plan(tmp_path), source="standin")
+    setups = {one: row.setup(plan, one) for row in PROCESSES for one in process_ids(row, plan)}
+    assert all(setup.process_id == one for one, setup in setups.items())
+    assert {(setup.run_id, setup.bus) for setup in setups.values()} == {(plan.run_id, plan.bus)}
+    mirror, worker = setups["mirror"], setups["w0"]
+    assert isinstance(mirror, WorkerSetup)
+    assert isinstance(worker, WorkerSetup)
+    assert (mirror.role, worker.role, mirror.planners) == ("mirror", "futures", ())
+    assert plan.config.planner in worker.planners
+
+
+def test_in_lock_step_tuning_does_not_begin_in_the_middle(tmp_path: Path) -> None:
+    plan = town_plan(tmp_path)
+    (row,) = (row for row in PROCESSES if row.name == TUNING)
+    assert row_of(row, configured(plan, speed=1.0)).when_dead == "restart"
+    assert row_of(row, configured(plan, speed=None)).when_dead == "report"

@@ -1,0 +1,81 @@
+"""The Worlds of a sweep: junctions of a map or files of a folder, chosen as the spec says."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.sweep.spec import SweepSpec
+from foretwin.orchestrator.sweep.worlds import Progress, source_digest, sweep_worlds
+from foretwin.orchestrator.worlds.choice import choose_junctions
+from foretwin.world_gen.world_store import WorldStore
+from tests.sim_worker.scenarios.worlds import cross
+
+TOWN = str(MAP_FILE)
+
+
+def counting(seen: list[str]) -> Progress:
+    """Progress that notes what is done."""
+    return lambda total, what: nullcontext((seen.append, total))
+
+
+def ids() -> list[str]:
+    return [junction.summary.id for junction in choose_junctions(MAP_FILE).junctions]
+
+
+def test_junctions_of_a_map_are_built_and_one_that_fails_stops_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good, bad = ids()[:2]
+    build = WorldStore.save
+
+    def save(store: WorldStore, world: object) -> object:
+        if world.intersection.id == bad:  # type: ignore[attr-defined]
+            raise OSError("disk full")
+        return build(store, world)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(WorldStore, "save", save)
+    seen: list[str] = []
+    spec = SweepSpec(map=TOWN, junctions=(good, bad), radius_m=60.0)
+    found = sweep_worlds(spec, tmp_path, counting(seen))
+    assert seen == sorted([good, bad])
+    assert len(found.ids) == 1
+    assert (found.folder / f"{found.ids[0]}.world").is_file()
+    assert found.failures == {bad: "OSError: disk full"}
+
+
+def test_a_sample_is_drawn_by_the_seed(tmp_path: Path) -> None:
+    def chosen(seed: int) -> list[str]:
+        names: list[str] = []
+        spec = SweepSpec(map=TOWN, sample=1, radius_m=60.0, seed=seed)
+        sweep_worlds(spec, tmp_path, counting(names))
+        return names
+
+    assert chosen(3) == chosen(3)
+    assert len(chosen(3)) == 1
+
+
+def test_what_is_not_there_is_named(tmp_path: Path) -> None:
+    for wrong, named in (
+        ({"junctions": ("n999",)}, "no such intersection"),
+        ({"bbox": "-30.0001,44.5,-30.0,44.5001"}, "no junction in bbox"),
+    ):
+        with pytest.raises(UserError, match=named):
+            sweep_worlds(SweepSpec(map=TOWN, **wrong), tmp_path, counting([]))  # type: ignore[arg-type]
+    WorldStore(tmp_path / "drawn").save(cross())
+    spec = SweepSpec(worlds=str(tmp_path / "drawn"), junctions=("n999",))
+    with pytest.raises(UserError, match="none of junction n999"):
+        sweep_worlds(spec, tmp_path, counting([]))
+
+
+def test_worlds_of_a_folder_are_taken_as_they_lie_there(tmp_path: Path) -> None:
+    WorldStore(tmp_path / "drawn").save(cross())
+    spec = SweepSpec(worlds=str(tmp_path / "drawn"))
+    found = sweep_worlds(spec, tmp_path, counting([]))
+    assert found.ids == (cross().id,)
+    assert source_digest(spec) == cross().id
+    assert source_digest(SweepSpec(map=TOWN)) != source_digest(spec)
