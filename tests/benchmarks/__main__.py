@@ -25,6 +25,7 @@ BENCHMARKS = (
     "boxes_200",
     "boxes_1000",
     "full_scene",
+    "live_metrics",
     "metadrive",
     "gym_steps",
     "world_from_open_map",
