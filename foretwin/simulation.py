@@ -29,6 +29,7 @@ from foretwin.contracts.job_identity import job_bytes, vehicle_digest
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.orchestrator.record.job_tables import as_table
 from foretwin.sim_worker.driver_model import UNKNOWN_LIMIT_MPS
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_rows import future_rows
@@ -67,8 +68,8 @@ class Futures(NamedTuple):
 
     @property
     def table(self) -> pa.Table:
-        """The rows as a table."""
-        return pa.Table.from_pylist(self.rows)
+        """The rows as a table, with the columns of the table `futures` of a run or sweep."""
+        return as_table("futures", self.rows)
 
 
 def ways_through(world: World) -> tuple[Way, ...]:
@@ -154,6 +155,8 @@ def run_futures(
     )
     result = run_alone(job, world, car)
     rows = future_rows(job, result, job_sha256=job_bytes(job).sha256)
+    for row in rows:
+        row |= {"junction_id": world.intersection.id, "vehicle": car.name}
     return Futures(job, result, rows)
 
 

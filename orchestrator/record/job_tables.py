@@ -6,7 +6,6 @@ import json
 import platform
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 
@@ -119,6 +118,6 @@ def keep_vehicles(folder: Path, vehicles: Iterable[VehicleParameters]) -> None:
         write_message(vehicle, folder / VEHICLES / f"{vehicle_digest(vehicle)}.vehicle")
 
 
-def as_table(name: str, rows: list[Row], metadata: dict[str, str]) -> Any:
+def as_table(name: str, rows: list[Row], metadata: dict[str, str] | None = None) -> pa.Table:
     """Return rows as a table of `JOB_TABLES`."""
     return pa.Table.from_pylist(rows, schema=JOB_TABLES[name].with_metadata(metadata))

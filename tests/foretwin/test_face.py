@@ -12,6 +12,7 @@ import pytest
 import foretwin
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 
@@ -109,12 +110,35 @@ def test_a_fault_as_wished_has_its_effect(world: foretwin.World) -> None:
     assert aside[1] - aside[0] == pytest.approx(0.5, abs=0.15)
 
 
+@pytest.mark.parametrize("scenarios", [(), ("scp",)])
+def test_futures_have_the_table_of_runs_and_sweeps(
+    world: foretwin.World, scenarios: tuple[str, ...]
+) -> None:
+    way = foretwin.ways_through(world)[0]
+    car = foretwin.state_on(world, way)
+
+    table = foretwin.run_futures(world, way, car, count=4, scenarios=scenarios, horizon_s=3.0).table
+
+    assert table.schema.equals(TABLES["futures"])
+    rows = table.to_pylist()
+    assert [row["scenario"] for row in rows] == [
+        "",
+        *(scenarios or ("",)),
+        "",
+        *(scenarios or ("",)),
+    ]
+    assert {(row["junction_id"], row["vehicle"]) for row in rows} == {
+        (world.intersection.id, foretwin.load_vehicle().name)
+    }
+
+
 def test_what_a_sweep_left_is_read(tmp_path: Path) -> None:
     loaded = load_spec(small_sweep(tmp_path, SMALL.replace("cases = 2", "cases = 1")))
     summary = run_sweep(loaded, tmp_path / "out", alone(loaded))
 
     left = foretwin.open_sweep(tmp_path / "out")
 
+    assert left.table("futures").schema.equals(TABLES["futures"])
     assert left.record["rows_sha256"] == summary["rows_sha256"]
     assert left.table("futures").num_rows == summary["rows"]
     assert left.table("jobs").num_rows == summary["jobs"]
