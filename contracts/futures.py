@@ -59,7 +59,8 @@ class Future(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def numbers_of(future: Future) -> dict[str, float]:
-    """Return all numbers of a future by name: its own, joined with those that its scenario draws.
+    """Return all numbers of a future by name: its own, joined with those that its scenario draws
+    and held within their ranges.
 
     Raises ValueError for a name that the table lacks.
     """
@@ -69,11 +70,12 @@ def numbers_of(future: Future) -> dict[str, float]:
             f"{', '.join(FUTURE_NUMBERS)}"
         )
     drawn = future.values if future.scenario_id else {}
-    found = {}
-    for name, row in FUTURE_NUMBERS.items():
-        value = drawn.get(f"{FAULTS}.{name}", row.neutral)
-        found[name] = row.joined(value, future.numbers[name]) if name in future.numbers else value
-    return found
+    return {
+        name: row.joined(
+            drawn.get(f"{FAULTS}.{name}", row.neutral), future.numbers.get(name, row.neutral)
+        )
+        for name, row in FUTURE_NUMBERS.items()
+    }
 
 
 class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):

@@ -25,6 +25,44 @@ itself to be.
 Operation = Literal["multiply", "add"]
 
 
+class Range(NamedTuple):
+    """What a number may be, both ends included but where it is to be above `low`."""
+
+    low: float
+    high: float
+    above_low: bool = False
+
+    def __str__(self) -> str:
+        if self.above_low:
+            return f"above {self.low:g}, at most {self.high:g}"
+        return f"{self.low:g} to {self.high:g}"
+
+
+MAX_SPEED_MPS = 100.0
+"""No car on a road, and no limit, is faster than 360 km/h."""
+MAX_ASIDE_M = 20.0
+"""Half of the widest roads there are, ten lanes of 4 m."""
+MAX_BELIEF_OFFSET_M = 100.0
+"""As far as satellite positions are off between high buildings, rarely."""
+MAX_GAP_M = 2000.0
+"""As far as the largest World reaches."""
+MAX_HORIZON_S = 60.0
+"""What begins after the longest future is over does not happen in it."""
+MAX_DECEL_MPS2 = 60.0
+"""Six times gravity, as racing cars brake."""
+MAX_EXTRA_DELAY_S = 0.4
+"""As long as a stage can hold back a command on top of the vehicle's own delay."""
+MAX_PERCEPTION_DELAY_S = 10.0
+"""What was seen is remembered for each control tick of the delay."""
+MAX_SEED = 2**63 - 1
+"""As messages and tables hold it."""
+
+_SIDE = Range(-MAX_ASIDE_M, MAX_ASIDE_M)
+_WHILE = Range(0.0, MAX_HORIZON_S)
+_FACTOR = Range(0.0, 10.0)
+"""Ten times what cars do, or ask for, is beyond what any of them can."""
+
+
 class FutureNumber(NamedTuple):
     """One row: `operation` is how the number acts on `acts_on`, and how a sweep's or a future's
     own value joins that of its scenario."""
@@ -33,10 +71,7 @@ class FutureNumber(NamedTuple):
     operation: Operation
     acts_on: Quantity
     meaning: str
-    low: float = -math.inf
-    high: float = math.inf
-    above_low: bool = False
-    """Whether `low` itself is out of range."""
+    range: Range
 
     @property
     def part(self) -> Literal["aim", "fault"]:
@@ -49,12 +84,10 @@ class FutureNumber(NamedTuple):
         return 1.0 if self.operation == "multiply" else 0.0
 
     def joined(self, value: float, other: float) -> float:
-        """Return two values of this number as one."""
-        return value * other if self.operation == "multiply" else value + other
+        """Return two values of this number as one, held within its range."""
+        both = value * other if self.operation == "multiply" else value + other
+        return min(max(both, self.range.low), self.range.high)
 
-
-MAX_EXTRA_DELAY_S = 0.4
-"""As long as a stage can hold back a command on top of the vehicle's own delay."""
 
 _FUTURE_NUMBERS = {
     "target_speed_factor": FutureNumber(
@@ -62,50 +95,72 @@ _FUTURE_NUMBERS = {
         "multiply",
         "aim.target_speed_mps",
         "of the speed that the nominal future aims at",
-        low=0.0,
+        _FACTOR,
     ),
     "target_speed_offset_mps": FutureNumber(
-        "m/s", "add", "aim.target_speed_mps", "on top of the speed aimed at"
+        "m/s",
+        "add",
+        "aim.target_speed_mps",
+        "on top of the speed aimed at",
+        Range(-MAX_SPEED_MPS, MAX_SPEED_MPS),
     ),
     "lateral_shift_m": FutureNumber(
-        "m", "add", "aim.offset_m", "how far to the left of its place on the path the ego aims"
+        "m",
+        "add",
+        "aim.offset_m",
+        "how far to the left of its place on the path the ego aims",
+        _SIDE,
     ),
     "friction_factor": FutureNumber(
         "1",
         "multiply",
         "ground.friction_factor",
         "of the ground's friction",
-        low=0.0,
-        above_low=True,
+        Range(0.0, 4.0, above_low=True),  # Drag racers on a prepared strip.
     ),
     "extra_steering_delay_s": FutureNumber(
         "s",
         "add",
         "vehicle.steering_delay_s",
         "between a steering command and the tyres, on top of the vehicle's own",
-        low=0.0,
-        high=MAX_EXTRA_DELAY_S,
+        Range(0.0, MAX_EXTRA_DELAY_S),
     ),
     "steering_gain": FutureNumber(
-        "1", "multiply", "command.tire_angle_rad", "of the tyre angle commanded"
+        "1",
+        "multiply",
+        "command.tire_angle_rad",
+        "of the tyre angle commanded",
+        Range(-10.0, 10.0),  # From little to the tyres' limit, to either side.
     ),
     "steering_offset_rad": FutureNumber(
-        "rad", "add", "command.tire_angle_rad", "on top of the tyre angle commanded"
+        "rad",
+        "add",
+        "command.tire_angle_rad",
+        "on top of the tyre angle commanded",
+        Range(-1.5, 1.5),  # Tyres turn by less than a right angle.
     ),
     "brake_gain": FutureNumber(
-        "1", "multiply", "command.brake_mps2", "of the deceleration commanded", low=0.0
+        "1", "multiply", "command.brake_mps2", "of the deceleration commanded", _FACTOR
     ),
     "perception_delay_s": FutureNumber(
-        "s", "add", "perception.delay_s", "how late everybody else is seen", low=0.0
+        "s",
+        "add",
+        "perception.delay_s",
+        "how late everybody else is seen",
+        Range(0.0, MAX_PERCEPTION_DELAY_S),
     ),
     "position_offset_m": FutureNumber(
-        "m", "add", "belief.offset_m", "how far to the left of the truth the planner believes to be"
+        "m",
+        "add",
+        "belief.offset_m",
+        "how far to the left of the truth the planner believes to be",
+        Range(-MAX_BELIEF_OFFSET_M, MAX_BELIEF_OFFSET_M),
     ),
     "lost_from_s": FutureNumber(
-        "s", "add", "perception.lost_from_s", "when the loss of all detections begins", low=0.0
+        "s", "add", "perception.lost_from_s", "when the loss of all detections begins", _WHILE
     ),
     "lost_for_s": FutureNumber(
-        "s", "add", "perception.lost_for_s", "how long all detections are lost", low=0.0
+        "s", "add", "perception.lost_for_s", "how long all detections are lost", _WHILE
     ),
 }
 FUTURE_NUMBERS: Mapping[str, FutureNumber] = MappingProxyType(_FUTURE_NUMBERS)
@@ -116,19 +171,18 @@ class ScenarioNumber(NamedTuple):
     """A number of a scenario's ego or of one of its road users, by its field."""
 
     unit: str
-    low: float = -math.inf
-    high: float = math.inf
+    range: Range
 
 
 _SCENARIO_NUMBERS = {
-    "speed_mps": ScenarioNumber("m/s", 0.0),
-    "lateral_shift_m": ScenarioNumber("m"),
-    "impact_share": ScenarioNumber("1", 0.0, 1.0),
-    "arrives_after_s": ScenarioNumber("s"),
-    "gap_m": ScenarioNumber("m", 0.0),
-    "lateral_m": ScenarioNumber("m"),
-    "acts_after_s": ScenarioNumber("s", 0.0),
-    "decel_mps2": ScenarioNumber("m/s²", 0.0),
+    "speed_mps": ScenarioNumber("m/s", Range(0.0, MAX_SPEED_MPS)),
+    "lateral_shift_m": ScenarioNumber("m", _SIDE),
+    "impact_share": ScenarioNumber("1", Range(0.0, 1.0)),
+    "arrives_after_s": ScenarioNumber("s", Range(-MAX_HORIZON_S, MAX_HORIZON_S)),
+    "gap_m": ScenarioNumber("m", Range(0.0, MAX_GAP_M)),
+    "lateral_m": ScenarioNumber("m", _SIDE),
+    "acts_after_s": ScenarioNumber("s", _WHILE),
+    "decel_mps2": ScenarioNumber("m/s²", Range(0.0, MAX_DECEL_MPS2)),
 }
 SCENARIO_NUMBERS: Mapping[str, ScenarioNumber] = MappingProxyType(_SCENARIO_NUMBERS)
 """Numbers of a case by their fields: `ego.speed_mps`, `<actor>.gap_m` and so on."""
@@ -139,14 +193,11 @@ def out_of_range(name: str, least: float, most: float) -> str:
 
     Raises KeyError for an unknown name.
     """
-    row = FUTURE_NUMBERS.get(name) or SCENARIO_NUMBERS[name]
+    allowed = (FUTURE_NUMBERS.get(name) or SCENARIO_NUMBERS[name]).range
     if not (math.isfinite(least) and math.isfinite(most)):
         return "must be finite"
-    if math.isfinite(row.high) and not row.low <= least <= most <= row.high:
-        wrong = least if least < row.low else most
-        return f"reaches {wrong:g}; it must be from {row.low:g} to {row.high:g}"
-    if least == row.low and isinstance(row, FutureNumber) and row.above_low:
-        return f"reaches {least:g}; it must be above {row.low:g}"
-    if least < row.low:
-        return f"reaches {least:g}; it must be {row.low:g} or more"
+    below = least < allowed.low or (allowed.above_low and least == allowed.low)
+    if below or most > allowed.high:
+        ends = str(allowed) if allowed.above_low else f"from {allowed}"
+        return f"reaches {least if below else most:g}; it must be {ends}"
     return ""

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.numbers import MAX_SEED
 from foretwin.contracts.roles import Correction, FollowLimits, Role
 from foretwin.orchestrator.settings import read_toml, settings_from
 from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning, processors
@@ -144,6 +145,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         # No number, and infinity, is in no range.
         speed = self.speed is None or 0.0 < self.speed <= 1000.0
         yield speed, f"--speed {self.speed}: above 0, at most 1000, or max"
+        yield 0 <= self.seed <= MAX_SEED, f"--seed {self.seed}: 0 to {MAX_SEED}"
         yield self.start_s >= 0.0, f"--start {self.start_s}: not negative"
         end = self.end_s is None or self.end_s > self.start_s
         yield end, f"--end {self.end_s}: after --start {self.start_s}"

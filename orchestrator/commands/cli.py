@@ -194,7 +194,8 @@ def sweep(
     spec: Annotated[
         Path,
         typer.Argument(
-            help="what to sweep over, TOML; [parameters] lists " + ", ".join(FUTURE_NUMBERS)
+            help="what to sweep over, TOML; [parameters] lists "
+            + ", ".join(f"{name} ({row.range})" for name, row in FUTURE_NUMBERS.items())
         ),
     ],
     out: Annotated[

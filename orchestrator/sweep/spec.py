@@ -10,7 +10,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import RESULT_STEP_S
-from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
+from foretwin.contracts.numbers import FUTURE_NUMBERS, MAX_SEED, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
@@ -164,7 +164,7 @@ def _checks(spec: SweepSpec) -> Iterator[tuple[bool, str]]:
     if spec.recorded is not None:
         yield spec.recorded.every_s > 0.0, "recorded.every_s: above 0"
         yield spec.recorded.longest_gap_s > 0.0, "recorded.longest_gap_s: above 0"
-    yield spec.seed >= 0, f"seed {spec.seed}: not negative"
+    yield 0 <= spec.seed <= MAX_SEED, f"seed {spec.seed}: 0 to {MAX_SEED}"
 
 
 def _whole(number: float) -> bool:

@@ -11,7 +11,7 @@ from typing import get_args, get_origin
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.numbers import out_of_range
+from foretwin.contracts.numbers import MAX_SEED, out_of_range
 from foretwin.contracts.scenario import (
     EGO,
     FAULTS,
@@ -45,26 +45,26 @@ def catalogue() -> dict[str, Scenario]:
     return {scenario.id: scenario for scenario in found}
 
 
-def find_scenario(name: str) -> Scenario:
+def find_scenario(name: Path | str) -> Scenario:
     """Return the scenario of a catalogue id or of a file that ends in .toml.
 
     Raises UserError for an id that the catalogue lacks, and what `read_scenario` raises.
     """
-    if name.endswith(".toml"):
-        return read_scenario(Path(name))
+    if str(name).endswith(".toml"):
+        return read_scenario(name)
     known = catalogue()
     if name not in known:
-        raise UserError(f"no scenario {name!r}; known: {', '.join(known)}, or a .toml file")
-    return known[name]
+        raise UserError(f"no scenario {str(name)!r}; known: {', '.join(known)}, or a .toml file")
+    return known[str(name)]
 
 
-def read_scenario(path: Path) -> Scenario:
+def read_scenario(path: Path | str) -> Scenario:
     """Read and check one scenario file.
 
-    Raises FileNotFoundError for a missing file and UserError, in one line with the file, the
-    field and what would be right, for anything that is no scenario.
+    Raises UserError, in one line with the file, the field and what would be right, for a missing
+    file (FileNotFoundError too) and for anything that is no scenario.
     """
-    return read_toml(path, Scenario, what="scenario", check=check_scenario, words=_words)
+    return read_toml(Path(path), Scenario, what="scenario", check=check_scenario, words=_words)
 
 
 def numbers(scenario: Scenario) -> Iterator[NamedNumber]:
@@ -104,6 +104,8 @@ def check_scenario(scenario: Scenario) -> None:
         )
     if not 1 <= scenario.samples <= 10_000:
         raise ValueError(f"samples is {scenario.samples}; it must be from 1 to 10000")
+    if not 0 <= scenario.seed <= MAX_SEED:
+        raise ValueError(f"seed is {scenario.seed}; it must be from 0 to {MAX_SEED}")
     _check_actors(scenario)
     for number in numbers(scenario):
         _check_number(number.name, number.value)
@@ -149,8 +151,9 @@ def _check_number(name: str, value: Number) -> None:
     field = name.split(".")[-1]
     if isinstance(value, Distribution):
         _check_span(name, value)
-        least = min((*value.values, *(v for v in (value.min,) if v is not None)), default=0.0)
-        most = max((*value.values, *(v for v in (value.max,) if v is not None)), default=0.0)
+        span = (v for v in (value.min, value.max, value.mean) if v is not None)
+        given = *value.values, *span
+        least, most = min(given), max(given)
     else:
         least = most = value
     if wrong := out_of_range(field, least, most):

@@ -9,10 +9,16 @@ import msgspec
 import pytest
 
 from foretwin.contracts.futures import Future, numbers_of
-from foretwin.contracts.numbers import FUTURE_NUMBERS, SCENARIO_NUMBERS, out_of_range
+from foretwin.contracts.numbers import (
+    FUTURE_NUMBERS,
+    MAX_EXTRA_DELAY_S,
+    SCENARIO_NUMBERS,
+    out_of_range,
+)
 from foretwin.contracts.scenario import ActorPart, EgoPart, FaultPart, Number, Scenario
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results.md"
+DOCS = Path(__file__).parents[2] / "docs"
+RESULTS, SCENARIOS = DOCS / "results.md", DOCS / "scenarios.md"
 
 
 def test_every_number_of_a_scenario_has_a_row() -> None:
@@ -52,15 +58,36 @@ def test_a_futures_own_numbers_join_those_of_its_scenario() -> None:
     assert alone["friction_factor"] == 0.5, "values belong to a scenario"
 
 
+def test_every_range_is_finite() -> None:
+    for row in (*FUTURE_NUMBERS.values(), *SCENARIO_NUMBERS.values()):
+        assert -math.inf < row.range.low < row.range.high < math.inf
+
+
+def test_what_two_come_to_together_stays_in_range() -> None:
+    future = Future(
+        index=0,
+        name="late",
+        scenario_id="scp",
+        values={"faults.extra_steering_delay_s": 0.3},
+        numbers={"extra_steering_delay_s": 0.4},
+    )
+    assert numbers_of(future)["extra_steering_delay_s"] == MAX_EXTRA_DELAY_S
+
+
 @pytest.mark.parametrize(
     ("name", "least", "most", "said"),
     [
-        ("friction_factor", 0.0, 1.0, "reaches 0; it must be above 0"),
+        ("friction_factor", 0.0, 1.0, "reaches 0; it must be above 0, at most 4"),
         ("brake_gain", 0.0, 1.0, ""),
-        ("brake_gain", -0.5, 1.0, "reaches -0.5; it must be 0 or more"),
+        ("brake_gain", -0.5, 1.0, "reaches -0.5; it must be from 0 to 10"),
         ("extra_steering_delay_s", 0.0, 0.5, "reaches 0.5; it must be from 0 to 0.4"),
         ("impact_share", -0.1, 1.0, "reaches -0.1; it must be from 0 to 1"),
         ("lateral_shift_m", -9.0, math.inf, "must be finite"),
+        ("lateral_shift_m", -9.0, 1e5, "reaches 100000; it must be from -20 to 20"),
+        ("steering_gain", 1.0, 1e308, "reaches 1e+308; it must be from -10 to 10"),
+        ("friction_factor", 1.0, 1e9, "reaches 1e+09; it must be above 0, at most 4"),
+        ("perception_delay_s", 0.0, 1e300, "reaches 1e+300; it must be from 0 to 10"),
+        ("speed_mps", 0.0, 1e3, "reaches 1000; it must be from 0 to 100"),
     ],
 )
 def test_what_is_out_of_range_is_said(name: str, least: float, most: float, said: str) -> None:
@@ -72,16 +99,11 @@ def test_the_documentation_has_the_same_table() -> None:
     for name, row in FUTURE_NUMBERS.items():
         line = next(line for line in told if line.startswith(f"| `{name}` |"))
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        assert cells[1:] == [row.unit, _range(name), _operation(name), row.meaning]
-
-
-def _range(name: str) -> str:
-    row = FUTURE_NUMBERS[name]
-    if math.isfinite(row.high):
-        return f"{row.low:g} to {row.high:g}"
-    if math.isfinite(row.low):
-        return f"above {row.low:g}" if row.above_low else f"{row.low:g} or more"
-    return "any"
+        assert cells[1:] == [row.unit, str(row.range), _operation(name), row.meaning]
+    told = [line for line in SCENARIOS.read_text(encoding="utf-8").splitlines() if "`" in line]
+    for name, number in SCENARIO_NUMBERS.items():
+        line = next(line for line in told if line.startswith(f"| `{name}` |"))
+        assert [cell.strip() for cell in line.split("|")[2:4]] == [number.unit, str(number.range)]
 
 
 def _operation(name: str) -> str:

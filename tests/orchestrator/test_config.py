@@ -31,6 +31,8 @@ def test_no_file_and_no_flags_is_the_embedded_drive() -> None:
         ({"workers": 0}, "--workers 0"),
         ({"least_futures": 0}, "--least-futures 0"),
         ({"futures": 8, "least_futures": 9}, "--least-futures 9: 1 to --futures, which is 8"),
+        ({"seed": -1}, "--seed -1: 0 to 9223"),
+        ({"seed": 2**70}, "--seed 1180591620717411303424: 0 to 9223"),
         ({"rate_hz": 0.0}, "--rate 0.0"),
         ({"speed": "fast"}, "--speed fast"),
         ({"speed": -1.0}, "--speed -1.0"),

@@ -68,6 +68,11 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
             "reaches 0.9; it must be from 0 to 0.4",
         ),
         ('map = "a"\n[parameters]\nlateral_shift_m = [inf]', "must be finite"),
+        ('map = "a"\n[parameters]\nperception_delay_s = [1e300]', "it must be from 0 to 10"),
+        ('map = "a"\n[parameters]\nsteering_gain = [1e308]', "it must be from -10 to 10"),
+        ('map = "a"\n[parameters]\nlateral_shift_m = [1e5]', "it must be from -20 to 20"),
+        ('map = "a"\nseed = 99999999999999999999', "seed 99999999999999999999: 0 to 9223"),
+        ('map = "a"\nseed = -1', "seed -1: 0 to 9223"),
         ("map = ", "not TOML"),
     ],
 )

@@ -42,7 +42,7 @@ def test_actuators_spoil_what_is_commanded() -> None:
 def test_a_new_fault_of_a_known_quantity_is_one_row(monkeypatch: pytest.MonkeyPatch) -> None:
     more = dict(numbers.FUTURE_NUMBERS) | {
         "weak_engine_gain": numbers.FutureNumber(
-            "1", "multiply", "command.accel_mps2", "of what is commanded", low=0.0
+            "1", "multiply", "command.accel_mps2", "of what is commanded", numbers.Range(0.0, 1.0)
         )
     }
     for place in (numbers, futures, module):

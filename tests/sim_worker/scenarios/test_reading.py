@@ -91,6 +91,8 @@ def test_a_file_is_found_by_id_or_by_path(tmp_path: Path) -> None:
         ("values = [8.0, 12.0]", "value = 8.0", "unknown field 'value'"),
         ("[ego]", "horizon_s = 0.0\n[ego]", "horizon_s is 0; it must be from 0.5 to 60"),
         ("[ego]", "lead_time_s = 9.0\n[ego]", "lead_time_s 9 is after the end"),
+        ("[ego]", "seed = -1\n[ego]", "seed is -1; it must be from 0 to 9223"),
+        ("min = 5.0, max = 9.0", "mean = 1e9, std = 1.0", "must be from 0 to 100"),
         ("[ego]", "samples = 0\n[ego]", "samples is 0; it must be from 1 to 10000"),
         ('name = "other"', 'name = "ego"', r"actors\[0\].name 'ego' is taken"),
         ('name = "other"', 'name = "other"\nhidden_by = "van"', "hidden_by 'van' must name"),
