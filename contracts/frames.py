@@ -17,6 +17,7 @@ import numpy as np
 import pyproj
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
 
 METRES_PER_DEG = 111_195.0
 """Of latitude, on a sphere of the Earth's mean radius, 6371 km (IUGG): for margins, not places."""
@@ -30,11 +31,11 @@ class GeoPoint(msgspec.Struct, frozen=True):
     alt_m: float = 0.0
 
     def validate(self) -> GeoPoint:
-        """Return self, or raise ValueError where the position is not on Earth or not finite."""
+        """Return self, or raise UserError where the position is not on Earth or not finite."""
         if not (np.isfinite(self.lat_deg) and np.isfinite(self.lon_deg)):
-            raise ValueError(f"position ({self.lat_deg}, {self.lon_deg}) is not finite")
+            raise UserError(f"position ({self.lat_deg}, {self.lon_deg}) is not finite")
         if not (-90.0 <= self.lat_deg <= 90.0 and -180.0 <= self.lon_deg <= 180.0):
-            raise ValueError(
+            raise UserError(
                 f"position ({self.lat_deg}, {self.lon_deg}) is outside latitude ±90, longitude ±180"
             )
         return self

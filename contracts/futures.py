@@ -7,13 +7,15 @@ tire_angle_rad, accel_mps2. `STATE_COLUMNS` names them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import msgspec
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
-from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
 from foretwin.contracts.scenario import FAULTS, Scenario
 
 _POSE = ("x_m", "y_m", "yaw_rad")
@@ -62,10 +64,10 @@ def numbers_of(future: Future) -> dict[str, float]:
     """Return all numbers of a future by name: its own, joined with those that its scenario draws
     and held within their ranges.
 
-    Raises ValueError for a name that the table lacks.
+    Raises UserError for a name that the table lacks.
     """
     if unknown := future.numbers.keys() - FUTURE_NUMBERS.keys():
-        raise ValueError(
+        raise UserError(
             f"future {future.name!r} has a number {min(unknown)!r}; known: "
             f"{', '.join(FUTURE_NUMBERS)}"
         )
@@ -76,6 +78,18 @@ def numbers_of(future: Future) -> dict[str, float]:
         )
         for name, row in FUTURE_NUMBERS.items()
     }
+
+
+def check_futures(futures: Sequence[Future]) -> None:
+    """Raise UserError for two futures of one index, or a number that is unknown or out of range."""
+    indices = [future.index for future in futures]
+    if twice := sorted({index for index in indices if indices.count(index) > 1}):
+        raise UserError(f"futures: two of index {twice[0]}; each needs one of its own")
+    for future in futures:
+        numbers_of(future)
+        for name, value in future.numbers.items():
+            if wrong := out_of_range(name, value, value):
+                raise UserError(f"future {future.name!r}: {name} {wrong}")
 
 
 class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):

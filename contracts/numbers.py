@@ -40,8 +40,8 @@ class Range(NamedTuple):
 
 MAX_SPEED_MPS = 100.0
 """No car on a road, and no limit, is faster than 360 km/h."""
-MAX_ASIDE_M = 20.0
-"""Half of the widest roads there are, ten lanes of 4 m."""
+MAX_ASIDE_M = 50.0
+"""Half of the widest road there is, of 26 lanes."""
 MAX_BELIEF_OFFSET_M = 100.0
 """As far as satellite positions are off between high buildings, rarely."""
 MAX_GAP_M = 2000.0

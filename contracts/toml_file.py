@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import msgspec
 
-from foretwin.contracts.errors import UserError
+from foretwin.contracts.errors import MissingFileError, UserError
 
 _Read = TypeVar("_Read")
 
@@ -25,14 +25,14 @@ def read_toml(
     """Return what a file of some kind, such as "scenario", holds.
 
     `check` raises ValueError for what is wrong though it has the right fields; `words` says in the
-    user's words what msgspec found. Raises FileNotFoundError for a missing file and UserError, in
-    one line with the file and the field, for anything else.
+    user's words what msgspec found. Raises UserError in one line: MissingFileError for a missing
+    file, and with the file and the field for anything else.
     """
     try:
         found = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), kind)
         check(found)
     except (FileNotFoundError, IsADirectoryError) as error:
-        raise FileNotFoundError(f"no {what} file {path}") from error
+        raise MissingFileError(f"no {what} file {path}") from error
     except UnicodeDecodeError as error:
         raise UserError(f"{what} file {path} is no UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:

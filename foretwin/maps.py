@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from pathlib import Path
 
+from foretwin.checks import expect, files_told, number, path_of
 from foretwin.contracts.codec import SchemaMismatch, read_message, write_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import IntersectionSummary, World
@@ -34,14 +35,15 @@ class Map:
 
     def nearest(self, lat_deg: float, lon_deg: float) -> IntersectionSummary:
         """Return the intersection nearest to a place; UserError where there is none near."""
-        return nearest_junction(self._opened, lat_deg, lon_deg).summary
+        place = number("lat_deg", lat_deg), number("lon_deg", lon_deg)
+        return nearest_junction(self._opened, *place).summary
 
     def world(self, intersection_id: str, *, radius_m: float = DEFAULT_RADIUS_M) -> World:
         """Return the World within `radius_m` of an intersection, in a frame of its own.
 
-        Raises UserError for an unknown intersection and ValueError for a radius that is not
-        between 10 and 2000 m.
+        Raises UserError for an unknown intersection, or a radius that is not between 10 and 2000 m.
         """
+        radius_m = number("radius_m", radius_m)
         junction = junction_by_id(self._opened, intersection_id)
         opened, index = self._opened, self._index
         return build_world(opened.osm, opened.graph, junction, radius_m=radius_m, index=index)
@@ -57,7 +59,7 @@ def open_map(file: Path | str, *, service_roads: bool = False) -> Map:
     With `service_roads`, driveways and parking aisles are roads like any other. Raises MapError, a
     UserError, where the file is no map or has no roads.
     """
-    return Map(read_whole(Path(file), service_roads=service_roads))
+    return Map(read_whole(path_of("file", file), service_roads=service_roads))
 
 
 def export_formats() -> dict[str, str]:
@@ -68,9 +70,10 @@ def export_formats() -> dict[str, str]:
 def export_world(world: World, file: Path | str, *, format_name: str | None = None) -> Path:
     """Write a World for another program; the file's suffix says as what where no format is named.
 
-    Raises UserError where neither says.
+    Raises UserError where neither says, or where the file cannot be written.
     """
-    file = Path(file)
+    file = path_of("file", file)
+    world = expect("world", world, World)
     named = formats_by_suffix(file.suffix)
     if format_name is None and len(named) != 1:
         wish = f"one of {', '.join(named)}" if named else f"one of {', '.join(FORMATS)}"
@@ -78,19 +81,26 @@ def export_world(world: World, file: Path | str, *, format_name: str | None = No
     name = named[0] if format_name is None else format_name
     if name not in FORMATS:
         raise UserError(f"format {name!r} is unknown; known: {', '.join(FORMATS)}")
-    FORMATS[name].write(world, file, ExportOptions())
+    with files_told(file):
+        FORMATS[name].write(world, file, ExportOptions())
     return file
 
 
 def save_world(world: World, file: Path | str) -> Path:
-    """Write a World as foretwin keeps it; `read_world` reads it again."""
-    write_message(world, Path(file))
-    return Path(file)
+    """Write a World as foretwin keeps it; `read_world` reads it again.
+
+    Raises UserError where the file cannot be written.
+    """
+    file = path_of("file", file)
+    with files_told(file):
+        write_message(expect("world", world, World), file)
+    return file
 
 
 def read_world(file: Path | str) -> World:
     """Return a World that foretwin wrote; UserError where the file holds none."""
     try:
-        return read_message(Path(file), World)
-    except (OSError, SchemaMismatch) as error:
-        raise UserError(f"{file}: {error}") from error
+        with files_told(file := path_of("file", file)):
+            return read_message(file, World)
+    except SchemaMismatch as error:
+        raise UserError(str(error)) from error

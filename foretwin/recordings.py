@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from foretwin.checks import path_of
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.record.job_tables import table_at
 
@@ -39,9 +40,9 @@ class Recording:
 
 def open_run(folder: Path | str) -> Recording:
     """Open what `foretwin drive` left; UserError where the folder holds no run."""
-    return Recording(Path(folder), _RUN)
+    return Recording(path_of("folder", folder), _RUN)
 
 
 def open_sweep(folder: Path | str) -> Recording:
     """Open what `foretwin sweep` left; UserError where the folder holds no sweep."""
-    return Recording(Path(folder), _SWEEP)
+    return Recording(path_of("folder", folder), _SWEEP)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
+from foretwin.checks import expect, number, path_of, whole_number
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
@@ -24,8 +26,10 @@ from foretwin.contracts.futures import (
     FuturesResult,
     Job,
     PathAhead,
+    check_futures,
 )
 from foretwin.contracts.job_identity import job_bytes, vehicle_digest
+from foretwin.contracts.numbers import MAX_HORIZON_S, MAX_SEED, out_of_range
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -37,11 +41,14 @@ from foretwin.sim_worker.futures.run_job import run_alone
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.scenarios.reading import numbers as numbers_of_cases
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 _NEAR_WAY_M = 10.0
+MAX_FUTURES = 10_000
+"""Side by side, in one process."""
 
 
 class Futures(NamedTuple):
@@ -74,6 +81,7 @@ class Futures(NamedTuple):
 
 def ways_through(world: World) -> tuple[Way, ...]:
     """Return the ways that a car can take through the World's intersection."""
+    expect("world", world, World)
     network = RoadNetwork(world)
     return tuple(network.way(p) for p in network.passages(world.intersection.id))
 
@@ -84,9 +92,10 @@ def state_on(
     """Return a car in its lane, `before_m` metres before the intersection.
 
     It drives at the speed limit there where no speed is given. Raises UserError where the way does
-    not reach back so far.
+    not reach back so far, or for a speed that no car has.
     """
-    arc_m = way.entry_m - before_m
+    expect("world", world, World)
+    arc_m = expect("way", way, Way).entry_m - number("before_m", before_m)
     if not PATH_BEHIND_M <= arc_m < way.path.length_m:
         most = way.entry_m - PATH_BEHIND_M
         raise UserError(f"{before_m:g} m before the intersection: way {way.name} has {most:.0f} m")
@@ -95,6 +104,9 @@ def state_on(
     limit = float(way.path.at_nodes(way.path.speed_limit_mps, np.array([arc_m]))[0])
     if speed_mps is None:
         speed_mps = limit if np.isfinite(limit) else UNKNOWN_LIMIT_MPS
+    speed_mps = number("speed_mps", speed_mps)
+    if wrong := out_of_range("speed_mps", speed_mps, speed_mps):
+        raise UserError(f"speed_mps {wrong}")
     lat, lon = geo_from_local(world.frame, xy)
     return VehicleState(
         vehicle_id="ego",
@@ -114,28 +126,38 @@ def run_futures(
     *,
     count: int = 64,
     futures: Sequence[Future] = (),
-    scenarios: Sequence[Scenario | str] = (),
+    scenarios: Sequence[Scenario | Path | str] | Scenario | Path | str = (),
     planner: str = "pure_pursuit_idm",
-    vehicle: VehicleParameters | None = None,
+    vehicle: VehicleParameters | Path | str | None = None,
     horizon_s: float = 8.0,
     seed: int = 0,
 ) -> Futures:
     """Play futures of a car that drives along `way` from `state`, side by side.
 
     `futures` as given, or a mix of `count`: the nominal one first, then others that differ in
-    speed, friction, steering delay and place in the lane, and in which `scenarios` (ids, files or
-    definitions) happen. Raises UserError for an unknown planner or scenario, or a state that is
-    not on the way.
+    speed, friction, steering delay and place in the lane, and in which `scenarios` (one or several
+    ids, files or definitions) happen. `vehicle` is a bundled one's name, a file or parameters.
+    Raises UserError for what cannot be played: an unknown planner or scenario, one that needs a
+    drive, a number out of range, a state that is not on the way.
     """
-    try:
-        check_planner(planner)
-    except ValueError as error:
-        raise UserError(str(error)) from error
-    known = tuple(find_scenario(s) if isinstance(s, str) else s for s in scenarios)
-    car = load_vehicle() if vehicle is None else vehicle
-    mix = tuple(futures) or plan_futures(
-        count=count, seed=seed, planners=(planner,), scenarios=known
+    expect("world", world, World)
+    expect("way", way, Way)
+    expect("state", state, VehicleState)
+    known = _scenarios(scenarios)
+    if not isinstance(vehicle, VehicleParameters):
+        vehicle = load_vehicle(None if vehicle is None else path_of("vehicle", vehicle))
+    seed = whole_number("seed", seed, 0, MAX_SEED)
+    given = tuple(expect("a future", future, Future) for future in futures)
+    _check_cases(given, known)
+    mix = given or plan_futures(
+        count=whole_number("count", count, 1, MAX_FUTURES),
+        seed=seed,
+        planners=(planner,),
+        scenarios=known,
     )
+    check_futures(mix)
+    for name in dict.fromkeys(future.planner for future in mix):
+        check_planner(name, in_drive=False)
     job = Job(
         round_id=0,
         job_index=0,
@@ -143,7 +165,7 @@ def run_futures(
         state=state,
         path=_path(world, way, state),
         futures=mix,
-        horizon_s=horizon_s,
+        horizon_s=_horizon(horizon_s),
         step_s=RESULT_STEP_S,
         seed=seed,
         cruise_speed_mps=state.speed_mps,
@@ -151,17 +173,51 @@ def run_futures(
         lights_by_plan=True,
         metrics=ROW_METRICS,
         accidents=True,
-        vehicle=vehicle_digest(car),
+        vehicle=vehicle_digest(vehicle),
     )
-    result = run_alone(job, world, car)
+    result = run_alone(job, world, vehicle)
     rows = future_rows(job, result, job_sha256=job_bytes(job).sha256)
     for row in rows:
-        row |= {"junction_id": world.intersection.id, "vehicle": car.name}
+        row |= {"junction_id": world.intersection.id, "vehicle": vehicle.name}
     return Futures(job, result, rows)
+
+
+def _scenarios(
+    given: Sequence[Scenario | Path | str] | Scenario | Path | str,
+) -> tuple[Scenario, ...]:
+    several = (given,) if isinstance(given, Scenario | Path | str) else given
+    return tuple(
+        one if isinstance(one, Scenario) else find_scenario(path_of("a scenario", one))
+        for one in several
+    )
+
+
+def _check_cases(futures: Sequence[Future], known: Sequence[Scenario]) -> None:
+    """Raise UserError where a future's values are no case of its scenario."""
+    names = {one.id: {number.name for number in numbers_of_cases(one)} for one in known}
+    for future in futures:
+        if future.scenario_id not in names:
+            continue
+        if wrong := names[future.scenario_id] ^ future.values.keys():
+            has = "an unknown" if min(wrong) in future.values else "no"
+            raise UserError(f"future {future.name!r} has {has} value {min(wrong)!r}")
+        for name, value in future.values.items():
+            if trouble := out_of_range(name.split(".")[-1], value, value):
+                raise UserError(f"future {future.name!r}: {name} {trouble}")
+
+
+def _horizon(given: float) -> float:
+    horizon_s = number("horizon_s", given)
+    steps = horizon_s / RESULT_STEP_S
+    if not RESULT_STEP_S <= horizon_s <= MAX_HORIZON_S or abs(steps - round(steps)) > 1e-6:
+        span = f"{RESULT_STEP_S:g} to {MAX_HORIZON_S:g} seconds, in steps of {RESULT_STEP_S:g}"
+        raise UserError(f"horizon_s {horizon_s:g}: {span}")
+    return horizon_s
 
 
 def _path(world: World, way: Way, state: VehicleState) -> PathAhead:
     """Return the way from a few metres behind the car on, a point each metre."""
+    state.position.validate()
     here = local_from_geo(world.frame, state.position.lat_deg, state.position.lon_deg)
     place = way.path.locate(np.asarray(here)[None])
     if not abs(place.offset_m[0]) <= _NEAR_WAY_M:

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from foretwin.world_gen.connections.connection_paths import draw_paths
@@ -46,10 +47,10 @@ def build_world(
     `index_map`) where many Worlds come from one map: making it takes longer than one World.
     Without `ground` it is a road network alone: no paved areas, kerbs, islands, sidewalks
     and buildings.
-    Raises ValueError where the radius is not between 10 and 2000 m.
+    Raises UserError where the radius is not between 10 and 2000 m.
     """
     if not 10.0 <= radius_m <= 2000.0:
-        raise ValueError(f"radius {radius_m} m is not between 10 and 2000 m")
+        raise UserError(f"radius {radius_m} m is not between 10 and 2000 m")
     index = index or index_map(osm, graph, (junction,))
     around = surroundings(index, world_frame(junction), Disc(radius_m), (junction,))
     return _world(index, around, junction.summary, ground=ground)

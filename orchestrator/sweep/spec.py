@@ -19,7 +19,7 @@ from foretwin.orchestrator.settings import read_toml, settings_from
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, read_drive
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
-from foretwin.sim_worker.planners.registry import REMOTE, check_planner
+from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
@@ -110,7 +110,7 @@ def check_spec(spec: SweepSpec) -> Loaded:
         for name in spec.junctions if spec.map is not None else ():
             node_of_id(name)
     for name in spec.planners:
-        check_planner(name)
+        check_planner(name, in_drive=False)
     _check_metrics(spec.metrics)
     _check_parameters(spec.parameters)
     scenarios = _scenarios(spec)
@@ -147,10 +147,6 @@ def _checks(spec: SweepSpec) -> Iterator[tuple[bool, str]]:
         names = getattr(spec, name)
         yield len(names) > 0, f"{name}: at least one name"
         yield len(set(names)) == len(names), f"{name}: each only once"
-    remote = (
-        f"planners: {REMOTE} asks a stack over the bus of a drive; a sweep has none to join yet"
-    )
-    yield REMOTE not in spec.planners, remote
     horizon, hz = spec.horizon_s, spec.control_hz
     in_steps = horizon is None or (1.0 <= horizon <= 60.0 and _whole(horizon / RESULT_STEP_S))
     yield in_steps, f"horizon_s {horizon}: 1 to 60 seconds, in steps of {RESULT_STEP_S:g}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.frames import GeoPoint, local_from_geo
 from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import LatLonBounds
@@ -26,7 +26,7 @@ def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
         if junction.summary.id == junction_id:
             return junction
     raise UserError(
-        f"--id {junction_id}: {opened.file} holds no such intersection; "
+        f"{junction_id}: {opened.file} holds no such intersection; "
         f"`foretwin intersections {opened.file}` lists all"
     )
 
@@ -35,7 +35,7 @@ def node_of_id(junction_id: str) -> int:
     """Return the node that a junction is named by; UserError where no junction is named so."""
     if not _JUNCTION_ID.fullmatch(junction_id):
         raise UserError(
-            f"--id {junction_id}: intersections are named n and a number, as n25; "
+            f"{junction_id}: intersections are named n and a number, as n25; "
             "`foretwin intersections MAP` lists all"
         )
     return int(junction_id[1:])
@@ -45,12 +45,13 @@ def nearest_junction(opened: OpenMap, lat: float, lon: float) -> Junction:
     """Return the junction nearest to a place; UserError where there is none near it."""
     if not opened.junctions:
         raise UserError(f"{opened.file}: no intersection in this map")
+    GeoPoint(lat, lon).validate()
     here = local_from_geo(opened.osm.frame, lat, lon)
     away = [float(np.hypot(*(j.centre_xy_m - here))) for j in opened.junctions]
     best = int(np.argmin(away))
     if not away[best] <= FARTHEST_M:
         raise UserError(
-            f"--at {lat},{lon}: the nearest intersection of {opened.file} is "
+            f"{lat},{lon}: the nearest intersection of {opened.file} is "
             f"{away[best]:.0f} m away, more than {FARTHEST_M:.0f}"
         )
     return opened.junctions[best]

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Future
 from foretwin.contracts.numbers import MAX_EXTRA_DELAY_S
 from foretwin.contracts.scenario import Scenario
@@ -39,7 +40,7 @@ def plan_futures(
     on, planners take turns. Raises ValueError for no planner or a count below 1.
     """
     if count < 1:
-        raise ValueError(f"{count} futures: at least 1 is needed")
+        raise UserError(f"{count} futures: at least 1 is needed")
     if not planners:
         raise ValueError("no planner named")
     nominal = Future(index=0, name="nominal", planner=planners[0])

@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.numbers import Quantity
 from foretwin.contracts.scenario import Scenario
@@ -247,7 +248,7 @@ def _scenario_of(future: Future, known: Mapping[str, Scenario]) -> Scenario | No
     if not future.scenario_id:
         return None
     if future.scenario_id not in known:
-        raise ValueError(
+        raise UserError(
             f"future {future.name!r} names scenario {future.scenario_id!r}; the job defines "
             f"{', '.join(known) or 'none'}"
         )

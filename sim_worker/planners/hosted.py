@@ -15,6 +15,7 @@ import subprocess
 import sys
 from typing import NamedTuple
 
+from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.host_link import (
     ANSWER,
@@ -58,7 +59,7 @@ class HostedPlanner:
         first_answer_s: float = FIRST_ANSWER_S,
         answer_s: float = ANSWER_S,
     ) -> None:
-        """Start its process; raises ValueError in words where its package does not load."""
+        """Start its process; raises UserError where its package does not load."""
         self._name, self._value = name, value
         self.first_answer_s, self.answer_s = first_answer_s, answer_s
         self._host: _Host | None = self._start()
@@ -68,7 +69,7 @@ class HostedPlanner:
             self._await_ready()
         except PlannerFailed as error:
             self.close()
-            raise ValueError(f"planner {name!r} ({value}) {error}") from error
+            raise UserError(f"planner {name!r} ({value}) {error}") from error
 
     @property
     def pid(self) -> int | None:

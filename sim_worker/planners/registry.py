@@ -12,6 +12,7 @@ import importlib.metadata
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
+from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.planner_interface import Planner
 from foretwin.sim_worker.planners.as_planned import AsPlanned
 from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
@@ -24,15 +25,19 @@ from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
 
 GROUP = "foretwin.planners"
-REMOTE = "remote"
-"""Of a worker on a bus alone: a driving stack in another process."""
+REMOTE, AS_PLANNED = "remote", "as_planned"
+_IN_DRIVES = {
+    REMOTE: "asks a stack over the bus of a drive",
+    AS_PLANNED: "drives the plan that the car of a drive publishes",
+}
+"""Planners that need a drive, and what for."""
 
 _BUILT_IN: dict[str, type[Planner]] = {
     "pure_pursuit_idm": PurePursuitIdm,
     "constant_speed": ConstantSpeed,
     "gap_acceptance": GapAcceptance,
     "frenet_lattice": FrenetLattice,
-    "as_planned": AsPlanned,
+    AS_PLANNED: AsPlanned,
     "reverse_pursuit": ReversePursuit,
     REMOTE: RemotePlanner,
 }
@@ -46,7 +51,7 @@ def planner_names() -> tuple[str, ...]:
 
 @functools.cache
 def load_planner(name: str) -> Planner:
-    """Return the planner of that name; raises ValueError naming the known ones."""
+    """Return the planner of that name; raises UserError naming the known ones."""
     if name in _BUILT_IN:
         return _BUILT_IN[name]()
     return HostedPlanner(name, _entry_point(name).value)
@@ -56,11 +61,16 @@ def _entry_point(name: str) -> EntryPoint:
     for point in entry_points(group=GROUP):
         if point.name == name:
             return point
-    raise ValueError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")
+    raise UserError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")
 
 
-def check_planner(name: str) -> None:
-    """Raise ValueError where no planner of that name loads; leaves no process behind."""
+def check_planner(name: str, *, in_drive: bool = True) -> None:
+    """Raise UserError where no planner of that name loads, or it needs a drive where there is none.
+
+    Leaves no process behind.
+    """
+    if not in_drive and name in _IN_DRIVES:
+        raise UserError(f"planner {name} {_IN_DRIVES[name]}; there is none here")
     planner = load_planner.__wrapped__(name)
     if isinstance(planner, HostedPlanner):
         planner.close()
@@ -72,7 +82,7 @@ def in_another_process(name: str) -> bool:
 
 
 def planner_origin(name: str) -> PlannerOrigin:
-    """Return what a planner is made of; raises ValueError naming the known ones."""
+    """Return what a planner is made of; raises UserError naming the known ones."""
     if name in _BUILT_IN:
         # Those of foretwin share most of their modules: a change of one counts for all.
         version = importlib.metadata.version("foretwin")

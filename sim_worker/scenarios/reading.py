@@ -50,19 +50,20 @@ def find_scenario(name: Path | str) -> Scenario:
 
     Raises UserError for an id that the catalogue lacks, and what `read_scenario` raises.
     """
-    if str(name).endswith(".toml"):
+    name = str(name)
+    if name.endswith(".toml"):
         return read_scenario(name)
     known = catalogue()
     if name not in known:
-        raise UserError(f"no scenario {str(name)!r}; known: {', '.join(known)}, or a .toml file")
-    return known[str(name)]
+        raise UserError(f"no scenario {name!r}; known: {', '.join(known)}, or a .toml file")
+    return known[name]
 
 
 def read_scenario(path: Path | str) -> Scenario:
     """Read and check one scenario file.
 
-    Raises UserError, in one line with the file, the field and what would be right, for a missing
-    file (FileNotFoundError too) and for anything that is no scenario.
+    Raises UserError, in one line with the file, the field and what would be right, for anything
+    that is no scenario, and MissingFileError for a missing file.
     """
     return read_toml(Path(path), Scenario, what="scenario", check=check_scenario, words=_words)
 

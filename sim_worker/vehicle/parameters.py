@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from foretwin.contracts.errors import MissingFileError
 from foretwin.contracts.toml_file import read_toml
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 
@@ -33,8 +34,8 @@ def bundled_vehicles() -> tuple[str, ...]:
 def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
     """Read the parameters of a bundled vehicle by its name, or of a file; None is the BMW 320i.
 
-    Raises FileNotFoundError for neither a name nor a file and ValueError, in one line with the
-    file and the field, for anything that is no vehicle.
+    Raises MissingFileError for neither a name nor a file and UserError, in one line with the file
+    and the field, for anything that is no vehicle.
     """
     source = DEFAULT_FILE if path is None else Path(path)
     if str(source) in bundled_vehicles():
@@ -43,7 +44,7 @@ def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
         return read_toml(source, VehicleParameters, what="vehicle", check=check_vehicle)
     except FileNotFoundError as error:
         names = ", ".join(bundled_vehicles())
-        raise FileNotFoundError(f"{error}, and no bundled vehicle of that name: {names}") from error
+        raise MissingFileError(f"{error}, and no bundled vehicle of that name: {names}") from error
 
 
 def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:

@@ -8,6 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
@@ -20,7 +21,7 @@ _MIN_SPEED_MPS = 1.0
 def local_state(state: VehicleState, frame: LocalFrame, vehicle: VehicleParameters) -> Array:
     """Return (8,) base_link state in `frame`, columns as `futures.STATE_COLUMNS`.
 
-    The lateral velocity of the rear axle is that of steady cornering. Raises ValueError where the
+    The lateral velocity of the rear axle is that of steady cornering. Raises UserError where the
     state is not finite.
     """
     state.position.validate()
@@ -39,7 +40,9 @@ def local_state(state: VehicleState, frame: LocalFrame, vehicle: VehicleParamete
         ]
     )
     if not np.isfinite(row).all():
-        raise ValueError(f"state of {state.vehicle_id} at {state.stamp_ns} ns is not finite: {row}")
+        raise UserError(
+            f"state of {state.vehicle_id} at {state.stamp_ns} ns is not finite: {row.tolist()}"
+        )
     return row
 
 

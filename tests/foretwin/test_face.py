@@ -18,6 +18,7 @@ from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 
 COVERS = (
     "foretwin",
+    "foretwin.checks",
     "foretwin.maps",
     "foretwin.recordings",
     "foretwin.simulation",
@@ -149,14 +150,3 @@ def test_what_a_sweep_left_is_read(tmp_path: Path) -> None:
             left.table(wrong)
     with pytest.raises(foretwin.UserError, match=r"no run\.json"):
         foretwin.open_run(tmp_path / "out")
-
-
-def test_mistakes_are_told_in_one_line(world: foretwin.World) -> None:
-    way = foretwin.ways_through(world)[0]
-    car = foretwin.state_on(world, way)
-    with pytest.raises(foretwin.UserError, match=r"has .* m"):
-        foretwin.state_on(world, way, before_m=1e4)
-    with pytest.raises(foretwin.UserError, match="no_such_planner"):
-        foretwin.run_futures(world, way, car, planner="no_such_planner")
-    with pytest.raises(foretwin.UserError, match=r"no run\.json"):
-        foretwin.open_run("nowhere")

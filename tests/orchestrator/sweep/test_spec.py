@@ -50,7 +50,11 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
         ('map = "a"\nplanners = ["nobody"]', "unknown planner 'nobody'"),
         (
             'map = "a"\nplanners = ["constant_speed", "remote"]',
-            "planners: remote asks a stack over the bus of a drive; a sweep has none to join yet",
+            "planner remote asks a stack over the bus of a drive; there is none here",
+        ),
+        (
+            'map = "a"\nplanners = ["as_planned"]',
+            "planner as_planned drives the plan that the car of",
         ),
         ('map = "a"\nvehicles = ["tank"]', "no vehicle file tank"),
         ('map = "a"\nmetrics = ["ade"]', "compares with a reference"),
@@ -70,7 +74,7 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
         ('map = "a"\n[parameters]\nlateral_shift_m = [inf]', "must be finite"),
         ('map = "a"\n[parameters]\nperception_delay_s = [1e300]', "it must be from 0 to 10"),
         ('map = "a"\n[parameters]\nsteering_gain = [1e308]', "it must be from -10 to 10"),
-        ('map = "a"\n[parameters]\nlateral_shift_m = [1e5]', "it must be from -20 to 20"),
+        ('map = "a"\n[parameters]\nlateral_shift_m = [1e5]', "it must be from -50 to 50"),
         ('map = "a"\nseed = 99999999999999999999', "seed 99999999999999999999: 0 to 9223"),
         ('map = "a"\nseed = -1', "seed -1: 0 to 9223"),
         ("map = ", "not TOML"),
