@@ -21,13 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from foretwin.contracts.world import World
-from foretwin.orchestrator.embedded import MAP_FILE
-from foretwin.sim_worker.gym import JunctionVectorEnv
-from foretwin.world_gen.build import build_world
-from foretwin.world_gen.junctions.find_intersections import find_intersections
-from foretwin.world_gen.osm.read_osm import read_map
-from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin import JunctionVectorEnv, World, drawn_town
 
 Weights = npt.NDArray[np.float64]
 
@@ -73,12 +67,8 @@ class Found(NamedTuple):
 
 def town_roundabout() -> World:
     """Return the World around the roundabout of the drawn town."""
-    osm = read_map(MAP_FILE)
-    graph = build_road_graph(osm)
-    for junction in find_intersections(osm, graph):
-        if junction.summary.kind == "roundabout":
-            return build_world(osm, graph, junction)
-    raise ValueError(f"{MAP_FILE} has no roundabout")
+    town = drawn_town()
+    return town.world(next(one.id for one in town.intersections if one.kind == "roundabout"))
 
 
 def inputs(seen: npt.NDArray[np.float32], names: Sequence[str]) -> Weights:

@@ -16,12 +16,20 @@ import time
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.bus import Bus, BusUnreachable, Mailbox, Received, ZenohBus
-from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
-from foretwin.contracts.setup import BusSetup
+from foretwin.bus import (
+    Bus,
+    BusSetup,
+    BusUnreachable,
+    Mailbox,
+    PlannedMotions,
+    PlannerScene,
+    Received,
+    ZenohBus,
+)
 
+Array = npt.NDArray[np.float64]
 TIME_S = np.linspace(0.0, 3.0, 16)
 ACCEL_MPS2, DECEL_MPS2, LATERAL_MPS2 = 1.5, 2.5, 2.0
 JOIN_S = 30.0

@@ -15,11 +15,21 @@ import sys
 
 import numpy as np
 
-from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
-from foretwin.contracts.drive import RoadUser, RoadUsers
-from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from foretwin.contracts.keys import alive_key, run_of_alive_key
-from foretwin.contracts.setup import BusSetup
+from foretwin.bus import (
+    Alive,
+    Bus,
+    BusSetup,
+    GeoPoint,
+    LocalFrame,
+    Mailbox,
+    Received,
+    RoadUser,
+    RoadUsers,
+    ZenohBus,
+    alive_key,
+    geo_from_local,
+    run_of_alive_key,
+)
 
 PERIOD_NS = 100_000_000
 WAY_M, SPEED_MPS = 6.0, 1.4

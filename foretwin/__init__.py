@@ -4,7 +4,7 @@ What a notebook needs, each name loaded when it is first used:
 
     import foretwin
 
-    town = foretwin.open_map("town.osm")
+    town = foretwin.open_map("town.osm")  # or foretwin.drawn_town()
     world = town.world(town.intersections[0].id)
     way = foretwin.ways_through(world)[0]
     futures = foretwin.run_futures(world, way, foretwin.state_on(world, way), count=32)
@@ -12,7 +12,7 @@ What a notebook needs, each name loaded when it is first used:
 
 Metres, seconds, radians; x east, y north in a World's own frame, yaw counter-clockwise from east.
 A car's pose is that of its rear axle's centre on the ground. Mistakes in what is given are
-`UserError`, in one line.
+`UserError`, in one line. `foretwin.bus` is what a program beside foretwin speaks on its bus with.
 
 The rooms (`foretwin.contracts`, `foretwin.world_gen` and so on) stand at the top level of the
 repository; the links beside this file let an editable install find them under this name.
@@ -30,16 +30,28 @@ if TYPE_CHECKING:
     from foretwin.contracts.scenario import Scenario
     from foretwin.contracts.vehicle import VehicleParameters
     from foretwin.contracts.world import World
-    from foretwin.maps import Map, export_formats, export_world, open_map, read_world, save_world
+    from foretwin.maps import (
+        Map,
+        drawn_town,
+        export_formats,
+        export_world,
+        open_map,
+        read_world,
+        save_world,
+    )
     from foretwin.recordings import Recording, open_run, open_sweep
+    from foretwin.sim_worker.gym import JunctionEnv as JunctionEnv
+    from foretwin.sim_worker.gym import JunctionVectorEnv as JunctionVectorEnv
     from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView
+    from foretwin.sim_worker.planners.one_at_a_time import CarView
     from foretwin.sim_worker.planners.registry import planner_names
+    from foretwin.sim_worker.planners.tracking import front_from_base_m, pure_pursuit
     from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
     from foretwin.sim_worker.scenarios.ways import Way
     from foretwin.sim_worker.vehicle.parameters import load_vehicle
     from foretwin.simulation import Futures, run_futures, state_on, ways_through
 
-_READ_AND_WRITTEN = "open_map", "read_world", "save_world"
+_MAPS = "Map", "drawn_town", "export_formats", "export_world", "open_map"
 _FROM = {
     "foretwin.contracts.drive": ("VehicleState",),
     "foretwin.contracts.errors": ("UserError",),
@@ -47,10 +59,13 @@ _FROM = {
     "foretwin.contracts.scenario": ("Scenario",),
     "foretwin.contracts.vehicle": ("VehicleParameters",),
     "foretwin.contracts.world": ("World",),
-    "foretwin.maps": ("Map", "export_formats", "export_world", *_READ_AND_WRITTEN),
+    "foretwin.maps": (*_MAPS, "read_world", "save_world"),
     "foretwin.recordings": ("Recording", "open_run", "open_sweep"),
+    "foretwin.sim_worker.gym": ("JunctionEnv", "JunctionVectorEnv"),
     "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
+    "foretwin.sim_worker.planners.one_at_a_time": ("CarView",),
     "foretwin.sim_worker.planners.registry": ("planner_names",),
+    "foretwin.sim_worker.planners.tracking": ("front_from_base_m", "pure_pursuit"),
     "foretwin.sim_worker.scenarios.reading": ("catalogue", "find_scenario", "read_scenario"),
     "foretwin.sim_worker.scenarios.ways": ("Way",),
     "foretwin.sim_worker.vehicle.parameters": ("load_vehicle",),
@@ -58,11 +73,13 @@ _FROM = {
 }
 _MODULE_OF = {name: module for module, names in _FROM.items() for name in names}
 
-__all__ = ["Future", "Futures", "Map", "Planner", "PlannerOutput", "PlannerView", "Recording"]
-__all__ += ["Scenario", "UserError", "VehicleParameters", "VehicleState", "Way", "World"]
-__all__ += ["catalogue", "export_formats", "export_world", "find_scenario", "load_vehicle"]
-__all__ += ["open_map", "open_run", "open_sweep", "planner_names", "read_scenario", "read_world"]
-__all__ += ["run_futures", "save_world", "state_on", "ways_through"]
+# Without the environments: they need an extra, and `import *` would fail where it is missing.
+__all__ = ["CarView", "Future", "Futures", "Map", "Planner"]
+__all__ += ["PlannerOutput", "PlannerView", "Recording", "Scenario", "UserError"]
+__all__ += ["VehicleParameters", "VehicleState", "Way", "World", "catalogue", "drawn_town"]
+__all__ += ["export_formats", "export_world", "find_scenario", "front_from_base_m", "load_vehicle"]
+__all__ += ["open_map", "open_run", "open_sweep", "planner_names", "pure_pursuit", "read_scenario"]
+__all__ += ["read_world", "run_futures", "save_world", "state_on", "ways_through"]
 
 
 def __getattr__(name: str) -> Any:
@@ -75,4 +92,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_MODULE_OF})

@@ -9,6 +9,7 @@ from foretwin.checks import expect, files_told, number, path_of
 from foretwin.contracts.codec import SchemaMismatch, read_message, write_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import IntersectionSummary, World
+from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.worlds.choice import junction_by_id, nearest_junction
 from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.orchestrator.worlds.opening import open_map as read_whole
@@ -60,6 +61,11 @@ def open_map(file: Path | str, *, service_roads: bool = False) -> Map:
     UserError, where the file is no map or has no roads.
     """
     return Map(read_whole(path_of("file", file), service_roads=service_roads))
+
+
+def drawn_town() -> Map:
+    """Read the map of the small town that comes with foretwin."""
+    return open_map(MAP_FILE)
 
 
 def export_formats() -> dict[str, str]:

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import ast
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import foretwin
+import foretwin.bus
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
+from tests.test_layout import ROOMS
 
 COVERS = (
     "foretwin",
+    "foretwin.bus",
     "foretwin.checks",
     "foretwin.maps",
     "foretwin.recordings",
     "foretwin.simulation",
 )
 
+USERS_READ = {".md", ".py", ".toml", ".ipynb"}
 LATE = {"orchestrator", "sim_worker", "world_gen", "viewer", "telemetry"}
 
 
@@ -37,9 +44,51 @@ def world(town: foretwin.Map) -> foretwin.World:
     return town.world(next(one.id for one in town.intersections if one.kind == "crossing"))
 
 
+WITH_AN_EXTRA = {"JunctionEnv", "JunctionVectorEnv"}
+ROOT = Path(__file__).parents[2]
+
+
 def test_every_name_of_the_face_is_there() -> None:
-    assert [name for name in foretwin.__all__ if getattr(foretwin, name) is None] == []
-    assert set(foretwin.__all__) == set(foretwin._MODULE_OF)
+    assert [name for name in foretwin._MODULE_OF if getattr(foretwin, name) is None] == []
+    assert set(foretwin.__all__) | WITH_AN_EXTRA == set(foretwin._MODULE_OF)
+    assert set(foretwin._MODULE_OF) <= set(dir(foretwin))
+
+
+def test_types_are_told_of_the_modules_that_names_are_loaded_from() -> None:
+    tree = ast.parse(Path(foretwin.__file__).read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    told = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+
+    assert {name.name: node.module for node in told for name in node.names} == foretwin._MODULE_OF
+
+
+def test_what_a_program_on_the_bus_needs_is_there() -> None:
+    tree = ast.parse(Path(foretwin.bus.__file__).read_text(encoding="utf-8"))
+    told = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.level == 0]
+    imported = {name.name for node in told for name in node.names} - {"annotations"}
+
+    assert imported == set(foretwin.bus.__all__)
+
+
+def test_every_module_of_the_face_is_packed() -> None:
+    hatch = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    here = {f"foretwin/{path.name}" for path in (ROOT / "foretwin").glob("*.py")}
+
+    for target in ("wheel", "sdist"):
+        assert here - set(hatch["targets"][target]["only-include"]) == set()
+
+
+def test_nothing_for_users_imports_a_room() -> None:
+    rooms = re.compile(rf"foretwin\.(?:{'|'.join(sorted(ROOMS))})\b")
+    files = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.*")]
+    texts = {file: file.read_text(encoding="utf-8") for file in files if file.suffix in USERS_READ}
+
+    assert len(texts) > 20
+    assert {file: found for file, text in texts.items() if (found := rooms.findall(text))} == {}
+
+
+def test_the_drawn_town_comes_along() -> None:
+    assert "roundabout" in {one.kind for one in foretwin.drawn_town().intersections}
 
 
 def test_a_name_that_is_not_there_is_told() -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
-from foretwin.sim_worker.planners.tracking import front_from_base_m, pure_pursuit
+from foretwin import PlannerOutput, PlannerView, front_from_base_m, pure_pursuit
 
 ACCEL_MPS2, DECEL_MPS2, MOST_MPS2 = 1.0, 1.5, 6.0
 GAIN_PS = 3.0

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from foretwin.sim_worker.planners.one_at_a_time import CarView
+from foretwin import CarView
 
 ACCEL_MPS2, DECEL_MPS2, MOST_MPS2 = 1.0, 1.5, 6.0
 GAIN_PS = 3.0

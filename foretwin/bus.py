@@ -1,0 +1,33 @@
+"""What a program beside foretwin needs to speak on the bus of a drive: docs/bus.md.
+
+`examples/remote_planner.py` is the stack of a planner under test, `examples/virtual_road_user.py` a
+road user for the car's own stack.
+"""
+
+from __future__ import annotations
+
+from foretwin.contracts.bus import Alive, Bus, BusUnreachable, Mailbox, Received, ZenohBus
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.keys import alive_key, run_of_alive_key
+from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
+from foretwin.contracts.setup import BusSetup
+
+__all__ = [
+    "Alive",
+    "Bus",
+    "BusSetup",
+    "BusUnreachable",
+    "GeoPoint",
+    "LocalFrame",
+    "Mailbox",
+    "PlannedMotions",
+    "PlannerScene",
+    "Received",
+    "RoadUser",
+    "RoadUsers",
+    "ZenohBus",
+    "alive_key",
+    "geo_from_local",
+    "run_of_alive_key",
+]
