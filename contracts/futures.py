@@ -64,13 +64,16 @@ def numbers_of(future: Future) -> dict[str, float]:
     """Return all numbers of a future by name: its own, joined with those that its scenario draws
     and held within their ranges.
 
-    Raises UserError for a name that the table lacks.
+    Raises UserError for a name that the table lacks and for an own value that is out of range.
     """
     if unknown := future.numbers.keys() - FUTURE_NUMBERS.keys():
         raise UserError(
             f"future {future.name!r} has a number {min(unknown)!r}; known: "
             f"{', '.join(FUTURE_NUMBERS)}"
         )
+    for name, value in future.numbers.items():
+        if wrong := out_of_range(name, value, value):
+            raise UserError(f"future {future.name!r}: {name} {wrong}")
     drawn = future.values if future.scenario_id else {}
     return {
         name: row.joined(
@@ -81,15 +84,12 @@ def numbers_of(future: Future) -> dict[str, float]:
 
 
 def check_futures(futures: Sequence[Future]) -> None:
-    """Raise UserError for two futures of one index, or a number that is unknown or out of range."""
+    """Raise UserError for two futures of one index, and what `numbers_of` raises."""
     indices = [future.index for future in futures]
     if twice := sorted({index for index in indices if indices.count(index) > 1}):
         raise UserError(f"futures: two of index {twice[0]}; each needs one of its own")
     for future in futures:
         numbers_of(future)
-        for name, value in future.numbers.items():
-            if wrong := out_of_range(name, value, value):
-                raise UserError(f"future {future.name!r}: {name} {wrong}")
 
 
 class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):

@@ -273,7 +273,7 @@ def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Future, ..
         ({"horizon_s": 0.05}, "horizon_s 0.05 must be a multiple"),
         ({"futures": NOMINAL * 65}, "65 states for a stage of 64"),
         ({"futures": (Future(index=0, name="x", planner="magic"),)}, "unknown planner 'magic'"),
-        ({"futures": (Future(index=0, name="x", numbers=TOO_LATE),)}, "longer than"),
+        ({"futures": (Future(index=0, name="x", numbers=TOO_LATE),)}, "must be from 0 to 0.4"),
         ({"futures": (Future(index=0, name="x", numbers={"mood": 1.0}),)}, "'mood'; known"),
         ({"schema_version": 0}, "schema version 0; this foretwin plays version 1"),
         ({"anchor": "wall"}, "knows neither"),
