@@ -194,7 +194,7 @@ def sweep(
     spec: Annotated[
         Path,
         typer.Argument(
-            help="what to sweep over, TOML; [parameters] lists "
+            help="what to sweep over, TOML; its table of parameters lists "
             + ", ".join(f"{name} ({row.range})" for name, row in FUTURE_NUMBERS.items())
         ),
     ],
