@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import DrivingSide
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.rounding import (
     FINE_M,
@@ -95,21 +96,21 @@ def driving_path(
     xy = drivable(smoothed(centre + offset[:, None] * normals(centre), 0.5 * SMOOTHING_M))
     if onto_lanes is not None:
         xy, place = evenly_spaced(onto_lanes(xy, place), place)
-        xy, place = with_driven_turns(xy, place, _lane_radii(graph))
+        xy, place = with_driven_turns(xy, place, turn_radii(graph.driving_side))
         xy = drivable(smoothed(xy, 0.5 * SMOOTHING_M))
     return _resampled(route, xy, place, begin, end)
 
 
-def _lane_radii(graph: RoadGraph) -> tuple[float, float]:
-    """Return the radii of the driven lane in turns to the left and to the right."""
+def turn_radii(driving_side: DrivingSide) -> tuple[float, float]:
+    """Return the radii in metres of the driven lane in turns to the left and to the right."""
     radii = KERB_TURN_RADIUS_M, FAR_TURN_RADIUS_M
-    return radii if graph.driving_side == "left" else radii[::-1]
+    return radii if driving_side == "left" else radii[::-1]
 
 
 def _turn_radii(graph: RoadGraph, line: Array, offset: Array) -> Array:
     """Return the radius of the road's line at each inner vertex, from that of the driven lane."""
     turn = turns(line)
-    lane_radius = np.where(turn > 0.0, *_lane_radii(graph))
+    lane_radius = np.where(turn > 0.0, *turn_radii(graph.driving_side))
     radius = np.maximum(lane_radius + np.sign(turn) * offset[1:-1], 5.0)
     return np.asarray(np.where(np.abs(turn) < TURN_RAD, BEND_RADIUS_M, radius))
 

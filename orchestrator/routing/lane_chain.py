@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.orchestrator.routing.rounding import normals
+from foretwin.orchestrator.routing.rounding import (
+    TURN_ROOM_M,
+    evenly_spaced,
+    normals,
+    with_driven_turns,
+)
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.world_lanes import Followed, WorldLanes
 
@@ -38,15 +43,23 @@ class LaneRun(NamedTuple):
 
 
 def chain(
-    pieces: Sequence[Followed], *, begin_m: float, end_m: float, car_s_m: float, car_xy_m: Array
+    pieces: Sequence[Followed],
+    *,
+    begin_m: float,
+    end_m: float,
+    car_s_m: float,
+    car_xy_m: Array,
+    turn_radii_m: tuple[float, float],
 ) -> tuple[LaneRun, ...]:
     """Return the chain of lanes to follow from `begin_m` to `end_m` of a path.
 
     It leaves as little as can be without lanes, then changes lanes as rarely, and then takes the
     lane that the car is in; a change that has to come soon is made where the chain begins.
+    `turn_radii_m` is that of driven turns to the left and to the right.
     """
     by_id = {one.piece.id: one for one in pieces}
-    own = {name: _own_cost(by_id[name], car_s_m, car_xy_m) for name in by_id}
+    driven = _driven_lines(by_id, car_s_m, turn_radii_m)
+    own = {name: _own_cost(by_id[name], driven.get(name), car_s_m, car_xy_m) for name in by_id}
     best: dict[str, float] = {}
     came: dict[str, str] = {}
     heap = [(max(0.0, by_id[name].begin_m - begin_m) + own[name], name, "") for name in by_id]
@@ -71,10 +84,31 @@ def chain(
     return _runs([by_id[name] for name in reversed(names)])
 
 
-def _own_cost(one: Followed, car_s_m: float, car_xy_m: Array) -> float:
+def _driven_lines(
+    by_id: Mapping[str, Followed], car_s_m: float, turn_radii_m: tuple[float, float]
+) -> dict[str, Array]:
+    """Return the lines (N, 2) that pieces in and beside a turn near the car are driven along.
+
+    A tight connection is driven inside of its line (`with_driven_turns`), so far that a car may lie
+    nearer to that of the next lane than to that of its own.
+    """
+    lines: dict[str, list[Array]] = {}
+    for one in by_id.values():
+        near = one.begin_m - TURN_ROOM_M <= car_s_m <= one.end_m + TURN_ROOM_M
+        if near and one.piece.joins:
+            before, after = (by_id[name] for name in one.piece.joins)
+            run = _joined([before, one, after])
+            line, _ = with_driven_turns(*evenly_spaced(run.xy_m, run.s_m), turn_radii_m)
+            for name in (before.piece.id, one.piece.id, after.piece.id):
+                lines.setdefault(name, []).append(line)
+    return {name: np.concatenate(found) for name, found in lines.items()}
+
+
+def _own_cost(one: Followed, driven: Array | None, car_s_m: float, car_xy_m: Array) -> float:
     cost = _PATH_ASIDE * one.aside_m * (one.end_m - one.begin_m)
     if one.begin_m <= car_s_m <= one.end_m:
-        aside = float(np.hypot(*(one.xy_m - car_xy_m).T).min())
+        line = one.xy_m if driven is None else driven
+        aside = float(np.hypot(*(line - car_xy_m).T).min())
         cost += _ASIDE * min(aside, _CAR_ASIDE_M)
     return cost
 
@@ -127,6 +161,7 @@ class LaneGuide:
             end_m=float(s_m[-1]),
             car_s_m=self._car_s_m,
             car_xy_m=self._car_xy_m,
+            turn_radii_m=self._lanes.turn_radii_m,
         )
         return on_lanes(xy_m, s_m, self.runs, car_s_m=self._car_s_m)
 

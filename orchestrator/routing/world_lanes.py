@@ -18,6 +18,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import arc_lengths
+from foretwin.orchestrator.routing.driving_path import turn_radii
 from foretwin.orchestrator.routing.rounding import FINE_M
 from foretwin.orchestrator.routing.route import Route
 
@@ -75,6 +76,7 @@ class WorldLanes:
             return np.stack([np.interp(at, arc, moved[:, k]) for k in (0, 1)], axis=-1)
 
         self.world_id = world.id
+        self.turn_radii_m = turn_radii(world.intersection.driving_side)
         pieces = {}
         for lane in world.lanes:
             if lane.kind != "driving" or len(lane.centerline) < 2:

@@ -15,7 +15,7 @@ from foretwin.contracts.world import World
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.driving_path import PathGeometry, driving_path
 from foretwin.orchestrator.routing.lane_chain import BLEND_M, LaneGuide, LaneRun, on_lanes
-from foretwin.orchestrator.routing.rounding import TIGHT_M, curvature_pm
+from foretwin.orchestrator.routing.rounding import TIGHT_M, curvature_pm, normals
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.world_lanes import WorldLanes
 from foretwin.world_gen.osm.osm_map import OsmMap
@@ -48,17 +48,22 @@ class Town:
         )
         self.path: PathGeometry | None = None
 
-    def guided(self, at: tuple[float, float]) -> LaneGuide:
-        """The guide of a car at metres east and north of the crossing, after its path was made."""
+    def guided(self, at: tuple[float, float], s_m: float | None = None) -> LaneGuide:
+        """The guide of a car at metres east and north of the crossing, after its path was made.
+
+        `s_m` is where on the route that is, if not on its first road.
+        """
         xy = np.array(at)
-        guide = LaneGuide(
-            WorldLanes(self.world, self.graph.frame), self.route,
-            car_s_m=100.0 + at[0], car_xy_m=xy,
-        )  # fmt: skip
+        s_m = 100.0 + at[0] if s_m is None else s_m
+        lanes = WorldLanes(self.world, self.graph.frame)
+        guide = LaneGuide(lanes, self.route, car_s_m=s_m, car_xy_m=xy)
         self.path = driving_path(
-            self.graph, self.route, s_from_m=90.0 + at[0], s_to_m=self.route.end_m,
+            self.graph,
+            self.route,
+            s_from_m=s_m - 10.0,
+            s_to_m=self.route.end_m,
             onto_lanes=guide.onto_lanes,
-        )  # fmt: skip
+        )
         return guide
 
     def ids(self, at: tuple[float, float]) -> list[list[str]]:
@@ -124,6 +129,25 @@ def test_a_turn_tighter_than_cars_are_driven_is_widened_and_nothing_else_is(leav
     assert 1.0 / 12.0 < np.abs(curvature_pm(town.path.xy_m)).max() < 1.0 / TIGHT_M
     assert town.away_m()[~turning].max() < 0.1
     assert 0.5 < town.away_m()[turning].max() < 3.0
+
+
+@pytest.mark.parametrize(("lane", "inside_m"), [("f0", -1.2), ("f1", -1.2), ("f1", 1.2)])
+def test_through_a_bend_of_several_lanes_the_path_stays_in_the_car_s(
+    lane: str, inside_m: float
+) -> None:
+    """The turn is driven inside of its connections: nearer to the next lane's than to its own."""
+    both = TWO_LANES | {"turn:lanes": "left|left"}
+    town = Town(crossing(street=both, avenue=TWO_LANES), NORTH)
+    town.guided((-60.0, 1.6 if lane == "f0" else -1.6))
+    assert town.path is not None
+    driven = town.path
+    turning = np.abs(driven.s_m - 100.0) < 20.0
+    places = driven.xy_m + inside_m * normals(driven.xy_m)
+
+    for (x, y), s_m in zip(places[turning][::3].tolist(), driven.s_m[turning][::3], strict=True):
+        (run,) = town.guided((x, y), float(s_m)).runs
+        assert {name.split(".")[-1] for name in run.ids} == {lane}
+        assert _away(np.array([[x, y]]), town.path.xy_m) == pytest.approx(abs(inside_m), abs=0.2)
 
 
 def test_without_a_connection_the_road_is_followed_between_the_lanes() -> None:
