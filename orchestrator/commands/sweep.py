@@ -19,7 +19,7 @@ from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.job_tables import keep_vehicles
-from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
+from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
     FoundPlaces,
     SweepFolder,
@@ -40,7 +40,7 @@ SOME_FAILED = 3
 def sweep(
     spec: Path, *, out: Path | None, workers: int = 2, fresh: bool = False, as_json: bool = False
 ) -> int:
-    """Run a sweep, or go on with it; returns 0, or 3 where futures failed.
+    """Run a sweep, or go on with it; returns 0, or 3 where futures failed or no worker can play.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
@@ -48,8 +48,12 @@ def sweep(
         raise UserError(f"--workers {workers}: at least 1")
     loaded = load_spec(spec)
     out = out or Path("sweeps") / spec.stem
-    with workers_for(loaded, out, workers) as runner:
-        summary = run_sweep(loaded, out, runner, fresh=fresh)
+    try:
+        with workers_for(loaded, out, workers) as runner:
+            summary = run_sweep(loaded, out, runner, fresh=fresh)
+    except NoWorkerError as error:
+        print(f"foretwin: {error}; what is done is kept", file=sys.stderr)
+        return SOME_FAILED
     if as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
