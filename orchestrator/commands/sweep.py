@@ -40,7 +40,8 @@ SOME_FAILED = 3
 def sweep(
     spec: Path, *, out: Path | None, workers: int = 2, fresh: bool = False, as_json: bool = False
 ) -> int:
-    """Run a sweep, or go on with it; returns 0, or 3 where futures failed or no worker can play.
+    """Run a sweep, or go on with it; returns 0, or 3 where futures failed, where none was played,
+    or where no worker can be started.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
@@ -58,7 +59,8 @@ def sweep(
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
         print_summary(out, summary)
-    return SOME_FAILED if summary["failed"] or summary["failures"] else 0
+    failed = summary["failed"] or summary["failures"] or not summary["placed"]
+    return SOME_FAILED if failed else 0
 
 
 @contextlib.contextmanager
@@ -148,6 +150,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         digest.update(msgspec.msgpack.encode(row))
         counted.add(row)
     unplaced = [one for world in places.worlds for one in world.unplaced]
+    placed = {one.scenario_id for world in places.worlds for one in world.placed}
     return {
         "complete": True,
         "spec": loaded.spec,
@@ -158,6 +161,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         "rows_sha256": digest.hexdigest(),
         "scenarios": counted.table(),
         "unplaced": [one for one in unplaced if one.applies],
+        "placed_nowhere": sorted({one.id for one in loaded.scenarios} - placed),
         "does_not_apply": sum(not one.applies for one in unplaced),
         "failures": places.failures,
     }

@@ -127,6 +127,21 @@ def test_another_spec_is_refused_in_the_same_folder(
     assert "--fresh starts anew" in capsys.readouterr().err
 
 
+def test_a_sweep_that_plays_nothing_says_which_scenarios_apply_nowhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = SMALL.replace(
+        '"scp", "cpta", "reversing_parking"', '"roundabout_entry", "race_track_lap"'
+    )
+    spec, out = small_sweep(tmp_path, text), tmp_path / "out"
+    assert run(["sweep", str(spec), "--out", str(out), "--workers", "1"]) == 3
+    said = capsys.readouterr().out
+    assert "placed nowhere: race_track_lap, roundabout_entry\n" in said
+    assert "0 rows of 1 Worlds" in said
+    written = json.loads((out / "sweep.json").read_text())
+    assert written["placed_nowhere"] == ["race_track_lap", "roundabout_entry"]
+
+
 PLANNER = """
 from foretwin.sim_worker.planner_interface import PlannerOutput
 
