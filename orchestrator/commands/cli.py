@@ -245,10 +245,11 @@ def run(arguments: list[str]) -> int:
         print(f"foretwin: {_one_line(error)}", file=sys.stderr)
         return EXIT_USER
     except (KeyboardInterrupt, typer.Abort):
-        print("foretwin: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        result = EXIT_INTERRUPTED
     except Exception as error:
         return _report(error)
+    if result == EXIT_INTERRUPTED:  # as typer, too, answers Ctrl-C
+        print("foretwin: interrupted", file=sys.stderr)
     return result if isinstance(result, int) else 0
 
 

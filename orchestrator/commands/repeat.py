@@ -27,9 +27,9 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
     where it cannot be repeated.
     """
     recorded = recorded_future(folder, future_id)
-    before = recorded.row["trajectory_sha256"]
+    before = recorded.row.trajectory_sha256
     if before is None:
-        reason = recorded.row["failure"] or recorded.row["left_out"]
+        reason = recorded.row.failure or recorded.row.left_out or "its row does not say why"
         raise UserError(f"{future_id}: was not played: {reason}")
     result, after = play_again(recorded)
     if as_json:
@@ -39,32 +39,33 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
         print(f"{future_id}: the same again, sha256 {after}")
     else:
         print(f"{future_id}: differs: recorded sha256 {before}, now {after}")
-    if view:
+    if view and after is not None:
         from foretwin.sim_worker.futures.future_picture import write_future_picture
 
         picture = folder / REPEATED / f"{future_id}.png"
-        index = result.future_indices.index(recorded.row["index"])
+        index = result.future_indices.index(recorded.row.index)
         write_future_picture(picture, recorded.job, result, index, recorded.world, recorded.vehicle)
         print(picture)
     return 0 if before == after else DIFFERS
 
 
-def play_again(recorded: RecordedFuture) -> tuple[FuturesResult, str]:
-    """Return what the job of a future comes to now, and the hash of the future's trajectory.
+def play_again(recorded: RecordedFuture) -> tuple[FuturesResult, str | None]:
+    """Return what the job of a future comes to now, and the hash of the future's trajectory, None
+    where it is not played now.
 
     Raises UserError where the future was driven by a planner in another process.
     """
-    planner = recorded.row["planner"]
-    if in_another_process(planner):
+    known = recorded.row
+    if in_another_process(known.planner):
         raise UserError(
-            f"{recorded.row['future_id']}: driven by {planner!r} in another process, whose answers "
-            "are not recorded"
+            f"{known.future_id}: driven by {known.planner!r} in another process, whose answers are "
+            "not recorded"
         )
     job = _without_others(recorded.job)
     result = run_alone(job, recorded.world, recorded.vehicle)
-    rows = future_rows(job, result, job_sha256=recorded.row["job_sha256"])
-    row = next(row for row in rows if row["index"] == recorded.row["index"])
-    return result, row["trajectory_sha256"]
+    rows = future_rows(job, result, job_sha256=known.job_sha256)
+    row = next(row for row in rows if row["index"] == known.index)
+    return result, row.get("trajectory_sha256")
 
 
 def _without_others(job: Job) -> Job:

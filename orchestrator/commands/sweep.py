@@ -16,25 +16,23 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
-from foretwin.contracts.placement import WorldPlaces
 from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.job_tables import keep_vehicles
-from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
+from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
     FoundPlaces,
     SweepFolder,
     fingerprint_of,
-    keep_worlds,
     planner_origins,
 )
 from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
 from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, plan_sweep
 from foretwin.orchestrator.sweep.rows import Parts
-from foretwin.orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
+from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from foretwin.orchestrator.sweep.workers import worker_setup
-from foretwin.orchestrator.sweep.worlds import source_digest, sweep_worlds
+from foretwin.orchestrator.sweep.worlds import all_there, source_digest, sweep_worlds
 
 SOME_FAILED = 3
 
@@ -42,7 +40,8 @@ SOME_FAILED = 3
 def sweep(
     spec: Path, *, out: Path | None, workers: int = 2, fresh: bool = False, as_json: bool = False
 ) -> int:
-    """Run a sweep, or go on with it; returns 0, or 3 where futures failed.
+    """Run a sweep, or go on with it; returns 0, or 3 where futures failed, where none was played,
+    or where no worker can be started.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
@@ -50,13 +49,18 @@ def sweep(
         raise UserError(f"--workers {workers}: at least 1")
     loaded = load_spec(spec)
     out = out or Path("sweeps") / spec.stem
-    with workers_for(loaded, out, workers) as runner:
-        summary = run_sweep(loaded, out, runner, fresh=fresh)
+    try:
+        with workers_for(loaded, out, workers) as runner:
+            summary = run_sweep(loaded, out, runner, fresh=fresh)
+    except NoWorkerError as error:
+        print(f"foretwin: {error}; what is done is kept", file=sys.stderr)
+        return SOME_FAILED
     if as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
         print_summary(out, summary)
-    return SOME_FAILED if summary["failed"] or summary["failures"] else 0
+    failed = summary["failed"] or summary["failures"] or not summary["placed"]
+    return SOME_FAILED if failed else 0
 
 
 @contextlib.contextmanager
@@ -79,26 +83,34 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
     fingerprint = fingerprint_of(loaded, source_digest(loaded.spec))
     with SweepFolder(out, fingerprint, fresh=fresh) as folder:
         folder.begin(loaded)
-        places = folder.places() or _find_places(loaded, folder, runner)
+        places = _find_places(loaded, folder, runner)
         plan = plan_sweep(loaded, places.worlds)
-        parts = Parts(folder.path)
         keep_vehicles(folder.path, loaded.vehicles.values())
-        keep_worlds(worlds_folder(loaded.spec), folder.worlds_dir, places.worlds)
-        there = parts.done(plan.jobs)
+        parts, maker = Parts(folder.path), JobMaker(loaded, plan.worlds)
+        parts.keep_first(len(plan.jobs))
+        left = [one for one in plan.jobs if not parts.hold(maker.job(one))]
         started_s = time.monotonic()
-        left = [job for job in plan.jobs if job.number not in there]
-        _play(left, JobMaker(loaded, plan.worlds), parts, runner)
+        _play(left, maker, parts, runner)
         playing_s = round(time.monotonic() - started_s, 3)
-        now = {"jobs_played": len(plan.jobs) - len(there), "playing_s": playing_s}
+        now = {"jobs_played": len(left), "playing_s": playing_s}
         return folder.summarise(_summary(loaded, plan, places, parts) | now)
 
 
 def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPlaces:
-    """Build or read the Worlds, and find where the scenarios take place in each."""
+    """Build or read the Worlds, and find where the scenarios take place in each.
+
+    What was found before is kept; what failed before is tried again, and Worlds that are lost are
+    built or read again.
+    """
+    kept = folder.places()
+    found = {} if kept is None else {world.world_id: world for world in kept.worlds}
+    there = all_there(folder.worlds_dir, found)
+    if kept is not None and there and not kept.failures:
+        return kept
     worlds = sweep_worlds(loaded.spec, folder.worlds_dir, progress_bar)
-    found: dict[int, WorldPlaces] = {}
     failures = dict(worlds.failures)
-    tasks = [place_task(place_request(loaded, world_id)) for world_id in worlds.ids]
+    left = [world_id for world_id in worlds.ids if world_id not in found]
+    tasks = [place_task(place_request(loaded, world_id)) for world_id in left]
     with progress_bar(len(tasks), "Worlds placed on") as (advance_one, say):
         for answer in answers(runner, tasks):
             world_id = answer.task.world_id
@@ -106,9 +118,9 @@ def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPl
                 failures[world_id] = answer.failure
                 say(f"failed: world {world_id}: {answer.failure}")
             else:
-                found[worlds.ids.index(world_id)] = answer.message
+                found[world_id] = answer.message
             advance_one(world_id)
-    return folder.save_places(tuple(found[number] for number in sorted(found)), failures)
+    return folder.save_places(tuple(found[one] for one in worlds.ids if one in found), failures)
 
 
 def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner) -> None:
@@ -138,6 +150,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         digest.update(msgspec.msgpack.encode(row))
         counted.add(row)
     unplaced = [one for world in places.worlds for one in world.unplaced]
+    placed = {one.scenario_id for world in places.worlds for one in world.placed}
     return {
         "complete": True,
         "spec": loaded.spec,
@@ -148,6 +161,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         "rows_sha256": digest.hexdigest(),
         "scenarios": counted.table(),
         "unplaced": [one for one in unplaced if one.applies],
+        "placed_nowhere": sorted({one.id for one in loaded.scenarios} - placed),
         "does_not_apply": sum(not one.applies for one in unplaced),
         "failures": places.failures,
     }

@@ -34,14 +34,15 @@ METRICS_FILE = "metrics.parquet"
 def table_at(folder: Path, table: str) -> Path:
     """Return the file of a run's or sweep's table, or the folder of a sweep's.
 
-    Raises FileNotFoundError where there is none.
+    Raises FileNotFoundError, naming those that are there, where there is none.
     """
-    swept = {"metrics": METRICS_FILE, **SWEPT_TABLES}.get(table)
-    places = [folder / "results" / f"{table}.parquet", *([folder / swept] if swept else [])]
-    for path in places:
-        if path.exists():
-            return path
-    raise FileNotFoundError(f"{folder}: holds no table of {table}, neither of a run nor a sweep")
+    swept = {name: folder / at for name, at in (("metrics", METRICS_FILE), *SWEPT_TABLES.items())}
+    there = {file.stem: file for file in (folder / "results").glob("*.parquet")}
+    there = {name: path for name, path in swept.items() if path.exists()} | there
+    if table not in there:
+        known = f"holds {', '.join(sorted(there))}" if there else "neither of a run nor a sweep"
+        raise FileNotFoundError(f"{folder}: holds no table of {table}: {known}")
+    return there[table]
 
 
 _PLACE = "kind:str x_m:float y_m:float yaw_rad:float speed_mps:float length_m:float width_m:float"

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
+import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
-from foretwin.contracts.job_identity import job_from_bytes
+from foretwin.contracts.job_identity import future_id, job_from_bytes, vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.job_tables import (
@@ -24,68 +26,153 @@ from foretwin.orchestrator.record.job_tables import (
 )
 from foretwin.orchestrator.record.versions import versions
 from foretwin.sim_worker.world_file import load_world
+from foretwin.world_gen.build import with_id
 
 _DECIDE = ("python", "foretwin", "mujoco", "numpy", "scipy", "numba")
 """Versions without which a job may come to other bits."""
 
 
+class FutureRow(msgspec.Struct, frozen=True):
+    """What a row of the table of futures must hold for the future to be played again."""
+
+    future_id: str
+    job_sha256: str
+    index: int
+    planner: str
+    trajectory_sha256: str | None
+    failure: str | None
+    left_out: str | None
+
+
+class _JobRow(msgspec.Struct, frozen=True):
+    job_sha256: str
+    job: bytes
+
+
+class _PlayedWith(msgspec.Struct, frozen=True):
+    versions: dict[str, str]
+    processor: str
+
+
+_Row = TypeVar("_Row", FutureRow, _JobRow)
+
+
 class RecordedFuture(NamedTuple):
     """A future's row, its job, and the World and vehicle that it was played with."""
 
-    row: dict[str, Any]
+    row: FutureRow
     job: Job
     world: World
     vehicle: VehicleParameters
 
 
-def recorded_future(folder: Path, future_id: str) -> RecordedFuture:
+def recorded_future(folder: Path, wanted: str) -> RecordedFuture:
     """Return a future of a run or sweep by its id.
 
-    Raises FileNotFoundError, or UserError in one line, where it is not there or was recorded with
-    what is not here: another schema, other versions, another processor.
+    Raises FileNotFoundError, or UserError in one line, where it is not there, is not what was
+    written, or was recorded with what is not here: another schema, other versions, another
+    processor.
     """
-    row = _row(table_at(folder, "futures"), "future_id", future_id)
-    asked = _row(table_at(folder, "jobs"), "job_sha256", row["job_sha256"])
-    if hashlib.sha256(asked["job"]).hexdigest() != row["job_sha256"]:
-        raise UserError(f"{folder}: the job of {future_id} is damaged: its hash is another one")
+    file = _file_of(table_at(folder, "futures"), "future_id", wanted)
+    row = _row(file, "future_id", wanted, FutureRow)
+    jobs = table_at(folder, "jobs")
+    part = jobs / file.name if jobs.is_dir() else jobs
+    asked = _row(part, "job_sha256", row.job_sha256, _JobRow)
+    if hashlib.sha256(asked.job).hexdigest() != row.job_sha256:
+        raise UserError(f"{part}: the job of {wanted} is damaged: its hash is another one")
     try:
-        job = job_from_bytes(asked["job"], where=f"{folder}: the job of {future_id}")
-        world = load_world(folder / "worlds", job.world_id)
-        file = folder / VEHICLES / f"{job.vehicle}.vehicle"
-        return RecordedFuture(row, job, world, read_message(file, VehicleParameters))
+        job = job_from_bytes(asked.job, where=f"{part}: the job of {wanted}")
+        held = wanted == future_id(row.job_sha256, row.index)
+        if not held or all(future.index != row.index for future in job.futures):
+            raise UserError(f"{file}: index {row.index} is not that of {wanted} in its job")
+        world, vehicle = kept_world(folder / "worlds", job.world_id), _vehicle(folder, job.vehicle)
     except SchemaMismatch as error:
         raise UserError(str(error)) from error
+    return RecordedFuture(row, job, world, vehicle)
 
 
-def _row(path: Path, column: str, value: str) -> dict[str, Any]:
+def kept_world(folder: Path, world_id: str) -> World:
+    """Return the World of an id; UserError where its file holds what has another one.
+
+    Raises FileNotFoundError or SchemaMismatch as `load_world` does.
+    """
+    world = load_world(folder, world_id)
+    if (found := with_id(world).id) != world_id:
+        raise UserError(f"{folder / world_id}.world: was changed: holds World {found}")
+    return world
+
+
+def _vehicle(folder: Path, digest: str) -> VehicleParameters:
+    file = folder / VEHICLES / f"{digest}.vehicle"
+    vehicle = read_message(file, VehicleParameters)
+    if vehicle_digest(vehicle) != digest:
+        raise UserError(f"{file}: was changed: holds vehicle {vehicle_digest(vehicle)}")
+    return vehicle
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[pq.ParquetFile]:
+    """Open a file of a table; all that damage in it can raise is a UserError that names it.
+
+    Raises FileNotFoundError where there is none.
+    """
     try:
-        schema = pq.ParquetDataset(path).schema
-        _check_same(path, schema)
-        found = pq.read_table(path, filters=[(column, "=", value)]).to_pylist()
-    except (OSError, pa.ArrowException) as error:
-        raise UserError(f"{path}: cannot be read: {error}") from error
-    if not found:
-        raise UserError(f"{path}: no {column} {value!r}")
-    row: dict[str, Any] = found[0]
-    return row
+        with pq.ParquetFile(path) as file:
+            yield file
+    except (UserError, FileNotFoundError):
+        raise
+    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+        raise UserError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
 
 
-def _check_same(path: Path, schema: pa.Schema) -> None:
-    """Raise UserError where a table was written with what may come to other bits."""
+def _file_of(table: Path, column: str, value: str) -> Path:
+    """Return which file of a table holds a value; what cannot be read is passed by."""
+    files = sorted(table.glob("*.parquet")) if table.is_dir() else [table]
+    unread = None if files else UserError(f"{table}: holds no rows")
+    for path in files:
+        try:
+            with opened(path) as file:
+                _check_schema(path, file.schema_arrow)
+                if value in file.read([column])[column].to_pylist():
+                    return path
+        except UserError as error:
+            unread = unread or error
+    raise unread or UserError(f"{table}: no {column} {value!r}")
+
+
+def _row(path: Path, column: str, value: str, kind: type[_Row]) -> _Row:
+    with opened(path) as file:
+        _check_same(path, file.schema_arrow)
+        for row in file.read(list(kind.__struct_fields__)).to_pylist():
+            if row[column] == value:
+                return msgspec.convert(row, kind)
+    raise UserError(f"{path}: no {column} {value!r}")
+
+
+def _check_schema(path: Path, schema: pa.Schema) -> dict[str, str]:
+    """Return the metadata of a table; UserError where another foretwin wrote it."""
     said = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
     if said.get("result_schema") != str(RESULT_SCHEMA_VERSION):
         raise UserError(
             f"{path}: written by another foretwin (schema of results "
             f"{said.get('result_schema', 'not told')}; this one reads {RESULT_SCHEMA_VERSION})"
         )
-    then, now = json.loads(said["versions"]), versions()
+    return said
+
+
+def _check_same(path: Path, schema: pa.Schema) -> None:
+    """Raise UserError where a table was written with what may come to other bits."""
+    said = _check_schema(path, schema)
+    known = msgspec.json.decode(said.get("versions", "null"))
+    then = msgspec.convert({**said, "versions": known}, _PlayedWith)
+    now = versions()
     for name in _DECIDE:
-        if then.get(name) != now[name]:
+        if then.versions.get(name) != now[name]:
             raise UserError(
-                f"{path}: recorded with {name} {then.get(name)}, here is {now[name]}: bits may "
-                "differ"
+                f"{path}: recorded with {name} {then.versions.get(name)}, here is {now[name]}: "
+                "bits may differ"
             )
-    if said["processor"] != processor():
+    if then.processor != processor():
         raise UserError(
-            f"{path}: recorded on {said['processor']}, this is {processor()}: bits may differ"
+            f"{path}: recorded on {then.processor}, this is {processor()}: bits may differ"
         )

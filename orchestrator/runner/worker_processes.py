@@ -36,6 +36,10 @@ _END_S = 0.5
 _MAILBOX_DEPTH = 4096
 
 
+class NoWorkerError(RuntimeError):
+    """Every worker ended again and again before it could take work."""
+
+
 class _WorkerRow(NamedTuple):
     module: str = "sim_worker"
     when_dead: WhenDead = "report"
@@ -115,7 +119,7 @@ class WorkerProcesses:
         self._dispatcher.cancel(key)
 
     def take(self, timeout_s: float | None = 0.0) -> Answer | None:
-        """Return one answer; see Runner. Raises RuntimeError where no worker can be started."""
+        """Return one answer; see Runner. Raises NoWorkerError where no worker can be started."""
         until_s = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._answers:
             if not self._dispatcher.dispatch.open:
@@ -179,7 +183,7 @@ class WorkerProcesses:
             if self._failed_starts.get(name, 0) < MAX_FAILED_STARTS
         ]
         if not able and not running:
-            raise RuntimeError(f"no worker can be started; see {self._setup.log_file}")
+            raise NoWorkerError(f"no worker can be started; see {self._setup.log_file}")
         missing = min(self._count, self._dispatcher.dispatch.open) - len(running)
         for name in [name for name in able if name not in running][: max(missing, 0)]:
             self._supervisor.start(

@@ -37,7 +37,7 @@ class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
     fingerprint: str
     worlds: tuple[WorldPlaces, ...]
     failures: dict[str, str]
-    """Junctions or Worlds of which nothing can be played, and why."""
+    """Junctions or Worlds of which nothing is known, and why: tried again at the next start."""
 
 
 class SweepFolder:
@@ -68,7 +68,7 @@ class SweepFolder:
 
     @property
     def worlds_dir(self) -> Path:
-        """Return where Worlds are built."""
+        """Return where the Worlds are."""
         return built_worlds(self.path)
 
     def _refuse_strangers(self) -> None:
@@ -131,18 +131,8 @@ class SweepFolder:
 
 
 def built_worlds(out: Path) -> Path:
-    """Return where the Worlds of a sweep are built."""
+    """Return where the Worlds of a sweep are, built or copied."""
     return out / WORLDS
-
-
-def keep_worlds(source: Path | None, folder: Path, used: tuple[WorldPlaces, ...]) -> None:
-    """Copy Worlds that lie elsewhere beside the rows, to play their futures again from there."""
-    if source is None:
-        return
-    for world in used:
-        name = f"{world.world_id}.world"
-        if not (folder / name).exists():
-            shutil.copyfile(source / name, folder / name)
 
 
 def planner_origins(spec: SweepSpec) -> dict[str, dict[str, str]]:

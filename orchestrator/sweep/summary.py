@@ -100,6 +100,8 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
         f"{summary['jobs']} jobs played now in {summary['playing_s']:.1f} s; "
         f"{len(summary['unplaced'])} unplaced"
     )
+    if summary["placed_nowhere"]:
+        print(f"placed nowhere: {', '.join(summary['placed_nowhere'])}")
     for place, reason in summary["failures"].items():
         print(f"failed: {place}: {reason}")
     for entry in summary["scenarios"]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.orchestrator.sweep.folder import LOG, built_worlds
-from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, worlds_folder
+from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded
 
 _KEPT_WORLDS = 2
 
@@ -21,7 +21,7 @@ def worker_setup(loaded: Loaded, out: Path) -> WorkerSetup:
         bus=BusSetup(endpoint=""),
         log_file=str(out / LOG),
         role="futures",
-        worlds_dir=str(worlds_folder(loaded.spec) or built_worlds(out)),
+        worlds_dir=str(built_worlds(out)),
         vehicle=vehicles[0],
         swept_vehicles=vehicles,
         control_hz=loaded.spec.control_hz,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -12,10 +12,12 @@ import numpy as np
 
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.record.recorded_jobs import kept_world
 from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
 from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
 from foretwin.orchestrator.worlds.opening import NodeClip, open_map
 from foretwin.sim_worker.world_file import load_world
+from foretwin.world_gen.build import with_id
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
@@ -29,15 +31,14 @@ Progress = Callable[[int, str], AbstractContextManager[tuple[Callable[[str], Non
 
 
 class SweepWorlds(NamedTuple):
-    """Where the Worlds lie, their ids in order, and what could not be built, by junction."""
+    """The ids of Worlds in order, and what could not be built, by junction."""
 
-    folder: Path
     ids: tuple[str, ...]
     failures: dict[str, str]
 
 
 def source_digest(spec: SweepSpec) -> str:
-    """Return what the Worlds of a sweep come from, in short: of a map its bytes.
+    """Return what the Worlds of a sweep come from, in short: of files their bytes.
 
     Raises FileNotFoundError where it is not there.
     """
@@ -45,21 +46,37 @@ def source_digest(spec: SweepSpec) -> str:
         path = Path(spec.map)
         if not path.is_file():
             raise FileNotFoundError(f"map {path}: no such file")
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return _digest(path)
     folder = worlds_folder(spec)
     assert folder is not None
-    return " ".join(path.stem for path in _files(folder))
+    return " ".join(_digest(path) for path in _files(folder))
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def all_there(folder: Path, world_ids: Iterable[str]) -> bool:
+    """Return whether a folder holds Worlds; files of theirs that hold anything else are removed."""
+    whole = True
+    for world_id in world_ids:
+        try:
+            kept_world(folder, world_id)
+        except (FileNotFoundError, SchemaMismatch, UserError):
+            (folder / f"{world_id}{SUFFIX}").unlink(missing_ok=True)
+            whole = False
+    return whole
 
 
 def sweep_worlds(spec: SweepSpec, folder: Path, progress: Progress) -> SweepWorlds:
-    """Return the Worlds that a spec asks for; those of a map are built into `folder`.
+    """Build the Worlds that a spec asks for into `folder`, or copy them there.
 
     Raises UserError for a junction that is not there, or where none is left.
     """
     there = worlds_folder(spec)
     if there is not None:
-        return _read(spec, there)
+        return _read(spec, there, WorldStore(folder))
     assert spec.map is not None
     opened = open_map(Path(spec.map), clip=_clip(spec), service_roads=spec.service_roads)
     if spec.junctions == "all":
@@ -83,7 +100,7 @@ def sweep_worlds(spec: SweepSpec, folder: Path, progress: Progress) -> SweepWorl
             except Exception as error:  # one bad junction never stops the rest
                 failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
             advance(name)
-    return SweepWorlds(folder, tuple(ids), failures)
+    return SweepWorlds(tuple(ids), failures)
 
 
 def _clip(spec: SweepSpec) -> NodeClip | LatLonBounds | None:
@@ -119,20 +136,25 @@ def _files(folder: Path) -> list[Path]:
     return files
 
 
-def _read(spec: SweepSpec, folder: Path) -> SweepWorlds:
+def _read(spec: SweepSpec, folder: Path, store: WorldStore) -> SweepWorlds:
+    """Copy Worlds, each under the id of its content: one that was corrected is another one."""
     bounds = _bounds(spec)
-    found: list[tuple[str, str]] = []
+    found: dict[tuple[str, str], Path] = {}
     for path in _files(folder):
         try:
-            summary = load_world(folder, path.stem).intersection
+            world = with_id(load_world(folder, path.stem))
         except SchemaMismatch as error:
-            raise UserError(f"{path}: {error}") from error
+            raise UserError(str(error)) from error
+        summary = world.intersection
         inside = bounds is None or _within(bounds, summary.lat, summary.lon)
         if inside and (spec.junctions == "all" or summary.id in spec.junctions):
-            found.append((summary.id, path.stem))
+            found[summary.id, world.id] = path
     missing = set(() if spec.junctions == "all" else spec.junctions) - {name for name, _ in found}
     if missing:
         raise UserError(f"worlds {folder}: none of junction {sorted(missing)[0]}")
     if not found:
         raise UserError(f"worlds {folder}: no junction in bbox {spec.bbox}")
-    return SweepWorlds(folder, tuple(world for _, world in _sampled(sorted(found), spec)), {})
+    chosen = _sampled(sorted(found), spec)
+    for one in chosen:
+        store.save(with_id(load_world(folder, found[one].stem)))
+    return SweepWorlds(tuple(world_id for _, world_id in chosen), {})

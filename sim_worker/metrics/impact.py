@@ -95,8 +95,9 @@ def delta_v(view: RolloutView) -> Measure:
     """Change of the ego's velocity (S,) if both went on as one body from the first touch.
 
     Plastic and central: m_other / (m_ego + m_other) times the relative speed; Shelby (2011),
-    Delta-V as a measure of traffic conflict severity, equation 1. A simulated accident replaces
-    this estimate. Invalid where nothing is hit or the other's mass is unknown.
+    Delta-V as a measure of traffic conflict severity, equation 1. It stays this estimate where an
+    accident was simulated, which tells its own. Invalid where nothing is hit or the other's mass is
+    unknown.
     """
     found, masses = view.keep(impacts), view.context.user_mass_kg
     if masses is None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
+
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.placement import WorldPlaces
 from foretwin.contracts.runner import Runner, answers, job_task, place_task
 from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
 from foretwin.orchestrator.sweep.plan import SweepPlan
-from foretwin.orchestrator.sweep.spec import Loaded
+from foretwin.orchestrator.sweep.spec import Loaded, worlds_folder
 from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.sim_worker.futures.future_rows import Row
 from foretwin.sim_worker.in_process_runner import InProcessRunner
@@ -39,7 +41,9 @@ def small_sweep(folder: Path, text: str = SMALL) -> Path:
 
 def alone(loaded: Loaded) -> InProcessRunner:
     """A runner of this process alone: what it answers is what any worker would."""
-    return InProcessRunner(worker_setup(loaded, Path("nowhere")))
+    setup = worker_setup(loaded, Path("nowhere"))
+    there = str(worlds_folder(loaded.spec))
+    return InProcessRunner(msgspec.structs.replace(setup, worlds_dir=there))
 
 
 def places_of(runner: Runner, loaded: Loaded, world_id: str) -> WorldPlaces:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -10,11 +11,14 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.codec import write_message
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
+from tests.sim_worker.scenarios.worlds import cross
 
 COVERS = (
     "foretwin.orchestrator.record.job_tables",
@@ -107,10 +111,96 @@ def test_what_cannot_be_repeated_is_told_in_one_line(
     assert said in _said(capsys)
 
 
+@pytest.mark.parametrize(
+    ("table", "metadata", "columns", "said"),
+    [
+        ("rows", {"versions": "xx"}, {}, "cannot be read: JSON is malformed"),
+        ("rows", {"versions": "[1]"}, {}, "Expected `object`, got `array`"),
+        ("rows", {}, {"index": None}, "cannot be read: Expected `int`, got `null` - at `$.index`"),
+        ("rows", {}, {"index": 99}, "index 99 is not that of"),
+        ("rows", {}, {"index": -1}, "index -1 is not that of"),
+        ("rows", {}, {"job_sha256": "zz"}, "no job_sha256 'zz'"),
+        ("rows", {}, {"trajectory_sha256": None}, "was not played: its row does not say why"),
+        ("jobs", {}, {"job": None}, "cannot be read: Expected `bytes`, got `null` - at `$.job`"),
+    ],
+)
+def test_what_was_edited_is_told_in_one_line(
+    copied: Path, table: str, metadata: dict[str, str], columns: dict[str, Any], said: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    future = _rows(copied)[0]["future_id"]
+    _rewritten(copied, table, metadata, **columns)
+    assert run(["repeat", str(copied), future]) == 2
+    assert said in _said(capsys)
+
+
+@pytest.mark.parametrize(
+    ("table", "column"),
+    [("rows", name) for name in ("future_id", "job_sha256", "index", "planner")]
+    + [("rows", "trajectory_sha256"), ("jobs", "job_sha256"), ("jobs", "job")],
+)
+def test_a_column_that_is_gone_is_named(
+    copied: Path, table: str, column: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future = _rows(copied)[0]["future_id"]
+    for part in (copied / table).glob("*.parquet"):
+        pq.write_table(pq.read_table(part).drop_columns([column]), part)
+    assert run(["repeat", str(copied), future]) == 2
+    said = _said(capsys)
+    assert f"{table}/job-0" in said
+    assert column in said
+
+
+@pytest.mark.parametrize("key", ["result_schema", "versions", "processor"])
+def test_a_table_that_does_not_say_what_it_was_played_with_is_refused(
+    copied: Path, key: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future = _rows(copied)[0]["future_id"]
+    for part in (copied / "rows").glob("*.parquet"):
+        table = pq.read_table(part)
+        del (metadata := dict(table.schema.metadata))[key.encode()]
+        pq.write_table(table.replace_schema_metadata(metadata), part)
+    assert run(["repeat", str(copied), future]) == 2
+    assert f"{copied}/rows/job-0" in _said(capsys)
+
+
+def test_parts_of_other_jobs_stop_no_repeat(
+    copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future = _rows(copied)[-1]["future_id"]
+    parts = sorted((copied / "rows").glob("*.parquet"))
+    parts[0].write_bytes(b"no table")
+    parts[1].unlink()
+    assert run(["repeat", str(copied), future]) == 0
+    capsys.readouterr()
+    assert run(["repeat", str(copied), "nobody-1"]) == 2
+    assert f"{parts[0]}: cannot be read" in _said(capsys)
+
+
+def test_worlds_and_vehicles_are_those_of_their_names(
+    copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future = _rows(copied)[0]["future_id"]
+    (world,) = (copied / "worlds").glob("*.world")
+    whole = world.read_bytes()
+    write_message(cross(signals=True), world)
+    assert run(["repeat", str(copied), future]) == 2
+    assert f"{world}: was changed: holds World {cross(signals=True).id}" in _said(capsys)
+    world.write_bytes(whole)
+    (vehicle,) = (copied / "vehicles").glob("*.vehicle")
+    write_message(load_vehicle("vw_vanagon"), vehicle)
+    assert run(["repeat", str(copied), future]) == 2
+    assert f"{vehicle}: was changed: holds vehicle" in _said(capsys)
+
+
 def test_what_is_not_there_is_told(
     swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["repeat", str(swept), "nobody-1"]) == 2
-    assert "no future_id 'nobody-1'" in _said(capsys)
+    for unknown in ("nobody-1", os.fsdecode(b"\xff-1")):
+        assert run(["repeat", str(swept), unknown]) == 2
+        assert f"no future_id {unknown!r}" in _said(capsys)
     assert run(["repeat", str(tmp_path), "nobody-1"]) == 2
     assert "neither of a run nor a sweep" in _said(capsys)
+    (tmp_path / "rows").mkdir()
+    assert run(["repeat", str(tmp_path), "nobody-1"]) == 2
+    assert f"{tmp_path}/rows: holds no rows" in _said(capsys)

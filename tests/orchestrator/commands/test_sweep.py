@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import signal
@@ -18,6 +19,7 @@ import pytest
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep, workers_for
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
+from foretwin.orchestrator.runner import worker_processes
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 from tests.sim_worker.planners.installed import install
@@ -125,6 +127,21 @@ def test_another_spec_is_refused_in_the_same_folder(
     assert "--fresh starts anew" in capsys.readouterr().err
 
 
+def test_a_sweep_that_plays_nothing_says_which_scenarios_apply_nowhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = SMALL.replace(
+        '"scp", "cpta", "reversing_parking"', '"roundabout_entry", "race_track_lap"'
+    )
+    spec, out = small_sweep(tmp_path, text), tmp_path / "out"
+    assert run(["sweep", str(spec), "--out", str(out), "--workers", "1"]) == 3
+    said = capsys.readouterr().out
+    assert "placed nowhere: race_track_lap, roundabout_entry\n" in said
+    assert "0 rows of 1 Worlds" in said
+    written = json.loads((out / "sweep.json").read_text())
+    assert written["placed_nowhere"] == ["race_track_lap", "roundabout_entry"]
+
+
 PLANNER = """
 from foretwin.sim_worker.planner_interface import PlannerOutput
 
@@ -159,14 +176,18 @@ def test_a_changed_planner_does_not_get_the_rows_of_the_old_one(
     assert again["rows_sha256"] != first["rows_sha256"]
 
 
-def _pressed(spec: Path, out: Path) -> tuple[int, str]:
-    """Start a sweep with one worker, press Ctrl-C after its first job; returns how it ended."""
+def _ended_by(sig: signal.Signals, spec: Path, out: Path) -> None:
+    """Start a sweep with one worker and end it by a signal after its first job: it ends soon, says
+    so, and leaves no other files behind."""
+    temporary = spec.parent / "temporary"
+    temporary.mkdir()
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", "foretwin", "sweep", str(spec), "--out", str(out),
          "--workers", "1"],
         cwd=Path(__file__).parents[3], stderr=subprocess.PIPE, text=True,
+        env=os.environ | {"TMPDIR": str(temporary)},
         # A shell's background jobs, and all they start, ignore Ctrl-C.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        preexec_fn=lambda: signal.signal(sig, signal.SIG_DFL),
     )  # fmt: skip
     try:
         deadline = time.monotonic() + STARTS_WITHIN_S
@@ -176,24 +197,29 @@ def _pressed(spec: Path, out: Path) -> tuple[int, str]:
                 process.wait(0.05)
         pressed_s = time.monotonic()
         with kept_waiting(process.pid) as kept:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(sig)
             _, said = process.communicate(timeout=STARTS_WITHIN_S)
         assert time.monotonic() - pressed_s - kept.seconds < ENDS_WITHIN_S
     finally:
         if process.poll() is None:
             process.kill()
             process.wait()
-    return process.returncode, said
+    assert process.returncode == 130
+    assert said.endswith("foretwin: interrupted\n")
+    assert "Traceback" not in said
+    assert list(temporary.iterdir()) == []
+
+
+def _long_sweep(folder: Path) -> Path:
+    """Seconds of work: a smaller sweep is done before a busy machine has pressed the key."""
+    frictions = str([round(0.4 + 0.01 * k, 2) for k in range(40)])
+    return small_sweep(folder, SMALL.replace("[1.0, 0.4]", frictions))
 
 
 def test_ctrl_c_ends_soon_and_keeps_what_is_done(tmp_path: Path) -> None:
-    # Seconds of work: a smaller sweep is done before a busy machine has pressed the key.
-    frictions = str([round(0.4 + 0.01 * k, 2) for k in range(40)])
-    spec = small_sweep(tmp_path, SMALL.replace("[1.0, 0.4]", frictions))
+    spec = _long_sweep(tmp_path)
     loaded, out = load_spec(spec), tmp_path / "out"
-    code, said = _pressed(spec, out)
-    assert code == 130
-    assert "Traceback" not in said
+    _ended_by(signal.SIGINT, spec, out)
     kept = list((out / "rows").glob("*.parquet"))
     assert kept
     assert not json.loads((out / "sweep.json").read_text())["complete"]
@@ -201,6 +227,23 @@ def test_ctrl_c_ends_soon_and_keeps_what_is_done(tmp_path: Path) -> None:
     whole = run_sweep(loaded, tmp_path / "whole", alone(loaded))
     assert again["jobs_played"] <= whole["jobs"] - len(kept)
     assert again["rows_sha256"] == whole["rows_sha256"]
+
+
+@pytest.mark.parametrize("sig", [signal.SIGTERM, signal.SIGHUP])
+def test_a_sweep_that_is_told_to_end_ends_as_by_ctrl_c(tmp_path: Path, sig: signal.Signals) -> None:
+    _ended_by(sig, _long_sweep(tmp_path), tmp_path / "out")
+
+
+def test_workers_that_cannot_be_started_are_told_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start = functools.partial(worker_processes.FreshInterpreter, package="no_such_package")
+    monkeypatch.setattr(worker_processes, "FreshInterpreter", start)
+    assert run(["sweep", str(small_sweep(tmp_path)), "--out", str(tmp_path / "out")]) == 3
+    said = capsys.readouterr().err
+    log = tmp_path / "out" / "log.jsonl"
+    assert said == f"foretwin: no worker can be started; see {log}; what is done is kept\n"
+    assert "no_such_package" in log.read_text()
 
 
 @pytest.mark.judge

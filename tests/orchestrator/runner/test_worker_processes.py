@@ -13,7 +13,7 @@ from foretwin.contracts.setup import BusSetup, ProcessSetup, WorkerSetup
 from foretwin.contracts.simulation import PrepareRequest
 from foretwin.orchestrator.runner.dispatch import ATTEMPTS
 from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
-from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
+from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
 
@@ -118,6 +118,6 @@ def test_an_exception_ends_all_processes(tmp_path: Path) -> None:
 
 def test_workers_that_cannot_be_started_are_said(tmp_path: Path) -> None:
     workers = runner(tmp_path, workers=1, role="never up")
-    with pytest.raises(RuntimeError, match=r"no worker can be started; see .*log\.jsonl"):
+    with pytest.raises(NoWorkerError, match=r"no worker can be started; see .*log\.jsonl"):
         asked(workers, "a")
     assert "no licence" in (tmp_path / "log.jsonl").read_text()

@@ -5,12 +5,14 @@ from __future__ import annotations
 from contextlib import nullcontext
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from foretwin.contracts.codec import write_message
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.sweep.spec import SweepSpec
-from foretwin.orchestrator.sweep.worlds import Progress, source_digest, sweep_worlds
+from foretwin.orchestrator.sweep.worlds import Progress, all_there, source_digest, sweep_worlds
 from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.world_gen.world_store import WorldStore
 from tests.sim_worker.scenarios.worlds import cross
@@ -44,7 +46,7 @@ def test_junctions_of_a_map_are_built_and_one_that_fails_stops_no_other(
     found = sweep_worlds(spec, tmp_path, counting(seen))
     assert seen == sorted([good, bad])
     assert len(found.ids) == 1
-    assert (found.folder / f"{found.ids[0]}.world").is_file()
+    assert (tmp_path / f"{found.ids[0]}.world").is_file()
     assert found.failures == {bad: "OSError: disk full"}
 
 
@@ -72,10 +74,23 @@ def test_what_is_not_there_is_named(tmp_path: Path) -> None:
         sweep_worlds(spec, tmp_path, counting([]))
 
 
-def test_worlds_of_a_folder_are_taken_as_they_lie_there(tmp_path: Path) -> None:
-    WorldStore(tmp_path / "drawn").save(cross())
-    spec = SweepSpec(worlds=str(tmp_path / "drawn"))
-    found = sweep_worlds(spec, tmp_path, counting([]))
-    assert found.ids == (cross().id,)
-    assert source_digest(spec) == cross().id
-    assert source_digest(SweepSpec(map=TOWN)) != source_digest(spec)
+def test_worlds_of_a_folder_are_copied_under_the_ids_of_their_content(tmp_path: Path) -> None:
+    drawn, out = tmp_path / "drawn", tmp_path / "out"
+    drawn.mkdir()
+    write_message(cross(), drawn / "by_hand.world")
+    spec = SweepSpec(worlds=str(drawn))
+    assert sweep_worlds(spec, out, counting([])).ids == (cross().id,)
+    assert [path.stem for path in out.iterdir()] == [cross().id]
+    before = source_digest(spec)
+    write_message(msgspec.structs.replace(cross(), stop_lines=()), drawn / "by_hand.world")
+    assert source_digest(spec) != before
+    assert sweep_worlds(spec, out, counting([])).ids != (cross().id,)
+
+
+def test_a_world_that_is_lost_or_another_one_is_not_there(tmp_path: Path) -> None:
+    file = WorldStore(tmp_path).save(cross())
+    assert all_there(tmp_path, [cross().id])
+    write_message(msgspec.structs.replace(cross(), stop_lines=()), file)
+    assert not all_there(tmp_path, [cross().id])
+    assert not file.exists()
+    assert not all_there(tmp_path, [cross().id])

@@ -1,0 +1,147 @@
+"""A sweep started again: what failed is tried again, what is lost or damaged is made anew."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from foretwin.contracts.runner import Answer
+from foretwin.contracts.setup import WorkerSetup
+from foretwin.orchestrator.commands.sweep import run_sweep
+from foretwin.orchestrator.sweep.spec import Loaded, load_spec
+from foretwin.orchestrator.sweep.workers import worker_setup
+from foretwin.sim_worker.in_process_runner import InProcessRunner
+from foretwin.world_gen.world_store import WorldStore
+from tests.orchestrator.sweeps import small_sweep
+from tests.sim_worker.scenarios.worlds import tee
+
+COVERS = ("foretwin.orchestrator.sweep.folder", "foretwin.orchestrator.sweep.rows")
+
+
+class Leaving(InProcessRunner):
+    """Gives up tasks of one channel on one World or all, as where no worker answers in time."""
+
+    def __init__(self, setup: WorkerSetup, channel: str = "", world_id: str = "") -> None:
+        super().__init__(setup)
+        self._channel, self._world_id = channel, world_id
+
+    def take(self, timeout_s: float | None = 0.0) -> Answer | None:
+        answer = super().take(timeout_s)
+        if answer is None or answer.task.channel != self._channel:
+            return answer
+        if self._world_id not in ("", answer.task.world_id):
+            return answer
+        return Answer(answer.task, None, "no answer in 1 s")
+
+
+def played(loaded: Loaded, out: Path, *left_out: str) -> dict[str, Any]:
+    return run_sweep(loaded, out, Leaving(worker_setup(loaded, out), *left_out))
+
+
+@pytest.fixture(scope="module")
+def two_worlds(tmp_path_factory: pytest.TempPathFactory) -> tuple[Loaded, Path, dict[str, Any]]:
+    """A small sweep over two Worlds, its folder, and what it came to."""
+    folder = tmp_path_factory.mktemp("two")
+    spec = small_sweep(folder)
+    WorldStore(folder / "drawn").save(tee())
+    loaded = load_spec(spec)
+    return loaded, folder / "out", played(loaded, folder / "out")
+
+
+def flipped(part: Path) -> None:
+    """Damage a part between its beginning and its footer."""
+    data = bytearray(part.read_bytes())
+    data[len(data) // 8 : len(data) // 4] = bytes(len(data) // 4 - len(data) // 8)
+    part.write_bytes(data)
+
+
+def without_a_column(part: Path) -> None:
+    pq.write_table(pq.read_table(part).drop_columns(["metric_ttc"]), part)
+
+
+def swapped(part: Path) -> None:
+    """Put the part of another job in its place."""
+    shutil.copyfile(part.with_name("job-000000.parquet"), part)
+
+
+def cut(part: Path) -> None:
+    part.write_bytes(part.read_bytes()[:-20])
+
+
+@pytest.mark.parametrize("table", ["rows", "jobs", "road_users"])
+@pytest.mark.parametrize("harm", [Path.unlink, cut, flipped, swapped])
+def test_a_job_is_done_where_all_its_parts_are_there_and_its_own(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path, table: str,
+    harm: Callable[[Path], None],
+) -> None:  # fmt: skip
+    loaded, out, summary = two_worlds
+    out = Path(shutil.copytree(out, tmp_path / "out"))
+    part = out / table / "job-000002.parquet"
+    before = part.read_bytes()
+    harm(part)
+    again = played(loaded, out)
+    # Nobody is with the futures of a staged job: another's part says the same of it.
+    assert again["jobs_played"] == (table != "road_users" or harm is not swapped)
+    assert part.read_bytes() == before
+    assert again["rows_sha256"] == summary["rows_sha256"]
+
+
+def test_rows_of_other_columns_are_played_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    loaded, out, summary = two_worlds
+    out = Path(shutil.copytree(out, tmp_path / "out"))
+    without_a_column(out / "rows" / "job-000001.parquet")
+    again = played(loaded, out)
+    assert (again["jobs_played"], again["rows_sha256"]) == (1, summary["rows_sha256"])
+
+
+@pytest.mark.parametrize("what", ["worlds/*.world", "vehicles/*.vehicle"])
+@pytest.mark.parametrize("harm", [Path.unlink, cut])
+def test_worlds_and_vehicles_that_are_lost_are_kept_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path, what: str,
+    harm: Callable[[Path], None],
+) -> None:  # fmt: skip
+    loaded, out, summary = two_worlds
+    out = Path(shutil.copytree(out, tmp_path / "out"))
+    lost = sorted(out.glob(what))[0]
+    before = lost.read_bytes()
+    harm(lost)
+    again = played(loaded, out)
+    assert (again["jobs_played"], again["rows_sha256"]) == (0, summary["rows_sha256"])
+    assert lost.read_bytes() == before
+
+
+@pytest.mark.parametrize("channel", ["place", "job"])
+def test_what_was_given_up_is_tried_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path, channel: str
+) -> None:
+    loaded, _, summary = two_worlds
+    failed = played(loaded, tmp_path / "out", channel)
+    assert failed["placed"] == 0
+    assert len(failed["failures"]) == (2 if channel == "place" else 0)
+    again = played(loaded, tmp_path / "out")
+    assert (again["failed"], again["failures"]) == (0, {})
+    assert again["rows_sha256"] == summary["rows_sha256"]
+    assert played(loaded, tmp_path / "out")["jobs_played"] == 0
+
+
+def test_places_found_later_come_to_the_rows_of_a_sweep_at_once(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    loaded, whole, summary = two_worlds
+    first = pq.read_table(whole / "rows" / "job-000000.parquet")["world_id"][0].as_py()
+    early = played(loaded, tmp_path / "out", "place", first)
+    assert 0 < early["jobs"] < summary["jobs"]
+    again = played(loaded, tmp_path / "out")
+    assert again["rows_sha256"] == summary["rows_sha256"]
+    # A World that is not placed on any more leaves no rows behind.
+    (tmp_path / "out" / "places.msgpack").unlink()
+    again = played(loaded, tmp_path / "out", "place", first)
+    assert again["rows_sha256"] == early["rows_sha256"]
+    assert pq.read_table(tmp_path / "out" / "rows").num_rows == early["rows"]
