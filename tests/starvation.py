@@ -93,10 +93,11 @@ def unhindered_wait_s(process: subprocess.Popen[bytes], deadline_s: float) -> fl
 
 def _waits_ns(pid: int) -> dict[Path, int]:
     """Return for how long each thread of a process was ready and did not run."""
-    found = {}
-    for thread in Path(f"/proc/{pid}/task").glob("*/schedstat"):
-        with contextlib.suppress(OSError, IndexError):
-            found[thread] = int(thread.read_text().split()[1])
+    found: dict[Path, int] = {}
+    with contextlib.suppress(OSError):  # Listing them fails once the process is gone.
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            with contextlib.suppress(OSError, IndexError):
+                found[thread] = int((thread / "schedstat").read_text().split()[1])
     return found
 
 
