@@ -27,7 +27,7 @@ class ConfigError(UserError):
     """A setting that cannot be used; the message names it and what would be right."""
 
 
-class VehicleBeside(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class OtherVehicleConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A vehicle beside the car: its role, its parameters, and where its telemetry comes from.
 
     One of three: a recorded drive (`log`), a vehicle of this id on the bus (`live`), or who the car
@@ -104,7 +104,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether the map's roads help to find the car where its positions are rougher than they."""
     follow: FollowLimits = FollowLimits()
     """How hard a twin that follows may be drawn."""
-    vehicles: tuple[VehicleBeside, ...] = ()
+    vehicles: tuple[OtherVehicleConfig, ...] = ()
     """Others in the mirror besides the car, each with a role of its own."""
     view: View = "auto"
     out: str = "runs"

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.bus import Bus, Mailbox
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 
@@ -22,7 +22,7 @@ class DriveContext:
     bus: Bus
     mailbox: Mailbox
     tables: ResultTables
-    tell: Callable[[Tell], None]
+    tell: Callable[[Notice], None]
 
     def publish(self, channel: str, message: msgspec.Struct) -> None:
         """Send a message below the run's key."""

@@ -29,14 +29,14 @@ class UseWorld:
 
 
 @dataclass(frozen=True, slots=True)
-class Tell:
-    """Tell the engineer."""
+class Notice:
+    """What the engineer is to read."""
 
     level: Literal["info", "warning", "error"]
     text: str
 
 
-Instruction = BuildWorld | UseWorld | Tell
+Instruction = BuildWorld | UseWorld | Notice
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.config import DriveConfig, VehicleBeside
+from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import StandinPath
@@ -21,10 +21,10 @@ from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
 
-class Beside(NamedTuple):
+class OtherVehiclePlan(NamedTuple):
     """A vehicle beside the car, its parameters, and whether its commands are recorded."""
 
-    config: VehicleBeside
+    config: OtherVehicleConfig
     vehicle: VehicleParameters
     commands_recorded: bool
     ros2: MappingFile | None = None
@@ -49,7 +49,7 @@ class DriveInputs:
     route_source: str
     drive_frame: LocalFrame
     vehicle: VehicleParameters
-    beside: tuple[Beside, ...]
+    beside: tuple[OtherVehiclePlan, ...]
     log_file: Path | None
     info: VehicleInfo | None
     standin: StandinPath | None

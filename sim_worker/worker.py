@@ -24,7 +24,7 @@ from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.futures.future_rows import future_rows, rows_as_bytes
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
@@ -39,11 +39,11 @@ log = logging.getLogger("sim_worker")
 
 
 class _Prepared(NamedTuple):
-    stage: Stage
+    stage: BatchSimulation
     scenes: SceneMaker
 
 
-class StageCache:
+class SimulationCache:
     """Compiled stages of the Worlds used last; loads a World's file on first use."""
 
     def __init__(self, setup: WorkerSetup, vehicle: VehicleParameters) -> None:
@@ -56,7 +56,7 @@ class StageCache:
             self._stages.move_to_end(world_id)
             return self._stages[world_id]
         setup, world = self._setup, load_world(Path(self._setup.worlds_dir), world_id)
-        stage = Stage(
+        stage = BatchSimulation(
             world,
             self._vehicle,
             nsim=setup.simulations,
@@ -86,9 +86,9 @@ class FuturesWorker:
     def __init__(self, setup: WorkerSetup) -> None:
         self._id = setup.process_id
         self._worlds_dir = Path(setup.worlds_dir)
-        self._stages = StageCache(setup, setup.vehicle)
+        self._stages = SimulationCache(setup, setup.vehicle)
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
-        self._swept = {name: StageCache(setup, v) for name, v in self._vehicles.items()}
+        self._swept = {name: SimulationCache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
@@ -149,7 +149,7 @@ class FuturesWorker:
         return places_in(world, question, self._vehicles[question.vehicle])
 
 
-def warm_up(stage: Stage) -> None:
+def warm_up(stage: BatchSimulation) -> None:
     """Do once, before it counts, what a first job does first: project and step."""
     assert stage.world is not None
     origin = stage.world.frame.origin

@@ -23,8 +23,8 @@ from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
 from foretwin.orchestrator.drive.world_handler import WorldHandler
-from foretwin.orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
-from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
+from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, NotReady, UseWorld
+from foretwin.orchestrator.other_vehicles.vehicles import OtherVehicleFeed
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
@@ -87,7 +87,7 @@ class Conductor:
             "vehicle": VehicleHandler(self.tuning.parameters),
         }
         self.changes = RuntimeConfiguration(handlers)
-        self.beside = VehiclesBeside(context)
+        self.beside = OtherVehicleFeed(context)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
@@ -130,7 +130,7 @@ class Conductor:
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
             where = f"where on the car its reference point ({info.reference_point}) sits"
-            self.tell(Tell("warning", f"the source does not say {where}; taken as base_link"))
+            self.tell(Notice("warning", f"the source does not say {where}; taken as base_link"))
 
     # Messages.
 
@@ -165,7 +165,7 @@ class Conductor:
             state = self.intake.take(item)
         except SchemaMismatch as error:
             if self.intake.refused == 1:
-                self.tell(Tell("error", str(error)))
+                self.tell(Notice("error", str(error)))
             return
         self.ads.take(state)
         if state is None:
@@ -183,7 +183,7 @@ class Conductor:
     def watch_telemetry(self, mono_ns: int) -> None:
         """Tell what newly went wrong with the telemetry; also when none comes any more."""
         for text in self.intake.warnings(mono_ns):
-            self.tell(Tell("warning", text))
+            self.tell(Notice("warning", text))
 
     def start_round(self) -> bool:
         """Start a round where the mission wants one; returns whether it did."""
@@ -222,7 +222,7 @@ class Conductor:
                     self._world_untold = True
                     if not self.plan.config.lock_step:
                         self.announce_world()
-                case Tell():
+                case Notice():
                     self.tell(instruction)
 
     def announce_world(self) -> None:
@@ -241,7 +241,7 @@ class Conductor:
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
 
     def _world_failed(self, junction_id: str, reason: str) -> None:
-        self.tell(Tell("error", f"no world for {junction_id}: {reason}"))
+        self.tell(Notice("error", f"no world for {junction_id}: {reason}"))
         self.mission.on_world_failed(junction_id)
 
     # Changes.
@@ -252,7 +252,7 @@ class Conductor:
             return
         stamp_ns, start_ns = self.intake.now_stamp_ns + 1, self.intake.start_stamp_ns
         for change in self.changes.make(stamp_ns=stamp_ns, start_stamp_ns=start_ns):
-            self.tell(Tell("info", f"set {change.text}"))
+            self.tell(Notice("info", f"set {change.text}"))
             self.tables.add("changes", [change.row()])
         self.tuning.hand_over()
 

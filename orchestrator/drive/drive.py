@@ -28,7 +28,7 @@ from foretwin.orchestrator.drive.progress import ProgressLine
 from foretwin.orchestrator.drive.run_record import reserve_record, run_record, write_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.record.versions import versions
@@ -224,12 +224,12 @@ class _Drive:
             if not death.restarted:
                 self._given_up.add(death.process_id)
             if death.restarted:
-                conductor.tell(Tell("warning", f"{text}; started again"))
+                conductor.tell(Notice("warning", f"{text}; started again"))
             elif death.row.when_dead == "end_drive":
-                conductor.tell(Tell("error", text))
+                conductor.tell(Notice("error", text))
                 self._vehicle_lost = True
             else:
-                conductor.tell(Tell("error", f"{text}; the drive goes on without it"))
+                conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
         self._end_the_hung(conductor, now_s)
 
     def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import ResultTables
 
@@ -28,7 +28,7 @@ class EventHandler:
     now_stamp_ns: Callable[[], int]
     on_event: Callable[[Event], None] | None = None
 
-    def tell(self, tell: Tell) -> None:
+    def tell(self, tell: Notice) -> None:
         """Log an event, publish it, and keep it."""
         event = Event(
             stamp_ns=self.now_stamp_ns(), level=tell.level, source=ORCHESTRATOR, text=tell.text

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from foretwin.contracts.simulation import MirrorSample
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import MIRROR, MIRRORED, ResultTables
 
@@ -19,7 +19,7 @@ class MirrorHandler:
     """Takes the mirror's samples in order."""
 
     tables: ResultTables
-    tell: Callable[[Tell], None]
+    tell: Callable[[Notice], None]
     stamp_ns: int = 0
     """Of the newest sample."""
     independent: bool | None = None
@@ -44,4 +44,4 @@ class MirrorHandler:
             if last_ns is None or sample.stamp_ns - last_ns > _APART_NS:
                 self.touches += 1
                 one, other = ("what stands" if name == "world" else name for name in pair)
-                self.tell(Tell("warning", f"in the mirror, {one} and {other} touch"))
+                self.tell(Notice("warning", f"in the mirror, {one} and {other} touch"))

@@ -16,9 +16,9 @@ from foretwin.orchestrator.drive.visits import Moment, VisitBook
 from foretwin.orchestrator.instructions import (
     BuildWorld,
     Instruction,
+    Notice,
     NotReady,
     RoundIntent,
-    Tell,
     UseWorld,
 )
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction
@@ -99,7 +99,7 @@ class Mission:
         todo: list[Instruction] = []
         if self.state != "following":
             text = "on the map" if self.state == "waiting" else "back on the map"
-            todo.append(Tell("info", f"{text}: {self._way.road_text}"))
+            todo.append(Notice("info", f"{text}: {self._way.road_text}"))
             self.state = "following"
         at = Moment(mono_s, self.drive_time_s)
         for junction in passed:
@@ -109,7 +109,7 @@ class Mission:
         todo += self._deviations()
         if state.map_shift_m is not None and not self._map_reported:
             self._map_reported = True
-            todo.append(Tell("info", "position from GNSS and the map"))
+            todo.append(Notice("info", "position from GNSS and the map"))
         return todo
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
@@ -217,7 +217,9 @@ class Mission:
         if self.state in ("off_map", "waiting"):
             return []
         self.state = "off_map"
-        todo: list[Instruction] = [Tell("warning", "off the map: no rounds until the car is back")]
+        todo: list[Instruction] = [
+            Notice("warning", "off the map: no rounds until the car is back")
+        ]
         if self._current is not None:
             self._current = None
             todo.append(UseWorld(None))
@@ -231,7 +233,7 @@ class Mission:
         self._visits.arrive(summary.id, at)
         self._passed_s_m = passed.centre_s_m
         text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
-        return [*todo, Tell("info", text)]
+        return [*todo, Notice("info", text)]
 
     def _wanted_worlds(self, at: Moment) -> list[Instruction]:
         soon = set(self._within_look_ahead())
@@ -278,14 +280,14 @@ class Mission:
         if self._way.off_route != self._off_route_reported:
             self._off_route_reported = self._way.off_route
             if self._off_route_reported:
-                todo.append(Tell("warning", "left the given route; the way ahead is predicted"))
+                todo.append(Notice("warning", "left the given route; the way ahead is predicted"))
             else:
-                todo.append(Tell("info", "back on the given route"))
+                todo.append(Notice("info", "back on the given route"))
         stretches = self._way.off_road_stretches
         if len(stretches) > self._stretches_reported:
             self._stretches_reported = len(stretches)
             last = stretches[-1]
             ways = ", ".join(str(way) for way in last.way_ids)
             why = _WHY_OFF_ROAD[last.reason]
-            todo.append(Tell("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
+            todo.append(Notice("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
         return todo

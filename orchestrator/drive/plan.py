@@ -16,10 +16,10 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, loca
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside, has_display
+from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
-from foretwin.orchestrator.plan import Beside, DriveInputs, DrivePlan
+from foretwin.orchestrator.plan import DriveInputs, DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import scenarios_of
 from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.road_index import RoadIndex
@@ -121,15 +121,17 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
     return log.info, line.lat_lon_deg
 
 
-def _read_beside(config: VehicleBeside, own: VehicleParameters) -> Beside:
+def _read_beside(config: OtherVehicleConfig, own: VehicleParameters) -> OtherVehiclePlan:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
     if config.log is None:
         ros2 = read_ros2_beside(config)
-        return Beside(config, vehicle, commands_recorded=config.live, ros2=ros2)
+        return OtherVehiclePlan(config, vehicle, commands_recorded=config.live, ros2=ros2)
     file = Path(config.log)
     if not file.exists():
         raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")
-    return Beside(config, vehicle, commands_recorded="control" in open_log(file).info.sends)
+    return OtherVehiclePlan(
+        config, vehicle, commands_recorded="control" in open_log(file).info.sends
+    )
 
 
 def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:

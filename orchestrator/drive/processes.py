@@ -17,7 +17,7 @@ from foretwin.contracts.setup import (
     ViewerSetup,
     WorkerSetup,
 )
-from foretwin.orchestrator.plan import Beside, DrivePlan
+from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
 
@@ -158,7 +158,7 @@ def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
     )
 
 
-def _ros2_of_others(plan: DrivePlan) -> list[Beside]:
+def _ros2_of_others(plan: DrivePlan) -> list[OtherVehiclePlan]:
     return [one for one in plan.beside if one.ros2 is not None]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from foretwin.orchestrator.config import DriveConfig, VehicleBeside
+from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
 from foretwin.telemetry.ros2.mapping import MappingError, MappingFile, read_mapping
 from foretwin.telemetry.ros_messages.parts import LANELET_ROUTE
 
@@ -33,7 +33,7 @@ def read_ros2(config: DriveConfig) -> MappingFile | None:
     return read
 
 
-def read_ros2_beside(config: VehicleBeside) -> MappingFile | None:
+def read_ros2_beside(config: OtherVehicleConfig) -> MappingFile | None:
     """Return the mapping of a vehicle beside the car, None where it speaks no ROS 2.
 
     Raises MappingError or FileNotFoundError, one line.

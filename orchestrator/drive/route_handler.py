@@ -13,7 +13,7 @@ from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import local_from_geo
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
 from foretwin.orchestrator.routing.road_index import RoadIndex
@@ -32,7 +32,7 @@ class RouteHandler:
     """
 
     def __init__(
-        self, plan: DrivePlan, *, use: Callable[[Route], None], tell: Callable[[Tell], None]
+        self, plan: DrivePlan, *, use: Callable[[Route], None], tell: Callable[[Notice], None]
     ) -> None:
         """`use` takes each route that was found; without `--route live` there is nothing to do."""
         self._graph, self._vehicle_id = plan.graph, plan.config.vehicle_id
@@ -95,7 +95,7 @@ class RouteHandler:
             found = looked.result()
         except UserError as error:
             text = f"the vehicle's route cannot be used: {error}; the way ahead is predicted"
-            self._tell(Tell("warning", text))
+            self._tell(Notice("warning", text))
             return
         first = self._route is None
         self._route = found.route
@@ -109,7 +109,7 @@ class RouteHandler:
             f"{length_m / 1000.0:.1f} km to {goal.lat_deg:.5f}, {goal.lon_deg:.5f}, {how} on this "
             f"map: its {self._said.segments} lanelets say nothing without their own"
         )
-        self._tell(Tell("info", text))
+        self._tell(Notice("info", text))
         self._use(found.route)
 
     def _leads_elsewhere(self, line_deg: Array) -> bool:

@@ -13,7 +13,7 @@ from foretwin.contracts.side_by_side import Disagreement, DisagreementKind, Driv
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import SideBySide
 
@@ -91,7 +91,7 @@ class SideBySideHandler:
         for one in found:
             self._context.publish("disagreement", one)
             if not one.over:
-                self._context.tell(Tell("warning", disagreement_text(one)))
+                self._context.tell(Notice("warning", disagreement_text(one)))
                 continue
             self._found.append(one)
             self._context.tables.add("disagreements", [disagreement_row(one)])

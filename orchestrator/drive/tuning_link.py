@@ -9,7 +9,7 @@ from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, Us
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.processes import MIRROR, TUNING
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.findings import Findings
 from foretwin.orchestrator.tuning.parameter_versions import (
@@ -62,12 +62,12 @@ class TuningLink:
             self.weighing = False
             self._weighed = item.message
             if item.message is None and TUNING in self._alive:
-                self._context.tell(Tell("error", f"{TUNING}: {item.error}"))
+                self._context.tell(Notice("error", f"{TUNING}: {item.error}"))
             return ""
         process_id: str = item.tag
         if item.message is None and process_id in self._alive:
             text = f"{process_id} did not take the vehicle's parameters: {item.error}"
-            self._context.tell(Tell("error", text))
+            self._context.tell(Notice("error", text))
         self.parameters.answered(process_id)
         return process_id
 
@@ -86,7 +86,7 @@ class TuningLink:
         self._rounds.use_vehicle(vehicle, version)
         self._intake.use_vehicle(vehicle)
         for change in changes:
-            self._context.tell(Tell("info", f"parameters {version}: {change_text(change)}"))
+            self._context.tell(Notice("info", f"parameters {version}: {change_text(change)}"))
             self._context.publish("parameter", change)
         self._context.tables.add(
             "parameters", [change_row(one, version=version) for one in changes]

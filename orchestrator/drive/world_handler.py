@@ -13,7 +13,7 @@ from foretwin.contracts.simulation import BuildRequest, PrepareRequest, WorldNot
 from foretwin.contracts.world import World
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.processes import BUILDER
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 
 log = logging.getLogger("orchestrator")
 
@@ -139,7 +139,7 @@ class WorldHandler:
             log.info("world %s not loaded by %s beforehand", world_id, worker_id)
         elif reply.message is None:
             text = f"{worker_id} could not load world {world_id}: {reply.error}"
-            self.context.tell(Tell("warning", text))
+            self.context.tell(Notice("warning", text))
         else:
             taken_s = time.perf_counter() - asked_s
             log.info("world %s loaded by %s in %.2f s", world_id, worker_id, taken_s)

@@ -12,7 +12,7 @@ from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 
-class DetectedBeside(OtherVehicleSource):
+class DetectedVehicle(OtherVehicleSource):
     """Who the car itself detects under one id."""
 
     def __init__(self, vehicle_id: str, seen_as: str, vehicle: VehicleParameters) -> None:

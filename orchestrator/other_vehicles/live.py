@@ -9,7 +9,7 @@ from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 
@@ -17,7 +17,7 @@ APART_NS = 1_000_000_000
 """Stamps that differ by more are not by one clock."""
 
 
-class LiveBeside(OtherVehicleSource):
+class LiveVehicle(OtherVehicleSource):
     """A vehicle that publishes on the bus by the car's own clock.
 
     `ask_info` asks it what it is, once, as its first sample comes; until it answers, and where it
@@ -30,7 +30,7 @@ class LiveBeside(OtherVehicleSource):
         vehicle: VehicleParameters,
         *,
         ask_info: Callable[[str], None],
-        tell: Callable[[Tell], None],
+        tell: Callable[[Notice], None],
     ) -> None:
         super().__init__()
         self._id, self._vehicle = vehicle_id, vehicle
@@ -49,7 +49,7 @@ class LiveBeside(OtherVehicleSource):
                 vehicle_id=self._id, time_base="utc", start_stamp_ns=message.stamp_ns
             )
             self._measured = OtherVehicleStates(self._id, estimator_of(info, self._vehicle))
-            self._tell(Tell("info", f"{self._id} is heard"))
+            self._tell(Notice("info", f"{self._id} is heard"))
             self._ask_info(self._id)
         heard = self._measured.take(item.channel, message, received_ns=item.received_mono_ns)
         if heard is not None:
@@ -59,7 +59,7 @@ class LiveBeside(OtherVehicleSource):
         """Take what the vehicle says of itself, None where it does not answer."""
         if info is None or info.body_from_antenna_m is None:
             text = f"{self._id} does not say where its reference point sits; taken as base_link"
-            self._tell(Tell("warning", text))
+            self._tell(Notice("warning", text))
         elif self._measured is not None:
             self._measured.begin_anew(estimator_of(info, self._vehicle))
 
@@ -75,5 +75,5 @@ class LiveBeside(OtherVehicleSource):
                     f"{'ahead of' if ahead_ns > 0 else 'behind'} the car: it must stamp by the "
                     "car's clock"
                 )
-                self._tell(Tell("warning", text))
+                self._tell(Notice("warning", text))
         return heard

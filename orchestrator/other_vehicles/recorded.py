@@ -12,7 +12,7 @@ from foretwin.contracts.errors import one_line
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
@@ -39,7 +39,7 @@ class _Over(NamedTuple):
     failed: str | None
 
 
-class LogBeside(OtherVehicleSource):
+class RecordedVehicle(OtherVehicleSource):
     """A recorded drive, given as far as the car's own time has come.
 
     Two logs on UTC keep their stamps; otherwise both begin together. `offset_s` says how much of
@@ -58,7 +58,7 @@ class LogBeside(OtherVehicleSource):
         own: VehicleInfo,
         offset_s: float | None,
         waits: bool,
-        tell: Callable[[Tell], None],
+        tell: Callable[[Notice], None],
     ) -> None:
         super().__init__()
         self._file, self._id, self._vehicle = file, vehicle_id, vehicle
@@ -107,13 +107,13 @@ class LogBeside(OtherVehicleSource):
         if not self._delay_reported and own.stamp_ns - self._newest_ns > BEHIND_NS:
             self._delay_reported = True
             text = f"{self._file} of {self._id} is read too slowly: its states come late"
-            self._tell(Tell("warning", text))
+            self._tell(Notice("warning", text))
 
     def _end(self, over: _Over) -> None:
         self._over = True
         if over.failed is not None:
             text = f"{self._file} of {self._id} cannot be read on: {over.failed}"
-            self._tell(Tell("warning", text))
+            self._tell(Notice("warning", text))
 
     def _read_all(self) -> None:
         """Read in a thread of its own; files and estimator belong to it alone."""

@@ -17,11 +17,11 @@ from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports
-from foretwin.orchestrator.other_vehicles.detected import DetectedBeside, moved_ahead
-from foretwin.orchestrator.other_vehicles.live import LiveBeside
+from foretwin.orchestrator.other_vehicles.detected import DetectedVehicle, moved_ahead
+from foretwin.orchestrator.other_vehicles.live import LiveVehicle
 from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
-from foretwin.orchestrator.other_vehicles.recorded import LogBeside
-from foretwin.orchestrator.plan import Beside
+from foretwin.orchestrator.other_vehicles.recorded import RecordedVehicle
+from foretwin.orchestrator.plan import OtherVehiclePlan
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 SAME_WITHIN_M = 2.0
@@ -43,7 +43,7 @@ def road_user(state: VehicleState, vehicle: VehicleParameters) -> RoadUser:
     )
 
 
-class VehiclesBeside:
+class OtherVehicleFeed:
     """All vehicles beside the car: passes their states on, and shows them to futures."""
 
     def __init__(self, context: DriveContext) -> None:
@@ -65,10 +65,10 @@ class VehiclesBeside:
         for source in self._sources.values():
             source.close()
 
-    def _source(self, beside: Beside, own: VehicleInfo) -> OtherVehicleSource:
+    def _source(self, beside: OtherVehiclePlan, own: VehicleInfo) -> OtherVehicleSource:
         config, vehicle = beside.config, beside.vehicle
         if config.log is not None:
-            return LogBeside(
+            return RecordedVehicle(
                 Path(config.log),
                 config.id,
                 vehicle,
@@ -78,8 +78,8 @@ class VehiclesBeside:
                 tell=self._context.tell,
             )
         if config.seen_as is not None:
-            return DetectedBeside(config.id, config.seen_as, vehicle)
-        return LiveBeside(config.id, vehicle, ask_info=self._ask_info, tell=self._context.tell)
+            return DetectedVehicle(config.id, config.seen_as, vehicle)
+        return LiveVehicle(config.id, vehicle, ask_info=self._ask_info, tell=self._context.tell)
 
     def _ask_info(self, vehicle_id: str) -> None:
         bus, mailbox = self._context.bus, self._context.mailbox
@@ -88,13 +88,13 @@ class VehiclesBeside:
     def take_sample(self, vehicle_id: str, item: Received) -> None:
         """Take a sample of a vehicle on the bus."""
         source = self._sources.get(vehicle_id)
-        if isinstance(source, LiveBeside):
+        if isinstance(source, LiveVehicle):
             source.take(item)
 
     def take_info(self, vehicle_id: str, info: VehicleInfo | None) -> None:
         """Take what a vehicle on the bus says of itself, None where it does not answer."""
         source = self._sources.get(vehicle_id)
-        if isinstance(source, LiveBeside):
+        if isinstance(source, LiveVehicle):
             source.take_info(info)
 
     def keep_up_with(self, own: VehicleState, detected: RoadUsers | None) -> None:
@@ -104,7 +104,7 @@ class VehiclesBeside:
         if detected is not None and detected.stamp_ns != self._detected_ns:
             self._detected_ns = detected.stamp_ns
             for source in self._sources.values():
-                if isinstance(source, DetectedBeside):
+                if isinstance(source, DetectedVehicle):
                     source.take(detected)
         heard = [one for s in self._sources.values() for one in s.states_until(own)]
         heard.sort(key=lambda one: (one.state.stamp_ns, one.state.vehicle_id))

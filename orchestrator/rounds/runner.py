@@ -17,7 +17,7 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows
 from foretwin.orchestrator.context import DriveContext
-from foretwin.orchestrator.instructions import LatestReports, LatestState, RoundIntent, Tell
+from foretwin.orchestrator.instructions import LatestReports, LatestState, Notice, RoundIntent
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
@@ -163,7 +163,7 @@ class RoundRunner:
         if reply.message is None:
             self.failed_jobs += 1
             if reply.error != NO_ANSWER:
-                self._tell(Tell("error", f"{worker_id}: {reply.error}"))
+                self._tell(Notice("error", f"{worker_id}: {reply.error}"))
         elif (result := reply.message.result).cpu_seconds > 0.0:
             self.rtf[worker_id] = result.sim_seconds / result.cpu_seconds
         self._take(self.dispatcher.reply(reply))
@@ -238,20 +238,20 @@ class RoundRunner:
                 words = (failures[place] if failures else "") or (remarks[place] if remarks else "")
                 if words and planner not in self._planners_reported:
                     self._planners_reported.add(planner)
-                    self._tell(Tell("warning", f"a future driven by {planner}: {words}"))
+                    self._tell(Notice("warning", f"a future driven by {planner}: {words}"))
 
     def _take_time(self, pace: Pace, seconds: float) -> None:
         """Count how long a round took, and tell where the next ones have another pace."""
         if not self.pace.take(pace, seconds):
             return
         if not self.pace.slowed:
-            self._tell(Tell("info", "the machine keeps up: all futures in every round again"))
+            self._tell(Notice("info", "the machine keeps up: all futures in every round again"))
             return
         text = (
             f"{self.short_of} from now on: the machine is too slow for all at "
             f"{self._plan.config.rate_hz:g} Hz"
         )
-        self._tell(Tell("info" if self._slow_reported else "warning", text))
+        self._tell(Notice("info" if self._slow_reported else "warning", text))
         self._slow_reported = True
 
     def _compare_plans(self, done: RoundDone, seed: _Seed, world: World) -> None:

@@ -13,7 +13,7 @@ import msgspec
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import GAP, ResultTables
 from foretwin.orchestrator.tuning.parameter_versions import departs
@@ -30,7 +30,7 @@ class Findings:
     """Takes what the process `tuning` says, in the order in which it says it."""
 
     tables: ResultTables
-    tell: Callable[[Tell], None]
+    tell: Callable[[Notice], None]
     start_stamp_ns: Callable[[], int]
     vehicle: Callable[[], VehicleParameters]
     on_identification: Callable[[Identification], None]
@@ -55,7 +55,7 @@ class Findings:
                     )
             case GapAlarm():
                 self._alarms += found.over
-                self.tell(Tell("warning" if found.over else "info", alarm_text(found)))
+                self.tell(Notice("warning" if found.over else "info", alarm_text(found)))
             case Verdict():
                 self._verdicts.append(found)
                 row = row_of(found)
@@ -64,7 +64,7 @@ class Findings:
                     for one in found.evidence
                 )
                 self.tables.add("verdicts", [row])
-                self.tell(Tell("warning", verdict_text(found)))
+                self.tell(Notice("warning", verdict_text(found)))
 
     def take_all(self, reply: TuneReply) -> None:
         """Keep and tell what one lock step has brought."""
@@ -78,13 +78,13 @@ class Findings:
         self.tables.add("identifications", rows)
         self._latest |= {found.name: found for found in told.estimates}
         if told.step_noticed:
-            self.tell(Tell("warning", f"the vehicle has changed: {told.step_noticed}"))
+            self.tell(Notice("warning", f"the vehicle has changed: {told.step_noticed}"))
         self.on_identification(told)
         for found in told.estimates:
             counts = in_force(self.vehicle(), found.name)
             if departs(found, counts) and self._reported.get(found.name) != counts:
                 self._reported[found.name] = counts
-                self.tell(Tell("info", found_text(found, counts)))
+                self.tell(Notice("info", found_text(found, counts)))
 
     def record(self) -> dict[str, Any]:
         """Return the `gap`, `verdicts` and `parameters` of run.json."""

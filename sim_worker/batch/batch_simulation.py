@@ -37,7 +37,7 @@ class Controls(NamedTuple):
     tire_angle_rad: Array
 
 
-class Stage:
+class BatchSimulation:
     """A compiled World with one vehicle, times `nsim`.
 
     Other road users are no part of it: kinematic bodies have infinite mass and would throw the

@@ -15,7 +15,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import ego_box
@@ -68,7 +68,7 @@ def planned_run(
 
     Raises ValueError where the planner fails.
     """
-    stage = Stage(world, vehicle, nsim=1)
+    stage = BatchSimulation(world, vehicle, nsim=1)
     result = run_job(_job(played, scenario, world, planner), stage)
     if result.left_out[0] or not result.outcome.valid[0]:
         reason = result.left_out[0] or ", ".join(result.outcome.failures)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.play import Play
 from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import (
@@ -40,7 +40,7 @@ class DriveRecord(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def drive(scene: JobScene, stage: Stage, *, ticks: int) -> DriveRecord:
+def drive(scene: JobScene, stage: BatchSimulation, *, ticks: int) -> DriveRecord:
     """Seed the stage with the scene's starts and drive for a number of control ticks."""
     play, planners = Play(scene, stage), _Planners(scene.planners)
     count, traffic = len(scene.starts), scene.traffic

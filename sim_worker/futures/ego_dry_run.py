@@ -16,7 +16,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.scenario import EGO
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import first_touches
 from foretwin.sim_worker.futures.closed_loop import drive
 from foretwin.sim_worker.futures.driven_line import (
@@ -57,7 +57,9 @@ class _Ego(NamedTuple):
     start_m: float | None
 
 
-def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, StagedCase | Unplaced]:
+def staged_cases(
+    job: Job, stage: BatchSimulation, maker: SceneMaker
+) -> dict[int, StagedCase | Unplaced]:
     """Return the cases of the rows that name their place, met where the car really drives.
 
     A function of the job, as what it leads to: the drives of one job are driven together, and kept
@@ -104,7 +106,7 @@ def _off_m(
     cases: Mapping[int, StagedCase],
     lines: Mapping[_Ego, DrivenLine],
     bent: Mapping[int, StagedCase],
-    stage: Stage,
+    stage: BatchSimulation,
 ) -> dict[int, float]:
     """Return how far from their plans impacts are, as it was driven, by row."""
     rows = list(cases)
@@ -165,7 +167,7 @@ def _bends(case: StagedCase) -> bool:
 
 
 def _lines(
-    job: Job, bent: Mapping[int, StagedCase], stage: Stage, maker: SceneMaker
+    job: Job, bent: Mapping[int, StagedCase], stage: BatchSimulation, maker: SceneMaker
 ) -> dict[_Ego, DrivenLine]:
     """Return the line of each ego, all driven side by side."""
     first: dict[_Ego, StagedCase] = {}
@@ -193,7 +195,7 @@ def _lines(
 
 
 def _drive_alone(
-    job: Job, cases: list[StagedCase], stage: Stage, maker: SceneMaker, ticks: int
+    job: Job, cases: list[StagedCase], stage: BatchSimulation, maker: SceneMaker, ticks: int
 ) -> Array:
     """Return states (S, T, 8) of egos without other road users."""
     futures = tuple(

@@ -6,7 +6,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import FrenetPoint
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.driver_model import DECIDE_EVERY_S
 from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
@@ -25,7 +25,7 @@ class Play:
     Each tick is a `look` followed by an `act`. `scene.traffic` and the stage hold what is now.
     """
 
-    def __init__(self, scene: JobScene, stage: Stage) -> None:
+    def __init__(self, scene: JobScene, stage: BatchSimulation) -> None:
         """Seed the stage with the scene's starts."""
         self.scene, self.stage = scene, stage
         count = len(scene.starts)
@@ -163,6 +163,6 @@ class Play:
         )
 
 
-def _steering_delay_s(scene: JobScene, stage: Stage) -> Array:
+def _steering_delay_s(scene: JobScene, stage: BatchSimulation) -> Array:
     delay_s = stage.vehicle.steering_delay_s.value
     return scene.numbers.applied("vehicle.steering_delay_s", delay_s)

@@ -37,7 +37,7 @@ from foretwin.sim_worker.batch.accident import (
     Accidents,
     run_accidents,
 )
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
@@ -52,7 +52,7 @@ from foretwin.sim_worker.scenarios.roles import StagedCase
 
 def run_job(
     job: Job,
-    stage: Stage,
+    stage: BatchSimulation,
     *,
     worker_id: str = "",
     scenes: SceneMaker | None = None,
@@ -113,7 +113,7 @@ class _Played(NamedTuple):
 def _play(
     job: Job,
     staged: Mapping[int, StagedCase],
-    stage: Stage,
+    stage: BatchSimulation,
     maker: SceneMaker,
     *,
     ticks: int,
@@ -139,10 +139,12 @@ def _play(
 
 def run_alone(job: Job, world: World, vehicle: VehicleParameters) -> FuturesResult:
     """Simulate a job on a stage made for it alone; raises as `run_job`."""
-    return run_job(job, Stage(world, vehicle, nsim=len(job.futures), control_hz=job.control_hz))
+    return run_job(
+        job, BatchSimulation(world, vehicle, nsim=len(job.futures), control_hz=job.control_hz)
+    )
 
 
-def check_job(job: Job, stage: Stage) -> None:
+def check_job(job: Job, stage: BatchSimulation) -> None:
     """Raise ValueError for a job that this version, or this stage, cannot play."""
     if job.schema_version != JOB_SCHEMA_VERSION:
         raise ValueError(
@@ -214,7 +216,7 @@ def result_digest(result: FuturesResult) -> str:
     return digest.hexdigest()
 
 
-def _ticks(job: Job, stage: Stage) -> tuple[int, int]:
+def _ticks(job: Job, stage: BatchSimulation) -> tuple[int, int]:
     """Return the number of control ticks and of ticks between two instants of the result."""
     every = job.step_s / stage.control_dt_s
     if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6:
@@ -248,7 +250,7 @@ def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> R
     )
 
 
-def _accidents(job: Job, scene: JobScene, stage: Stage, touches: Touches) -> Accidents:
+def _accidents(job: Job, scene: JobScene, stage: BatchSimulation, touches: Touches) -> Accidents:
     kinds = []
     if scene.traffic is not None:
         met = scene.traffic.crowd.kinds[touches.future, touches.user]

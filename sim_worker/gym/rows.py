@@ -9,7 +9,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import touched
 from foretwin.sim_worker.futures.play import Play
 from foretwin.sim_worker.futures.scene import Aims, JobScene
@@ -81,7 +81,9 @@ class EpisodeRows:
     ) -> None:
         """Compile the World; raises UserError where no episode can be played on it."""
         world = episodes.world
-        self.stage = Stage(world, vehicle, nsim=count, control_hz=control_hz, threads=threads)
+        self.stage = BatchSimulation(
+            world, vehicle, nsim=count, control_hz=control_hz, threads=threads
+        )
         self.episodes, self.count = episodes, count
         tick_s = self.stage.control_dt_s
         self._pool = episodes.scenes.scene(episodes.job, vehicle, tick_s=tick_s)

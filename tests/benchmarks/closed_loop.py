@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from foretwin.contracts.futures import FuturesResult, Job
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
@@ -31,16 +31,18 @@ def measure_at(control_hz: float) -> Measurement:
     return Measurement(SECONDS / job_s, "simulated s per CPU s", SECONDS / bare_s)
 
 
-def flat_job(control_hz: float) -> tuple[Stage, Callable[[], FuturesResult]]:
+def flat_job(control_hz: float) -> tuple[BatchSimulation, Callable[[], FuturesResult]]:
     """Return a stage without buildings and what runs a job on it."""
     world = scenes.street(buildings=0)
-    stage = Stage(world, load_vehicle(), nsim=scenes.FUTURES, control_hz=control_hz, threads=1)
+    stage = BatchSimulation(
+        world, load_vehicle(), nsim=scenes.FUTURES, control_hz=control_hz, threads=1
+    )
     futures = plan_futures(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
     job = msgspec.structs.replace(scenes.job(world, futures), control_hz=control_hz)
     return stage, job_runner(stage, job)
 
 
-def job_runner(stage: Stage, job: Job) -> Callable[[], FuturesResult]:
+def job_runner(stage: BatchSimulation, job: Job) -> Callable[[], FuturesResult]:
     """Return what runs a job as a worker does, whose World is prepared; it ran once already."""
     assert stage.world is not None
     maker = SceneMaker(stage.world)

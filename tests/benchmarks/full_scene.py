@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
 from tests.benchmarks.bare_loop import bare_loop
@@ -16,13 +16,13 @@ REPEATS = 12
 
 def measure() -> Measurement:
     """Return milliseconds of CPU per future of 8 s; the bare loop steps a car on open ground."""
-    stage = Stage(
+    stage = BatchSimulation(
         busy_junction.world(), load_vehicle(), nsim=scenes.FUTURES, control_hz=scenes.CONTROL_HZ
     )
     if stage.model.ngeom < busy_junction.BUILDINGS:
         raise AssertionError(f"the stage has {stage.model.ngeom} geoms only")
     run = job_runner(stage, busy_junction.busy_job())
-    flat = Stage(None, load_vehicle(), nsim=1).model
+    flat = BatchSimulation(None, load_vehicle(), nsim=1).model
     speeds = run().road_users.speed_mps
     moving = float(np.mean((speeds > 0.5).any(axis=1).sum(axis=1)))
     if moving < busy_junction.ROAD_USERS:

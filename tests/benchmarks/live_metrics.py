@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import msgspec
 
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
@@ -20,7 +20,7 @@ ROAD_USERS = 10
 
 def measure() -> Measurement:
     """Return CPU seconds of a round's futures as a drive asks for them, against none measured."""
-    stage = Stage(
+    stage = BatchSimulation(
         busy_junction.world(), load_vehicle(), nsim=scenes.FUTURES, control_hz=scenes.CONTROL_HZ
     )
     busy = busy_junction.busy_job()

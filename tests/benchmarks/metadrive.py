@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
 from tests.benchmarks.closed_loop import SECONDS, job_runner
@@ -26,7 +26,7 @@ DRIVER = Path(__file__).with_name("metadrive_drive.py")
 
 def measure() -> Measurement:
     """Return simulated seconds per CPU second of whole jobs of the full scene."""
-    stage = Stage(
+    stage = BatchSimulation(
         busy_junction.world(), load_vehicle(), nsim=scenes.FUTURES, control_hz=scenes.CONTROL_HZ
     )
     with _metadrive() as theirs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.world import World
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes
 from tests.benchmarks.bare_loop import bare_loop
@@ -35,12 +35,14 @@ def measure() -> Measurement:
     )  # fmt: skip
 
 
-def stage_of(world: World | None, *, futures: int, control_hz: float = scenes.CONTROL_HZ) -> Stage:
+def stage_of(
+    world: World | None, *, futures: int, control_hz: float = scenes.CONTROL_HZ
+) -> BatchSimulation:
     """Return a stage of `futures` cars, ready for `drive`."""
-    return Stage(world, load_vehicle(), nsim=futures, control_hz=control_hz, threads=1)
+    return BatchSimulation(world, load_vehicle(), nsim=futures, control_hz=control_hz, threads=1)
 
 
-def drive(stage: Stage) -> None:
+def drive(stage: BatchSimulation) -> None:
     """Let all cars of a stage start anew and drive straight on at 10 m/s for 8 s."""
     count = stage.nsim
     starts = np.zeros((count, 8))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
@@ -41,7 +41,7 @@ def measure() -> Measurement:
             watched.handle(channel, message)
 
     cost_s = cpu_minimum_s(watch, repeats=3) / DRIVE_S
-    stage = Stage(town_world("n4"), vehicle, nsim=32)
+    stage = BatchSimulation(town_world("n4"), vehicle, nsim=32)
     others = [vehicle, altered(vehicle, wheelbase_m=2.7, mass_kg=1300.0)]
 
     def change() -> None:

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.futures import Future
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planners.hosted import HostedPlanner
 from foretwin.sim_worker.planners.registry import load_planner, planner_names
@@ -56,7 +56,9 @@ def test_both_planners_are_found_and_drive_and_stop() -> None:
         happening(2, "lead_stopping", planner="calm", **lead),
         happening(3, "lead_stopping", planner="calm_one", **lead),
     )
-    outcome = run_job(job(futures, horizon_s=8.0), Stage(crossroads(), load_vehicle(), nsim=4))
+    outcome = run_job(
+        job(futures, horizon_s=8.0), BatchSimulation(crossroads(), load_vehicle(), nsim=4)
+    )
     outcome = outcome.outcome
     assert outcome.valid.all(), outcome.failures
     assert not outcome.collided.any()

@@ -20,7 +20,7 @@ from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.telemetry.estimator.estimator import StateEstimator
@@ -45,7 +45,7 @@ class _Builder:
         self._index = index_map(inputs.osm, inputs.graph, inputs.junctions)
         self._junctions = {junction.summary.id: junction for junction in inputs.junctions}
         self._worlds: dict[str, World] = {}
-        self._stages: dict[str, tuple[Stage, SceneMaker]] = {}
+        self._stages: dict[str, tuple[BatchSimulation, SceneMaker]] = {}
 
     def world(self, junction_id: str) -> World:
         if junction_id not in self._worlds:
@@ -55,9 +55,9 @@ class _Builder:
             )  # fmt: skip
         return self._worlds[junction_id]
 
-    def stage(self, world: World) -> tuple[Stage, SceneMaker]:
+    def stage(self, world: World) -> tuple[BatchSimulation, SceneMaker]:
         if world.id not in self._stages:
-            stage = Stage(world, self._inputs.vehicle, nsim=1)
+            stage = BatchSimulation(world, self._inputs.vehicle, nsim=1)
             self._stages[world.id] = stage, SceneMaker(world)
         return self._stages[world.id]
 

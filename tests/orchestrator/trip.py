@@ -25,7 +25,7 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
-from foretwin.orchestrator.instructions import BuildWorld, Instruction, Tell, UseWorld
+from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, UseWorld
 from foretwin.orchestrator.plan import DriveInputs, DrivePlan
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.world_gen.build import build_world
@@ -150,7 +150,7 @@ class Trip:
         return [(at_s, t.world_id) for at_s, t in self.told if isinstance(t, UseWorld)]
 
     def texts(self, level: str) -> list[str]:
-        return [t.text for _, t in self.told if isinstance(t, Tell) and t.level == level]
+        return [t.text for _, t in self.told if isinstance(t, Notice) and t.level == level]
 
 
 def world_named(junction_id: str, frame: LocalFrame) -> World:

@@ -7,7 +7,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 
 
 def altered(vehicle: VehicleParameters, **values: float) -> VehicleParameters:
@@ -23,7 +23,11 @@ def states(count: int, *, speed: Array | float = 0.0, tire: Array | float = 0.0)
 
 
 def seed(
-    stage: Stage, rows: Array, *, delay: Array | float = 0.0, friction: Array | float = 1.0
+    stage: BatchSimulation,
+    rows: Array,
+    *,
+    delay: Array | float = 0.0,
+    friction: Array | float = 1.0,
 ) -> None:
     count = len(rows)
     stage.seed(
@@ -34,7 +38,7 @@ def seed(
 
 
 def drive(
-    stage: Stage, ticks: int, *, accel: Array | float = 0.0, tire: Array | float = 0.0,
+    stage: BatchSimulation, ticks: int, *, accel: Array | float = 0.0, tire: Array | float = 0.0,
     hold_speed: Array | None = None,
 ) -> Array:  # fmt: skip
     """Return (S, ticks + 1, 8) states under constant commands, or at a held speed."""

@@ -17,7 +17,7 @@ from foretwin.contracts.futures import Future
 from foretwin.geometry import compiled as compiled_geometry
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker import driver_model as driver
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.displacement import cheapest_walks
@@ -91,7 +91,7 @@ def test_a_job_adds_no_signature_whatever_its_planners_answer(
     for kind in kinds[:4]:
         monkeypatch.setitem(registry._BUILT_IN, kind, lambda kind=kind: _Dressed(kind))
     load_planner.cache_clear()
-    stage, before = Stage(crossroads(), CAR, nsim=8), signatures()
+    stage, before = BatchSimulation(crossroads(), CAR, nsim=8), signatures()
     faulty = {"position_offset_m": 0.1, "friction_factor": 0.8, "brake_gain": 0.9}
     try:
         for numbers in ({}, faulty):

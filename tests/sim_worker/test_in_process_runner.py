@@ -12,7 +12,7 @@ from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import job_bytes, vehicle_digest
 from foretwin.contracts.runner import Runner, Task, answers, job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.in_process_runner import InProcessRunner
@@ -44,7 +44,7 @@ def task(question: Job) -> Task:
 def test_a_job_comes_to_what_it_always_comes_to(runner: Runner) -> None:
     (answer,) = answers(runner, [task(TWO)])
     assert (answer.task.key, answer.failure, answer.worker_id) == (task(TWO).key, "", "here")
-    here = run_job(TWO, Stage(crossroads(), CAR, nsim=32))
+    here = run_job(TWO, BatchSimulation(crossroads(), CAR, nsim=32))
     assert result_digest(answer.message.result) == result_digest(here)
 
 
@@ -53,7 +53,7 @@ def test_a_job_is_played_with_the_vehicle_that_it_names(runner: Runner) -> None:
     for vehicle in (CAR, HEAVY):
         question = msgspec.structs.replace(TWO, vehicle=vehicle_digest(vehicle))
         (answer,) = answers(runner, [task(question)])
-        alone = run_job(question, Stage(crossroads(), vehicle, nsim=2))
+        alone = run_job(question, BatchSimulation(crossroads(), vehicle, nsim=2))
         by_vehicle[vehicle.mass_kg.value] = result_digest(answer.message.result)
         assert by_vehicle[vehicle.mass_kg.value] == result_digest(alone)
     assert len(set(by_vehicle.values())) == 2

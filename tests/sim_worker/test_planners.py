@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import Future
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import registry
@@ -21,8 +21,8 @@ COVERS = (
 
 
 @pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage(crossroads(), load_vehicle(), nsim=8)
+def stage() -> BatchSimulation:
+    return BatchSimulation(crossroads(), load_vehicle(), nsim=8)
 
 
 def test_built_in_planners_are_known_without_installation() -> None:
@@ -57,7 +57,7 @@ def offered(monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
     load_planner.cache_clear()
 
 
-def test_a_planner_drives_the_futures_that_name_it(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
+def test_a_planner_drives_the_futures_that_name_it(offered, stage: BatchSimulation) -> None:  # type: ignore[no-untyped-def]
     offered(_Coasting)
     assert planner_names()[-1] == "theirs"
     futures = (Future(index=0, name="a"), Future(index=1, name="b", planner="theirs"))
@@ -66,7 +66,7 @@ def test_a_planner_drives_the_futures_that_name_it(offered, stage: Stage) -> Non
     assert result.outcome.progress_m[0] > 70.0
 
 
-def test_a_planner_of_the_wrong_shape_is_named(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
+def test_a_planner_of_the_wrong_shape_is_named(offered, stage: BatchSimulation) -> None:  # type: ignore[no-untyped-def]
     offered(_Scalar)
     futures = tuple(Future(index=i, name="x", planner="theirs") for i in range(3))
     outcome = run_job(job((*futures, Future(index=3, name="ours"))), stage).outcome
@@ -82,7 +82,9 @@ class _Raises:
         return PlannerOutput(np.zeros_like(view.arc_m), np.zeros_like(view.arc_m))
 
 
-def test_a_planner_that_raises_fails_its_futures_and_no_others(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
+def test_a_planner_that_raises_fails_its_futures_and_no_others(
+    offered, stage: BatchSimulation
+) -> None:  # type: ignore[no-untyped-def]
     offered(_Raises)
     futures = (Future(index=0, name="ours"), Future(index=1, name="x", planner="theirs"))
     alone = run_job(job(futures[:1]), stage)
@@ -93,14 +95,14 @@ def test_a_planner_that_raises_fails_its_futures_and_no_others(offered, stage: S
     assert np.isfinite(together.trajectory.states).all()
 
 
-def test_the_driver_reaches_and_keeps_the_cruise_speed(stage: Stage) -> None:
+def test_the_driver_reaches_and_keeps_the_cruise_speed(stage: BatchSimulation) -> None:
     result = run_job(job((Future(index=0, name="n"),), state=state_at(-50, -1.5, speed=4.0)), stage)
     speed = result.trajectory.states[0, :, 3]
     assert speed[-1] == pytest.approx(8.0, abs=0.6)
     assert speed.max() < 8.1
 
 
-def test_the_driver_slows_for_a_curve_and_stays_on_its_path(stage: Stage) -> None:
+def test_the_driver_slows_for_a_curve_and_stays_on_its_path(stage: BatchSimulation) -> None:
     result = run_job(
         job((Future(index=0, name="n"),), path=turning_path(), cruise=10.0,
             state=state_at(-30.0, -1.5, speed=10.0)),
@@ -116,7 +118,7 @@ def test_the_driver_slows_for_a_curve_and_stays_on_its_path(stage: Stage) -> Non
 
 
 def test_the_driver_stops_behind_a_standing_lead_and_the_careless_one_does_not(
-    stage: Stage,
+    stage: BatchSimulation,
 ) -> None:
     lead = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
     futures = (
@@ -134,7 +136,7 @@ def test_the_driver_stops_behind_a_standing_lead_and_the_careless_one_does_not(
 
 
 @pytest.mark.parametrize("planner", ["pure_pursuit_idm", "constant_speed"])
-def test_a_car_with_nothing_to_do_stands_still(stage: Stage, planner: str) -> None:
+def test_a_car_with_nothing_to_do_stands_still(stage: BatchSimulation, planner: str) -> None:
     future = Future(index=0, name="n", planner=planner)
     result = run_job(job((future,), state=state_at(-50, -1.5, speed=0.0), cruise=0.0), stage)
     states = result.trajectory.states[0]
@@ -143,7 +145,7 @@ def test_a_car_with_nothing_to_do_stands_still(stage: Stage, planner: str) -> No
 
 @pytest.mark.parametrize("speed", [0.0, 2.0])
 def test_a_car_across_its_path_with_wheels_turned_rejoins_it_without_a_loop(
-    stage: Stage, speed: float
+    stage: BatchSimulation, speed: float
 ) -> None:
     limit = stage.vehicle.max_tire_angle_rad.value
     planners = ("pure_pursuit_idm", "constant_speed")

@@ -24,13 +24,13 @@ from foretwin.contracts.runner import Wanted, job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
 from foretwin.contracts.tuning import UseVehicle
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_rows import future_rows, rows_from_bytes
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.worker import StageCache, serve_futures
+from foretwin.sim_worker.worker import SimulationCache, serve_futures
 from foretwin.sim_worker.world_file import load_world
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
@@ -92,7 +92,7 @@ def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
     question = job(plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
     result = asked(served, "job", request(question)).result
     assert result.worker_id == "w0"
-    here = run_job(question, Stage(crossroads(), CAR, nsim=32))
+    here = run_job(question, BatchSimulation(crossroads(), CAR, nsim=32))
     assert result_digest(result) == result_digest(here)
 
 
@@ -131,7 +131,7 @@ def test_a_worker_goes_on_with_other_parameters_and_says_with_which(served: Memo
     assert asked(served, "use_vehicle", use) == use
     second = asked(served, "job", request(after)).result
     assert (first.vehicle_version, second.vehicle_version) == (0, 1)
-    anew = run_job(after, Stage(crossroads(), heavy, nsim=32))
+    anew = run_job(after, BatchSimulation(crossroads(), heavy, nsim=32))
     assert result_digest(second) == result_digest(anew) != result_digest(first)
 
 
@@ -140,7 +140,7 @@ def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:
         world = msgspec.structs.replace(crossroads(), id=name)
         write_message(world, folder / f"{name}.world")
     setup = msgspec.structs.replace(_setup(folder), simulations=2, kept_worlds=2)
-    cache = StageCache(setup, CAR)
+    cache = SimulationCache(setup, CAR)
     first = cache.get("a")
     cache.get("b")
     assert cache.get("a") is first
@@ -213,7 +213,7 @@ def test_a_worker_process_over_zenoh_answers_logs_and_leaves(folder: Path) -> No
                 ask(bus, "prepare", PrepareRequest(world_id="nowhere"), timeout_s=DEADLINE_S, **IDS)
             question = job(plan_futures(count=8, seed=0, planners=["pure_pursuit_idm"]))
             result = ask(bus, "job", request(question), timeout_s=DEADLINE_S, **IDS).result
-            here = run_job(question, Stage(crossroads(), CAR, nsim=32))
+            here = run_job(question, BatchSimulation(crossroads(), CAR, nsim=32))
             assert result_digest(result) == result_digest(here)
             bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
             assert unhindered_wait_s(process, DEADLINE_S) < 3.0

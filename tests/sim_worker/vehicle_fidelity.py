@@ -14,7 +14,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2, load_vehicle, understeer_gradient
 from tests.sim_worker import commonroad_drives
 from tests.sim_worker.commonroad_drives import NUMBERS, Drive, Kind
@@ -114,7 +114,7 @@ def _drive(
     vehicle: VehicleParameters, cases: list[tuple[float, float]], *,
     duration_s: float, steer_at_s: float,
 ) -> Array:  # fmt: skip
-    stage = Stage(None, vehicle, nsim=len(cases))
+    stage = BatchSimulation(None, vehicle, nsim=len(cases))
     speed, tire = np.array(cases).T
     seed(stage, states(len(cases), speed=speed))
     record, sum_of_errors = [stage.states.copy()], np.zeros(len(cases))
@@ -158,7 +158,7 @@ def _step_steer_errors(name: str, kind: Kind, vehicle: VehicleParameters) -> Arr
 
 
 def _stopping_distances(vehicle: VehicleParameters) -> Array:
-    stage = Stage(None, vehicle, nsim=len(STOPS))
+    stage = BatchSimulation(None, vehicle, nsim=len(STOPS))
     speed, decel = np.array(STOPS).T
     seed(stage, states(len(STOPS), speed=speed))
     record = [stage.states.copy()]

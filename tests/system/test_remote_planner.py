@@ -13,7 +13,7 @@ from foretwin.contracts.bus import Bus, Mailbox, ZenohBus
 from foretwin.contracts.futures import Future
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
@@ -84,7 +84,9 @@ def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
         planner.connect(bus, run="r1", process="w0")
         shown = Mailbox(64)
         bus.subscribe("planned_motions", shown, run="r1", process="w0")
-        result = run_job(job(futures, horizon_s=4.0), Stage(crossroads(), VEHICLE, nsim=2))
+        result = run_job(
+            job(futures, horizon_s=4.0), BatchSimulation(crossroads(), VEHICLE, nsim=2)
+        )
     load_planner.cache_clear()
     assert result.outcome.valid.all()
     assert result.outcome.progress_m[1] > 25.0

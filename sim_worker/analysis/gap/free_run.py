@@ -15,7 +15,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
@@ -54,7 +54,7 @@ class FreeRunner:
 
     def __init__(self, vehicle: VehicleParameters, *, batch: int = 32) -> None:
         self.vehicle = vehicle
-        self._stage = Stage(None, vehicle, nsim=batch, control_hz=1.0 / PERIOD_S)
+        self._stage = BatchSimulation(None, vehicle, nsim=batch, control_hz=1.0 / PERIOD_S)
 
     def run(
         self,

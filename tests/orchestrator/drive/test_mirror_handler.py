@@ -6,7 +6,7 @@ from typing import Any
 
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 
 HERE = PlaneState(0.0, 0.0, 0.0, 0.0)
 
@@ -28,7 +28,7 @@ def sample(at_s: float, *touches: tuple[str, str]) -> MirrorSample:
 
 
 def test_a_touch_is_told_as_it_begins_and_again_only_after_a_while() -> None:
-    tables, told = Tables(), list[Tell]()
+    tables, told = Tables(), list[Notice]()
     handler = MirrorHandler(tables, told.append)  # type: ignore[arg-type]
     for at_s in (1.0, 1.1, 1.2, 2.5, 5.0):
         handler.take(sample(at_s, ("ego", "van")))

@@ -8,9 +8,9 @@ from pathlib import Path
 import msgspec
 
 from foretwin.contracts.setup import WorkerSetup
-from foretwin.orchestrator.config import VehicleBeside
+from foretwin.orchestrator.config import OtherVehicleConfig
 from foretwin.orchestrator.drive.processes import PROCESSES, TUNING, process_ids, row_of
-from foretwin.orchestrator.plan import Beside, DrivePlan
+from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
 from tests.orchestrator.trip import town_plan
 
@@ -39,7 +39,7 @@ def test_a_drive_has_its_workers_one_source_and_what_it_is_asked_for(tmp_path: P
 def test_each_vehicle_beside_with_topics_of_its_own_has_its_gateway(tmp_path: Path) -> None:
     plan = configured(town_plan(tmp_path), tuning="off")
     beside = tuple(
-        Beside(VehicleBeside(id=name, live=True), plan.vehicle, True, ros2=topics)
+        OtherVehiclePlan(OtherVehicleConfig(id=name, live=True), plan.vehicle, True, ros2=topics)
         for name, topics in (("a", autoware()), ("b", None), ("c", autoware()))
     )
     plan = replace(plan, beside=beside)

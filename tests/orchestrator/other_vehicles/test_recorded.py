@@ -13,7 +13,7 @@ import pytest
 from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.orchestrator.other_vehicles import recorded
-from foretwin.orchestrator.other_vehicles.recorded import LogBeside
+from foretwin.orchestrator.other_vehicles.recorded import RecordedVehicle
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs.log import Log, Sample
 
@@ -47,11 +47,11 @@ class Ground:
 
     def __init__(self) -> None:
         self.told: list[str] = []
-        self.opened: list[LogBeside] = []
+        self.opened: list[RecordedVehicle] = []
         self.read: Callable[[], Iterator[Sample]] = lambda: samples(100)
 
-    def open(self, *, waits: bool) -> LogBeside:
-        log = LogBeside(
+    def open(self, *, waits: bool) -> RecordedVehicle:
+        log = RecordedVehicle(
             Path("van.mcap"), "van", CAR, own=INFO, offset_s=None, waits=waits,
             tell=lambda told: self.told.append(told.text),
         )  # fmt: skip
@@ -79,7 +79,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
         threading.Event().wait(0.002)
 
 
-def stamps_s(log: LogBeside, until_s: float) -> list[float]:
+def stamps_s(log: RecordedVehicle, until_s: float) -> list[float]:
     return [(one.state.stamp_ns - START_NS) / 1e9 for one in log.states_until(own(until_s))]
 
 

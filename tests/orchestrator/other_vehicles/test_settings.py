@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside, load_config
+from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, load_config
 from foretwin.orchestrator.drive.plan import read_inputs
 
 
@@ -40,7 +40,7 @@ def test_settings_that_cannot_be_used_are_told_in_one_line(
 
 def test_a_log_beside_that_is_not_there_is_told_before_anything_begins(tmp_path: Path) -> None:
     config = DriveConfig(
-        vehicles=(VehicleBeside(id="van", log=str(tmp_path / "no.mcap")),), out=str(tmp_path)
+        vehicles=(OtherVehicleConfig(id="van", log=str(tmp_path / "no.mcap")),), out=str(tmp_path)
     )
     with pytest.raises(FileNotFoundError, match=r"no\.mcap of van: no such file or folder"):
         read_inputs(config.validate())
@@ -57,7 +57,7 @@ def test_a_mapping_of_a_vehicle_beside_that_is_of_no_use_is_told_before_anything
     if text is not None:
         file.write_text(text)
     config = DriveConfig(
-        vehicles=(VehicleBeside(id="van", live=True, ros2=str(file)),), out=str(tmp_path)
+        vehicles=(OtherVehicleConfig(id="van", live=True, ros2=str(file)),), out=str(tmp_path)
     )
     with pytest.raises((FileNotFoundError, UserError), match=told):
         read_inputs(config.validate())

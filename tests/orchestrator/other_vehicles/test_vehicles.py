@@ -22,11 +22,11 @@ from foretwin.contracts.drive import (
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicles, Role
-from foretwin.orchestrator.config import VehicleBeside
+from foretwin.orchestrator.config import OtherVehicleConfig
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports
-from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
-from foretwin.orchestrator.plan import Beside
+from foretwin.orchestrator.other_vehicles.vehicles import OtherVehicleFeed
+from foretwin.orchestrator.plan import OtherVehiclePlan
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs.write_mcap import create
@@ -84,16 +84,18 @@ class HearingBus(MemoryBus):
         ASKED.append(str(ids["vehicle"]))
 
 
-def crew(folder: Path, *configs: VehicleBeside) -> tuple[VehiclesBeside, list[OtherVehicles]]:
+def crew(
+    folder: Path, *configs: OtherVehicleConfig
+) -> tuple[OtherVehicleFeed, list[OtherVehicles]]:
     """The vehicles of a drive whose car begins at START_NS, and what is passed on of them."""
-    members = tuple(Beside(config, VAN, commands_recorded=False) for config in configs)
+    members = tuple(OtherVehiclePlan(config, VAN, commands_recorded=False) for config in configs)
     plan = town_plan(folder)
     lock_step = msgspec.structs.replace(plan.config, speed=None)
     plan = replace(plan, beside=members, drive_frame=FRAME, config=lock_step)
     bus = HearingBus()
     tables: Any = None
     context = DriveContext(plan, bus, Mailbox(8), tables, lambda told: TOLD.append(told.text))
-    beside = VehiclesBeside(context)
+    beside = OtherVehicleFeed(context)
     beside.begin(INFO)
     return beside, bus.heard
 
@@ -114,7 +116,7 @@ def van_log(folder: Path, *, start_ns: int) -> Path:
     return file
 
 
-def drive(beside: VehiclesBeside, until_s: float) -> None:
+def drive(beside: OtherVehicleFeed, until_s: float) -> None:
     for k in range(round(until_s * 20) + 1):
         beside.keep_up_with(own(k / 20.0), None)
 
@@ -131,7 +133,7 @@ def test_a_log_beside_is_read_as_far_as_the_cars_time_has_come(
     tmp_path: Path, log_later_s: float, offset_s: float | None, at_5_s_m: float
 ) -> None:
     log = van_log(tmp_path, start_ns=START_NS + round(log_later_s * 1e9))
-    config = VehicleBeside(id="van", log=str(log), log_offset_s=offset_s)
+    config = OtherVehicleConfig(id="van", log=str(log), log_offset_s=offset_s)
     beside, heard = crew(tmp_path, config)
     drive(beside, until_s=5.0)
     assert len(heard) == 101
@@ -146,7 +148,7 @@ def test_a_log_beside_is_read_as_far_as_the_cars_time_has_come(
 
 
 def test_who_is_on_the_bus_is_estimated_from_what_it_sends(tmp_path: Path) -> None:
-    beside, heard = crew(tmp_path, VehicleBeside(id="van", live=True))
+    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
     bus, box = MemoryBus(), Mailbox(64)
     for channel in ("gnss", "speed"):
         bus.subscribe(channel, box, vehicle="van")
@@ -164,7 +166,9 @@ def test_who_is_on_the_bus_is_estimated_from_what_it_sends(tmp_path: Path) -> No
     assert TOLD[0] == "van is heard"
 
 
-def on_the_bus(beside: VehiclesBeside, *, from_s: float, to_s: float, later_s: float = 0.0) -> None:
+def on_the_bus(
+    beside: OtherVehicleFeed, *, from_s: float, to_s: float, later_s: float = 0.0
+) -> None:
     """Let the van drive east at 10 m/s; its antenna is where its position is measured."""
     bus, box = MemoryBus(), Mailbox(64)
     for channel in ("gnss", "speed"):
@@ -180,7 +184,7 @@ def on_the_bus(beside: VehiclesBeside, *, from_s: float, to_s: float, later_s: f
 def test_who_is_on_the_bus_is_placed_by_its_antenna_once_it_says_where_that_sits(
     tmp_path: Path,
 ) -> None:
-    beside, heard = crew(tmp_path, VehicleBeside(id="van", live=True))
+    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
     on_the_bus(beside, from_s=0.0, to_s=2.0)
     said = msgspec.structs.replace(INFO, vehicle_id="van", body_from_antenna_m=(1.5, 0.0, 0.0))
     beside.take_info("van", said)
@@ -191,14 +195,14 @@ def test_who_is_on_the_bus_is_placed_by_its_antenna_once_it_says_where_that_sits
 
 
 def test_who_does_not_say_where_its_antenna_sits_is_told_of(tmp_path: Path) -> None:
-    beside, _ = crew(tmp_path, VehicleBeside(id="van", live=True))
+    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
     on_the_bus(beside, from_s=0.0, to_s=0.2)
     beside.take_info("van", None)
     assert "van does not say where its reference point sits" in TOLD[-1]
 
 
 def test_stamps_of_another_clock_are_told_once(tmp_path: Path) -> None:
-    beside, _ = crew(tmp_path, VehicleBeside(id="van", live=True))
+    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
     for second in (0.0, 2.0):
         on_the_bus(beside, from_s=second, to_s=second + 2.0, later_s=30.0)
         beside.keep_up_with(own(second + 1.9), None)
@@ -214,7 +218,7 @@ def user(user_id: str, x_m: float, *, yaw: float = 0.0, kind: str = "car") -> Ro
 
 
 def test_who_the_car_detects_has_its_pose_at_the_rear_axle(tmp_path: Path) -> None:
-    beside, heard = crew(tmp_path, VehicleBeside(id="van", seen_as="17"))
+    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", seen_as="17"))
     for k in range(3):
         users = RoadUsers(
             stamp_ns=own(k / 10).stamp_ns, users=(user("17", 20.0, yaw=0.1 * k), user("4", 9.0))
@@ -231,8 +235,8 @@ def test_futures_meet_twins_and_shadows_once_and_no_ghosts(tmp_path: Path) -> No
     log = van_log(tmp_path, start_ns=START_NS)
     beside, _ = crew(
         tmp_path,
-        VehicleBeside(id="van", log=str(log)),
-        VehicleBeside(id="other", seen_as="17"),
+        OtherVehicleConfig(id="van", log=str(log)),
+        OtherVehicleConfig(id="other", seen_as="17"),
     )
     drive(beside, until_s=2.0)
     now = own(2.0)
@@ -260,7 +264,7 @@ def test_futures_meet_twins_and_shadows_once_and_no_ghosts(tmp_path: Path) -> No
 
 def test_the_van_as_a_road_user_has_its_own_size_and_centre(tmp_path: Path) -> None:
     beside, _ = crew(
-        tmp_path, VehicleBeside(id="van", log=str(van_log(tmp_path, start_ns=START_NS)))
+        tmp_path, OtherVehicleConfig(id="van", log=str(van_log(tmp_path, start_ns=START_NS)))
     )
     drive(beside, until_s=2.0)
     users = beside.among(LatestReports(None, None, ()), own(2.0), {"van": "twin"}).road_users
@@ -274,9 +278,9 @@ def test_the_van_as_a_road_user_has_its_own_size_and_centre(tmp_path: Path) -> N
 @pytest.mark.parametrize(("role", "met"), [("shadow", {"van"}), ("ghost", set())])
 def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, met: set) -> None:
     house = House(tmp_path, futures=2)
-    config = VehicleBeside(id="van", seen_as="17", role=role)
-    plan = replace(house.plan, beside=(Beside(config, VAN, commands_recorded=False),))
-    house.conductor.beside = VehiclesBeside(replace(house.conductor.context, plan=plan))
+    config = OtherVehicleConfig(id="van", seen_as="17", role=role)
+    plan = replace(house.plan, beside=(OtherVehiclePlan(config, VAN, commands_recorded=False),))
+    house.conductor.beside = OtherVehicleFeed(replace(house.conductor.context, plan=plan))
     house.conductor.beside.begin(INFO)
     house.conductor.roles.roles["van"] = role
     house.drive(25)

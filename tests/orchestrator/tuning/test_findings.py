@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from foretwin.contracts.gap import Evidence, GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
-from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.tuning.findings import Findings
 from foretwin.orchestrator.tuning.words import summary_lines
@@ -51,7 +51,7 @@ class Kept:
     """Findings that were taken, and what became of them."""
 
     def __init__(self, folder: Path, *replies: TuneReply) -> None:
-        self.told: list[Tell] = []
+        self.told: list[Notice] = []
         self.identified: list[Identification] = []
         tables = ResultTables(folder, {}, lossless=True)
         findings = Findings(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, drive, seed, states
@@ -19,22 +19,22 @@ CAR = load_vehicle()
 
 
 @pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage(None, CAR, nsim=8)
+def stage() -> BatchSimulation:
+    return BatchSimulation(None, CAR, nsim=8)
 
 
 def test_the_profiling_clock_is_taken_out_of_the_step() -> None:
     assert silence_step_clock()
 
 
-def test_a_seeded_future_keeps_steering_through_the_delay(stage: Stage) -> None:
+def test_a_seeded_future_keeps_steering_through_the_delay(stage: BatchSimulation) -> None:
     # Without its history filled, it would steer to 0 for the length of the delay.
     seed(stage, states(3, speed=8.0, tire=0.2), delay=[0.0, 0.25, 0.5])
     tire = drive(stage, 20, tire=0.2)[:, :, 6]
     assert tire == pytest.approx(np.full_like(tire, 0.2), abs=1e-3)
 
 
-def test_a_command_acts_after_the_delay_and_not_before(stage: Stage) -> None:
+def test_a_command_acts_after_the_delay_and_not_before(stage: BatchSimulation) -> None:
     delays = np.array([0.0, 0.1, 0.3, 0.6])
     seed(stage, states(4, speed=8.0), delay=delays)
     tire = drive(stage, 20, tire=0.1)[:, :, 6]
@@ -43,7 +43,7 @@ def test_a_command_acts_after_the_delay_and_not_before(stage: Stage) -> None:
     assert (moved > delays).all()
 
 
-def test_given_history_is_replayed(stage: Stage) -> None:
+def test_given_history_is_replayed(stage: BatchSimulation) -> None:
     history = np.zeros((1, 40))
     history[0, 20:] = 0.1
     stage.seed(
@@ -57,12 +57,14 @@ def test_given_history_is_replayed(stage: Stage) -> None:
     assert tire[6] == pytest.approx(0.1, abs=0.01)
 
 
-def test_a_delay_beyond_the_buffer_is_refused_and_not_shortened(stage: Stage) -> None:
+def test_a_delay_beyond_the_buffer_is_refused_and_not_shortened(stage: BatchSimulation) -> None:
     with pytest.raises(ValueError, match=r"steering delay 1\.1 s is longer than the buffer"):
         seed(stage, states(1), delay=1.1)
 
 
-def test_fewer_states_than_simulations_give_the_same_as_a_full_stage(stage: Stage) -> None:
+def test_fewer_states_than_simulations_give_the_same_as_a_full_stage(
+    stage: BatchSimulation,
+) -> None:
     rows = states(8, speed=np.linspace(2.0, 9.0, 8), tire=0.1)
     seed(stage, rows)
     full = drive(stage, 40, accel=0.5, tire=0.1)
@@ -71,7 +73,7 @@ def test_fewer_states_than_simulations_give_the_same_as_a_full_stage(stage: Stag
     assert full[:3].tobytes() == part.tobytes()
 
 
-def test_what_a_stage_did_before_leaves_no_trace(stage: Stage) -> None:
+def test_what_a_stage_did_before_leaves_no_trace(stage: BatchSimulation) -> None:
     rows = states(8, speed=8.0)
     seed(stage, rows, delay=0.2)
     first = drive(stage, 40, accel=-1.0, tire=0.1)
@@ -81,7 +83,7 @@ def test_what_a_stage_did_before_leaves_no_trace(stage: Stage) -> None:
     assert drive(stage, 40, accel=-1.0, tire=0.1).tobytes() == first.tobytes()
 
 
-def test_futures_begun_anew_are_as_if_they_had_begun_alone(stage: Stage) -> None:
+def test_futures_begun_anew_are_as_if_they_had_begun_alone(stage: BatchSimulation) -> None:
     rows = states(8, speed=np.linspace(2.0, 9.0, 8), tire=0.1)
     anew = states(2, speed=12.0, tire=-0.2)
     seed(stage, anew, delay=0.3, friction=0.6)
@@ -104,17 +106,17 @@ def test_futures_begun_anew_are_as_if_they_had_begun_alone(stage: Stage) -> None
     assert after[others][:, 1:].tobytes() == undisturbed[others][:, 11:].tobytes()
 
 
-def test_threads_change_nothing(stage: Stage) -> None:
+def test_threads_change_nothing(stage: BatchSimulation) -> None:
     rows = states(8, speed=np.linspace(1.0, 15.0, 8))
     seed(stage, rows)
     alone = drive(stage, 40, accel=0.3, tire=0.1)
-    two = Stage(None, CAR, nsim=8, threads=2)
+    two = BatchSimulation(None, CAR, nsim=8, threads=2)
     seed(two, rows)
     assert drive(two, 40, accel=0.3, tire=0.1).tobytes() == alone.tobytes()
 
 
 def test_a_wall_stops_the_car_and_is_felt() -> None:
-    stage = Stage(crossroads(buildings=(box(30.0, 0.0, 2.0, 10.0),)), CAR, nsim=2)
+    stage = BatchSimulation(crossroads(buildings=(box(30.0, 0.0, 2.0, 10.0),)), CAR, nsim=2)
     rows = states(2, speed=8.0)
     rows[1, 1] = 40.0
     seed(stage, rows)
@@ -136,7 +138,7 @@ def test_a_vehicle_changed_in_place_is_as_one_compiled_with_it() -> None:
         width_m=1.9, height_m=1.7, rear_overhang_m=1.1,
     )  # fmt: skip
     world = crossroads(buildings=(box(30.0, 0.0, 2.0, 10.0),))
-    changed, anew = Stage(world, CAR, nsim=2), Stage(world, vehicle, nsim=2)
+    changed, anew = BatchSimulation(world, CAR, nsim=2), BatchSimulation(world, vehicle, nsim=2)
     changed.use_vehicle(vehicle)
     names = [name for name in dir(anew.model) if not name.startswith("_")]
     arrays = [name for name in names if isinstance(getattr(anew.model, name), np.ndarray)]
@@ -154,6 +156,6 @@ def test_a_vehicle_changed_in_place_is_as_one_compiled_with_it() -> None:
 
 def test_the_control_rate_must_fit_the_physics() -> None:
     with pytest.raises(ValueError, match="control rate 30 Hz"):
-        Stage(None, CAR, nsim=1, control_hz=30.0)
+        BatchSimulation(None, CAR, nsim=1, control_hz=30.0)
     with pytest.raises(ValueError, match="9 states for a stage of 8"):
-        seed(Stage(None, CAR, nsim=8), states(9))
+        seed(BatchSimulation(None, CAR, nsim=8), states(9))

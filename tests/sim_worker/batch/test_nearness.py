@@ -13,7 +13,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import Future
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Building
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.nearness import NearStatics
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
@@ -34,7 +34,7 @@ def _turned(x: float, y: float, yaw: float, name: str) -> Building:
 
 
 HOUSES = (_turned(20.0, 12.0, 0.7, "a"), _turned(-30.0, -11.0, -0.3, "b"), box(3, 15, 4, 4, "c"))
-STAGE = Stage(crossroads(buildings=HOUSES), CAR, nsim=64)
+STAGE = BatchSimulation(crossroads(buildings=HOUSES), CAR, nsim=64)
 NEAR = NearStatics(STAGE.model, reach_m=REACH_M)
 
 
@@ -55,7 +55,7 @@ def test_places_outside_the_grid_and_no_places_at_all_are_far() -> None:
     places = np.array([-1e9, 1e9, np.nan, np.inf, 0.0])
     assert not NEAR.at(np.stack([places, places[::-1]])).any()
     assert (
-        not NearStatics(Stage(None, CAR, nsim=1).model, reach_m=5.0)
+        not NearStatics(BatchSimulation(None, CAR, nsim=1).model, reach_m=5.0)
         .at(np.stack([places, places]))
         .any()
     )

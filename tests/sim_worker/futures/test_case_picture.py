@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foretwin.geometry.rectangles import clearance
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.case_picture import caption, write_case_picture
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
 from foretwin.sim_worker.futures.future_mix import plan_futures
@@ -78,7 +78,7 @@ def test_a_case_is_drawn_with_the_name_of_its_map(tmp_path: Path) -> None:
 
 
 def test_a_future_is_drawn_as_it_was_driven_with_the_name_of_its_map(tmp_path: Path) -> None:
-    stage, question = Stage(crossroads(), VEHICLE, nsim=2), job(PAIR, horizon_s=2.0)
+    stage, question = BatchSimulation(crossroads(), VEHICLE, nsim=2), job(PAIR, horizon_s=2.0)
     result, file = run_job(question, stage), tmp_path / "one" / "future.png"
     write_future_picture(file, question, result, 1, crossroads(), VEHICLE)
     first = file.read_bytes()

@@ -15,7 +15,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
 from foretwin.contracts.world import World
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
@@ -53,9 +53,9 @@ class Played(NamedTuple):
 
 
 @functools.cache
-def _stage(world_id: str) -> tuple[Stage, SceneMaker]:
+def _stage(world_id: str) -> tuple[BatchSimulation, SceneMaker]:
     world = _WORLDS[world_id]
-    return Stage(world, CAR, nsim=16), SceneMaker(world)
+    return BatchSimulation(world, CAR, nsim=16), SceneMaker(world)
 
 
 _WORLDS: dict[str, World] = {}
@@ -201,7 +201,7 @@ def test_what_has_no_place_in_a_world_is_not_played_and_told() -> None:
 def test_another_maker_of_scenes_gives_the_same_bits() -> None:
     played = play(cross(), "ccftap")
     assert played is not None
-    other = Stage(cross(), CAR, nsim=8)
+    other = BatchSimulation(cross(), CAR, nsim=8)
     assert result_digest(run_job(played.job, other)) == result_digest(played.result)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from foretwin.contracts.futures import Future, SeenRoadUser
 from foretwin.contracts.numbers import FUTURE_NUMBERS
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_rows import FUTURE_COLUMNS, future_rows, road_user_names
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -29,7 +29,7 @@ def test_a_row_tells_what_was_asked_and_what_became_of_it() -> None:
     asked = msgspec.structs.replace(
         job((happening(2, "scp"), blind), accidents=True), road_users=(SEEN,), metrics=("ttc",)
     )
-    result = run_job(asked, Stage(crossroads(), load_vehicle(), nsim=2), worker_id="w1")
+    result = run_job(asked, BatchSimulation(crossroads(), load_vehicle(), nsim=2), worker_id="w1")
     crossed, crash = future_rows(asked, result, job_sha256="ab" * 32)
     assert set(crossed) | set(crash) <= set(FUTURE_COLUMNS)
     assert [row["future_id"] for row in (crossed, crash)] == ["abababababab-2", "abababababab-5"]

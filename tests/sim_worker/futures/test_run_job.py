@@ -11,7 +11,7 @@ import pytest
 
 from foretwin.contracts.codec import content_bytes, write_message
 from foretwin.contracts.futures import Future, FuturesResult
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.metrics.displacement import distinct_count
@@ -43,8 +43,8 @@ HAPPENINGS = tuple(catalogue()[name] for name in ("scp", "cccscp", "lead_stoppin
 
 
 @pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage(crossroads(buildings=(box(40.0, 20.0, 8.0, 8.0),)), CAR, nsim=64)
+def stage() -> BatchSimulation:
+    return BatchSimulation(crossroads(buildings=(box(40.0, 20.0, 8.0, 8.0),)), CAR, nsim=64)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def _ends(result: FuturesResult) -> np.ndarray:  # type: ignore[type-arg]
     ids=["straight", "turning", "standing", "standing without aim", "fast"],
 )
 def test_at_least_48_of_64_futures_end_apart(
-    stage: Stage,
+    stage: BatchSimulation,
     round_of_64: tuple[Future, ...],
     setting: dict,  # type: ignore[type-arg]
 ) -> None:
@@ -78,7 +78,7 @@ def test_at_least_48_of_64_futures_end_apart(
 
 
 @pytest.mark.parametrize("seed", [1, 12345])
-def test_futures_differ_with_any_seed(stage: Stage, seed: int) -> None:
+def test_futures_differ_with_any_seed(stage: BatchSimulation, seed: int) -> None:
     futures = plan_futures(
         count=64, seed=seed, planners=(*PLANNERS, "constant_speed"), scenarios=HAPPENINGS
     )
@@ -87,19 +87,19 @@ def test_futures_differ_with_any_seed(stage: Stage, seed: int) -> None:
 
 
 def test_the_same_job_gives_the_same_bytes_again_and_on_another_stage(
-    stage: Stage, round_of_64: tuple[Future, ...]
+    stage: BatchSimulation, round_of_64: tuple[Future, ...]
 ) -> None:
     question = job(round_of_64[:32], path=turning_path(), horizon_s=4.0)
     first = run_job(question, stage)
     run_job(job(round_of_64[32:], state=state_at(-20.0, -1.0, speed=3.0), horizon_s=1.0), stage)
     again = run_job(question, stage)
-    other = run_job(question, Stage(stage.world, CAR, nsim=32, threads=2))
+    other = run_job(question, BatchSimulation(stage.world, CAR, nsim=32, threads=2))
     assert content_bytes(first.trajectory) == content_bytes(again.trajectory)
     assert result_digest(first) == result_digest(again) == result_digest(other)
 
 
 def test_another_process_computes_the_same_bytes(
-    stage: Stage, round_of_64: tuple[Future, ...], tmp_path: Path
+    stage: BatchSimulation, round_of_64: tuple[Future, ...], tmp_path: Path
 ) -> None:
     question = job(round_of_64[:16], horizon_s=3.0)
     assert stage.world is not None
@@ -110,9 +110,9 @@ def test_another_process_computes_the_same_bytes(
         "from foretwin.contracts.world import World;"
         "from foretwin.contracts.futures import Job;"
         "from foretwin.sim_worker.futures.run_job import run_job, result_digest;"
-        "from foretwin.sim_worker.batch.batch_simulation import Stage;"
+        "from foretwin.sim_worker.batch.batch_simulation import BatchSimulation;"
         "from foretwin.sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
-        "s = Stage(read_message(d / 'world', World), load_vehicle(), nsim=16);"
+        "s = BatchSimulation(read_message(d / 'world', World), load_vehicle(), nsim=16);"
         "print(result_digest(run_job(read_message(d / 'job', Job), s)))"
     )
     there = subprocess.run(
@@ -122,7 +122,7 @@ def test_another_process_computes_the_same_bytes(
 
 
 def test_a_future_does_not_depend_on_its_companions(
-    stage: Stage, round_of_64: tuple[Future, ...]
+    stage: BatchSimulation, round_of_64: tuple[Future, ...]
 ) -> None:
     together = run_job(job(round_of_64[:32], horizon_s=4.0), stage).trajectory.states
     for chosen in (5, 7):
@@ -130,14 +130,14 @@ def test_a_future_does_not_depend_on_its_companions(
         assert alone == pytest.approx(together[chosen], abs=1e-4)
 
 
-def test_a_future_keeps_the_cars_present_offset_from_the_path(stage: Stage) -> None:
+def test_a_future_keeps_the_cars_present_offset_from_the_path(stage: BatchSimulation) -> None:
     futures = (*NOMINAL, Future(index=1, name="shift", numbers={"lateral_shift_m": 0.5}))
     result = run_job(job(futures, state=state_at(-50.0, -0.8)), stage)
     assert result.trajectory.states[0, :, 1] == pytest.approx(np.full(81, -0.8), abs=0.02)
     assert result.trajectory.states[1, -1, 1] == pytest.approx(-0.3, abs=0.05)
 
 
-def test_the_first_instant_is_the_seeding_state(stage: Stage) -> None:
+def test_the_first_instant_is_the_seeding_state(stage: BatchSimulation) -> None:
     state = state_at(-40.0, -1.0, 0.05, 9.0, yaw_rate=0.02, tire_angle=0.01, accel=0.3)
     result = run_job(job(NOMINAL, state=state), stage)
     assert result.trajectory.time_s == pytest.approx(np.arange(81) * 0.1)
@@ -147,14 +147,14 @@ def test_the_first_instant_is_the_seeding_state(stage: Stage) -> None:
     )
 
 
-def test_a_turning_car_without_measured_steering_goes_on_turning(stage: Stage) -> None:
+def test_a_turning_car_without_measured_steering_goes_on_turning(stage: BatchSimulation) -> None:
     state = state_at(0.0, 0.0, 0.0, 8.0, yaw_rate=0.4, tire_angle=None)
     start = run_job(job(NOMINAL, state=state), stage).trajectory.states[0]
     assert start[0, 6] == pytest.approx(np.arctan(CAR.wheelbase_m.value * 0.4 / 8.0), rel=0.02)
     assert start[1, 5] == pytest.approx(0.4, rel=0.05)
 
 
-def test_only_drops_of_the_speed_limit_ahead_count(stage: Stage) -> None:
+def test_only_drops_of_the_speed_limit_ahead_count(stage: BatchSimulation) -> None:
     path = straight_path()
     limits = np.where(path.xy_m[:, 0] < -20.0, 10.0, 5.0)
     slow = msgspec.structs.replace(path, speed_limit_mps=limits)
@@ -162,7 +162,7 @@ def test_only_drops_of_the_speed_limit_ahead_count(stage: Stage) -> None:
     assert end == pytest.approx(4.0, abs=0.4)
 
 
-def test_low_friction_makes_a_future_slide_and_delay_makes_it_late(stage: Stage) -> None:
+def test_low_friction_makes_a_future_slide_and_delay_makes_it_late(stage: BatchSimulation) -> None:
     futures = (
         Future(index=0, name="n", planner="constant_speed"),
         Future(index=1, name="ice", planner="constant_speed", numbers=ICE),
@@ -178,7 +178,7 @@ def test_low_friction_makes_a_future_slide_and_delay_makes_it_late(stage: Stage)
 def test_a_building_in_the_way_is_a_collision_with_a_building(
     round_of_64: tuple[Future, ...],
 ) -> None:
-    walled = Stage(crossroads(buildings=(box(0.0, 0.0, 4.0, 20.0),)), CAR, nsim=8)
+    walled = BatchSimulation(crossroads(buildings=(box(0.0, 0.0, 4.0, 20.0),)), CAR, nsim=8)
     outcome = run_job(job(NOMINAL), walled).outcome
     assert outcome.collided.tolist() == [True]
     assert outcome.collision_with.tolist() == [2]
@@ -187,7 +187,7 @@ def test_a_building_in_the_way_is_a_collision_with_a_building(
 
 
 def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
-    stage: Stage,
+    stage: BatchSimulation,
 ) -> None:
     futures = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
     result = run_job(job(futures), stage)
@@ -200,7 +200,7 @@ def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
     assert np.ptp(states[0, :, 0]) > 1.0
 
 
-def test_an_accident_is_run_on_when_asked_for(stage: Stage) -> None:
+def test_an_accident_is_run_on_when_asked_for(stage: BatchSimulation) -> None:
     futures = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
     result = run_job(job(futures, accidents=True), stage)
     (accident,) = result.accidents
@@ -212,7 +212,7 @@ def test_an_accident_is_run_on_when_asked_for(stage: Stage) -> None:
     assert moved > 0.5, "a car that was hit moves on"
 
 
-def test_a_planned_impact_happens_where_it_was_planned(stage: Stage) -> None:
+def test_a_planned_impact_happens_where_it_was_planned(stage: BatchSimulation) -> None:
     """The car keeps its speed, and so does who crosses: they meet on the crossing."""
     hit = happening(0, "cccscp", planner="constant_speed", crossing_car__impact_share=0.5)
     outcome = run_job(job((hit,)), stage).outcome
@@ -221,7 +221,7 @@ def test_a_planned_impact_happens_where_it_was_planned(stage: Stage) -> None:
     assert run_job(job((late,)), stage).outcome.collision_with.tolist() == [0]
 
 
-def test_a_scenario_behind_the_car_says_so(stage: Stage) -> None:
+def test_a_scenario_behind_the_car_says_so(stage: BatchSimulation) -> None:
     state = state_at(40.0, -1.5)
     result = run_job(job((*NOMINAL, happening(1, "cccscp")), state=state), stage)
     assert result.left_out[0] == ""
@@ -233,7 +233,7 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    stage = Stage(crossroads(), CAR, nsim=2)
+    stage = BatchSimulation(crossroads(), CAR, nsim=2)
     futures = tuple(Future(index=i, name=str(i)) for i in range(2))
     sound = run_job(job(futures, horizon_s=2.0), stage)
     seed = stage.seed
@@ -255,7 +255,9 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Future, ...]) -> None:
+def test_a_result_survives_the_codec(
+    stage: BatchSimulation, round_of_64: tuple[Future, ...]
+) -> None:
     from foretwin.contracts.codec import decode, encode
 
     result = run_job(job(round_of_64[:8]), stage)
@@ -283,7 +285,7 @@ def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Future, ..
     ],
 )
 def test_a_job_that_cannot_be_done_says_why(
-    stage: Stage,
+    stage: BatchSimulation,
     changes: dict,  # type: ignore[type-arg]
     said: str,
 ) -> None:
@@ -291,7 +293,7 @@ def test_a_job_that_cannot_be_done_says_why(
         run_job(msgspec.structs.replace(job(NOMINAL), **changes), stage)
 
 
-def test_result_digest_ignores_who_computed_it(stage: Stage) -> None:
+def test_result_digest_ignores_who_computed_it(stage: BatchSimulation) -> None:
     result = run_job(job(NOMINAL, horizon_s=1.0), stage, worker_id="a")
     other = run_job(job(NOMINAL, horizon_s=1.0), stage, worker_id="b")
     assert result_digest(result) == result_digest(other)

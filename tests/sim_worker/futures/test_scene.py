@@ -9,7 +9,7 @@ import pytest
 from foretwin.contracts.drive import SignalState
 from foretwin.contracts.futures import Future, Job, PathAhead, SeenRoadUser
 from foretwin.contracts.world import World
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -24,22 +24,22 @@ STANDING_LEAD = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
 
 
 @pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage(crossroads(), CAR, nsim=8)
+def stage() -> BatchSimulation:
+    return BatchSimulation(crossroads(), CAR, nsim=8)
 
 
 def faulty(index: int, **faults: float) -> Future:
     return Future(index=index, name=str(index), numbers=faults)
 
 
-def test_who_believes_to_be_farther_left_drives_farther_right(stage: Stage) -> None:
+def test_who_believes_to_be_farther_left_drives_farther_right(stage: BatchSimulation) -> None:
     futures = (faulty(0), faulty(1, position_offset_m=0.6))
     states = run_job(job(futures), stage).trajectory.states
     assert states[1, -1, 1] - states[0, -1, 1] == pytest.approx(-0.6, abs=0.05)
 
 
 def test_a_steering_offset_draws_a_car_aside_and_half_the_steering_turns_less(
-    stage: Stage,
+    stage: BatchSimulation,
 ) -> None:
     aside = state_at(-50.0, -0.5)
     shift = Future(index=0, name="shift", numbers={"lateral_shift_m": 2.0})
@@ -51,7 +51,7 @@ def test_a_steering_offset_draws_a_car_aside_and_half_the_steering_turns_less(
     assert states.trajectory.states[2, 10, 1] > -0.45, "0.02 rad to the left, for a second"
 
 
-def test_weak_brakes_end_in_the_car_ahead(stage: Stage) -> None:
+def test_weak_brakes_end_in_the_car_ahead(stage: BatchSimulation) -> None:
     # From 20 m/s, 45 m behind somebody who stands, good brakes just do.
     ahead = {"lead__speed_mps": 0.0, "lead__gap_m": 45.0}
     sound = happening(0, "lead_stopping", **ahead)
@@ -63,7 +63,7 @@ def test_weak_brakes_end_in_the_car_ahead(stage: Stage) -> None:
     assert outcome.collision_with.tolist() == [0, 1]
 
 
-def test_who_sees_late_or_nothing_brakes_late_or_not_at_all(stage: Stage) -> None:
+def test_who_sees_late_or_nothing_brakes_late_or_not_at_all(stage: BatchSimulation) -> None:
     seen = happening(0, "lead_stopping", **STANDING_LEAD)
     late = happening(1, "lead_stopping", faults__perception_delay_s=1.0, **STANDING_LEAD)
     blind = happening(
@@ -88,7 +88,7 @@ def with_users(question: Job, *users: SeenRoadUser) -> Job:
     return msgspec.structs.replace(question, road_users=users)
 
 
-def test_detected_road_users_are_part_of_every_future(stage: Stage) -> None:
+def test_detected_road_users_are_part_of_every_future(stage: BatchSimulation) -> None:
     futures = (faulty(0), Future(index=1, name="careless", planner="constant_speed"))
     result = run_job(with_users(job(futures), detected()), stage)
     assert result.outcome.collision_with.tolist() == [0, 1]
@@ -97,7 +97,9 @@ def test_detected_road_users_are_part_of_every_future(stage: Stage) -> None:
     assert np.ptp(stands, axis=1).max() == 0.0
 
 
-def test_a_detected_car_goes_on_along_its_lane_and_a_walker_straight_on(stage: Stage) -> None:
+def test_a_detected_car_goes_on_along_its_lane_and_a_walker_straight_on(
+    stage: BatchSimulation,
+) -> None:
     driver = detected(x_m=1.5, y_m=-60.0, yaw_rad=np.pi / 2, speed_mps=6.0)
     walker = detected(kind="pedestrian", x_m=-30.0, y_m=12.0, yaw_rad=0.3, speed_mps=1.5)
     result = run_job(
@@ -115,7 +117,7 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> World:
     return mapped_crossroads(tmp_path_factory.mktemp("map"), centre={"highway": "traffic_signals"})
 
 
-def approach(world: World) -> tuple[Job, SceneMaker, Stage]:
+def approach(world: World) -> tuple[Job, SceneMaker, BatchSimulation]:
     """A job that drives east towards the lights, which are 60 m away."""
     path = straight_on(world, (1.0, 0.0))
     arc = float(path.locate(np.zeros((1, 2))).arc_m[0]) - 60.0
@@ -128,7 +130,7 @@ def approach(world: World) -> tuple[Job, SceneMaker, Stage]:
         futures=(Future(index=0, name="a"),), horizon_s=12.0, step_s=0.1, seed=0,
         cruise_speed_mps=9.0, starts=start,
     )  # fmt: skip
-    return question, SceneMaker(world), Stage(world, CAR, nsim=1)
+    return question, SceneMaker(world), BatchSimulation(world, CAR, nsim=1)
 
 
 @pytest.mark.parametrize(("colour", "stops"), [("red", True), ("green", False), ("dark", False)])
@@ -157,14 +159,14 @@ def test_a_plan_that_no_map_tells_stops_nobody_unless_asked_for(lit: World) -> N
     assert max(slowest) > 7.0, "and at another green"
 
 
-def test_an_unknown_scenario_names_those_that_the_job_defines(stage: Stage) -> None:
+def test_an_unknown_scenario_names_those_that_the_job_defines(stage: BatchSimulation) -> None:
     future = Future(index=0, name="x", scenario_id="flood")
     question = msgspec.structs.replace(job((faulty(0),)), futures=(future,))
     with pytest.raises(ValueError, match="scenario 'flood'; the job defines none"):
         run_job(question, stage)
 
 
-def test_metrics_that_a_job_names_come_back_for_every_future(stage: Stage) -> None:
+def test_metrics_that_a_job_names_come_back_for_every_future(stage: BatchSimulation) -> None:
     futures = (faulty(0), happening(1, "lead_stopping", planner="constant_speed", **STANDING_LEAD))
     question = msgspec.structs.replace(job(futures), metrics=("ttc", "max_jerk", "on_road"))
     metrics = run_job(question, stage).metrics

@@ -13,7 +13,7 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance
-from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.planner_interface import (
     Planner,
     PlannerView,
@@ -51,8 +51,8 @@ def _path(points: bytes) -> FrenetPath:
 
 
 @functools.cache
-def _stage(vehicle_name: str, count: int) -> Stage:
-    return Stage(None, load_vehicle(), nsim=count)
+def _stage(vehicle_name: str, count: int) -> BatchSimulation:
+    return BatchSimulation(None, load_vehicle(), nsim=count)
 
 
 class Drive(NamedTuple):
@@ -151,7 +151,8 @@ def drive(
     planner: Planner, path: FrenetPath, starts: Array, *, vehicle: VehicleParameters,
     seconds: float, others: list[Other] | None = None,
     others_of: Sequence[list[Other]] | None = None, target_mps: Any = 8.0,
-    red_until_s: float = 0.0, red_arc_m: float = np.inf, stage: Stage | None = None, **fields: Any,
+    red_until_s: float = 0.0, red_arc_m: float = np.inf, stage: BatchSimulation | None = None,
+    **fields: Any,
 ) -> Drive:  # fmt: skip
     """Drive all cars from `starts` (S, 8) among the same `others`, or each among `others_of` it."""
     count, ticks = len(starts), round(seconds / TICK_S)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import Future
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import Planner, RemembersWithinJob
 from foretwin.sim_worker.planners.hosted import ANSWER_S, HostedDriver, HostedPlanner, PlannerFailed
@@ -137,8 +137,8 @@ def theirs(name: str) -> HostedPlanner:
 
 
 @pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage(crossroads(), VEHICLE, nsim=8)
+def stage() -> BatchSimulation:
+    return BatchSimulation(crossroads(), VEHICLE, nsim=8)
 
 
 def test_they_are_known_by_their_entry_points() -> None:
@@ -240,7 +240,7 @@ def test_checking_leaves_no_process() -> None:
 
 
 @pytest.mark.parametrize("name", ["blocks", "crashes", "no_number"])
-def test_in_a_job_only_its_own_futures_fail(stage: Stage, name: str) -> None:
+def test_in_a_job_only_its_own_futures_fail(stage: BatchSimulation, name: str) -> None:
     planner = theirs(name)
     assert planner.pid is not None
     futures = (

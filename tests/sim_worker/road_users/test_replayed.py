@@ -11,7 +11,7 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import decode, encode
 from foretwin.contracts.futures import Future, Job, RecordedRoadUser
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -28,8 +28,8 @@ EVERY = tuple(
 
 
 @pytest.fixture(scope="module")
-def stage() -> Stage:
-    return Stage(crossroads(), CAR, nsim=8)
+def stage() -> BatchSimulation:
+    return BatchSimulation(crossroads(), CAR, nsim=8)
 
 
 def _moving(
@@ -49,7 +49,7 @@ def _job(*users: RecordedRoadUser, planners: tuple[str, ...] = ("constant_speed"
     return msgspec.structs.replace(job(futures), replayed=users)
 
 
-def test_a_standing_car_is_touched_when_the_way_is_driven(stage: Stage) -> None:
+def test_a_standing_car_is_touched_when_the_way_is_driven(stage: BatchSimulation) -> None:
     # Rear first, at 6.5 m/s, from 30 m ahead; its samples are not those of the control ticks.
     times_s = np.arange(-0.03, 6.0, 0.11)
     start_x = -50.0 + FRONT_M + 2.0 + 30.0
@@ -67,7 +67,7 @@ def test_a_standing_car_is_touched_when_the_way_is_driven(stage: Stage) -> None:
     assert end[there, 0] == pytest.approx(start_x - 6.5 * result.trajectory.time_s[there], abs=1e-5)
 
 
-def test_who_is_away_is_not_touched_and_who_comes_back_is(stage: Stage) -> None:
+def test_who_is_away_is_not_touched_and_who_comes_back_is(stage: BatchSimulation) -> None:
     times_s = np.array([0.0, 1.0, 9.0])
     stands = _moving("stands", times_s, (0.0, -1.5), 0.0, 0.0)
     away = msgspec.structs.replace(stands, gone_after=np.array([False, True, False]))
@@ -78,7 +78,9 @@ def test_who_is_away_is_not_touched_and_who_comes_back_is(stage: Stage) -> None:
     assert passed.outcome.min_clearance_m[0] == pytest.approx(50.0 - FRONT_M - 2.0 - 8.0, abs=0.1)
 
 
-def test_planners_drive_and_all_metrics_are_told_among_those_who_come_and_go(stage: Stage) -> None:
+def test_planners_drive_and_all_metrics_are_told_among_those_who_come_and_go(
+    stage: BatchSimulation,
+) -> None:
     crossing = _moving("crossing", np.arange(1.03, 5.0, 0.1), (1.5, -30.0), math.pi / 2.0, 6.0)
     lead = _moving("lead", np.arange(0.0, 3.0, 0.1), (-20.0, -1.5), 0.0, 5.0)
     planners = ("pure_pursuit_idm", "gap_acceptance", "frenet_lattice", "constant_speed")
@@ -96,7 +98,7 @@ def test_planners_drive_and_all_metrics_are_told_among_those_who_come_and_go(sta
     assert result_digest(run_job(again, stage)) == result_digest(result)
 
 
-def test_scenarios_and_seen_road_users_come_after_them(stage: Stage) -> None:
+def test_scenarios_and_seen_road_users_come_after_them(stage: BatchSimulation) -> None:
     lead = _moving("lead", np.arange(0.0, 9.0, 0.5), (60.0, 40.0), 0.0, 0.0)
     meets = happening(1, "scp", planner="constant_speed")
     question = job((Future(index=0, name="alone"), meets), accidents=True)

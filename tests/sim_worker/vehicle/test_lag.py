@@ -5,7 +5,7 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.vehicle.lag import ForceLag, lags_of_force
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -62,7 +62,7 @@ def test_a_vehicle_without_lags_needs_no_filter() -> None:
 def test_tyres_turn_with_the_steering_lag_after_the_delay(lag: float) -> None:
     # A small step, so that the limit of the rate does not matter: it takes 50 ms at 0.4 rad/s.
     car = altered(CAR, steering_lag_s=lag, max_tire_rate_radps=100.0)
-    stage = Stage(None, car, nsim=1)
+    stage = BatchSimulation(None, car, nsim=1)
     seed(stage, states(1, speed=5.0), delay=0.1)
     tire = drive(stage, 20, tire=0.1)[0, :, 6]
     time_s = TICK_S * np.arange(21)

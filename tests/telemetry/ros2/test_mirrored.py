@@ -13,7 +13,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.roles import Role
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
 from foretwin.contracts.towards_vehicle import Authority
-from foretwin.orchestrator.config import DriveConfig, VehicleBeside
+from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.ros2.gateway import Gateway
@@ -274,15 +274,18 @@ def test_mappings_that_cannot_be_used_say_why(text: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("vehicles", "said"),
     [
-        ((VehicleBeside(id="van", live=True),), "'second': not in the drive's .*which are van"),
         (
-            (VehicleBeside(id="van", live=True), VehicleBeside(id="second", seen_as="4")),
+            (OtherVehicleConfig(id="van", live=True),),
+            "'second': not in the drive's .*which are van",
+        ),
+        (
+            (OtherVehicleConfig(id="van", live=True), OtherVehicleConfig(id="second", seen_as="4")),
             "'second': the car detects it itself",
         ),
     ],
 )
 def test_who_goes_out_must_be_in_the_drive(
-    tmp_path, vehicles: tuple[VehicleBeside, ...], said: str
+    tmp_path, vehicles: tuple[OtherVehicleConfig, ...], said: str
 ) -> None:
     file = tmp_path / "m.toml"
     file.write_text(TEXT.format(dialect="ros2dds"))
