@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from foretwin.contracts.world import Area, World
-from tests.world_gen.drawn_maps import STREET, crossing, roundabout, world_of
+from tests.world_gen.drawn_maps import CROSS, STREET, crossing, drawn_map, roundabout, world_of
 
 COVERS = (
     "foretwin.world_gen.ground.crossings",
@@ -77,3 +77,10 @@ def test_areas_are_on_the_grid_and_turn_counter_clockwise(world):
         assert np.array_equal(area.outline, np.round(area.outline, 3))
         assert shapely.Polygon(area.outline).is_valid
         assert shapely.is_ccw(shapely.LinearRing(area.outline))
+
+
+def test_a_wide_road_that_ends_at_a_street_does_not_widen_its_other_side():
+    one_way = STREET | {"oneway": "yes"}
+    ways = [(11, [0, 1], one_way), (13, [3, 0], one_way), (14, [4, 0], one_way | {"lanes": "6"})]
+    tee = world_of(drawn_map({node: CROSS[node] for node in (0, 1, 3, 4)}, ways))
+    assert covered(tee.road_surface).bounds[3] == pytest.approx(1.5, abs=0.01)
