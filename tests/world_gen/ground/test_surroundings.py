@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from foretwin.contracts.world import Area, World
-from tests.world_gen.drawn_maps import CROSS, STREET, crossing, drawn_map, roundabout, world_of
+from tests.world_gen.drawn_maps import STREET, crossing, roundabout, world_of
 
 COVERS = (
     "foretwin.world_gen.ground.crossings",
@@ -79,8 +79,7 @@ def test_areas_are_on_the_grid_and_turn_counter_clockwise(world):
         assert shapely.is_ccw(shapely.LinearRing(area.outline))
 
 
-def test_a_wide_road_that_ends_at_a_street_does_not_widen_its_other_side():
-    one_way = STREET | {"oneway": "yes"}
-    ways = [(11, [0, 1], one_way), (13, [3, 0], one_way), (14, [4, 0], one_way | {"lanes": "6"})]
-    tee = world_of(drawn_map({node: CROSS[node] for node in (0, 1, 3, 4)}, ways))
-    assert covered(tee.road_surface).bounds[3] == pytest.approx(1.5, abs=0.01)
+def test_an_arm_that_is_wider_than_the_ring_does_not_pave_its_middle():
+    ground = covered(world_of(roundabout()).road_surface)
+    # The ring's middle line is at 15 m, and it is 4.5 m wide.
+    assert ground.intersection(shapely.Point(0.0, 0.0).buffer(12.5)).area < 0.01
