@@ -14,9 +14,11 @@ import pytest
 from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, take
+from tests.contracts.memory_bus import MemoryBus
 
 RUN = {"run": "r1"}
 
@@ -126,3 +128,21 @@ def test_an_error_ends_it_with_code_1_and_stands_in_the_log(run: Run) -> None:
     assert line["process"] == "p0"
     assert line["level"] == "error"
     assert "the wheels came off" in str(line["traceback"])
+
+
+def test_it_waits_out_the_grace_once_the_orchestrator_is_gone() -> None:
+    orchestrator = alive_key(process="orchestrator", **RUN)
+    setup = ProcessSetup(
+        run_id="r1", process_id="p0", vehicle_id="ego", bus=BusSetup(endpoint=""), log_file=""
+    )
+    bus, now_s = MemoryBus(), 100.0
+    bus.declare_alive(orchestrator)
+    life = ProcessLife(setup, bus, mono_s=lambda: now_s)
+    assert not life.over
+
+    bus.lose(orchestrator)
+    assert not life.over
+    now_s += ORCHESTRATOR_GRACE_S
+    assert not life.over
+    now_s += 0.1
+    assert life.over

@@ -143,6 +143,7 @@ def test_futures_begin_where_the_car_is_and_differ(world: foretwin.World) -> Non
     assert futures.states[:, 0, :2] == pytest.approx(np.tile(here, (6, 1)), abs=1e-3)
     assert len({round(float(x), 3) for x in futures.states[:, -1, 0]}) == 6
     assert futures.rows[0]["name"] == "nominal"
+    assert {(row["round_id"], row["job_index"]) for row in futures.rows} == {(0, 0)}
     assert futures.table.num_rows == 6
 
 

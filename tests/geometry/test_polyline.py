@@ -47,3 +47,8 @@ def test_an_offset_to_the_inside_of_a_tight_bend_never_runs_backwards():
 def test_a_cut_has_the_length_asked_for(begin, span):
     line = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 30.0], [50.0, 30.0]])
     assert length(cut(line, begin, begin + span)) == pytest.approx(span, abs=1e-6)
+
+
+def test_an_offset_keeps_the_nodes_of_short_steps():
+    line = np.array([[0.0, 0.0], [10.0, 0.0], [10.1, 0.0], [20.0, 0.0]])
+    np.testing.assert_allclose(offset(line, 2.0), line + np.array([0.0, 2.0]))

@@ -24,6 +24,7 @@ from tests.telemetry.drive_messages import INFO, START_NS, every_channel, sample
 from tests.telemetry.own_recordings import message_from, read_drive
 
 COVERS = (
+    "foretwin.telemetry.logs.ros_log",
     "foretwin.telemetry.logs.write_mcap",
     "foretwin.telemetry.logs.mcap_records",
     "foretwin.telemetry.ros_messages.table",

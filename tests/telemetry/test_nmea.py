@@ -110,6 +110,17 @@ def test_vtg_gives_the_speed_where_there_is_no_rmc(tmp_path: Path) -> None:
     assert found["heading"][0].yaw_rad == pytest.approx(-0.5 * math.pi)
 
 
+def test_vtg_without_a_speed_is_no_fix(tmp_path: Path) -> None:
+    log, found = opened(
+        tmp_path,
+        line("GPZDA,120000.00,01,03,2026,00,00"),
+        gga("120000.00"),
+        line("GPVTG,180.0,T,,M,,N,,K,A"),
+    )
+    assert "speed" not in found
+    assert log.skipped == {"receiver without fix": 1}
+
+
 @pytest.mark.parametrize("dated", [True, False])
 def test_midnight_begins_the_next_day(tmp_path: Path, dated: bool) -> None:
     day = rmc("235959.50", "280226")

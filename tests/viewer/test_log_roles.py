@@ -9,7 +9,7 @@ import pytest
 
 from foretwin.contracts.roles import Role
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, TwinCorrection
-from foretwin.viewer.log_roles import CARS, RolesLog
+from foretwin.viewer.log_roles import CARS, RolesLog, static_rows
 from foretwin.viewer.rows import Row
 from tests.viewer import scene
 
@@ -93,3 +93,9 @@ def test_a_correction_is_an_arrow_and_two_curves_until_it_ends() -> None:
     after = by_path(log.rows(sample(), 2))
     assert {"world/ego/twin/correction", "world/ego/free"} <= set(after)
     assert len(log.rows(sample(), 3)) == 3
+
+
+def test_the_curves_and_the_arrow_of_a_correction_have_their_looks_once() -> None:
+    corrected = RolesLog().rows(sample(role="all", correction=DRAWN), 1)
+    styled = by_path(static_rows())
+    assert {path for path in by_path(corrected) if "correction" in path} == set(styled)

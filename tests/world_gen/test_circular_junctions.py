@@ -7,6 +7,8 @@ from pathlib import Path
 
 from tests.world_gen.sketch import Sketch, off_centre_m, only, star
 
+COVERS = ("foretwin.world_gen.junctions.chains",)
+
 
 def roundabout(kind: str = "roundabout") -> Sketch:
     """A ring of two ways and 15 m radius; the eastern arm parts 25 m before it."""

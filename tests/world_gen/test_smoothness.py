@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString
 
 from foretwin.contracts.world import Connection, World
+from foretwin.world_gen.lanes.legs import heading_out
+from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.world_gen.drawn_stars import stars, world_of_star
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
+from tests.world_gen.road_edges import road as straight_road
 
 COVERS = (
     "foretwin.world_gen.connections.connection_paths",
@@ -97,3 +102,12 @@ def _mirrored(mine: np.ndarray, its: np.ndarray) -> bool:
     if len(mine) != len(its):
         return False
     return bool(np.abs(mine * [-1.0, 1.0] - its).max() < 0.003)
+
+
+def test_a_leg_heads_where_it_leads_over_its_first_metres():
+    line = np.array([[100.0, 50.0], [103.0, 54.0], [107.0, 57.0]])
+    bent = msgspec.structs.replace(straight_road(), xy_m=line)
+    assert heading_out(DirectedEdge(bent, reverse=False), 5.0) == pytest.approx((0.6, 0.8))
+    assert heading_out(DirectedEdge(bent, reverse=False), 10.0) == pytest.approx(
+        np.array([7.0, 7.0]) / math.hypot(7.0, 7.0)
+    )

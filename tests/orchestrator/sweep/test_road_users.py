@@ -166,7 +166,9 @@ def test_a_log_of_others_replaces_what_the_car_saw(run: Path, tmp_path: Path) ->
     with pytest.raises(UserError, match=r"leave_out 'x': no such road user .* there are the car"):
         check_spec(_spec(run, road_user_log=log, leave_out=("x",)))
     late = _log(tmp_path, ("beside", 4.0), after_s=1000.0)
-    with pytest.raises(UserError, match="they need one clock"):
+    with pytest.raises(
+        UserError, match=r"from 1688681000\.0 to 1688681009\.9 s, .* they need one clock"
+    ):
         check_spec(_spec(run, road_user_log=str(late)))
 
 

@@ -37,6 +37,13 @@ def test_variants_cover_their_ranges_with_a_target_speed_each(seed: int) -> None
     assert max(shift) > 0.4
 
 
+def test_one_thing_is_wrong_with_a_car_or_everything() -> None:
+    faults = ("friction_factor", "extra_steering_delay_s", "lateral_shift_m")
+    futures = plan_futures(count=6, seed=0, planners=["a"])
+    found = {tuple(name for name in faults if name in v.numbers) for v in futures[1:]}
+    assert found == {(), faults, *((name,) for name in faults)}
+
+
 def test_small_counts_and_wrong_ones() -> None:
     assert len(plan_futures(count=1, seed=0, planners=["a"])) == 1
     assert len(plan_futures(count=2, seed=0, planners=["a"])) == 2

@@ -10,7 +10,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.drive import ControlCommand
-from foretwin.contracts.roles import FollowLimits, UseRoles
+from foretwin.contracts.roles import Correction, FollowLimits, UseRoles
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.sim_worker.mirror.member import GroupMember
 from foretwin.sim_worker.mirror.mirror import Mirror
@@ -20,7 +20,7 @@ from tests.sim_worker.driving import altered
 from tests.sim_worker.mirror.test_vehicle_group import TICK_NS, weaving
 from tests.sim_worker.places import FRAME, crossroads, state_at
 
-COVERS = ("foretwin.sim_worker.mirror.role_manager",)
+COVERS = ("foretwin.sim_worker.mirror.role_manager", "foretwin.sim_worker.mirror.samples")
 
 CAR = load_vehicle()
 LIMITS = FollowLimits()
@@ -133,6 +133,16 @@ def test_without_anything_asked_for_there_is_no_cast() -> None:
     sample = _mirror().handle_state(weaving(0))
     assert sample is not None
     assert (sample.role, sample.free, sample.correction) == ("all", None, None)
+
+
+@pytest.mark.parametrize(("correction", "shown"), [("follow", True), ("free", False)])
+def test_a_correction_of_nothing_is_shown_while_following_alone(
+    correction: Correction, shown: bool
+) -> None:
+    mirror = _mirror()
+    mirror.set_roles(UseRoles(stamp_ns=0, roles={"ego": "twin"}, correction=correction))
+    samples = drive(mirror, wrong_gain=0.1, changes={}, ticks=50)
+    assert (samples[-1].correction is not None) == shown
 
 
 def test_a_new_world_does_not_move_a_following_twin() -> None:

@@ -79,6 +79,15 @@ def test_without_recorded_commands_the_twin_repeats_the_motion_and_says_so() -> 
         assert sample.twin_yaw_rate_radps == pytest.approx(sample.twin.speed_mps / 25.0, abs=0.03)
 
 
+def test_the_gap_is_along_and_across_the_measured_heading() -> None:
+    for sample in _samples(Mirror(CAR, drive_frame=FRAME), _circle()):
+        real, twin = sample.real, sample.twin
+        along = np.array([math.cos(real.yaw_rad), math.sin(real.yaw_rad)])
+        gap = np.array([twin.x_m - real.x_m, twin.y_m - real.y_m])
+        assert sample.gap_along_m == pytest.approx(gap @ along, abs=1e-6)
+        assert sample.gap_across_m == pytest.approx(along[0] * gap[1] - along[1] * gap[0], abs=1e-6)
+
+
 def test_where_a_map_moves_the_car_the_free_twins_gap_does_not_jump() -> None:
     track = _circle(until_s=4.0)
     found = []

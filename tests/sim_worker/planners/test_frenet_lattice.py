@@ -167,3 +167,23 @@ def test_what_one_car_does_is_independent_of_the_others_in_the_job() -> None:
         alone = choose(view_of(path, starts[rows], VEHICLE, target_mps=9.0, users=seen))
         for whole, part in zip((along, across), alone, strict=True):
             assert whole.coefficients[:, rows].tobytes() == part.coefficients.tobytes()
+
+
+def test_it_brakes_for_a_car_ahead_between_its_choices_once_that_brakes() -> None:
+    path = straight(300.0)
+    driver = FrenetLattice().begin(1)
+    asked = []
+    for time_s, lead_mps in ((0.0, 10.0), (0.28, 10.0), (0.3, 9.6)):
+        users, _ = see(path, [Other(ALONG, lead_mps, 20.0)], 0.0, 1)
+        view = view_of(
+            path,
+            at_rest_on(path, 0.0, 10.0, 1),
+            VEHICLE,
+            time_s=time_s,
+            target_mps=10.0,
+            users=users,
+            lead_gap_m=np.array([14.0]),
+            lead_speed_mps=np.array([lead_mps]),
+        )
+        asked.append(float(driver.plan(view).accel_mps2[0]))
+    assert asked[2] < 0.0 < asked[1]

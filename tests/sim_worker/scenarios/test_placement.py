@@ -25,7 +25,7 @@ from foretwin.world_gen.build import build_region
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import box
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
-from tests.world_gen.drawn_maps import drawn_map
+from tests.world_gen.drawn_maps import CROSS, STREET, drawn_map, world_of
 
 COVERS = (
     "foretwin.sim_worker.scenarios.beyond_junctions",
@@ -246,3 +246,18 @@ def test_the_clearest_turn_comes_first() -> None:
         chosen = passages[first.ego.name]
         off = unlike_its_turn(chosen.turn, chosen.exit_heading_rad - chosen.entry_heading_rad)
         assert off == min(offs) < max(offs)
+
+
+def test_an_adult_walks_over_the_crossing_that_the_map_has_beyond_the_exit() -> None:
+    arms = {end: [end, 0] for end in (1, 2, 4)} | {3: [3, 5, 0]}
+    osm = drawn_map(
+        CROSS | {5: (-25.0, 0.0)},
+        [(10 + end, nodes, STREET) for end, nodes in arms.items()],
+        node_tags={5: {"highway": "crossing", "crossing": "zebra"}},
+    )
+    exits_and_crossings = {
+        (place.ego.name.split(">")[1].split(".")[0], "over n5" in place.actor_ways[0][0].name)
+        for place in placed("cpta", world_of(osm))
+    }
+    assert ("w13", True) in exits_and_crossings
+    assert {exit_ for exit_, over in exits_and_crossings if over} == {"w13"}

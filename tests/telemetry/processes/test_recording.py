@@ -7,12 +7,15 @@ import io
 from pathlib import Path
 
 import pytest
+from mcap.reader import NonSeekingReader
 
 from foretwin.contracts.drive import ImuSample, SpeedSample
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.own_recordings import read_drive
+
+COVERS = ("foretwin.telemetry.logs.write_mcap",)
 
 
 class SmallDisk(io.BytesIO):
@@ -64,6 +67,8 @@ def test_a_full_disk_is_told_once_and_what_was_written_stays_readable(
         found = [message for _, message in read_drive(path)]
         assert 1000 < len(found) < 6000
         assert found == [imu(number) for number in range(len(found))]
+        with path.open("rb") as file:
+            assert len(list(NonSeekingReader(file).iter_messages())) == len(found)
 
 
 def test_a_folder_that_is_not_there_stops_the_recording_alone(tmp_path: Path) -> None:

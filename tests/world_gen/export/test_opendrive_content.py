@@ -94,6 +94,8 @@ def test_a_stop_sign_stands_by_the_kerb_and_looks_at_its_driver(tmp_path: Path) 
         assert abs(float(sign.get("hOffset"))) < 1e-3
         road = file.roads[sign.getparent().getparent().get("id")]
         places.append(road.beside(float(sign.get("s")), float(sign.get("t"))).tolist())
+    paint = [o for o in file.root.iter("object") if o.get("type") == "roadMark"]
+    assert {(o.get("zOffset"), o.get("height")) for o in paint} == {("0", "0")}
     west = min(places)
     # Where the map has it, and 0.6 m right of a lane that leads east and is 3 m wide.
     assert west == pytest.approx([-15.0, -3.6], abs=0.01)

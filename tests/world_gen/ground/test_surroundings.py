@@ -77,3 +77,9 @@ def test_areas_are_on_the_grid_and_turn_counter_clockwise(world):
         assert np.array_equal(area.outline, np.round(area.outline, 3))
         assert shapely.Polygon(area.outline).is_valid
         assert shapely.is_ccw(shapely.LinearRing(area.outline))
+
+
+def test_an_arm_that_is_wider_than_the_ring_does_not_pave_its_middle():
+    ground = covered(world_of(roundabout()).road_surface)
+    # The ring's middle line is at 15 m, and it is 4.5 m wide.
+    assert ground.intersection(shapely.Point(0.0, 0.0).buffer(12.5)).area < 0.01

@@ -119,3 +119,12 @@ def test_lanes_lie_side_by_side_and_fill_the_carriageway(forward, backward, side
 )
 def test_metres(text, value):
     assert metres(text) == (value if value is None else pytest.approx(value))
+
+
+@pytest.mark.parametrize(
+    ("word", "kinds"), [("lane", ["bicycle", "driving"]), ("track", ["driving"])]
+)
+def test_a_cycle_track_against_a_one_way_street_is_no_lane_of_it(word, kinds):
+    tags = {"oneway": "yes", "cycleway:left": word, "cycleway:left:oneway": "-1"}
+    lanes = cross_section(_road(tags, backward=0), "right").lanes
+    assert sorted(lane.kind for lane in lanes) == kinds

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.rules.signal_plan import share_green
+from foretwin.world_gen.rules.signal_plan import oncoming, share_green
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
 from tests.world_gen.plan_checks import check_plans, plan_of
 
@@ -135,3 +136,14 @@ def test_green_is_shared_out_whole(parts, total_s):
     assert all(green >= lowest for green, lowest in zip(shared, least, strict=True))
     if any(weights):
         assert sum(shared) == pytest.approx(max(total_s, sum(least)), abs=0.26)
+
+
+def test_roads_face_each_other_where_each_lies_straight_ahead_of_the_other():
+    def group(key, straight_ahead):
+        return SimpleNamespace(approach=SimpleNamespace(key=key, opposite=straight_ahead))
+
+    east, west = group((1, True), (2, True)), group((2, True), (1, True))
+    north_west = group((3, True), (1, True))
+    assert oncoming(east, west)
+    assert not oncoming(east, north_west)
+    assert not oncoming(north_west, east)

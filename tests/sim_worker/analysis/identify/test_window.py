@@ -10,6 +10,7 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.analysis.identify.longitudinal import grade_from_altitude
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -131,3 +132,12 @@ def test_one_window_takes_little_time() -> None:
     for _ in range(5):
         identify(city_minute(), load_vehicle(), vehicle_id="standin")
     assert (time.process_time() - begun) / 5 <= 0.15
+
+
+def test_an_even_climb_has_its_grade_from_the_first_metre_to_the_last() -> None:
+    speed = np.full(len(city_minute().time_s), 20.0)
+    height = 30.0 + 0.05 * 20.0 * city_minute().time_s
+    climb = city_minute()._replace(speed_mps=speed, altitude_m=height)
+    grade = grade_from_altitude(climb)
+    assert grade == pytest.approx(0.05, rel=0.06)
+    assert grade[0] == pytest.approx(0.05, rel=0.004)
