@@ -127,10 +127,6 @@ class OsmMap(msgspec.Struct, frozen=True, kw_only=True):
     note_places: Mapping[str, tuple[float, float]] = msgspec.field(default_factory=dict)
     """(lat, lon) of those notes that are about a place."""
 
-    def lat_lon_deg(self, nodes: Sequence[int] | IntArray) -> Array:
-        """Return (N, 2) degrees of many nodes at once; KeyError names one without a position."""
-        return self.locations.of(nodes)
-
     def points_of(self, lines: Sequence[Sequence[int]]) -> tuple[Array, IntArray]:
         """Return (P, 2) degrees of lines of nodes, one line after the other, and where each of the
         L lines begins, and the last ends, (L + 1,)."""

@@ -84,12 +84,10 @@ class HearingBus(MemoryBus):
         ASKED.append(str(ids["vehicle"]))
 
 
-def crew(
-    folder: Path, *configs: OtherVehicleConfig
-) -> tuple[OtherVehicleFeed, list[OtherVehicles]]:
+def crew(at: Path, *configs: OtherVehicleConfig) -> tuple[OtherVehicleFeed, list[OtherVehicles]]:
     """The vehicles of a drive whose car begins at START_NS, and what is passed on of them."""
     members = tuple(OtherVehiclePlan(config, VAN, commands_recorded=False) for config in configs)
-    plan = town_plan(folder)
+    plan = town_plan(at)
     lock_step = msgspec.structs.replace(plan.config, speed=None)
     plan = replace(plan, beside=members, drive_frame=FRAME, config=lock_step)
     bus = HearingBus()

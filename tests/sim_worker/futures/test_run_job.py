@@ -255,9 +255,7 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_result_survives_the_codec(
-    stage: BatchSimulation, round_of_64: tuple[Future, ...]
-) -> None:
+def test_results_survive_the_codec(stage: BatchSimulation, round_of_64: tuple[Future, ...]) -> None:
     from foretwin.contracts.codec import decode, encode
 
     result = run_job(job(round_of_64[:8]), stage)
