@@ -10,6 +10,7 @@ my.toml needs so that it goes out.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import sys
 
@@ -81,11 +82,9 @@ def main() -> int:
     parser.add_argument("--lat", type=float, required=True, help="degrees")
     parser.add_argument("--lon", type=float, required=True, help="degrees")
     given = parser.parse_args()
-    try:
-        with ZenohBus(BusSetup(endpoint=given.endpoint)) as bus:
-            serve(bus, GeoPoint(given.lat, given.lon))
-    except KeyboardInterrupt:
-        return 0
+    with contextlib.suppress(KeyboardInterrupt), ZenohBus(BusSetup(endpoint=given.endpoint)) as bus:
+        serve(bus, GeoPoint(given.lat, given.lon))
+    return 0
 
 
 if __name__ == "__main__":
