@@ -17,6 +17,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.estimator import motion_noise
+from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
@@ -32,7 +33,7 @@ _LEAST_TURN_RAD = 0.002
 _KNOWN_YAW_VAR = 0.15**2
 
 
-class KinematicFilter:
+class KinematicFilter(ShallowCopied):
     """Predicts with constant acceleration and curvature, and is corrected by each measurement.
 
     `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices;

@@ -9,6 +9,7 @@ from typing import Any
 
 from foretwin.contracts.drive import SpeedSample, SteeringSample
 from foretwin.geometry.steering import SteeringColumn
+from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""
@@ -34,7 +35,7 @@ _LIMITS = {
 """Beyond these a number is no motion of a road vehicle."""
 
 
-class MotionSamples:
+class MotionSamples(ShallowCopied):
     """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
 
     def __init__(
@@ -121,7 +122,7 @@ class MotionSamples:
         return None if wheel is None else self._column.tire_rad(wheel)
 
 
-class Doubt:
+class Doubt(ShallowCopied):
     """The standard deviation to give a sensor that states none: its recent surprises, at least.
 
     Speeds and courses of a satellite receiver lag behind its positions by up to a second; taken at

@@ -10,12 +10,13 @@ from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, Stee
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
+from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
 
 
-class MotionCorrections:
+class MotionCorrections(ShallowCopied):
     """Gives each kind of sample its weight; speeds and headings lose theirs as they surprise."""
 
     def __init__(self, measured: MotionSamples, *, wheelbase_m: float) -> None:

@@ -19,6 +19,7 @@ from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate
 from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
+from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1
@@ -27,7 +28,7 @@ _UNKNOWN_PLACE_M = 1000.0
 _CREEPING_MPS = 1.0
 
 
-class MotionTrack:
+class MotionTrack(ShallowCopied):
     """Takes samples one by one and says where base_link is, and how it moves.
 
     Positions whose source states no standard deviation, or only positions of at most 5 cm, are

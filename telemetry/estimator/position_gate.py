@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
 from foretwin.telemetry.estimator.measured import CLOCK_LEAP_NS
+from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 MAX_SPEED_MPS = 70.0
 """A position that asks for more than this is no motion of a road vehicle. Chosen: 252 km/h."""
@@ -34,7 +35,7 @@ class LocalFix(NamedTuple):
     xy_m: Array
 
 
-class PositionGate:
+class PositionGate(ShallowCopied):
     """Sorts fixes into those to use, those that move the whole track, and those to skip.
 
     `skipped` counts what was refused by reason. `recent` holds the believed fixes of some seconds.
