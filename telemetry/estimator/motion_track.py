@@ -24,8 +24,7 @@ from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1
 """Of the stated error of a receiver that wanders: what changes from fix to fix."""
-_UNKNOWN_PLACE_M = 1000.0
-_CREEPING_MPS = 1.0
+_UNKNOWN_PLACE_M, _CREEPING_MPS = 1000.0, 1.0
 
 
 class MotionTrack(ShallowCopied):
@@ -282,8 +281,8 @@ class MotionTrack(ShallowCopied):
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
         self._advance(stamp_ns)
-        here, vehicle_id = self._position_out(fix), self._info.vehicle_id
-        unmoved = unmoved_state(self._measured, vehicle_id, stamp_ns, here, self._fix.std_m)
+        here, name = self._position_out(fix), self._info.vehicle_id
+        unmoved = unmoved_state(self._measured, name, stamp_ns, here, self._fix.std_m)
         if self._filter is None:
             return unmoved
         return moving_state(
