@@ -281,12 +281,11 @@ class MotionTrack(ShallowCopied):
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
         self._advance(stamp_ns)
-        here, name = self._position_out(fix), self._info.vehicle_id
-        unmoved = unmoved_state(self._measured, name, stamp_ns, here, self._fix.std_m)
+        known = self._measured, self._info.vehicle_id, stamp_ns, self._position_out(fix)
         if self._filter is None:
-            return unmoved
+            return unmoved_state(*known, self._fix.std_m)
         return moving_state(
-            unmoved,
+            *known,
             self._filter,
             convergence_rad=self._convergence_rad,
             wheelbase_m=self._wheelbase_m,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import msgspec
 import numpy as np
 
 from foretwin.contracts.drive import VehicleState
@@ -48,7 +47,10 @@ def unmoved_state(
 
 
 def moving_state(
-    unmoved: VehicleState,
+    measured: MotionSamples,
+    vehicle_id: str,
+    stamp_ns: int,
+    position: GeoPoint,
     filter_: KinematicFilter,
     *,
     convergence_rad: float,
@@ -56,28 +58,32 @@ def moving_state(
     standing: bool,
     map_shift_m: tuple[float, float] | None,
 ) -> VehicleState:
-    """Return the state of a car whose heading is known, of what it would be without.
+    """Return the state of a car whose heading is known.
 
     `convergence_rad` is the angle of the filter's frame against east; a car that stands has no
     speed, turning or acceleration. Fields without a fresh sample are named in `estimated`.
     """
-    angle = unmoved.tire_angle_rad
+    estimated = measured.estimated(stamp_ns)
+    angle = None if "tire_angle_rad" in estimated else measured.tire_angle_rad
     if angle is None:
         angle = math.atan(wheelbase_m * filter_.mean[CURVATURE])
     spread = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
     position_std_m = math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)
     if map_shift_m is not None:
         position_std_m = math.hypot(position_std_m, ALIKE_M)
-    return msgspec.structs.replace(
-        unmoved,
+    return VehicleState(
+        vehicle_id=vehicle_id,
+        stamp_ns=stamp_ns,
+        position=position,
         yaw_rad=float(wrap_angle(filter_.mean[YAW] - convergence_rad)),
         speed_mps=0.0 if standing else float(filter_.mean[SPEED]),
         yaw_rate_radps=0.0 if standing else filter_.yaw_rate_radps,
         accel_mps2=0.0 if standing else float(filter_.mean[ACCEL]),
         tire_angle_rad=angle,
+        steering_wheel_rad=measured.steering_wheel_rad,
         position_std_m=position_std_m,
         yaw_std_rad=float(spread[YAW]),
         speed_std_mps=float(spread[SPEED]),
         map_shift_m=map_shift_m,
-        yaw_valid=True,
+        estimated=estimated,
     )
