@@ -6,7 +6,7 @@ that a map can lack says whether it was tagged in the map, inferred from it, or 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import msgspec
 
@@ -17,6 +17,8 @@ from foretwin.contracts.signals import Signal, SignalPlan
 
 _RingKind = Literal["roundabout", "circular", "mini_roundabout"]
 _PlainKind = Literal["crossing", "t_junction", "y_junction", "staggered", "merge", "other"]
+ROUNDABOUT_KINDS = frozenset(get_args(_RingKind))
+"""Junctions whose traffic goes round."""
 JunctionKind = Literal[_RingKind, _PlainKind, "region"]
 """`region` is no junction: it names a World made of a whole stretch of map."""
 Control = Literal["signals", "stop", "all_way_stop", "give_way", "roundabout", "uncontrolled"]

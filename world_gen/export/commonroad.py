@@ -17,7 +17,15 @@ import numpy as np
 from lxml import etree
 from shapely.geometry import Polygon
 
-from foretwin.contracts.world import Building, Connection, Crossing, Lane, LaneKind, World
+from foretwin.contracts.world import (
+    ROUNDABOUT_KINDS,
+    Building,
+    Connection,
+    Crossing,
+    Lane,
+    LaneKind,
+    World,
+)
 from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import commonroad_controls as controls
 from foretwin.world_gen.export import lanelets
@@ -223,7 +231,7 @@ def _tags(world: World) -> Element:
     limits_mps = [lane.speed_limit_mps.value for lane in world.lanes]
     child(tags, "urban" if not limits_mps or np.median(limits_mps) <= URBAN_MPS else "rural")
     child(tags, "intersection")
-    if kinds & {"roundabout", "circular", "mini_roundabout"}:
+    if kinds & ROUNDABOUT_KINDS:
         child(tags, "roundabout")
     return tags
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from lxml import etree
 
 from foretwin.contracts.frames import LocalFrame
-from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.contracts.world import ATTRIBUTION, ROUNDABOUT_KINDS, World
 from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.opendrive_elements import road_element
 from foretwin.world_gen.export.opendrive_objects import add_objects
@@ -17,7 +17,6 @@ from foretwin.world_gen.export.opendrive_places import OdrJunction, OdrNetwork, 
 from foretwin.world_gen.export.opendrive_signals import Controller, add_signals
 from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment
 
-RING_KINDS = ("roundabout", "circular", "mini_roundabout")
 _LICENSE = {
     "name": "Open Data Commons Open Database License 1.0",
     "spdxid": "ODbL-1.0",
@@ -135,7 +134,7 @@ def _rings(world: World, network: OdrNetwork) -> list[Element]:
     rings: dict[str, Element] = {}
     for junction in network.junctions:
         name = junction.junction_id
-        if kinds.get(name) in RING_KINDS:
+        if kinds.get(name) in ROUNDABOUT_KINDS:
             if name not in rings:
                 rings[name] = element(
                     "junctionGroup", name=name, type="roundabout", id=len(rings) + 1

@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.signals import Signal
 from foretwin.contracts.world import (
+    ROUNDABOUT_KINDS,
     Building,
     Conflict,
     Connection,
@@ -145,7 +146,7 @@ def _lanes(at: Neighbourhood, ids: Iterable[str]) -> list[Lane]:
 
 def _kind(junction: WorldJunction) -> list[Value]:
     kind = junction.summary.kind
-    ring = kind in ("roundabout", "circular", "mini_roundabout")
+    ring = kind in ROUNDABOUT_KINDS
     found = [Value("junction", kind.replace("_", " "), "tagged" if ring else "inferred")]
     for arm in junction.arms:
         one = len(arm.osm_ways) == 1
