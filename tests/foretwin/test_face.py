@@ -15,7 +15,6 @@ import pytest
 import foretwin
 import foretwin.bus
 from foretwin.orchestrator.commands.sweep import run_sweep
-from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
@@ -32,16 +31,6 @@ COVERS = (
 
 USERS_READ = {".md", ".py", ".toml", ".ipynb"}
 LATE = {"orchestrator", "sim_worker", "world_gen", "viewer", "telemetry"}
-
-
-@pytest.fixture(scope="module")
-def town() -> foretwin.Map:
-    return foretwin.open_map(MAP_FILE)
-
-
-@pytest.fixture(scope="module")
-def world(town: foretwin.Map) -> foretwin.World:
-    return town.world(next(one.id for one in town.intersections if one.kind == "crossing"))
 
 
 WITH_AN_EXTRA = {"JunctionEnv", "JunctionVectorEnv"}

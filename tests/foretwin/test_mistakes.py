@@ -12,19 +12,8 @@ import pytest
 
 import foretwin
 from foretwin.contracts.frames import GeoPoint
-from foretwin.orchestrator.embedded import MAP_FILE
 
 IDM = "pure_pursuit_idm"
-
-
-@pytest.fixture(scope="module")
-def town() -> foretwin.Map:
-    return foretwin.open_map(MAP_FILE)
-
-
-@pytest.fixture(scope="module")
-def world(town: foretwin.Map) -> foretwin.World:
-    return town.world(next(one.id for one in town.intersections if one.kind == "crossing"))
 
 
 @pytest.fixture(scope="module")

@@ -99,21 +99,6 @@ def test_what_comes_to_something_else_is_3(copied: Path) -> None:
         ("rows", {}, {"planner": "remote"}, "driven by 'remote' in another process"),
         ("rows", {}, {"trajectory_sha256": None, "left_out": "no room"}, "not played: no room"),
         ("jobs", {}, {"job": b"other"}, "is damaged"),
-    ],
-)
-def test_what_cannot_be_repeated_is_told_in_one_line(
-    copied: Path, table: str, metadata: dict[str, str], columns: dict[str, Any], said: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    future = _rows(copied)[0]["future_id"]
-    _rewritten(copied, table, metadata, **columns)
-    assert run(["repeat", str(copied), future]) == 2
-    assert said in _said(capsys)
-
-
-@pytest.mark.parametrize(
-    ("table", "metadata", "columns", "said"),
-    [
         ("rows", {"versions": "xx"}, {}, "cannot be read: JSON is malformed"),
         ("rows", {"versions": "[1]"}, {}, "Expected `object`, got `array`"),
         ("rows", {}, {"index": None}, "cannot be read: Expected `int`, got `null` - at `$.index`"),
@@ -124,7 +109,7 @@ def test_what_cannot_be_repeated_is_told_in_one_line(
         ("jobs", {}, {"job": None}, "cannot be read: Expected `bytes`, got `null` - at `$.job`"),
     ],
 )
-def test_what_was_edited_is_told_in_one_line(
+def test_what_cannot_be_repeated_is_told_in_one_line(
     copied: Path, table: str, metadata: dict[str, str], columns: dict[str, Any], said: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
