@@ -13,10 +13,11 @@ from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import AdvanceReply, DriveEnd, GnssFix, SpeedSample
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Mailbox, Received, Request
-from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.simulation import PlaneState
 from foretwin.contracts.tuning import SetRequest
 from foretwin.orchestrator.drive import lock_step
 from foretwin.orchestrator.drive.lock_step import LockStepError, LockStepLoop
+from tests.contracts.mirror_samples import mirror_sample
 from tests.orchestrator.house import AtOnce, House
 from tests.orchestrator.trip import START_NS
 
@@ -67,11 +68,7 @@ def add_mirror(house: House) -> list[str | None]:
         request.reply(active)
 
     def mirror(received: Received) -> None:
-        sample = MirrorSample(
-            stamp_ns=received.message().stamp_ns, world_id=None, real=NOWHERE, twin=NOWHERE,
-            shadow=NOWHERE, ghost=NOWHERE, gap_m=0.0, gap_along_m=0.0, gap_across_m=0.0,
-            gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=0.0, independent=False,
-        )  # fmt: skip
+        sample = mirror_sample(received.message().stamp_ns, NOWHERE, independent=False)
         house.bus.publish("mirror", sample, run=house.plan.run_id)
 
     run = house.plan.run_id

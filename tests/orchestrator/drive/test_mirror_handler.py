@@ -7,6 +7,7 @@ from typing import Any
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.instructions import Notice
+from tests.contracts.mirror_samples import mirror_sample
 
 HERE = PlaneState(0.0, 0.0, 0.0, 0.0)
 
@@ -20,11 +21,7 @@ class Tables:
 
 
 def sample(at_s: float, *touches: tuple[str, str]) -> MirrorSample:
-    return MirrorSample(
-        stamp_ns=round(at_s * 1e9), world_id=None, real=HERE, twin=HERE, shadow=HERE, ghost=HERE,
-        gap_m=0.0, gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0,
-        since_reset_s=0.0, independent=True, touches=touches,
-    )  # fmt: skip
+    return mirror_sample(round(at_s * 1e9), HERE, touches=touches)
 
 
 def test_a_touch_is_told_as_it_begins_and_again_only_after_a_while() -> None:

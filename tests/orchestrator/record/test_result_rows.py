@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.gap import Verdict
-from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
+from foretwin.contracts.simulation import MirroredVehicle, PlaneState, TwinCorrection
 from foretwin.orchestrator.record.columns import columns, columns_of, row_of
 from foretwin.orchestrator.record.result_rows import (
     plan_row,
@@ -17,6 +17,7 @@ from foretwin.orchestrator.record.result_rows import (
 )
 from foretwin.orchestrator.record.results import MIRROR, MIRRORED, TABLES
 from foretwin.orchestrator.rounds.views import round_view
+from tests.contracts.mirror_samples import mirror_sample
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, town_world
 from tests.viewer.scene import drive
@@ -80,10 +81,9 @@ def test_a_mirror_row_keeps_who_is_who() -> None:
         who: PlaneState(float(n), 0.0, 0.0, 0.0)
         for n, who in enumerate(("real", "twin", "shadow", "ghost"))
     }
-    sample = MirrorSample(
-        stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
-        gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, **poses,
-    )  # fmt: skip
+    sample = mirror_sample(
+        1, poses["real"], gap_m=1.0, gap_along_m=1.0, since_reset_s=2.0, independent=False, **poses
+    )
     row = row_of(sample, MIRROR)
 
     assert [row[f"{who}_x_m"] for who in poses] == [0.0, 1.0, 2.0, 3.0]

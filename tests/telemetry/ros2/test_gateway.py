@@ -9,13 +9,14 @@ import pytest
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
 from foretwin.contracts.frames import GeoPoint
-from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.simulation import PlaneState
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.parts import ODOMETRY, typestore, yaw_of
 from tests.contracts.memory_bus import MemoryBus
+from tests.contracts.mirror_samples import mirror_sample
 from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
     FRAME,
@@ -160,22 +161,7 @@ def test_lost_samples_are_counted_by_sequence_number() -> None:
 def test_the_twin_goes_out_as_odometry() -> None:
     ground = Ground(enabled=False, flag=False)
     car = PlaneState(100.0, -50.0, 0.5, 7.0)
-    mirror = MirrorSample(
-        stamp_ns=5 * S,
-        world_id=None,
-        real=car,
-        twin=car,
-        shadow=car,
-        ghost=car,
-        gap_m=0.0,
-        gap_along_m=0.0,
-        gap_across_m=0.0,
-        gap_yaw_rad=0.0,
-        gap_speed_mps=0.0,
-        since_reset_s=0.0,
-        independent=True,
-        twin_yaw_rate_radps=0.3,
-    )
+    mirror = mirror_sample(5 * S, car, twin_yaw_rate_radps=0.3)
     ground.bus.publish("mirror", mirror, run="r")
     ground.step()
     (data,) = ground.foreign.on("/foretwin/twin")

@@ -18,9 +18,10 @@ from foretwin.contracts.drive import GnssFix, InfoRequest
 from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
-from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.simulation import PlaneState
 from foretwin.telemetry.ros_messages.parts import CONTROL, ODOMETRY, typestore
 from tests.contracts.bus_sides import DEADLINE_S, python, take_until
+from tests.contracts.mirror_samples import mirror_sample
 from tests.starvation import kept_waiting
 from tests.telemetry.ros2.gateway_ground import (
     CONTROL_KEY,
@@ -127,21 +128,7 @@ def test_a_peer_of_rmw_zenoh_talks_to_it_both_ways(tmp_path: Path) -> None:
             # Said once, before the gateway was there, and kept by who said it.
             assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
             car = PlaneState(1.0, 2.0, 0.0, 3.0)
-            mirror = MirrorSample(
-                stamp_ns=10**18,
-                world_id=None,
-                real=car,
-                twin=car,
-                shadow=car,
-                ghost=car,
-                gap_m=0.0,
-                gap_along_m=0.0,
-                gap_across_m=0.0,
-                gap_yaw_rad=0.0,
-                gap_speed_mps=0.0,
-                since_reset_s=0.0,
-                independent=True,
-            )
+            mirror = mirror_sample(10**18, car)
             bus.publish("mirror", mirror, run="r")
             assert peer.stdout is not None
             said = json.loads(peer.stdout.readline())

@@ -25,6 +25,7 @@ from foretwin.telemetry.ros_messages.parts import (
     yaw_of,
 )
 from tests.contracts.memory_bus import MemoryBus
+from tests.contracts.mirror_samples import mirror_sample
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
 
 S = 10**9
@@ -68,22 +69,9 @@ def vehicle(name: str, role: Role, *, x_m: float, yaw_rad: float = 0.0) -> Mirro
 
 def mirror(stamp_ns: int, *others: MirroredVehicle, role: Role = "all") -> MirrorSample:
     car = PlaneState(0.0, 0.0, 0.0, 7.0)
-    return MirrorSample(
-        stamp_ns=stamp_ns,
-        world_id=None,
-        real=car,
-        twin=PlaneState(0.5, 0.0, 0.0, 7.0),
-        shadow=car,
-        ghost=car,
-        gap_m=0.5,
-        gap_along_m=0.5,
-        gap_across_m=0.0,
-        gap_yaw_rad=0.0,
-        gap_speed_mps=0.0,
-        since_reset_s=0.0,
-        independent=True,
-        role=role,
-        others=others,
+    twin = PlaneState(0.5, 0.0, 0.0, 7.0)
+    return mirror_sample(
+        stamp_ns, car, twin=twin, gap_m=0.5, gap_along_m=0.5, role=role, others=others
     )
 
 
