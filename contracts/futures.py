@@ -75,12 +75,16 @@ def numbers_of(future: Future) -> dict[str, float]:
         if wrong := out_of_range(name, value, value):
             raise UserError(f"future {future.name!r}: {name} {wrong}")
     drawn = future.values if future.scenario_id else {}
-    return {
+    return _NEUTRAL | {
         name: row.joined(
             drawn.get(f"{FAULTS}.{name}", row.neutral), future.numbers.get(name, row.neutral)
         )
         for name, row in FUTURE_NUMBERS.items()
+        if name in future.numbers or f"{FAULTS}.{name}" in drawn
     }
+
+
+_NEUTRAL = {name: row.neutral for name, row in FUTURE_NUMBERS.items()}
 
 
 def check_futures(futures: Sequence[Future]) -> None:
