@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 from foretwin.telemetry.estimator.motion_noise import GYRO_BIAS_DENSITY, GYRO_BIAS_STD_RADPS
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 _MOST_RADPS = 0.005
 """Of an automotive gyro on a rough road; taken until its own samples say less."""
@@ -22,7 +21,7 @@ class _Rate(NamedTuple):
     rate_radps: float
 
 
-class Gyro(ShallowCopied):
+class Gyro:
     """Watches the yaw rates of a gyro in the order of their stamps.
 
     The noise is how far a rate lies off the line between its neighbours: turning is smooth over

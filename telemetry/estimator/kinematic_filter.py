@@ -9,7 +9,6 @@ whatever its positions jitter; and the gyro's bias is learnt for free while it s
 
 from __future__ import annotations
 
-import copy
 import math
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.estimator import motion_noise
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
@@ -33,7 +32,7 @@ _LEAST_TURN_RAD = 0.002
 _KNOWN_YAW_VAR = 0.15**2
 
 
-class KinematicFilter(ShallowCopied):
+class KinematicFilter:
     """Predicts with constant acceleration and curvature, and is corrected by each measurement.
 
     `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices;
@@ -57,7 +56,7 @@ class KinematicFilter(ShallowCopied):
 
     def copy(self) -> KinematicFilter:
         """Return another filter that goes on from the same state."""
-        other = copy.copy(self)
+        other = shallow_copy(self)
         other.mean, other.covariance = self.mean.copy(), self.covariance.copy()
         return other
 

@@ -26,7 +26,6 @@ from foretwin.telemetry.estimator.kinematic_filter import (
     Y,
 )
 from foretwin.telemetry.estimator.local_place import LocalPlace
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
 
 ALIKE_M = 0.5
 """How far the streets of a map lie off the ground all together: no street can tell."""
@@ -58,7 +57,7 @@ class RoadLine(NamedTuple):
     """Of the state that it is near; set by who takes it."""
 
 
-class MapAid(ShallowCopied):
+class MapAid:
     """Corrects a filter with lines, as far as they know more than it does.
 
     `shift_m` (east, north) is what lines have moved the place by so far, None before the first.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections import Counter
 from typing import Any
 
 from foretwin.contracts.drive import SpeedSample, SteeringSample
 from foretwin.geometry.steering import SteeringColumn
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""
@@ -35,7 +34,7 @@ _LIMITS = {
 """Beyond these a number is no motion of a road vehicle."""
 
 
-class MotionSamples(ShallowCopied):
+class MotionSamples:
     """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
 
     def __init__(
@@ -52,7 +51,7 @@ class MotionSamples(ShallowCopied):
 
     def copy(self, *, skipped: Counter[str]) -> MotionSamples:
         """Return another memory of the same samples that counts into `skipped`."""
-        other = copy.copy(self)
+        other = shallow_copy(self)
         other._skipped = skipped
         other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
         return other
@@ -122,7 +121,7 @@ class MotionSamples(ShallowCopied):
         return None if wheel is None else self._column.tire_rad(wheel)
 
 
-class Doubt(ShallowCopied):
+class Doubt:
     """The standard deviation to give a sensor that states none: its recent surprises, at least.
 
     Speeds and courses of a satellite receiver lag behind its positions by up to a second; taken at

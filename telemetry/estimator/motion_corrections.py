@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from typing import Any
 
@@ -10,13 +9,13 @@ from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, Stee
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
 
 
-class MotionCorrections(ShallowCopied):
+class MotionCorrections:
     """Gives each kind of sample its weight; speeds and headings lose theirs as they surprise."""
 
     def __init__(self, measured: MotionSamples, *, wheelbase_m: float) -> None:
@@ -28,11 +27,11 @@ class MotionCorrections(ShallowCopied):
 
     def copy(self, measured: MotionSamples) -> MotionCorrections:
         """Return others with the same doubts, which read `measured`."""
-        other = copy.copy(self)
+        other = shallow_copy(self)
         other._measured = measured
-        other._speed_doubt = copy.copy(self._speed_doubt)
-        other._yaw_doubt = copy.copy(self._yaw_doubt)
-        other._gyro = copy.copy(self._gyro)
+        other._speed_doubt = shallow_copy(self._speed_doubt)
+        other._yaw_doubt = shallow_copy(self._yaw_doubt)
+        other._gyro = shallow_copy(self._gyro)
         return other
 
     def watch(self, message: Any, *, standing: bool) -> None:

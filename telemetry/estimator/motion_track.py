@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections import Counter
 from typing import Any
@@ -19,7 +18,7 @@ from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate
 from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1
@@ -27,7 +26,7 @@ _WHITE_SHARE = 0.1
 _UNKNOWN_PLACE_M, _CREEPING_MPS = 1000.0, 1.0
 
 
-class MotionTrack(ShallowCopied):
+class MotionTrack:
     """Takes samples one by one and says where base_link is, and how it moves.
 
     Positions whose source states no standard deviation, or only positions of at most 5 cm, are
@@ -68,11 +67,11 @@ class MotionTrack(ShallowCopied):
 
     def copy(self) -> MotionTrack:
         """Return another track that goes on from here by itself."""
-        other = copy.copy(self)
+        other = shallow_copy(self)
         other._gate = self._gate.copy()
         other._measured = self._measured.copy(skipped=other._gate.skipped)
         other._corrections = self._corrections.copy(other._measured)
-        other._aid = copy.copy(self._aid)
+        other._aid = shallow_copy(self._aid)
         if self._filter is not None:
             other._filter = self._filter.copy()
         return other

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections import Counter, deque
 from typing import Literal, NamedTuple
@@ -12,7 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
 from foretwin.telemetry.estimator.measured import CLOCK_LEAP_NS
-from foretwin.telemetry.estimator.shallow_copy import ShallowCopied
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 MAX_SPEED_MPS = 70.0
 """A position that asks for more than this is no motion of a road vehicle. Chosen: 252 km/h."""
@@ -35,7 +34,7 @@ class LocalFix(NamedTuple):
     xy_m: Array
 
 
-class PositionGate(ShallowCopied):
+class PositionGate:
     """Sorts fixes into those to use, those that move the whole track, and those to skip.
 
     `skipped` counts what was refused by reason. `recent` holds the believed fixes of some seconds.
@@ -52,7 +51,7 @@ class PositionGate(ShallowCopied):
 
     def copy(self) -> PositionGate:
         """Return another gate that goes on from here by itself."""
-        other = copy.copy(self)
+        other = shallow_copy(self)
         other.skipped, other.recent = self.skipped.copy(), self.recent.copy()
         other._elsewhere = self._elsewhere.copy()
         return other
