@@ -77,7 +77,7 @@ def with_stop_sign() -> str:
     """The drawn town with a stop sign 8 m before its first junction, which its map forgot."""
     text = MAP_FILE.read_text(encoding="utf-8")
     sign = (
-        '<node id="99003" version="1" lat="45.0" lon="-30.003526"><tag k="highway" v="stop"/>'
+        '<node id="99003" version="1" lat="44.9999891" lon="-30.003526"><tag k="highway" v="stop"/>'
         '<tag k="direction" v="forward"/></node>'
     )
     text = text.replace('<node id="5" ', f'{sign}<node id="5" ', 1)
