@@ -164,8 +164,10 @@ def _forced(
 def _needed_deceleration(distance_m: Array, speed_mps: Array, within_s: Array) -> Array:
     """Return the constant deceleration (K,) with which a distance lasts for `within_s`."""
     stopping = np.square(speed_mps) / (2.0 * distance_m)
-    late = np.isfinite(within_s) & (2.0 * distance_m >= speed_mps * within_s)
-    time_s = np.where(late, within_s, 1.0)
+    known = np.isfinite(within_s)
+    time_s = np.where(known, within_s, 1.0)
+    late = known & (2.0 * distance_m >= speed_mps * time_s)
+    time_s = np.where(late, time_s, 1.0)
     slowing = 2.0 * (speed_mps * time_s - distance_m) / np.square(time_s)
     return np.maximum(np.where(late, slowing, stopping), 0.0)
 

@@ -186,6 +186,12 @@ def test_forcing_who_has_priority_to_brake_is_a_violation() -> None:
     assert value(both, "right_of_way_violations", given) == 2.0
 
 
+def test_one_that_stands_is_not_forced_to_brake_by_an_ego_that_stays_in_its_way() -> None:
+    slow = rollout(Mover(0.5 - HALF_M - 0.5 * 2.5, -1.5, 0.0, 0.5), Mover(1.5, -8.0, math.pi / 2))
+
+    assert value(slow, "right_of_way_violations", context()) == 0.0
+
+
 def test_who_has_red_has_no_priority() -> None:
     given = context(lights=True, start_s=0.0)
     ego = Mover(0.5 - HALF_M - 8.0 * 2.5, -1.5, 0.0, 8.0)
