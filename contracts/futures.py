@@ -15,7 +15,7 @@ import msgspec
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
+from foretwin.contracts.numbers import FUTURE_NUMBERS, NEUTRAL, out_of_range
 from foretwin.contracts.scenario import FAULTS, Scenario
 
 _POSE = ("x_m", "y_m", "yaw_rad")
@@ -75,16 +75,13 @@ def numbers_of(future: Future) -> dict[str, float]:
         if wrong := out_of_range(name, value, value):
             raise UserError(f"future {future.name!r}: {name} {wrong}")
     drawn = future.values if future.scenario_id else {}
-    return _NEUTRAL | {
+    return dict(NEUTRAL) | {
         name: row.joined(
             drawn.get(f"{FAULTS}.{name}", row.neutral), future.numbers.get(name, row.neutral)
         )
         for name, row in FUTURE_NUMBERS.items()
         if name in future.numbers or f"{FAULTS}.{name}" in drawn
     }
-
-
-_NEUTRAL = {name: row.neutral for name, row in FUTURE_NUMBERS.items()}
 
 
 def check_futures(futures: Sequence[Future]) -> None:

@@ -165,6 +165,7 @@ _FUTURE_NUMBERS = {
 }
 FUTURE_NUMBERS: Mapping[str, FutureNumber] = MappingProxyType(_FUTURE_NUMBERS)
 """All numbers of a future by name; those of one quantity act on it in this order."""
+NEUTRAL: Mapping[str, float] = {name: row.neutral for name, row in FUTURE_NUMBERS.items()}
 
 
 class ScenarioNumber(NamedTuple):
