@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.futures import Job
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.futures.closed_loop import DriveRecord
@@ -17,14 +17,16 @@ from foretwin.sim_worker.metrics.table import METRICS, evaluate
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
-CLEARANCE = "min_clearance"
+CLEARANCE, PROGRESS = "min_clearance", "progress"
 
 
 class JobMetrics(NamedTuple):
-    """Metrics that the job names, each (S,), and clearances (S,), infinite without others."""
+    """Metrics that the job names, each (S,), clearances (S,), infinite without others, and progress
+    (S,) along the path."""
 
     values: dict[str, Array]
     clearance_m: Array
+    progress_m: Array
 
 
 def measure(
@@ -32,12 +34,14 @@ def measure(
     scene: JobScene,
     record: DriveRecord,
     user_size_m: Array,
+    last: Indices,
     *,
     vehicle: VehicleParameters,
     every: int,
     scenes: SceneMaker,
 ) -> JobMetrics:
-    """Measure what the job names, and the clearance, at the instants of the result.
+    """Measure what the job names, clearance and progress, at the instants of the result, up to
+    the `last` of each future (S,).
 
     `scenes` are those of the job's World.
 
@@ -46,11 +50,12 @@ def measure(
     count = len(scene.starts)
     clearance = np.full(count, np.inf)
     names = list(job.metrics)
-    if scene.traffic is not None:
-        names = list(dict.fromkeys([CLEARANCE, *names]))
-    if not names:
-        return JobMetrics({}, clearance)
     instants = record.states[:, ::every]
+    over = last < instants.shape[1] - 1
+    if scene.traffic is not None:
+        names = list(dict.fromkeys([CLEARANCE, *names, *([PROGRESS] if over.any() else [])]))
+    if not names:
+        return JobMetrics({}, clearance, record.progress_m)
     rollout = Rollout(
         time_s=np.arange(instants.shape[1], dtype=np.float64) * job.step_s,
         states=instants,
@@ -59,6 +64,7 @@ def measure(
         user_size_m=user_size_m,
         valid=np.asarray(record.valid.all(axis=1)),
         vehicle=vehicle,
+        last=last if over.any() else None,
     )
     needs = {need for name in names if name in METRICS for need in METRICS[name].needs}
     context = Context(
@@ -72,7 +78,10 @@ def measure(
     found = evaluate(rollout, names, context=context)
     if CLEARANCE in found:
         clearance = found[CLEARANCE].values
-    return JobMetrics({name: found[name].values for name in job.metrics}, clearance)
+    way_m = record.progress_m
+    if over.any():
+        way_m = np.where(over, found[PROGRESS].values, way_m)
+    return JobMetrics({name: found[name].values for name in job.metrics}, clearance, way_m)
 
 
 def _masses(scene: JobScene) -> Array:

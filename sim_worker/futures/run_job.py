@@ -42,7 +42,12 @@ from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.measuring import measure
-from foretwin.sim_worker.futures.outcomes import judge, with_collisions
+from foretwin.sim_worker.futures.outcomes import (
+    Collisions,
+    find_collisions,
+    judge,
+    with_collisions,
+)
 from foretwin.sim_worker.futures.planned_impacts import planned_impacts
 from foretwin.sim_worker.futures.scene import JobScene, SceneMaker
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
@@ -124,13 +129,15 @@ def _play(
         record = drive(scene, stage, ticks=ticks)
         states = record.states[:, ::every].astype(np.float32)
     sizes = _sizes(scene)
-    measured = measure(job, scene, record, sizes, vehicle=stage.vehicle, every=every, scenes=maker)
-    outcome, touches = judge(
-        stage.vehicle, record, sizes, measured.clearance_m, tick_s=stage.control_dt_s
+    hits = find_collisions(stage.vehicle, record, sizes, tick_s=stage.control_dt_s)
+    last = hits.last_instants(states.shape[1], step_s=job.step_s)
+    measured = measure(
+        job, scene, record, sizes, last, vehicle=stage.vehicle, every=every, scenes=maker
     )
-    ran_on = _accidents(job, scene, stage, touches) if job.accidents else None
+    outcome = judge(record, hits, measured)
+    ran_on = _accidents(job, scene, stage, hits) if job.accidents else None
     motion = ran_on if job.accident_motion else None
-    states = with_collisions(states, outcome, motion, step_s=job.step_s)
+    states = with_collisions(states, hits, motion, step_s=job.step_s)
     accidents = () if ran_on is None else _accident_messages(ran_on)
     planned = planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s)
     tracks = _tracks(scene, record, sizes, every)
@@ -250,7 +257,8 @@ def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> R
     )
 
 
-def _accidents(job: Job, scene: JobScene, stage: BatchSimulation, touches: Touches) -> Accidents:
+def _accidents(job: Job, scene: JobScene, stage: BatchSimulation, hits: Collisions) -> Accidents:
+    touches = Touches._make(field[hits.counts] for field in hits.touches)
     kinds = []
     if scene.traffic is not None:
         met = scene.traffic.crowd.kinds[touches.future, touches.user]

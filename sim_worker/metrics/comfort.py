@@ -51,8 +51,8 @@ def motion(view: RolloutView) -> EgoMotion:
     steps = np.diff(view.time_s)
     if np.ptp(steps) > 1e-3 * steps[0]:
         raise ValueError("comfort needs evenly spaced instants")
-    vx, vy = view.states[..., 3], view.states[..., 4]
-    yaw = np.unwrap(view.states[..., 2], axis=1)
+    vx, vy = view.driven[..., 3], view.driven[..., 4]
+    yaw = np.unwrap(view.driven[..., 2], axis=1)
     count, step_s = len(view.time_s), float(steps.mean())
     slope = _operator(count, step_s, _ACCEL_WINDOW_S, 1)
     rate = _operator(count, step_s, _JERK_WINDOW_S, 1)
@@ -60,7 +60,7 @@ def motion(view: RolloutView) -> EgoMotion:
     turning = yaw @ rate
     lon = vx @ slope - vy * turning
     lat = vy @ slope + vx * turning
-    return EgoMotion(
+    found = EgoMotion(
         lon_accel_mps2=lon,
         lat_accel_mps2=lat,
         jerk_mps3=np.hypot(lon, lat) @ rate,
@@ -68,6 +68,11 @@ def motion(view: RolloutView) -> EgoMotion:
         yaw_rate_radps=turning,
         yaw_accel_radps2=yaw @ curve,
     )
+    counts = view.counts
+    if counts is None:
+        return found
+    # What comes after the end of a future is no extreme of it.
+    return EgoMotion._make(np.where(counts, values, values[:, :1]) for values in found)
 
 
 @functools.lru_cache(maxsize=32)

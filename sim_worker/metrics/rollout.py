@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Flags
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.futures import STATE_COLUMNS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
@@ -33,7 +33,8 @@ class Rollout(NamedTuple):
     `time_s` (N,); `states` (S, N, 8) of base_link as `futures.STATE_COLUMNS`; `users`
     (S, N, R, 3) x, y, yaw of box centres, NaN where a road user is not there; `user_speed_mps`
     (S, N, R) along their yaw; `user_size_m` (S, R, 2) length and width; `valid` (S,) false where
-    the simulation diverged or its planner failed.
+    the simulation diverged or its planner failed. A future ends at its instant `last` (S,), where
+    it hits a road user: after it the ego stays where it is and is alone.
     """
 
     time_s: Array
@@ -43,6 +44,7 @@ class Rollout(NamedTuple):
     user_size_m: Array
     valid: Flags
     vehicle: VehicleParameters
+    last: Indices | None = None
 
 
 class Measure(NamedTuple):
@@ -97,7 +99,16 @@ class RolloutView:
         self.valid: Flags = np.asarray(rollout.valid, dtype=bool) & whole
         """(S,) whether a future was simulated to its end."""
         self.all_valid = bool(self.valid.all())
-        self.states = states if self.all_valid else np.where(self.valid[:, None, None], states, 0.0)
+        self.driven = states if self.all_valid else np.where(self.valid[:, None, None], states, 0.0)
+        """States (S, N, 8) as simulated, beyond the end of a future too."""
+        self.states = self.driven
+        self.counts: Flags | None = None
+        """Which instants (S, N) come before the end of a future; None where all do."""
+        if rollout.last is not None:
+            instants = np.arange(states.shape[1])
+            self.counts = instants <= rollout.last[:, None]
+            held = np.minimum(instants, rollout.last[:, None])
+            self.states = np.take_along_axis(self.driven, held[..., None], axis=1)
         self.time_s = np.asarray(rollout.time_s, dtype=np.float64)
         vehicle = rollout.vehicle
         self.half_m = (vehicle.length_m.value / 2.0, vehicle.width_m.value / 2.0)
@@ -164,7 +175,8 @@ class RolloutView:
     @functools.cached_property
     def there(self) -> Flags:
         """(S, N, R) where a road user is on the road."""
-        return np.asarray(np.isfinite(self.rollout.users[..., 0]))
+        there = np.asarray(np.isfinite(self.rollout.users[..., 0]))
+        return there if self.counts is None else there & self.counts[..., None]
 
     @functools.cached_property
     def users(self) -> tuple[Array, Array, Array, Array]:

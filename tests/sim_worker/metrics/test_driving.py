@@ -186,6 +186,27 @@ def test_forcing_who_has_priority_to_brake_is_a_violation() -> None:
     assert value(both, "right_of_way_violations", given) == 2.0
 
 
+def test_nothing_after_the_end_of_a_future_counts() -> None:
+    """At 4 s the ego is at 8 m/s on its lane; half a second later it leaves the road and brakes."""
+    time_s = times()
+    late = time_s > 4.5
+    driven = rollout(Mover(-50, -1.5, 0, 8), Mover(-10.0, -6.0), futures=2)
+    driven.states[:, late, 1] -= 2.0 * (time_s[late] - 4.5)
+    driven.states[:, late, 3] -= np.minimum(6.0 * (time_s[late] - 4.5), 8.0)
+    ended = driven._replace(last=np.array([40, len(time_s) - 1]))
+    names = ("progress", "off_road_share", "max_deceleration", "comfortable", "min_clearance")
+
+    found = {
+        name: measure.values for name, measure in evaluate(ended, names, context=context()).items()
+    }
+
+    assert found["progress"] == pytest.approx([32.0, 64.0], abs=0.1)
+    assert found["off_road_share"][0] == 0.0 < found["off_road_share"][1]
+    assert found["max_deceleration"] == pytest.approx([0.0, 6.0], abs=0.9)
+    assert found["comfortable"].tolist() == [1.0, 0.0]
+    assert found["min_clearance"][0] > found["min_clearance"][1] + 3.0
+
+
 def test_one_that_stands_is_not_forced_to_brake_by_an_ego_that_stays_in_its_way() -> None:
     slow = rollout(Mover(0.5 - HALF_M - 0.5 * 2.5, -1.5, 0.0, 0.5), Mover(1.5, -8.0, math.pi / 2))
 
