@@ -9,6 +9,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import ATTRIBUTION
 
 AS_RECORDED = "as_recorded"
 """Id of the scenario that adds nobody to those who were around a recorded car."""
@@ -45,6 +46,7 @@ class WorldPlaces(msgspec.Struct, frozen=True, kw_only=True):
     unplaced: tuple[NotPlaced, ...]
     ways: dict[str, PathAhead] = {}
     """Those that staged egos take, by name."""
+    attribution: str = ATTRIBUTION
 
 
 class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):

@@ -86,7 +86,8 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         places = _find_places(loaded, folder, runner)
         plan = plan_sweep(loaded, places.worlds)
         keep_vehicles(folder.path, loaded.vehicles.values())
-        parts, maker = Parts(folder.path), JobMaker(loaded, plan.worlds)
+        parts = Parts(folder.path, attribution=plan.attribution)
+        maker = JobMaker(loaded, plan.worlds)
         parts.keep_first(len(plan.jobs))
         left = [one for one in plan.jobs if not parts.hold(maker.job(one))]
         started_s = time.monotonic()
@@ -164,4 +165,5 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         "placed_nowhere": sorted({one.id for one in loaded.scenarios} - placed),
         "does_not_apply": sum(not one.applies for one in unplaced),
         "failures": places.failures,
+        "attribution": plan.attribution,
     }

@@ -53,6 +53,11 @@ class SweepPlan(msgspec.Struct, frozen=True, kw_only=True):
     jobs: tuple[SweepJob, ...]
 
     @property
+    def attribution(self) -> str:
+        """Return whose data the Worlds are made from."""
+        return "; ".join(sorted({world.attribution for world in self.worlds}))
+
+    @property
     def cells(self) -> int:
         """Return how many futures there are."""
         return sum(len(job.cells) for job in self.jobs)

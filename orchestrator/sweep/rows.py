@@ -30,8 +30,9 @@ class Parts:
     """The tables of a sweep in its folder: Parquet files for each job that is done, each of which
     is whole or not there."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder, self._metadata = folder, played_with()
+    def __init__(self, folder: Path, *, attribution: str) -> None:
+        self._folder = folder
+        self._metadata = {"attribution": attribution, **played_with()}
         for name in SWEPT_TABLES.values():
             (folder / name).mkdir(parents=True, exist_ok=True)
             for left in (folder / name).glob("*.writing"):

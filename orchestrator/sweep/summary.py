@@ -80,7 +80,7 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     from rich.table import Column, Table
 
     named = (Column(name, no_wrap=True) for name in ("scenario", "planner"))
-    numbers = (*COUNTS, "clearance", "score")
+    numbers = (*COUNTS, "median clearance", "mean score")
     table = Table(*named, *(Column(name, justify="right", no_wrap=True) for name in numbers))
     for entry in summary["scenarios"]:
         clearance, score = entry["median_clearance_m"], entry["mean_score"]
@@ -108,3 +108,4 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
         for reason, count in entry["reasons"].items():
             print(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}")
     print(f"sha256 of the rows: {summary['rows_sha256']}")
+    print(summary["attribution"])

@@ -88,4 +88,5 @@ def _world_places(
         placed=tuple(placed),
         unplaced=tuple(unplaced),
         ways=ways,
+        attribution=world.attribution,
     )

@@ -16,6 +16,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.world import ATTRIBUTION
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep, workers_for
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
@@ -85,6 +86,15 @@ def test_the_summary_counts_by_scenario_and_planner(swept: tuple[Path, dict[str,
     assert written["rows_sha256"] == summary["rows_sha256"]
     assert written["complete"] is True
     assert written["spec"]["cases"] == 2
+
+
+def test_whose_map_it_is_stands_in_the_summary_and_in_every_table(
+    swept: tuple[Path, dict[str, Any]],
+) -> None:
+    folder, summary = swept
+    assert summary["attribution"] == ATTRIBUTION
+    for table in sorted((folder / "out").rglob("*.parquet")):
+        assert pq.read_schema(table).metadata[b"attribution"].decode() == ATTRIBUTION, table
 
 
 def test_two_workers_give_the_same_rows_again_and_again(
