@@ -8,6 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.impact import impacts
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _CHUNK = 8
@@ -60,7 +61,20 @@ def post_encroachment_time(view: RolloutView) -> Measure:
     between = np.maximum(np.maximum(other_from - ego_until, ego_from - other_until), 0.0)
     least = np.full(len(view.valid), np.inf)
     np.minimum.at(least, future, between)
+    least[_met(view)] = 0.0
     return view.measure(least)
+
+
+def _met(view: RolloutView) -> Indices:
+    """Return the futures (K,) that end as the ego hits a road user whose way it crosses."""
+    if view.counts is None:
+        return np.zeros(0, dtype=np.intp)
+    found, last = view.keep(impacts), view.counts.sum(axis=1) - 1
+    future = np.flatnonzero(found.collided & (last < len(view.time_s) - 1))
+    turned = view.users[2][future, last[future], found.user[future]]
+    turned = turned - view.states[future, last[future], 2]
+    crossing: Indices = future[np.abs(np.sin(turned)) >= _PARALLEL_SIN]
+    return crossing
 
 
 def crossings(view: RolloutView) -> Crossings:
