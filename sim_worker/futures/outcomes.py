@@ -14,6 +14,9 @@ from foretwin.sim_worker.batch.collision_detection import Touches, first_touches
 from foretwin.sim_worker.futures.closed_loop import DriveRecord
 from foretwin.sim_worker.futures.measuring import JobMetrics
 
+OVERLAP_STEPS = 0.2
+"""Of the result, for which outlines overlap where a future's metrics end: those that look at its
+instants alone then see the touch too."""
 NOTHING, ROAD_USER, STATIC = 0, 1, 2
 """Values of Outcome.collision_with."""
 
@@ -28,11 +31,11 @@ class Collisions(NamedTuple):
     touches: Touches
     counts: Flags
 
-    def last_instants(self, count: int, *, step_s: float) -> Indices:
-        """Return the first of `count` instants (S,) at which futures have hit a road user, else the
-        last of all."""
+    def last_instants(self, count: int, *, step_s: float, after_steps: float = 0.0) -> Indices:
+        """Return the first of `count` instants (S,) at which futures have hit a road user for so
+        many steps, else the last of all."""
         last = np.full(len(self.time_s), count - 1)
-        hit = np.ceil(self.time_s[self.with_user] / step_s - 1e-6)
+        hit = np.ceil(self.time_s[self.with_user] / step_s + after_steps - 1e-6)
         last[self.with_user] = np.minimum(hit, count - 1)
         return last
 

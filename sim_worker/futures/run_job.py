@@ -43,6 +43,7 @@ from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.measuring import measure
 from foretwin.sim_worker.futures.outcomes import (
+    OVERLAP_STEPS,
     Collisions,
     find_collisions,
     judge,
@@ -130,7 +131,7 @@ def _play(
         states = record.states[:, ::every].astype(np.float32)
     sizes = _sizes(scene)
     hits = find_collisions(stage.vehicle, record, sizes, tick_s=stage.control_dt_s)
-    last = hits.last_instants(states.shape[1], step_s=job.step_s)
+    last = hits.last_instants(states.shape[1], step_s=job.step_s, after_steps=OVERLAP_STEPS)
     measured = measure(
         job, scene, record, sizes, last, vehicle=stage.vehicle, every=every, scenes=maker
     )

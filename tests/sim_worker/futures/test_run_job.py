@@ -29,7 +29,6 @@ from tests.sim_worker.places import (
 
 COVERS = (
     "foretwin.sim_worker.futures.closed_loop",
-    "foretwin.sim_worker.futures.outcomes",
     "foretwin.sim_worker.scenarios.live",
     "foretwin.sim_worker.vehicle.seeding",
 )
@@ -198,18 +197,6 @@ def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
     assert np.ptp(states[1, after, :3], axis=0).max() == 0.0
     assert not states[1, after][:, [3, 4, 5, 7]].any()
     assert np.ptp(states[0, :, 0]) > 1.0
-
-
-def test_progress_and_metrics_of_a_future_end_at_its_collision(stage: BatchSimulation) -> None:
-    futures = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
-    names = ("progress", "max_deceleration", "pet")
-    result = run_job(msgspec.structs.replace(job(futures), metrics=names), stage)
-    driven_m = np.hypot(*(result.trajectory.states[1, -1, :2] - result.trajectory.states[1, 0, :2]))
-    assert result.outcome.progress_m[1] == pytest.approx(driven_m, abs=0.5)
-    assert result.metrics["progress"].tolist() == pytest.approx(result.outcome.progress_m.tolist())
-    assert result.outcome.progress_m[0] > driven_m + 10.0
-    assert result.metrics["max_deceleration"][1] < 1.0, "its stop is that of a picture"
-    assert result.metrics["pet"][1] == 0.0, "both meet where their ways cross"
 
 
 def test_an_accident_is_run_on_when_asked_for(stage: BatchSimulation) -> None:
