@@ -8,6 +8,7 @@ import pytest
 
 from foretwin.contracts.futures import Future, FuturesResult
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures.outcomes import OVERLAP_STEPS, Collisions
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, happening, job, state_at
@@ -45,6 +46,16 @@ def test_progress_and_metrics_end_at_the_collision(stage: BatchSimulation) -> No
     assert result.metrics["progress"].tolist() == pytest.approx(result.outcome.progress_m.tolist())
     assert result.metrics["max_deceleration"][1] < 1.0, "its stop is that of a picture"
     assert result.metrics["pet"][1] == 0.0, "both meet where their ways cross"
+
+
+def test_outlines_have_overlapped_for_a_fifth_of_a_step_where_metrics_end() -> None:
+    """A hit at an instant itself, as staged ones are, shows at the next one alone."""
+    times = np.array([4.0, 3.99, 3.97, 3.92, 7.99, np.inf])
+    hit = np.isfinite(times)
+    found = Collisions(times, hit, touches=None, counts=hit)  # type: ignore[arg-type]
+    ends = found.last_instants(81, step_s=0.1, after_steps=OVERLAP_STEPS)
+    assert ends.tolist() == [41, 41, 40, 40, 80, 80]
+    assert found.last_instants(81, step_s=0.1).tolist() == [40, 40, 40, 40, 80, 80]
 
 
 def test_metrics_see_the_collision_wherever_between_two_instants_it_is(
