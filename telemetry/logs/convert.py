@@ -47,18 +47,46 @@ def convert(
 
     `to` is the kind of target, else its suffix tells; `declaration` is that of a CSV at `source`.
     The declaration of a CSV written is `TARGET.toml`. Raises what `telemetry.logs.open_log` raises,
-    LogError where no sample is valid or the target is the source or an existing folder, and OSError
-    where `target` cannot be written.
+    LogError where no sample is valid or what would be written is the source, its declaration, an
+    existing folder or a declaration of somebody else, and OSError where `target` cannot be written.
     """
     source, target = Path(source), Path(target)
     kind = target_of(target) if to is None else to
     log = open_log(source, declaration=declaration)
-    if target.exists() and target.samefile(source):
-        raise LogError(f"{target}: is the log itself; name another target")
+    declared_in = _declaration_of(source) if declaration is None else declaration
+    written = (target, _declaration_of(target)) if kind == "csv" else (target,)
+    for file in written:
+        _check_not_read(file, source, declared_in)
     if kind == "ros2" and target.exists():
         raise LogError(f"{target}: exists; name a folder that does not")
+    if kind != "ros2" and target.is_dir():
+        raise LogError(f"{target}: is a folder; name a file")
+    if kind == "csv":
+        _check_own(_declaration_of(target))
     counts, left_out = _WRITERS[kind](source, log, target)
     return ConvertReport(counts=dict(counts), skipped=dict(left_out + log.skipped))
+
+
+def _declaration_of(path: Path) -> Path:
+    return path.with_name(path.name + ".toml")
+
+
+def _check_not_read(written: Path, source: Path, declared_in: Path) -> None:
+    for read, what in ((source, "log itself"), (declared_in, "declaration of the log")):
+        if written.exists() and read.exists() and written.samefile(read):
+            raise LogError(f"{written}: is the {what}; name another target")
+
+
+def _check_own(declaration: Path) -> None:
+    """Refuse to replace a declaration that somebody wrote: only CSVs can be made again."""
+    from foretwin.telemetry.logs.write_csv import DECLARATION_MARK
+
+    mark = DECLARATION_MARK.encode()
+    if declaration.is_file() and not declaration.read_bytes().startswith(mark):
+        raise LogError(
+            f"{declaration}: would be replaced, and does not begin with foretwin's mark as a "
+            "declaration that `convert` wrote; move it, or name another target"
+        )
 
 
 def _check(source: Path, log: Log, counts: Counter[str]) -> None:
@@ -130,8 +158,7 @@ def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> Counter[str]:
 def _to_csv(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
     from foretwin.telemetry.logs.write_csv import write_csv
 
-    toml = target.with_name(target.name + ".toml")
-    with _partial(toml) as declaration, _partial(target) as table:
+    with _partial(_declaration_of(target)) as declaration, _partial(target) as table:
         try:
             counts, left_out = write_csv(log.samples, log.info, table, declaration)
         except LogError:

@@ -27,6 +27,8 @@ _MORE = {
     "imu": 'axes = "forward-left-up"\n',
 }
 """Further lines of a channel's section in the declaration."""
+DECLARATION_MARK = "# Written by foretwin convert"
+"""How a declaration begins that `convert` may replace."""
 
 
 def write_csv(
@@ -94,7 +96,8 @@ def _rows(
 
 def _declaration(info: VehicleInfo, kept: dict[str, tuple[str, ...]]) -> str:
     # JSON's strings are TOML's.
-    text = f"reference_point = {json.dumps(info.reference_point)}\n"
+    text = f"{DECLARATION_MARK}, which replaces it with its CSV; without this line it is kept.\n"
+    text += f"reference_point = {json.dumps(info.reference_point)}\n"
     if info.body_from_antenna_m is not None:
         text += f"body_from_antenna_m = {list(map(float, info.body_from_antenna_m))}\n"
     text += f'\n[time]\ncolumn = "stamp_ns"\nunit = "ns"\nbase = "{info.time_base}"\n'

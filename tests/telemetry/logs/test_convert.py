@@ -8,6 +8,7 @@ import pytest
 
 from foretwin.telemetry.logs import LogError, open_log
 from foretwin.telemetry.logs.convert import convert
+from foretwin.telemetry.logs.write_csv import DECLARATION_MARK
 from tests.telemetry.test_drive_mcap import assert_same
 
 GOOD = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
@@ -60,3 +61,47 @@ def test_a_drive_is_not_converted_onto_itself(tmp_path: Path) -> None:
     convert(source, tmp_path / "gt.mcap")
     with pytest.raises(LogError, match="is the log itself"):
         convert(tmp_path / "gt.mcap", tmp_path / "gt.mcap")
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """A CSV with a declaration that somebody wrote."""
+    source = tmp_path / "gt.txt"
+    source.write_text(GOOD.format(0) + GOOD.format(1))
+    convert(source, tmp_path / "mine.csv")
+    declaration = tmp_path / "mine.csv.toml"
+    mark, _, rest = declaration.read_text().partition("\n")
+    assert mark.startswith(DECLARATION_MARK)
+    declaration.write_text("# by hand\n" + rest)
+    return tmp_path / "mine.csv"
+
+
+def test_the_declaration_that_is_read_is_never_written_over(table: Path) -> None:
+    declaration = table.with_name("mine.csv.toml")
+    other = table.rename(table.with_name("other.csv"))
+    with pytest.raises(LogError, match=r"mine\.csv\.toml: is the declaration of the log"):
+        convert(other, table, declaration=declaration)
+    declaration.rename(table.with_name("other.csv.toml"))
+    with pytest.raises(LogError, match=r"other\.csv\.toml: is the declaration of the log"):
+        convert(other, table.with_name("other.csv.toml"), to="csv")
+    with pytest.raises(LogError, match=r"other\.csv\.toml: is the declaration of the log"):
+        convert(other, table.with_name("other.csv.toml"), to="mcap")
+    assert table.with_name("other.csv.toml").read_text().startswith("# by hand")
+    assert not table.exists()
+
+
+def test_only_declarations_that_it_wrote_are_replaced(table: Path) -> None:
+    source, before = table.with_name("gt.txt"), table.read_bytes()
+    declaration = table.with_name("mine.csv.toml")
+    with pytest.raises(LogError, match=r"mine\.csv\.toml: would be replaced"):
+        convert(source, table)
+    assert declaration.read_text().startswith("# by hand")
+    assert table.read_bytes() == before
+    convert(source, table.with_name("own.csv"))
+    convert(source, table.with_name("own.csv"))
+
+
+def test_a_folder_is_no_target(table: Path) -> None:
+    (table.parent / "folder.mcap").mkdir()
+    with pytest.raises(LogError, match=r"folder\.mcap: is a folder; name a file"):
+        convert(table, table.parent / "folder.mcap")
