@@ -13,7 +13,7 @@ from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, aske
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.openscenario import write_openscenario
+from foretwin.sim_worker.scenarios.openscenario import EXPORT_MARK, write_openscenario
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -41,18 +41,31 @@ class PlacedCase(NamedTuple):
 def export_scenario(request: CaseRequest, out: Path) -> None:
     """Write one case as OpenSCENARIO, and its roads beside it as OpenDRIVE.
 
-    Raises UserError where there is no such case, or no place for it at that junction.
+    Raises UserError where there is no such case, no place for it at that junction, or where the
+    roads would replace others.
     """
     if out.suffix != ".xosc":
         raise UserError(f"{out}: an OpenSCENARIO file is written as .xosc")
-    out.parent.mkdir(parents=True, exist_ok=True)
+    _check_roads(out)
     vehicle = load_vehicle(request.vehicle)
     found = placed_case(request)
+    out.parent.mkdir(parents=True, exist_ok=True)
     now, case = datetime.datetime.now(datetime.UTC), (found.played, found.scenario, found.world)
     roads = write_openscenario(*case, out, vehicle=vehicle, written_at=now)
     played = found.played
     print(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
     print(f"{roads}: its roads")
+
+
+def _check_roads(out: Path) -> None:
+    """Refuse to replace roads that are not those of an earlier export to the same file."""
+    roads = out.with_suffix(".xodr")
+    exported = out.is_file() and EXPORT_MARK.encode() in out.read_bytes()
+    if roads.exists() and not exported:
+        raise UserError(
+            f"{roads}: would be replaced by the roads of {out.name}, and was not made for it; "
+            "move it, or name another --out"
+        )
 
 
 def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:

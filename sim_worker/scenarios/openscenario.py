@@ -35,6 +35,9 @@ from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.world_gen.export.opendrive import write_opendrive
 from foretwin.world_gen.export.xml_tree import in_comment, legal
 
+AUTHOR = "foretwin"
+EXPORT_MARK = f'author="{AUTHOR}"'
+"""What stands in each file that was written here."""
 UNSAID = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
@@ -131,7 +134,7 @@ def _header(
         properties(said | played.values),
         revMajor="1",
         revMinor="2",
-        author="foretwin",
+        author=AUTHOR,
         date=written_at.astimezone(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         description=legal(f"{scenario.title}: {scenario.shows} Map: {world.attribution}"),
     )

@@ -143,6 +143,28 @@ def test_a_case_is_exported_with_its_roads(
     assert "name the junction" in capsys.readouterr().err
 
 
+def test_an_export_replaces_its_own_roads_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = next(j.summary for j in open_map(MAP_FILE).junctions if j.summary.kind == "crossing")
+    out, roads = tmp_path / "scp.xosc", tmp_path / "scp.xodr"
+    asked = ["scenarios", "export", "scp", "--map", MAP, "--id", where.id, "--out", str(out)]
+    roads.write_text("mine")
+    assert run(asked) == 2
+    assert "scp.xodr: would be replaced by the roads of scp.xosc" in capsys.readouterr().err
+    assert (roads.read_text(), out.exists()) == ("mine", False)
+    roads.unlink()
+    assert run(asked) == 0
+    assert run(asked) == 0
+
+
+def test_a_case_without_a_place_leaves_no_folder(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "o.xosc"
+    asked = ["scenarios", "export", "scp", "--map", MAP, "--id", "n0", "--out", str(out)]
+    assert run(asked) == 2
+    assert not out.parent.exists()
+
+
 def test_a_case_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     where = next(j.summary for j in open_map(MAP_FILE).junctions if j.summary.kind == "crossing")
     out = tmp_path / "scp.png"
