@@ -17,7 +17,6 @@ from foretwin.contracts.tuning import (
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
-from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
 
 HALF_OF_95 = 1.96
 """Standard deviations to either side that hold 95 % of a Gaussian."""
@@ -81,9 +80,6 @@ def accepted(
                 continue
             name, value, std = STIFFNESS, stiffness, abs(stiffness - softer)
         before = getattr(vehicle, name).value
-        low, high = PLAUSIBLE[name]
-        if not low <= value <= high:
-            continue
         changed = msgspec.structs.replace(
             vehicle, **{name: Parameter(value, std, f"{source}, {result.excited_s:.0f} s")}
         )

@@ -22,7 +22,6 @@ from foretwin.sim_worker.analysis.identify.acceptance import (
     std_of,
 )
 from foretwin.sim_worker.vehicle.parameters import check_vehicle
-from foretwin.sim_worker.vehicle.plausible import check_plausible
 
 
 class ParametersInForce:
@@ -75,7 +74,6 @@ class ParametersInForce:
             raise UserError(f"{name} follows from the stiffnesses: set {STIFFNESS}")
         try:
             check_vehicle(msgspec.structs.replace(self.vehicle, **{name: Parameter(value)}))
-            check_plausible(name, value)
         except ValueError as error:
             raise UserError(str(error)) from error
 

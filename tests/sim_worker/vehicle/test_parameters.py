@@ -40,11 +40,25 @@ def test_every_value_says_where_it_came_from() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("[mass_kg]\nvalue = 1093.2952334674046", "[mass_kg]\nvalue = -3.0", "mass_kg is -3.0"),
+        (
+            "[mass_kg]\nvalue = 1093.2952334674046",
+            "[mass_kg]\nvalue = -3.0",
+            "mass_kg -3 is implausible; it must be 150 to 60000",
+        ),
         ("[mass_kg]\nvalue = 1093.2952334674046", '[mass_kg]\nvalue = "x"', "mass_kg"),
-        ("[friction]\nvalue = 1.0489", "[friction]\nvalue = nan", "friction is nan"),
+        ("[friction]\nvalue = 1.0489", "[friction]\nvalue = nan", "friction nan is implausible"),
         ("[length_m]", "[lenght_m]", "lenght_m"),
         ("[wheelbase_m]\nvalue = 2.5789128", "[wheelbase_m]\nvalue = 1.0", "less than"),
+        (
+            "[wheelbase_m]\nvalue = 2.5789128",
+            "[wheelbase_m]\nvalue = 257.0",
+            "wheelbase_m 257 is implausible; it must be 0.8 to 12",
+        ),
+        (
+            "[mass_kg]\nvalue = 1093.2952334674046\nstd = ",
+            "[mass_kg]\nvalue = 1093.2952334674046\nstd = -",
+            "it must be zero or more, and finite",
+        ),
         ("[steering_delay_s]\nvalue = 0.1", "[steering_delay_s]\nvalue = 0.9", "delay"),
         ('name = "bmw_320i"', "name = ", "no TOML"),
     ],
@@ -60,6 +74,10 @@ def test_wrong_file_is_refused_in_one_line_that_names_file_and_field(
         load_vehicle(file)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_every_parameter_has_its_range() -> None:
+    assert set(PLAUSIBLE) == set(load_vehicle().__struct_fields__) - {"name"}
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
