@@ -13,8 +13,9 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED
 from foretwin.contracts.roles import Correction, FollowLimits, Role
+from foretwin.orchestrator.processors import processors, trouble_with_workers
 from foretwin.orchestrator.settings import read_toml, settings_from
-from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning, processors
+from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning
 
 View = Literal["auto", "native", "web", "none"]
 MapAiding = Literal["auto", "off"]
@@ -134,7 +135,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     def _checks(self) -> Iterator[tuple[bool, str]]:
         """Yield what must hold, and what is said where it does not."""
-        yield self.workers >= 1, f"--workers {self.workers}: at least 1"
+        workers = trouble_with_workers(self.workers)
+        yield workers is None, f"{workers}"
         yield self.futures >= 1, f"--futures {self.futures}: at least 1"
         least = self.least_futures
         few = f"--least-futures {least}: 1 to --futures, which is {self.futures}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Literal, NamedTuple
 
 Tuning = Literal["off", "report", "apply"]
@@ -37,10 +36,3 @@ def choose_tuning(
     if processors >= workers:
         return TuningChoice("report", f"{has} for {needs}, to whom it gives way")
     return TuningChoice("off", f"{has} for {needs} leave none over (--tuning report has it)")
-
-
-def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

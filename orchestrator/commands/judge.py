@@ -19,6 +19,7 @@ from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.drive import carry_out
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.embedded import ROUTE_FILE
+from foretwin.orchestrator.processors import most_workers
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 
@@ -110,8 +111,9 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
         _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
     inputs = {"log": str(run / DRIVE), "source": "log", "map": map_file, "route": route}
     alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
+    workers = {"workers": min(was.workers, most_workers())}  # it may come from a larger machine
     no_car = {"endpoint": None, "ros2": None, "towards_vehicle": False}
-    return msgspec.structs.replace(was, **inputs, **alone, **no_car).validate()
+    return msgspec.structs.replace(was, **inputs, **alone, **workers, **no_car).validate()
 
 
 def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:

@@ -18,6 +18,7 @@ from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.processors import trouble_with_workers
 from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
@@ -45,8 +46,8 @@ def sweep(
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
-    if workers < 1:
-        raise UserError(f"--workers {workers}: at least 1")
+    if (trouble := trouble_with_workers(workers)) is not None:
+        raise UserError(trouble)
     loaded = load_spec(spec)
     out = out or Path("sweeps") / spec.stem
     try:

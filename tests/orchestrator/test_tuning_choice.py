@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.tuning_choice import Tuning, choose_tuning, processors
+from foretwin.orchestrator.processors import processors
+from foretwin.orchestrator.tuning_choice import Tuning, choose_tuning
 
 
 @pytest.mark.parametrize(

@@ -115,7 +115,7 @@ def test_a_folder_of_something_else_is_left_alone(
 def test_no_workers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spec = _written(tmp_path, 'map = "a.osm"')
     assert run(["sweep", str(spec), "--workers", "0"]) == 2
-    assert "--workers 0: at least 1" in capsys.readouterr().err
+    assert "--workers 0: 1 to " in capsys.readouterr().err
 
 
 def test_an_error_of_a_scenario_file_names_it(tmp_path: Path) -> None:
