@@ -14,6 +14,27 @@ from foretwin.contracts.errors import MissingFileError, UserError
 _Read = TypeVar("_Read")
 
 
+def toml_text(path: Path, what: str, *, error: type[UserError] = UserError) -> str:
+    """Return the text of a TOML file, which is UTF-8, with a byte order mark or without.
+
+    Raises FileNotFoundError, calling the file `what`, or `error` with the line at fault.
+    """
+    if path.is_dir():
+        raise error(f"{what} {path}: is a folder, not a file")
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise MissingFileError(f"{what} {path}: no such file") from None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as wrong:
+        line = data.count(b"\n", 0, wrong.start) + 1
+        raise error(
+            f"{what} {path}: line {line} is no UTF-8 text (byte 0x{data[wrong.start]:02x}); "
+            "save the file as UTF-8"
+        ) from wrong
+
+
 def read_toml(
     path: Path,
     kind: type[_Read],
@@ -26,15 +47,15 @@ def read_toml(
 
     `check` raises ValueError for what is wrong though it has the right fields; `words` says in the
     user's words what msgspec found. Raises UserError in one line: MissingFileError for a missing
-    file, and with the file and the field for anything else.
+    file, and with the file and the line or field for anything else.
     """
     try:
-        found = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), kind)
-        check(found)
-    except (FileNotFoundError, IsADirectoryError) as error:
+        text = toml_text(path, f"{what} file")
+    except FileNotFoundError as error:
         raise MissingFileError(f"no {what} file {path}") from error
-    except UnicodeDecodeError as error:
-        raise UserError(f"{what} file {path} is no UTF-8 text") from error
+    try:
+        found = msgspec.convert(tomllib.loads(text), kind)
+        check(found)
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{what} file {path} is no TOML: {error}") from error
     except msgspec.ValidationError as error:

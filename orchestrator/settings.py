@@ -8,17 +8,17 @@ from typing import Any, TypeVar
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.toml_file import toml_text
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 
 def read_toml(path: Path, what: str, *, error: type[UserError] = UserError) -> dict[str, Any]:
     """Return what a TOML file holds; raises FileNotFoundError, calling it `what`, or `error`."""
-    if not path.is_file():
-        raise FileNotFoundError(f"{what} {path}: no such file")
+    text = toml_text(path, what, error=error)
     try:
-        values: dict[str, Any] = msgspec.toml.decode(path.read_bytes())
-    except (msgspec.DecodeError, UnicodeDecodeError) as wrong:
+        values: dict[str, Any] = msgspec.toml.decode(text)
+    except msgspec.DecodeError as wrong:
         raise error(f"{path}: not TOML: {wrong}") from wrong
     return values
 

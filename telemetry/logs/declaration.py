@@ -27,6 +27,7 @@ from typing import Literal
 import msgspec
 
 from foretwin.contracts.drive import TimeBase
+from foretwin.contracts.toml_file import toml_text
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
 from foretwin.telemetry.logs.log import LogError
@@ -151,9 +152,10 @@ UNITS: dict[str, Mapping[str, float]] = {
 
 def read_declaration(path: Path) -> Declaration:
     """Read and check a declaration; raises FileNotFoundError, or LogError naming the field."""
+    text = toml_text(path, "declaration", error=LogError)
     try:
-        declaration = msgspec.toml.decode(path.read_bytes(), type=Declaration)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        declaration = msgspec.toml.decode(text, type=Declaration)
+    except msgspec.DecodeError as error:
         raise LogError(f"{path}: {error}") from None
     _known_unit(path, declaration.time, (*units.TIME_NS, units.ISO_TIME))
     _check_position(path, declaration.position, declaration.heading)

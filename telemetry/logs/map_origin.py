@@ -19,6 +19,7 @@ import msgspec
 
 from foretwin.contracts.drive import Vector3
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.toml_file import toml_text
 from foretwin.telemetry.logs.log import LogError
 
 
@@ -53,9 +54,10 @@ def declared_of(path: Path, declaration: Path | None = None) -> RecordingDeclara
     if declaration is None and not beside.is_file():
         return RecordingDeclaration()
     file = beside if declaration is None else declaration
+    text = toml_text(file, "declaration", error=LogError)
     try:
-        found = msgspec.toml.decode(file.read_bytes(), type=RecordingDeclaration)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        found = msgspec.toml.decode(text, type=RecordingDeclaration)
+    except msgspec.DecodeError as error:
         raise LogError(f"{file}: {error}") from None
     if (frame := found.frame()) is not None:
         try:

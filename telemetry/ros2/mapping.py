@@ -17,6 +17,7 @@ import msgspec
 from foretwin.contracts.drive import Vector3
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.toml_file import toml_text
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
@@ -178,9 +179,7 @@ def read_mapping(path: Path) -> MappingFile:
     """
     if str(path) == "autoware":
         path = AUTOWARE
-    if not path.is_file():
-        raise FileNotFoundError(f"ROS 2 mapping {path}: no such file")
-    text = path.read_text(encoding="utf-8")
+    text = toml_text(path, "ROS 2 mapping", error=MappingError)
     return MappingFile(str(path), text, parse_mapping(text, name=str(path)))
 
 

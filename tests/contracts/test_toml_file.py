@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -9,6 +10,11 @@ import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.toml_file import read_toml
+from foretwin.orchestrator.settings import read_toml as read_settings
+from foretwin.telemetry.logs.declaration import read_declaration
+from foretwin.telemetry.logs.map_origin import declared_of
+from foretwin.telemetry.ros2.mapping import read_mapping
+from foretwin.telemetry.standin.parameters import read_parameters
 
 
 class Cake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,7 +41,7 @@ def test_a_file_is_what_it_says(tmp_path: Path) -> None:
         (b"layers = 0", "layers is 0; it must be 1 or more"),
         (b"layers = ", "is no TOML: Invalid value"),
         (b"layers = 'x'", "EXPECTED `INT`, GOT `STR` - AT `$.LAYERS`"),
-        (b"layers = '\xff'", "is no UTF-8 text"),
+        (b"# cake\nlayers = '\xff'", "line 2 is no UTF-8 text (byte 0xff); save the file as UTF-8"),
     ],
 )
 def test_what_is_wrong_is_said_with_the_file(text: bytes, said: str, tmp_path: Path) -> None:
@@ -47,7 +53,36 @@ def test_what_is_wrong_is_said_with_the_file(text: bytes, said: str, tmp_path: P
     assert said in str(caught.value)
 
 
-def test_a_missing_file_and_a_folder_are_no_files(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "none.toml"):
-        with pytest.raises(FileNotFoundError, match="no cake file"):
-            read(path)
+def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbflayers = 3")
+    assert read(tmp_path / "a.toml") == Cake(3)
+
+
+def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no cake file"):
+        read(tmp_path / "none.toml")
+    with pytest.raises(UserError, match=r"cake file .*: is a folder, not a file"):
+        read(tmp_path)
+
+
+READERS = (
+    lambda path: read_settings(path, "configuration"),
+    read_declaration,
+    lambda path: declared_of(path.with_name("drive.mcap"), path),
+    read_mapping,
+    read_parameters,
+)
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_every_reader_says_the_line_that_is_no_utf8(
+    reader: Callable[[Path], object], tmp_path: Path
+) -> None:
+    file = tmp_path / "a.toml"
+    file.write_bytes(b"# Stra\xdfe\n")
+    with pytest.raises(UserError, match=r"a\.toml: line 1 is no UTF-8 text \(byte 0xdf\)"):
+        reader(file)
+    with pytest.raises(UserError, match="is a folder, not a file"):
+        reader(tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"none\.toml: no such file"):
+        reader(tmp_path / "none.toml")

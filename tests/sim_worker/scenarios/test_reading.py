@@ -122,7 +122,7 @@ def test_two_actors_need_two_names(tmp_path: Path) -> None:
 def test_what_is_no_scenario_file_says_so(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no scenario file"):
         read_scenario(tmp_path / "none.toml")
-    with pytest.raises(FileNotFoundError, match="no scenario file"):
+    with pytest.raises(UserError, match="is a folder, not a file"):
         read_scenario(tmp_path)
     with pytest.raises(UserError, match="is no TOML"):
         read("id = ", tmp_path)
