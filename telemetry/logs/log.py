@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -41,6 +42,12 @@ _MOTION = (
 
 class LogError(UserError):
     """A log that cannot be read: one line with the file, the line or field, and what would do."""
+
+
+def check_undeclared(path: Path, declaration: Path | None, kind: str) -> None:
+    """Refuse a declaration that nothing would be read from."""
+    if declaration is not None:
+        raise LogError(f"{path}: {kind} says all of itself; leave out --declaration {declaration}")
 
 
 @dataclass(frozen=True, kw_only=True)

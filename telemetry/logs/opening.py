@@ -8,7 +8,7 @@ from foretwin.contracts.drive import RoadUsers
 from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
 from foretwin.telemetry.logs.geojson import open_geojson
 from foretwin.telemetry.logs.gpx import open_gpx
-from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.log import Log, LogError, check_undeclared
 from foretwin.telemetry.logs.mcity import is_mcity, read_mcity
 from foretwin.telemetry.logs.nmea import is_nmea, open_nmea
 from foretwin.telemetry.logs.road_users import (
@@ -33,13 +33,16 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
 
     `declaration` is the TOML that declares a CSV's columns, or what a recording with ROS messages
     does not say of itself; without it `NAME.toml` beside the file. Raises FileNotFoundError for a
-    missing file and LogError for one that is no log.
+    missing file and LogError for one that is no log, or that has no use for a declaration.
     """
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
+    if declaration is not None and not declaration.exists():
+        raise FileNotFoundError(f"declaration {declaration}: no such file")
     if path.is_dir():
         if is_comma2k19(path):
+            check_undeclared(path, declaration, "a comma2k19 segment")
             return open_comma2k19(path)
         if (path / "metadata.yaml").is_file():
             from foretwin.telemetry.logs.ros_log import open_bag
@@ -65,10 +68,13 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if suffix != ".csv" and declaration is None and is_nmea(text):
         return open_nmea(path)
     if is_smartloc(text):
+        check_undeclared(path, declaration, "smartLoc's ground truth")
         return open_smartloc(path)
     if suffix == ".gpx" or (text.startswith("<") and "<gpx" in text):
+        check_undeclared(path, declaration, "a GPX file")
         return open_gpx(path)
     if suffix in (".geojson", ".json") or text.startswith("{"):
+        check_undeclared(path, declaration, "a GeoJSON file")
         return open_geojson(path)
     if suffix == ".csv" or declaration is not None:
         from foretwin.telemetry.logs.csv_table import open_csv

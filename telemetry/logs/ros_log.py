@@ -16,7 +16,14 @@ import msgspec
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
-from foretwin.telemetry.logs.log import FILE_CUT_SHORT, VALUE_NOT_FINITE, Log, LogError, Sample
+from foretwin.telemetry.logs.log import (
+    FILE_CUT_SHORT,
+    VALUE_NOT_FINITE,
+    Log,
+    LogError,
+    Sample,
+    check_undeclared,
+)
 from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording
@@ -42,6 +49,7 @@ def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
         *(metadata.get(name, {}).get("json") for name in (FRAME_METADATA, INFO_METADATA))
     )
     if FORMAT_METADATA in metadata:
+        check_undeclared(path, declaration, "foretwin's own recording")
         return _open_own(recording, own)
     return open_foreign(recording, declared_of(path, declaration), frame=own.frame())
 
@@ -55,6 +63,7 @@ def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
     known = {INFO_TOPIC, FRAME_TOPIC} & set(recording.contents.schemas)
     if not known:
         return open_foreign(recording, declared_of(path, declaration))
+    check_undeclared(path, declaration, "foretwin's own recording")
     texts: dict[str, str] = {}
     decode = decoder(recording, known)
     for record in recording.chosen(known, Counter()):

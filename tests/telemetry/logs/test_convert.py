@@ -105,3 +105,16 @@ def test_a_folder_is_no_target(table: Path) -> None:
     (table.parent / "folder.mcap").mkdir()
     with pytest.raises(LogError, match=r"folder\.mcap: is a folder; name a file"):
         convert(table, table.parent / "folder.mcap")
+
+
+def test_a_declaration_that_is_missing_or_of_no_use_is_told(table: Path) -> None:
+    source, recording = table.with_name("gt.txt"), table.with_name("gt.mcap")
+    convert(source, recording)
+    for log in (source, recording, table):
+        with pytest.raises(FileNotFoundError, match=r"declaration .*none\.toml: no such file"):
+            open_log(log, declaration=table.with_name("none.toml"))
+    declaration = table.with_name("mine.csv.toml")
+    with pytest.raises(LogError, match=r"gt\.txt: smartLoc's .* leave out --declaration"):
+        open_log(source, declaration=declaration)
+    with pytest.raises(LogError, match=r"gt\.mcap: foretwin's own .* leave out --declaration"):
+        open_log(recording, declaration=declaration)
