@@ -60,6 +60,8 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         from foretwin.telemetry.logs.ros_log import open_mcap
 
         return open_mcap(path, declaration=declaration)
+    if suffix == ".bag" and not head.startswith(BAG_MAGIC):
+        raise LogError(f"{path}: no ROS 1 bag: it does not begin with {BAG_MAGIC.decode()}")
     if head.startswith((BAG_MAGIC, SQLITE_MAGIC)) or suffix in (".bag", ".db3"):
         from foretwin.telemetry.logs.ros_log import open_bag
 

@@ -281,6 +281,12 @@ def test_files_that_are_no_bag(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(data)
         with pytest.raises(LogError, match=f"{name}: unreadable bag"):
             open_log(tmp_path / name)
+    (tmp_path / "a.bag").write_bytes(b"\x2a\x2e\xae\x57")
+    with pytest.raises(LogError, match=r"a\.bag: no ROS 1 bag: it does not begin with #ROSBAG V"):
+        open_log(tmp_path / "a.bag")
+    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n" + bytes(range(256)) * 20)
+    with pytest.raises(LogError, match=r"a\.bag: unreadable bag"):
+        open_log(tmp_path / "a.bag")
     folder = tmp_path / "bag"
     folder.mkdir()
     (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 4}\n")
