@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
@@ -227,15 +228,45 @@ def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
 
     `speed` may be a number or `max` in both. Raises FileNotFoundError or ConfigError, one line.
     """
-    values = {} if path is None else read_toml(path, "configuration", error=ConfigError)
-    if "towards_vehicle" in values:
+    written: dict[str, Any] = {}
+    if path is not None:
+        written = read_toml(path, "configuration", error=ConfigError)
+    if "towards_vehicle" in written:
         # Else one file could hold both switches.
         raise ConfigError(f"{path}: towards_vehicle: on the command line alone")
-    values |= {name: value for name, value in overrides.items() if value is not None}
-    if "speed" in values:
-        values["speed"] = parse_speed(values["speed"])
-    where = f"{path or 'flags'}:"
-    return settings_from(values, DriveConfig, where, error=ConfigError).validate()
+    flags = {name: value for name, value in overrides.items() if value is not None}
+    try:
+        for values in (written, flags):
+            if "speed" in values:
+                values["speed"] = parse_speed(values["speed"])
+        settings_from(written, DriveConfig, f"{path}:", error=ConfigError)
+        config = settings_from(written | flags, DriveConfig, "flags:", error=ConfigError)
+        return config.validate()
+    except ConfigError as wrong:
+        at_fault = _setting_of(str(wrong))
+        if at_fault is None or at_fault.name not in written or at_fault.name in flags:
+            raise
+        raise ConfigError(f"{path}: {at_fault.name}{at_fault.rest}") from wrong
+
+
+class _AtFault(NamedTuple):
+    """A setting as a file calls it, and what is said of it."""
+
+    name: str
+    rest: str
+
+
+_SHORTER = {"rate": "rate_hz", "horizon": "horizon_s", "start": "start_s", "end": "end_s"}
+"""Settings whose flag leaves out the unit."""
+
+
+def _setting_of(text: str) -> _AtFault | None:
+    """Return the setting that an error begins with, by its flag or by its name."""
+    found = re.match(r"(--)?([a-z0-9_-]+)", text)
+    if found is None:
+        return None
+    name = found[2].replace("-", "_")
+    return _AtFault(_SHORTER.get(name, name) if found[1] else name, text[found.end() :])
 
 
 def parse_speed(value: object) -> float | None:

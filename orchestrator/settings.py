@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
+import msgspec.inspect
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.toml_file import toml_text
@@ -30,5 +32,41 @@ def settings_from(
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as wrong:
-        known = ", ".join(kind.__struct_fields__)
-        raise error(f"{where} {wrong} (known settings: {known})") from wrong
+        raise error(f"{where} {_in_words(str(wrong), kind)}") from wrong
+
+
+_AT = " - at `$"
+_STEP = re.compile(r"\.(\w+)|\[")
+
+
+def _in_words(text: str, kind: type[msgspec.Struct]) -> str:
+    """Return what msgspec found, with the values or settings that there are at that place."""
+    what, _, at = text.partition(_AT)
+    place = at.strip("`.")
+    found = [msgspec.inspect.type_info(kind)]
+    for step in _STEP.finditer(at):
+        found = [one for before in found for one in _inside(before, step[1])]
+    if what.startswith("Invalid enum value "):
+        literals = (one for one in found if isinstance(one, msgspec.inspect.LiteralType))
+        values = ", ".join(str(value) for literal in literals for value in literal.values)
+        return f"{place} {what.removeprefix('Invalid enum value ')}: one of {values}"
+    if "unknown field" in what:
+        structs = (one for one in found if isinstance(one, msgspec.inspect.StructType))
+        names = ", ".join(field.encode_name for struct in structs for field in struct.fields)
+        return f"{text} (known settings: {names})"
+    return text
+
+
+def _inside(around: msgspec.inspect.Type, field: str | None) -> list[msgspec.inspect.Type]:
+    """Return the types that a field of a type may have, or its items, with those of unions."""
+    match around:
+        case msgspec.inspect.StructType() if field is not None:
+            found = [one.type for one in around.fields if one.encode_name == field]
+        case msgspec.inspect.VarTupleType() if field is None:
+            found = [around.item_type]
+        case msgspec.inspect.DictType() if field is None:
+            found = [around.value_type]
+        case _:
+            found = []
+    unions = (one.types if isinstance(one, msgspec.inspect.UnionType) else (one,) for one in found)
+    return [one for types in unions for one in types]

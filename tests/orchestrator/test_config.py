@@ -36,13 +36,14 @@ def test_no_file_and_no_flags_is_the_embedded_drive() -> None:
         ({"rate_hz": 0.0}, "--rate 0.0"),
         ({"speed": "fast"}, "--speed fast"),
         ({"speed": -1.0}, "--speed -1.0"),
-        ({"start_s": 5.0, "end_s": 4.0}, "--end 4.0"),
+        ({"log": "a", "map": "a", "start_s": 5.0, "end_s": 4.0}, "--end 4.0"),
         ({"route": "from-log"}, "--log FILE"),
         ({"log": "a.gpx"}, "--map FILE"),
         ({"map": "a.osm"}, "--log FILE"),
         ({"view": "hologram"}, "view"),
         ({"ros2": "autoware"}, "--source live"),
         ({"ros2": "autoware", "source": "live", "speed": "max"}, "--speed max"),
+        ({"tuning": "maybe"}, "flags: tuning 'maybe': one of apply, off, report"),
         ({"towards_vehicle": True, "source": "live"}, "--towards-vehicle needs --ros2"),
     ],
 )
@@ -58,6 +59,40 @@ def test_an_unknown_setting_lists_the_known_ones(tmp_path: Path) -> None:
     file.write_text("futurs = 3\n")
     with pytest.raises(ConfigError, match=r"futurs.*known settings:.*futures"):
         load_config(file, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("rate_hz = nan", "rate_hz nan: above 0, at most 50"),
+        ("workers = 0", "workers 0: 1 to"),
+        ('speed = "fast"', "speed fast: a number above 0, or max"),
+        ("radius_m = 5", "radius_m 5.0: 20 to 2000"),
+        ("[follow]\naccel_mps2 = -1", "follow: accel_mps2"),
+        ("[follow]\nx = 1", "(known settings: accel_mps2, jerk_mps3"),
+        ('[[vehicles]]\nid = "v"\nrole = "x"', "vehicles[0].role 'x': one of all, ghost"),
+        ("futures = 'x'", "Expected `int`, got `str` - at `$.futures`"),
+    ],
+)
+def test_what_a_file_says_is_told_with_its_name_and_not_as_a_flag(
+    text: str, said: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_config(file, {"horizon_s": 8.0})
+    assert str(caught.value).startswith(f"{file}: ")
+    assert said in str(caught.value)
+    assert "--" not in str(caught.value)
+
+
+def test_a_flag_over_a_file_is_told_as_the_flag(tmp_path: Path) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text("rate_hz = 1.0\n")
+    with pytest.raises(ConfigError, match=r"^--rate nan"):
+        load_config(file, {"rate_hz": float("nan")})
+    with pytest.raises(ConfigError, match=r"^flags: tuning 'maybe'"):
+        load_config(file, {"tuning": "maybe"})
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

@@ -21,10 +21,13 @@ from foretwin.orchestrator.drive.plan import read_inputs
         ('[[vehicles]]\nid = "a b"\nlive = true', "must be one word"),
         ('[[vehicles]]\nid = "ego"\nlive = true', "ids ego, ego must differ"),
         ('speed = "max"\n[[vehicles]]\nid = "v"\nlive = true', "knows no --speed max"),
-        ('[[vehicles]]\nid = "v"\nrole = "wheel"', "Invalid enum value 'wheel'"),
+        (
+            '[[vehicles]]\nid = "v"\nrole = "wheel"',
+            "vehicles[0].role 'wheel': one of all, ghost, shadow, twin",
+        ),
         ("[follow]\njerk_mps3 = -1.0", "follow: jerk_mps3 -1.0: above 0"),
         ("[follow]\njerk_mps3 = 100.0", "follow: jerk_mps3 100.0: at most 60 times"),
-        ('correction = "hard"', "Invalid enum value 'hard'"),
+        ('correction = "hard"', "correction 'hard': one of follow, free"),
     ],
 )
 def test_settings_that_cannot_be_used_are_told_in_one_line(
