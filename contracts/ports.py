@@ -1,8 +1,9 @@
-"""Where something of ours may listen on this machine."""
+"""Where something of ours may listen."""
 
 from __future__ import annotations
 
 import random
+import re
 import socket
 
 LOOPBACK = "127.0.0.1"
@@ -33,3 +34,22 @@ def free_port() -> int:
 def free_endpoint() -> str:
     """Return a Zenoh endpoint on such a port."""
     return f"tcp/{LOOPBACK}:{free_port()}"
+
+
+_ENDPOINT = re.compile(r"(?P<protocol>[a-z][a-z0-9-]*)/(?P<address>.+)")
+_HOST_AND_PORT = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[^:/]+):(?P<port>[0-9]{1,5})")
+_ON_IP = ("tcp", "udp", "tls", "quic", "ws")
+
+
+def trouble_with_endpoint(endpoint: str) -> str | None:
+    """Return what is wrong with the form of a Zenoh endpoint, None where nothing is."""
+    found = _ENDPOINT.fullmatch(endpoint)
+    if found is None:
+        return f"PROTOCOL/ADDRESS, such as tcp/{LOOPBACK}:7447"
+    if found["protocol"] not in _ON_IP:
+        return None
+    # What may follow are Zenoh's own metadata and settings of the link.
+    place = _HOST_AND_PORT.fullmatch(re.split("[?#]", found["address"])[0])
+    if place is None or not 0 < int(place["port"]) < 2**16:
+        return f"{found['protocol']}/HOST:PORT with a port of 1 to 65535"
+    return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -13,6 +14,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED
+from foretwin.contracts.ports import trouble_with_endpoint
 from foretwin.contracts.roles import Correction, FollowLimits, Role
 from foretwin.orchestrator.processors import processors, trouble_with_workers
 from foretwin.orchestrator.settings import read_toml, settings_from
@@ -156,14 +158,19 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         yield radius, f"radius_m {self.radius_m}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"
         yield 5.0 <= self.look_ahead_s <= 600.0, f"look_ahead_s {self.look_ahead_s}: 5 to 600"
         log, ros2, live = self.log is not None, self.ros2 is not None, self.source == "live"
-        yield log or self.source != "log", "source log needs --log FILE"
+        yield log or self.source != "log", "--source log needs --log FILE"
+        no_log = f"--source {self.source}: takes no --log, which is {self.log}"
+        yield not log or self.source in ("auto", "log"), no_log
+        yield log or not self.start_s, f"--start {self.start_s}: needs --log FILE, to begin in it"
+        ends = f"--end {self.end_s}: not of --source live, which ends with its car"
+        yield self.end_s is None or not live, ends
         yield log or self.route != "from-log", "--route from-log needs --log FILE"
         goal = "--route live needs --source live: a car that says where it drives to"
         yield live or self.route != "live", goal
         topics = "--ros2 MAPPING needs --source live: its topics are the car's telemetry"
         yield live or not ros2, topics
-        max_speed = "--ros2 MAPPING: a live car knows no --speed max"
-        yield not ros2 or not self.lock_step, max_speed
+        max_speed = "--speed max: not of --source live, whose car nobody can hold up"
+        yield not live or not self.lock_step, max_speed
         yield ros2 or not self.towards_vehicle, "--towards-vehicle needs --ros2 MAPPING"
         embedded = "--log needs --map FILE: the embedded map holds no real drive"
         yield self.map is not None or not log, embedded
@@ -175,6 +182,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         for other in self.vehicles:
             trouble = other.trouble()
             yield trouble is None, f"vehicles, {other.id}: {trouble}"
+        shift_m = self.standin_plan_shift_m
+        yield math.isfinite(shift_m), f"standin_plan_shift_m {shift_m}: a finite number of metres"
+        place = None if self.endpoint is None else trouble_with_endpoint(self.endpoint)
+        yield place is None, f"endpoint {self.endpoint!r}: {place}"
         yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
         yield len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"

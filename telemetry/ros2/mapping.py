@@ -17,6 +17,7 @@ import msgspec
 from foretwin.contracts.drive import Vector3
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.ports import trouble_with_endpoint
 from foretwin.contracts.toml_file import toml_text
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.mirrored import Mirrored
@@ -224,6 +225,8 @@ def listening_only(mapping: Mapping) -> Mapping:
 def _check_head(mapping: Mapping) -> None:
     if not 0 <= mapping.domain <= 232:
         raise ValueError(f"domain {mapping.domain}: 0 to 232")
+    if mapping.endpoint is not None and (trouble := trouble_with_endpoint(mapping.endpoint)):
+        raise ValueError(f"endpoint {mapping.endpoint!r}: {trouble}")
     at = mapping.map_place
     if at is not None and not (abs(at.lat_deg) < 90.0 and abs(at.lon_deg) <= 180.0):
         raise ValueError(f"map at {at.lat_deg}, {at.lon_deg}: degrees of latitude and longitude")
