@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from foretwin.orchestrator.sweep.rows import Parts
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from foretwin.orchestrator.sweep.workers import worker_setup
-from foretwin.orchestrator.sweep.worlds import all_there, source_digest, sweep_worlds
+from foretwin.orchestrator.sweep.worlds import Building, all_there, choose_worlds, source_digest
 
 SOME_FAILED = 3
 
@@ -82,9 +83,13 @@ def workers_for(loaded: Loaded, out: Path, workers: int) -> Iterator[WorkerProce
 def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False) -> dict[str, Any]:
     """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
     fingerprint = fingerprint_of(loaded, source_digest(loaded.spec))
-    with SweepFolder(out, fingerprint, fresh=fresh) as folder:
+    chosen = functools.cache(lambda: choose_worlds(loaded.spec))
+    sweep_folder = SweepFolder(out, fingerprint, fresh=fresh)
+    if sweep_folder.is_new() or fresh:
+        chosen()  # what is wrong with them is told before anything is written
+    with sweep_folder as folder:
         folder.begin(loaded)
-        places = _find_places(loaded, folder, runner)
+        places = _find_places(loaded, folder, runner, chosen)
         plan = plan_sweep(loaded, places.worlds)
         keep_vehicles(folder.path, loaded.vehicles.values())
         parts = Parts(folder.path, attribution=plan.attribution)
@@ -98,7 +103,9 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         return folder.summarise(_summary(loaded, plan, places, parts) | now)
 
 
-def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPlaces:
+def _find_places(
+    loaded: Loaded, folder: SweepFolder, runner: Runner, chosen: Callable[[], Building]
+) -> FoundPlaces:
     """Build or read the Worlds, and find where the scenarios take place in each.
 
     What was found before is kept; what failed before is tried again, and Worlds that are lost are
@@ -109,7 +116,7 @@ def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPl
     there = all_there(folder.worlds_dir, found)
     if kept is not None and there and not kept.failures:
         return kept
-    worlds = sweep_worlds(loaded.spec, folder.worlds_dir, progress_bar)
+    worlds = chosen()(folder.worlds_dir, progress_bar)
     failures = dict(worlds.failures)
     left = [world_id for world_id in worlds.ids if world_id not in found]
     tasks = [place_task(place_request(loaded, world_id)) for world_id in left]

@@ -51,6 +51,11 @@ class SweepFolder:
         self._fresh = fresh
         self._held = ExitStack()
 
+    def is_new(self) -> bool:
+        """Return whether no sweep was begun there; UserError where it holds something else."""
+        self._refuse_strangers()
+        return not (self.path / SUMMARY).is_file()
+
     def __enter__(self) -> Self:
         self._refuse_strangers()
         self.path.mkdir(parents=True, exist_ok=True)

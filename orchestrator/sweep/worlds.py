@@ -37,6 +37,10 @@ class SweepWorlds(NamedTuple):
     failures: dict[str, str]
 
 
+Building = Callable[[Path, Progress], SweepWorlds]
+"""Puts chosen Worlds into a folder."""
+
+
 def source_digest(spec: SweepSpec) -> str:
     """Return what the Worlds of a sweep come from, in short: of files their bytes.
 
@@ -69,14 +73,15 @@ def all_there(folder: Path, world_ids: Iterable[str]) -> bool:
     return whole
 
 
-def sweep_worlds(spec: SweepSpec, folder: Path, progress: Progress) -> SweepWorlds:
-    """Build the Worlds that a spec asks for into `folder`, or copy them there.
+def choose_worlds(spec: SweepSpec) -> Building:
+    """Return what builds the Worlds that a spec asks for into a folder, or copies them there.
 
-    Raises UserError for a junction that is not there, or where none is left.
+    Nothing is written yet. Raises UserError for a junction that is not there, or where none is
+    left.
     """
     there = worlds_folder(spec)
     if there is not None:
-        return _read(spec, there, WorldStore(folder))
+        return _choose_given(spec, there)
     assert spec.map is not None
     opened = open_map(Path(spec.map), clip=_clip(spec), service_roads=spec.service_roads)
     if spec.junctions == "all":
@@ -89,18 +94,23 @@ def sweep_worlds(spec: SweepSpec, folder: Path, progress: Progress) -> SweepWorl
     if not chosen:
         where = "" if bounds is None else f" in bbox {spec.bbox}"
         raise UserError(f"{spec.map}: no junction{where}")
-    index = index_map(opened.osm, opened.graph, opened.junctions)
-    store = WorldStore(folder)
-    ids, failures = [], {}
-    with progress(len(chosen), "Worlds") as (advance, _):
-        for junction in chosen:
-            name = junction.summary.id
-            try:
-                ids.append(cached_build(store, index, junction, radius_m=spec.radius_m).world.id)
-            except Exception as error:  # one bad junction never stops the rest
-                failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            advance(name)
-    return SweepWorlds(tuple(ids), failures)
+
+    def build(folder: Path, progress: Progress) -> SweepWorlds:
+        index = index_map(opened.osm, opened.graph, opened.junctions)
+        store = WorldStore(folder)
+        ids, failures = [], {}
+        with progress(len(chosen), "Worlds") as (advance, _):
+            for junction in chosen:
+                name = junction.summary.id
+                try:
+                    built = cached_build(store, index, junction, radius_m=spec.radius_m)
+                    ids.append(built.world.id)
+                except Exception as error:  # one bad junction never stops the rest
+                    failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
+                advance(name)
+        return SweepWorlds(tuple(ids), failures)
+
+    return build
 
 
 def _clip(spec: SweepSpec) -> NodeClip | LatLonBounds | None:
@@ -136,8 +146,8 @@ def _files(folder: Path) -> list[Path]:
     return files
 
 
-def _read(spec: SweepSpec, folder: Path, store: WorldStore) -> SweepWorlds:
-    """Copy Worlds, each under the id of its content: one that was corrected is another one."""
+def _choose_given(spec: SweepSpec, folder: Path) -> Building:
+    """Return what copies Worlds, each under the id of its content: one corrected is another one."""
     bounds = _bounds(spec)
     found: dict[tuple[str, str], Path] = {}
     for path in _files(folder):
@@ -155,6 +165,11 @@ def _read(spec: SweepSpec, folder: Path, store: WorldStore) -> SweepWorlds:
     if not found:
         raise UserError(f"worlds {folder}: no junction in bbox {spec.bbox}")
     chosen = _sampled(sorted(found), spec)
-    for one in chosen:
-        store.save(with_id(load_world(folder, found[one].stem)))
-    return SweepWorlds(tuple(world_id for _, world_id in chosen), {})
+
+    def copy(target: Path, _: Progress) -> SweepWorlds:
+        store = WorldStore(target)
+        for one in chosen:
+            store.save(with_id(load_world(folder, found[one].stem)))
+        return SweepWorlds(tuple(world_id for _, world_id in chosen), {})
+
+    return copy

@@ -19,6 +19,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import METRES_PER_DEG, GeoPoint, LocalFrame
+from foretwin.contracts.new_folder import new_folder
 from foretwin.world_gen.osm.build_map_store import build_map_store
 from foretwin.world_gen.osm.clip import clip_map, find_node
 from foretwin.world_gen.osm.map_file import file_fault
@@ -51,7 +52,11 @@ class MapStore:
         several processes may build it at once. Raises `MapError` where the map cannot be read.
         """
         folder = folder or default_folder()
-        folder.mkdir(parents=True, exist_ok=True)
+        with new_folder(folder):
+            return cls._open(map_file, folder, progress)
+
+    @classmethod
+    def _open(cls, map_file: Path, folder: Path, progress: Progress | None) -> MapStore:
         digest = _known_digest(map_file, folder)
         if digest is not None:
             path = index_path(folder, digest)

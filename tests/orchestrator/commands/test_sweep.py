@@ -19,6 +19,7 @@ import pytest
 from foretwin.contracts.world import ATTRIBUTION
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep, workers_for
+from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.runner import worker_processes
 from foretwin.orchestrator.sweep.spec import load_spec
@@ -271,3 +272,11 @@ def test_100_of_100_runs_give_the_same_hash(
                 os.kill(runner.pids[0], signal.SIGKILL)
             hashes.append(run_sweep(loaded, tmp_path, runner, fresh=True)["rows_sha256"])
     assert hashes == 100 * [summary["rows_sha256"]]
+
+
+@pytest.mark.parametrize("wrong", ['junctions = ["n999"]', 'bbox = "13,52,14,53"'])
+def test_a_sweep_that_cannot_begin_leaves_no_folder(wrong: str, tmp_path: Path) -> None:
+    spec = tmp_path / "wrong.toml"
+    spec.write_text(f'map = "{MAP_FILE}"\n{wrong}\n')
+    assert run(["sweep", str(spec), "--out", str(tmp_path / "out")]) == 2
+    assert not (tmp_path / "out").exists()

@@ -12,7 +12,7 @@ from foretwin.contracts.codec import write_message
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.sweep.spec import SweepSpec
-from foretwin.orchestrator.sweep.worlds import Progress, all_there, source_digest, sweep_worlds
+from foretwin.orchestrator.sweep.worlds import Progress, all_there, choose_worlds, source_digest
 from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.world_gen.world_store import WorldStore
 from tests.sim_worker.scenarios.worlds import cross
@@ -43,7 +43,7 @@ def test_junctions_of_a_map_are_built_and_one_that_fails_stops_no_other(
     monkeypatch.setattr(WorldStore, "save", save)
     seen: list[str] = []
     spec = SweepSpec(map=TOWN, junctions=(good, bad), radius_m=60.0)
-    found = sweep_worlds(spec, tmp_path, counting(seen))
+    found = choose_worlds(spec)(tmp_path, counting(seen))
     assert seen == sorted([good, bad])
     assert len(found.ids) == 1
     assert (tmp_path / f"{found.ids[0]}.world").is_file()
@@ -54,7 +54,7 @@ def test_a_sample_is_drawn_by_the_seed(tmp_path: Path) -> None:
     def chosen(seed: int) -> list[str]:
         names: list[str] = []
         spec = SweepSpec(map=TOWN, sample=1, radius_m=60.0, seed=seed)
-        sweep_worlds(spec, tmp_path, counting(names))
+        choose_worlds(spec)(tmp_path, counting(names))
         return names
 
     assert chosen(3) == chosen(3)
@@ -67,11 +67,11 @@ def test_what_is_not_there_is_named(tmp_path: Path) -> None:
         ({"bbox": "-30.0001,44.5,-30.0,44.5001"}, "no junction in bbox"),
     ):
         with pytest.raises(UserError, match=named):
-            sweep_worlds(SweepSpec(map=TOWN, **wrong), tmp_path, counting([]))  # type: ignore[arg-type]
+            choose_worlds(SweepSpec(map=TOWN, **wrong))  # type: ignore[arg-type]
     WorldStore(tmp_path / "drawn").save(cross())
     spec = SweepSpec(worlds=str(tmp_path / "drawn"), junctions=("n999",))
     with pytest.raises(UserError, match="none of junction n999"):
-        sweep_worlds(spec, tmp_path, counting([]))
+        choose_worlds(spec)
 
 
 def test_worlds_of_a_folder_are_copied_under_the_ids_of_their_content(tmp_path: Path) -> None:
@@ -79,12 +79,12 @@ def test_worlds_of_a_folder_are_copied_under_the_ids_of_their_content(tmp_path: 
     drawn.mkdir()
     write_message(cross(), drawn / "by_hand.world")
     spec = SweepSpec(worlds=str(drawn))
-    assert sweep_worlds(spec, out, counting([])).ids == (cross().id,)
+    assert choose_worlds(spec)(out, counting([])).ids == (cross().id,)
     assert [path.stem for path in out.iterdir()] == [cross().id]
     before = source_digest(spec)
     write_message(msgspec.structs.replace(cross(), stop_lines=()), drawn / "by_hand.world")
     assert source_digest(spec) != before
-    assert sweep_worlds(spec, out, counting([])).ids != (cross().id,)
+    assert choose_worlds(spec)(out, counting([])).ids != (cross().id,)
 
 
 def test_a_world_that_is_lost_or_another_one_is_not_there(tmp_path: Path) -> None:

@@ -165,6 +165,10 @@ def test_what_cannot_be_read_leaves_no_index(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-200])
     with pytest.raises(MapError, match="not a readable OSM file"):
         MapStore.open(path, folder)
+    assert not folder.exists()
+    folder.mkdir()
+    with pytest.raises(MapError, match="not a readable OSM file"):
+        MapStore.open(path, folder)
     assert not list(folder.iterdir())
 
 
