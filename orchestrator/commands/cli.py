@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -14,8 +15,15 @@ from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judg
 from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_set import set_value
+from foretwin.orchestrator.commands.error_lines import (
+    NO_PLACE,
+    drop_output,
+    one_line,
+    report,
+    usage_line,
+)
 
-EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_USER, EXIT_INTERRUPTED = 2, 130
 _NO_FOLDER = IsADirectoryError, NotADirectoryError
 PATH_ERRORS = (FileNotFoundError, FileExistsError, *_NO_FOLDER, PermissionError)
 """What is wrong with a path is the user's to mend."""
@@ -240,40 +248,26 @@ def doctor() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command; returns 0 done, 1 internal error, 2 the user's input, 130 Ctrl-C."""
     try:
-        result = app(arguments, standalone_mode=False)
+        result = app(arguments, prog_name="foretwin", standalone_mode=False)
+        with contextlib.suppress(BrokenPipeError):  # whoever read it has seen enough
+            sys.stdout.flush()
     except (UserError, *PATH_ERRORS) as error:
-        print(f"foretwin: {_one_line(error)}", file=sys.stderr)
+        print(f"foretwin: {one_line(error)}", file=sys.stderr)
+        return EXIT_USER
+    except OSError as error:
+        if error.errno not in NO_PLACE:
+            return report(error)
+        print(f"foretwin: {one_line(error)}", file=sys.stderr)
+        drop_output()
         return EXIT_USER
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
     except Exception as error:
-        return _report(error)
+        if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # of typer's own
+            if line := usage_line(error, arguments):
+                print(line, file=sys.stderr)
+            return int(error.exit_code)
+        return report(error)
     if result == EXIT_INTERRUPTED:  # as typer, too, answers Ctrl-C
         print("foretwin: interrupted", file=sys.stderr)
     return result if isinstance(result, int) else 0
-
-
-def _report(error: Exception) -> int:
-    """Say an unexpected error in one line; the traceback goes to a file."""
-    if hasattr(error, "show") and hasattr(error, "exit_code"):  # the command line's own errors
-        error.show()
-        return int(error.exit_code)
-    import tempfile
-    import traceback
-
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="foretwin-", suffix=".log", delete=False, encoding="utf-8"
-    ) as file:
-        traceback.print_exception(error, file=file)
-    print(
-        f"foretwin: internal error: {type(error).__name__}: {_one_line(error)} "
-        f"(traceback in {file.name})",
-        file=sys.stderr,
-    )
-    return EXIT_INTERNAL
-
-
-def _one_line(error: BaseException) -> str:
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.filename}: {error.strerror.lower()}"
-    return " ".join(str(error).split())
