@@ -13,6 +13,7 @@ from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
 from foretwin.orchestrator.commands.progress_bar import progress_bar
@@ -108,8 +109,8 @@ def report_gap(
 ) -> None:
     """Print the gap of a recorded drive; with `out` also write its plots there."""
     parameters = load_vehicle(vehicle)
-    if out is not None and out.exists() and not out.is_dir():
-        raise UserError(f"{out}: is no folder")
+    if out is not None and (trouble := trouble_with_folder(out)) is not None:
+        raise UserError(f"--out {out}: {trouble}")
     log = open_log(recording, declaration=declaration)
     report = gap_of(log, parameters, name=str(recording), progress=True)
     plots: list[Path] = []

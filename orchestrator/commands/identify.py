@@ -14,6 +14,7 @@ import numpy as np
 from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.tuning import Identification
 from foretwin.orchestrator.commands.output import print_json
 from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
@@ -53,6 +54,8 @@ def identify_log(
 
     Returns the exit code, 0.
     """
+    if out is not None and (trouble := trouble_with_folder(out)) is not None:
+        raise UserError(f"--out {out}: {trouble}")
     vehicle = load_vehicle(vehicle_file)
     record, vehicle_id = read_record(log_file)
     told = identify(record, vehicle, vehicle_id=vehicle_id)

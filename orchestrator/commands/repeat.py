@@ -9,6 +9,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.orchestrator.record.job_tables import REPEATED
 from foretwin.orchestrator.record.recorded_jobs import RecordedFuture, recorded_future
 from foretwin.sim_worker.futures.future_rows import future_rows
@@ -27,6 +28,9 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
     where it cannot be repeated.
     """
     recorded = recorded_future(folder, future_id)
+    pictures = folder / REPEATED
+    if view and (trouble := trouble_with_folder(pictures)) is not None:
+        raise UserError(f"--view {pictures}: {trouble}")
     before = recorded.row.trajectory_sha256
     if before is None:
         reason = recorded.row.failure or recorded.row.left_out or "its row does not say why"
@@ -42,7 +46,7 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
     if view and after is not None:
         from foretwin.sim_worker.futures.future_picture import write_future_picture
 
-        picture = folder / REPEATED / f"{future_id}.png"
+        picture = pictures / f"{future_id}.png"
         index = result.future_indices.index(recorded.row.index)
         write_future_picture(picture, recorded.job, result, index, recorded.world, recorded.vehicle)
         print(picture)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.world_files import write_each, write_report
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
@@ -209,18 +209,12 @@ def _check_out(out: Path, *, many: bool) -> None:
     if many:
         if out.exists() and not out.is_dir():
             raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
-        _check_writable(out, next(path for path in (out, *out.parents) if path.exists()))
+        if (trouble := trouble_with_folder(out)) is not None:
+            raise UserError(f"--out {out}: {trouble}")
         return
     if out.is_dir():
         raise UserError(f"--out {out}: is a folder; name the file to write")
     if not out.parent.is_dir():
         raise UserError(f"--out {out}: folder {out.parent} does not exist")
-    _check_writable(out, out.parent)
-
-
-def _check_writable(out: Path, folder: Path) -> None:
-    """Refuse before the map is read, which may take long; UserError says what stands there."""
-    if not folder.is_dir():
-        raise UserError(f"--out {out}: {folder} is no folder")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise UserError(f"--out {out}: folder {folder} cannot be written to")
+    if (trouble := trouble_with_folder(out.parent)) is not None:
+        raise UserError(f"--out {out}: {trouble}")

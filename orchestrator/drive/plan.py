@@ -13,6 +13,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
@@ -49,6 +50,9 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     except ValueError as error:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins
+    for name, folder in (("--out", config.out), ("cache_dir", config.cache_dir)):
+        if folder is not None and (trouble := trouble_with_folder(Path(folder))) is not None:
+            raise ConfigError(f"{name} {folder}: {trouble}")
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))

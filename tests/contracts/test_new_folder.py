@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.contracts.new_folder import new_folder
+from foretwin.contracts.new_folder import new_folder, trouble_with_folder
 
 
 def half_made(folder: Path, *, file: str = "") -> None:
@@ -35,3 +35,12 @@ def test_folders_that_were_there_or_that_hold_something_stay(tmp_path: Path) -> 
             half_made(folder, file=file)
     assert (tmp_path / "a").is_dir()
     assert (tmp_path / "b" / "precious").is_file()
+
+
+def test_what_stands_in_a_folders_way_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    assert trouble_with_folder(tmp_path) is None
+    assert trouble_with_folder(tmp_path / "a" / "b") is None
+    assert trouble_with_folder(file) == "is no folder"
+    assert trouble_with_folder(file / "a" / "b") == f"{file} is no folder"

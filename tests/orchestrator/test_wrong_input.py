@@ -132,3 +132,14 @@ def test_the_embedded_route_is_listed_in_driving_order(
     assert code == 0
     kinds = [line.split('"')[3] for line in listed.splitlines() if '"kind"' in line]
     assert kinds == ["t_junction", "roundabout", "crossing", "crossing"]
+
+
+def test_folders_that_are_files_are_told_before_anything_begins(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, config = tmp_path / "text.txt", tmp_path / "drive.toml"
+    file.write_text("precious")
+    config.write_text(f'cache_dir = "{file}"\n')
+    refused(["--config", str(config)], "cache_dir", tmp_path, capsys)
+    assert run(["drive", "--view", "none", "--out", str(file / "a")]) == 2
+    assert capsys.readouterr().err == f"foretwin: --out {file / 'a'}: {file} is no folder\n"

@@ -118,6 +118,14 @@ def test_what_is_no_drive_is_said_in_one_line(
     assert told in line
 
 
+def test_a_file_in_the_place_of_the_folder_is_said_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert run(["identify", "none.mcap", "--out", str(tmp_path / "file")]) == 2
+    assert capsys.readouterr().err == f"foretwin: --out {tmp_path / 'file'}: is no folder\n"
+
+
 def test_an_unknown_vehicle_is_said_in_one_line(
     log_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,7 +14,7 @@ import pytest
 from foretwin.contracts.codec import write_message
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep
-from foretwin.orchestrator.record.job_tables import JOB_TABLES
+from foretwin.orchestrator.record.job_tables import JOB_TABLES, REPEATED
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
@@ -82,6 +82,18 @@ def _rewritten(folder: Path, table: str, metadata: dict[str, str], **columns: An
         name = "futures" if table == "rows" else table
         schema = JOB_TABLES[name].with_metadata(said)
         pq.write_table(type(old).from_pylist(rows, schema=schema), part)
+
+
+def test_a_file_where_pictures_belong_is_told_before_it_is_played(
+    copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.rmtree(copied / REPEATED, ignore_errors=True)
+    (copied / REPEATED).touch()
+    future = _rows(copied)[0]["future_id"]
+    assert run(["repeat", str(copied), future, "--view"]) == 2
+    said = capsys.readouterr()
+    assert said.err == f"foretwin: --view {copied / REPEATED}: is no folder\n"
+    assert said.out == ""
 
 
 def test_what_comes_to_something_else_is_3(copied: Path) -> None:
