@@ -150,13 +150,22 @@ def world(
         ),
     ] = None,
     radius_m: Annotated[float, typer.Option("--radius", help="metres around the junction")] = 150.0,
-    opendrive_version: Annotated[str, typer.Option(help="1.8, or 1.4 for CARLA")] = "1.8",
+    opendrive_version: Annotated[
+        str | None, typer.Option(help="opendrive: 1.8, or 1.4 for CARLA [default: 1.8]")
+    ] = None,
     simulator: Annotated[
-        str, typer.Option(help="sdf: classic (Gazebo Classic with ROS 2) or gazebo (gz-sim)")
-    ] = "classic",
+        str | None,
+        typer.Option(
+            help="sdf: classic (Gazebo Classic with ROS 2) or gazebo (gz-sim) [default: classic]"
+        ),
+    ] = None,
     vehicles: Annotated[
-        str, typer.Option(help="sdf: NAME:KIND,… (twin, shadow, ghost), or none")
-    ] = "twin:twin,shadow:shadow,ghost:ghost",
+        str | None,
+        typer.Option(
+            help="sdf: NAME:KIND,… (twin, shadow, ghost), or none "
+            "[default: twin:twin,shadow:shadow,ghost:ghost]"
+        ),
+    ] = None,
     vehicle: Annotated[Path | None, typer.Option(help="sdf: vehicle parameters, TOML")] = None,
     report: Annotated[
         bool, typer.Option("--report", help="also say what was tagged and what was guessed")

@@ -31,6 +31,7 @@ from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
+DEFAULT_VEHICLES = "twin:twin,shadow:shadow,ghost:ghost"
 _Word = TypeVar("_Word", bound=str)
 
 
@@ -49,9 +50,9 @@ class WorldRequest:
     file_format: str | None = None
     """None goes by the suffix of `out`."""
     radius_m: float = 150.0
-    opendrive_version: str = "1.8"
-    simulator: str = "classic"
-    vehicles: str = "twin:twin,shadow:shadow,ghost:ghost"
+    opendrive_version: str | None = None
+    simulator: str | None = None
+    vehicles: str | None = None
     vehicle: Path | None = None
     report: bool = False
 
@@ -154,7 +155,7 @@ def _format(name: str | None, file: Path | None) -> Format:
     """Return the format that was named or that the file's suffix says; in a folder, the default."""
     if name is not None and name not in FORMATS:
         raise UserError(f"--format {name}: one of {', '.join(FORMATS)}")
-    if file is None or (name is None and not file.suffix):
+    if file is None:
         return FORMATS[name or DEFAULT_FORMAT]
     said = formats_by_suffix(file.suffix)
     if name is None and not said:
@@ -167,11 +168,27 @@ def _format(name: str | None, file: Path | None) -> Format:
 
 
 def _options(request: WorldRequest, format_: Format) -> ExportOptions:
+    given = {
+        "--opendrive-version": (request.opendrive_version, "opendrive"),
+        "--simulator": (request.simulator, "sdf"),
+        "--vehicles": (request.vehicles, "sdf"),
+        "--vehicle": (request.vehicle, "sdf"),
+    }
+    for option, (value, only) in given.items():
+        if value is not None and format_.name != only:
+            raise UserError(
+                f"{option} {value}: goes with the format {only} alone; {request.out} is written "
+                f"as {format_.name}"
+            )
     version = _one_of("--opendrive-version", request.opendrive_version, OPENDRIVE_VERSIONS)
     simulator = _one_of("--simulator", request.simulator, SIMULATORS)
-    vehicles = _vehicles(request.vehicles)
-    if format_.name != "sdf" or not vehicles:
-        return ExportOptions(opendrive_version=version, simulator=simulator)
+    vehicles = _vehicles(DEFAULT_VEHICLES if request.vehicles is None else request.vehicles)
+    if format_.name != "sdf":
+        return ExportOptions(opendrive_version=version)
+    if not vehicles:
+        if request.vehicle is not None:
+            raise UserError(f"--vehicle {request.vehicle}: there is none, by --vehicles none")
+        return ExportOptions(simulator=simulator)
     from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
     return ExportOptions(
@@ -179,9 +196,10 @@ def _options(request: WorldRequest, format_: Format) -> ExportOptions:
     )
 
 
-def _one_of(option: str, word: str, choices: tuple[_Word, ...]) -> _Word:
+def _one_of(option: str, word: str | None, choices: tuple[_Word, ...]) -> _Word:
+    """Return the choice that was named, the first where none was."""
     for choice in choices:
-        if choice == word:
+        if word in (None, choice):
             return choice
     raise UserError(f"{option} {word}: one of {', '.join(choices)}")
 
@@ -209,6 +227,11 @@ def _check_out(out: Path, *, many: bool) -> None:
     if many:
         if out.exists() and not out.is_dir():
             raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
+        if not out.exists() and formats_by_suffix(out.suffix):
+            raise UserError(
+                f"--out {out}: is named as a file; --all and --route write into a folder, in the "
+                "format that --format names"
+            )
         if (trouble := trouble_with_folder(out)) is not None:
             raise UserError(f"--out {out}: {trouble}")
         return

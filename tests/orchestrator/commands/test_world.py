@@ -40,7 +40,7 @@ def a_junction() -> str:
 
 
 HOLDS = {
-    ".xml": b"<mujoco", "": b"<mujoco", ".sdf": b"<sdf", ".xodr": b"<OpenDRIVE", ".osm": b"<osm",
+    ".xml": b"<mujoco", ".sdf": b"<sdf", ".xodr": b"<OpenDRIVE", ".osm": b"<osm",
     ".geojson": b"FeatureCollection", ".svg": b"<svg", ".png": b"PNG", ".PNG": b"PNG",
 }  # fmt: skip
 

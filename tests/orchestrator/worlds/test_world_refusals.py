@@ -39,6 +39,15 @@ WRONG = [
     (["--all", "--format", "sdf", "--vehicles", "a:twin,a:ghost"], "a name of its own"),
     (["--all", "--format", "sdf", "--vehicle", "no.toml"], "no.toml"),
     (["--route", "no.gpx"], "no.gpx"),
+    (["--id", "n4", "--simulator", "gazebo"], "--simulator gazebo: goes with the format sdf alone"),
+    (["--id", "n4", "--vehicles", "none"], "world.xml is written as mjcf"),
+    (["--id", "n4", "--vehicle", "bmw_320i"], "--vehicle bmw_320i: goes with the format sdf"),
+    (["--id", "n4", "--opendrive-version", "1.4"], "goes with the format opendrive alone"),
+    (
+        ["--all", "--format", "sdf", "--vehicles", "none", "--vehicle", "bmw_320i"],
+        "--vehicle bmw_320i: there is none, by --vehicles none",
+    ),
+    (["--all", "--format", "sdf", "--vehicles", ""], "none, or NAME:KIND"),
 ]
 
 
@@ -46,7 +55,8 @@ WRONG = [
 def test_what_cannot_be_meant_is_named_in_one_line(
     arguments: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = run(["world", MAP, *arguments, "--out", str(tmp_path / "world")])
+    out = "world" if {"--all", "--route"} & set(arguments) else "world.xml"
+    code = run(["world", MAP, *arguments, "--out", str(tmp_path / out)])
     error = capsys.readouterr().err.strip()
     assert code == 2, error
     assert "\n" not in error
@@ -66,6 +76,8 @@ def test_an_output_that_cannot_be_is_named(
         (["--at", "45,-30", "--format", "mjcf", "--out", str(tmp_path / "w.png")], "ends in .xml"),
         (["--at", "45,-30", "--format", "sdf", "--out", str(tmp_path / "w.OSM")], "ends in .sdf"),
         (["--at", "45,-30", "--out", str(tmp_path / "w.gltf")], "ends in none of .xml, .sdf, "),
+        (["--at", "45,-30", "--out", str(tmp_path / "w")], "ends in none of .xml, .sdf, "),
+        (["--all", "--out", str(tmp_path / "w.xodr")], "w.xodr: is named as a file"),
         (["--all", "--out", str(file / "worlds")], "is no folder"),
     ):
         assert run(["world", MAP, *arguments]) == 2
