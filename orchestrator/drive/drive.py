@@ -24,7 +24,7 @@ from foretwin.orchestrator.drive.lock_step import LockStepLoop
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
-from foretwin.orchestrator.drive.progress import ProgressLine
+from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
 from foretwin.orchestrator.drive.run_record import reserve_record, run_record, write_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
@@ -141,6 +141,8 @@ class _Drive:
         reserve_record(self._plan, self._plan.folder / "run.json")
         self._start_processes()
         conductor.rounds.draw_cases()  # while they come up
+        if self._plan.config.resolved_source == "live":
+            line.say(waiting_text(self._plan))
         if not self._join_processes(bus, conductor):
             return "interrupted", EXIT_INTERRUPTED
         prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)

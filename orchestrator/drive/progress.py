@@ -9,9 +9,11 @@ from typing import Literal
 from rich.console import Console
 from rich.status import Status
 
+from foretwin.contracts.keys import key
 from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission
+from foretwin.orchestrator.plan import DrivePlan
 
 PERIOD_S = 0.25
 PLAIN_PERIOD_S = 10.0
@@ -121,3 +123,13 @@ class ProgressLine:
             f"missed {conductor.missed_rounds}  "
             f"dropped {progress.dropped}"
         )
+
+
+def waiting_text(plan: DrivePlan) -> str:
+    """Return what a drive with a live car waits for, and where that has to arrive."""
+    vehicle_id, endpoint = plan.config.vehicle_id, plan.bus.endpoint
+    if plan.ros2 is None:
+        keys = key("gnss", vehicle=vehicle_id).removesuffix("gnss") + "…"
+        return f"waiting for a live car: its telemetry as {keys} on {endpoint}"
+    where = plan.ros2.mapping.endpoint or endpoint
+    return f"waiting for a live car: the ROS 2 topics of {plan.ros2.name} on {where}"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.simulation import Event
-from foretwin.orchestrator.drive.progress import ProgressLine
+from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
 from foretwin.orchestrator.rounds.pace import Pace
+from foretwin.telemetry.ros2.mapping import read_mapping
 from tests.orchestrator.house import House
 
 
@@ -126,3 +128,13 @@ def test_the_line_says_what_a_slow_machine_leaves_out(
 
     assert said == ["", "3 of 6 futures", "1 of 6 futures in 1 of 4 rounds"]
     assert "  3 of 6 futures (machine too slow for all)  " in capsys.readouterr().err
+
+
+def test_who_waits_for_a_live_car_says_for_what_and_where(house: House) -> None:
+    where = house.plan.bus.endpoint
+    said = waiting_text(house.plan)
+    vehicle = house.plan.config.vehicle_id
+    assert said.startswith("waiting for a live car: its telemetry as ")
+    assert said.endswith(f"/vehicle/{vehicle}/telemetry/… on {where}")
+    by_ros2 = replace(house.plan, ros2=read_mapping(Path("autoware")))
+    assert "the ROS 2 topics of " in waiting_text(by_ros2)
