@@ -53,8 +53,7 @@ def difference_of(before: JudgedRun, after: JudgedRun) -> dict[str, Any]:
 def difference_lines(found: dict[str, Any]) -> list[str]:
     """Return the difference for people."""
     lines = [
-        f"{side}: {found[side]['run']} (map {found[side]['map']}{_worlds(found[side])})"
-        for side in ("before", "after")
+        f"{side}: {found[side]['run']} ({_inputs(found[side])})" for side in ("before", "after")
     ]
     apart = found["disagreements"]
     lines.append(
@@ -93,8 +92,9 @@ def difference_lines(found: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _worlds(run: dict[str, Any]) -> str:
-    return f", Worlds of {run['worlds']}" if run.get("worlds") else ""
+def _inputs(run: dict[str, Any]) -> str:
+    named = {"map": run["map"], "vehicle": run.get("vehicle"), "Worlds of": run.get("worlds")}
+    return ", ".join(f"{what} {given}" for what, given in named.items() if given)
 
 
 def _run_of(run: JudgedRun) -> dict[str, Any]:

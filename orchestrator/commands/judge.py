@@ -44,6 +44,10 @@ def judge(
     """
     record = _record(run)
     again = _again(run, record, out=out or run / JUDGED)
+    if map_file is None and vehicle is None and worlds is None:
+        raise UserError(
+            f"judge {run}: name what is corrected, by --map FILE, --vehicle FILE or --worlds FOLDER"
+        )
     corrected = msgspec.structs.replace(
         again,
         map=again.map if map_file is None else str(map_file),

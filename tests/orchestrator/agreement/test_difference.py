@@ -84,3 +84,12 @@ def test_runs_without_rounds_or_plans_are_compared_as_far_as_they_go() -> None:
     assert found["agreement"]["before"] is None
     assert len(found["disagreements"]["new"]) == 1
     assert difference_lines(found)
+
+
+def test_each_side_names_what_it_was_driven_with() -> None:
+    before, after = run("a", [], []), run("b", [], [])
+    after.record["config"] |= {"vehicle": "car.toml", "worlds": "corrected"}
+    assert difference_lines(difference_of(before, after))[:2] == [
+        "before: a (map a.osm)",
+        "after: b (map b.osm, vehicle car.toml, Worlds of corrected)",
+    ]

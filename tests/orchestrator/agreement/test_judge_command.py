@@ -54,6 +54,17 @@ def test_a_folder_that_is_no_run_is_told_in_one_line(
     assert "\n" not in told
 
 
+def test_a_judgement_without_a_correction_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = DriveConfig(workers=100_000)  # of a larger machine, which is no reason to refuse
+    record = {"config": msgspec.to_builtins(config), "map": {"file": str(MAP_FILE)}}
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    (tmp_path / "drive.mcap").write_bytes(b"")
+    assert run(["judge", str(tmp_path)]) == 2
+    assert "name what is corrected, by --map FILE" in capsys.readouterr().err
+
+
 def test_a_world_beside_the_way_is_told_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -102,9 +113,10 @@ def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path:
     corrected = tmp_path / "corrected.osm"
     corrected.write_text(with_stop_sign(), encoding="utf-8")
     answers = []
-    for options in (("--map", str(corrected)), ()):
+    for map_file in (corrected, MAP_FILE):
         done = subprocess.run(
-            [sys.executable, "-P", "-m", "foretwin", "judge", str(run), "--json", *options],
+            [sys.executable, "-P", "-m", "foretwin", "judge", str(run), "--json",
+             "--map", str(map_file)],
             env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
             check=False,
         )  # fmt: skip
@@ -115,7 +127,7 @@ def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path:
     for one in changed["outcomes"]:
         assert "stop_line" not in one["before"]["observable"]
         assert one["after"]["driven_fails"] == "stop_line"
-    # Nothing corrected, nothing changes: the recorded drive is the drive.
+    # By its own map nothing changes: the recorded drive is the drive.
     assert same["outcomes"] == []
     assert same["gap"]["nominal_ade_m"]["before"] == same["gap"]["nominal_ade_m"]["after"]
 
