@@ -48,6 +48,8 @@ def source_digest(spec: SweepSpec) -> str:
     """
     if spec.map is not None:
         path = Path(spec.map)
+        if path.is_dir():
+            raise UserError(f"map {path}: is a folder, not a file")
         if not path.is_file():
             raise FileNotFoundError(f"map {path}: no such file")
         return _digest(path)

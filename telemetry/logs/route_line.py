@@ -33,6 +33,8 @@ def read_line(path: Path) -> RouteLine:
     a missing file and LogError for a file without such a line of two positions or more.
     """
     file, index = _file_and_index(Path(path))
+    if file.is_dir():
+        raise LogError(f"{file}: is a folder, not a file")
     if not file.is_file():
         raise FileNotFoundError(f"{file}: no such file")
     if file.suffix.lower() == ".gpx":

@@ -139,6 +139,8 @@ def test_smartloc_counts_what_it_cannot_use(tmp_path: Path) -> None:
 def test_files_that_are_no_log(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"missing\.gpx: no such file"):
         open_log(tmp_path / "missing.gpx")
+    with pytest.raises(LogError, match="is a folder, not a file"):
+        read_line(tmp_path)
     with pytest.raises(LogError, match="no comma2k19 segment"):
         open_log(tmp_path)
     with pytest.raises(LogError, match="is empty"):

@@ -43,8 +43,9 @@ def format_of(path: Path, head: bytes) -> str:
 
 def unreadable(path: Path, error: BaseException) -> MapError:
     """Return the error of a damaged file, in one line."""
-    reason = " ".join(str(error).split())
-    return MapError(f"{path}: not a readable OSM file: {reason}")
+    # zlib and bzip2 may give no reason after their colon.
+    reason = " ".join(str(error).split()).rstrip(":")
+    return MapError(f"{path}: not a readable OSM file, cut off or damaged: {reason}")
 
 
 def file_fault(path: Path, error: OSError) -> MapError:

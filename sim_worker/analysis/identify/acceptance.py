@@ -17,6 +17,7 @@ from foretwin.contracts.tuning import (
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
 
 HALF_OF_95 = 1.96
 """Standard deviations to either side that hold 95 % of a Gaussian."""
@@ -121,7 +122,7 @@ def in_force(vehicle: VehicleParameters, name: str) -> float:
         return understeer_gradient(vehicle)
     parameter = getattr(vehicle, name, None)
     if not isinstance(parameter, Parameter):
-        raise UserError(f"{name} is no parameter of a vehicle")
+        raise UserError(f"{name} is no parameter of a vehicle; known: {', '.join(PLAUSIBLE)}")
     return float(parameter.value)
 
 

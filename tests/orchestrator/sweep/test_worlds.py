@@ -74,6 +74,11 @@ def test_what_is_not_there_is_named(tmp_path: Path) -> None:
         choose_worlds(spec)
 
 
+def test_a_folder_is_no_map(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="is a folder, not a file"):
+        source_digest(SweepSpec(map=str(tmp_path)))
+
+
 def test_worlds_of_a_folder_are_copied_under_the_ids_of_their_content(tmp_path: Path) -> None:
     drawn, out = tmp_path / "drawn", tmp_path / "out"
     drawn.mkdir()

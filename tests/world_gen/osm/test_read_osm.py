@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
 
 import osmium
@@ -150,6 +151,18 @@ def test_what_is_no_map_says_so_in_one_line(content: bytes, complaint: str, tmp_
     message = str(caught.value)
     assert message.startswith(str(path))
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("pack", [gzip.compress, bz2.compress])
+def test_a_packing_that_was_cut_off_is_said_to_be_so(
+    pack: Callable[[bytes], bytes], street: Sketch, tmp_path: Path
+) -> None:
+    packed = pack(street.xml().encode())
+    file = tmp_path / "cut.osm"
+    file.write_bytes(packed[: len(packed) // 2])
+    with pytest.raises(MapError, match=r"cut off or damaged: [^:]*[a-z]") as caught:
+        read_map(file)
+    assert not str(caught.value).endswith(":")
 
 
 def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
