@@ -22,7 +22,7 @@ from foretwin.orchestrator.drive.intake import unannounced
 from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.lock_step import LockStepLoop
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, open_bus, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
 from foretwin.orchestrator.drive.run_record import reserve_record, run_record, write_record
@@ -110,7 +110,7 @@ class _Drive:
         plan = self._plan
         started_s = time.monotonic()
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
-        with ZenohBus(plan.bus, router=True) as bus:
+        with open_bus(plan) as bus:
             tables = ResultTables(
                 plan.folder / "results",
                 {

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -143,3 +146,18 @@ def test_folders_that_are_files_are_told_before_anything_begins(
     refused(["--config", str(config)], "cache_dir", tmp_path, capsys)
     assert run(["drive", "--view", "none", "--out", str(file / "a")]) == 2
     assert capsys.readouterr().err == f"foretwin: --out {file / 'a'}: {file} is no folder\n"
+
+
+def test_an_endpoint_that_is_taken_is_told_and_leaves_no_run(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        endpoint = f"tcp/127.0.0.1:{other.getsockname()[1]}"
+        (tmp_path / "drive.toml").write_text(f'endpoint = "{endpoint}"\n')
+        ended = subprocess.run(
+            [sys.executable, "-P", "-m", "foretwin", "drive", "--view", "none",
+             "--config", "drive.toml"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    assert ended.returncode == 2
+    assert ended.stderr.startswith(f"foretwin: endpoint {endpoint}: cannot be listened on here")
+    assert ended.stderr.count("\n") == 1
+    assert list((tmp_path / "runs").iterdir()) == []
