@@ -28,6 +28,6 @@ def trouble_with_workers(workers: int) -> str | None:
     if 1 <= workers <= most_workers():
         return None
     return (
-        f"--workers {workers}: 1 to {most_workers()}, at most {_PER_PROCESSOR} a processor "
-        f"or {_LEAST_BOUND}"
+        f"--workers {workers}: 1 to {most_workers()} here, {_PER_PROCESSOR} a processor and never "
+        f"fewer than {_LEAST_BOUND}"
     )

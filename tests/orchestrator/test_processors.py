@@ -17,7 +17,7 @@ def test_workers_are_bounded_by_processors(
     assert most_workers() == most
     assert trouble_with_workers(1) is None is trouble_with_workers(most)
     for wrong in (0, most + 1):
-        said = f"--workers {wrong}: 1 to {most}, at most 4 a processor or 16"
+        said = f"--workers {wrong}: 1 to {most} here, 4 a processor and never fewer than 16"
         assert trouble_with_workers(wrong) == said
 
 
