@@ -21,9 +21,11 @@ from typing import TypeVar
 
 import msgspec
 
-from foretwin.contracts.bus import Alive, Bus, Mailbox, ZenohBus
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup, read_setup
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
@@ -75,6 +77,7 @@ class ProcessLife:
         self._mono_s = mono_s
         self._parent = os.getppid()
         self._mailbox = Mailbox(16)
+        self._refusals = Refusals()
         self._orchestrator_seen = False
         self._gone_since_s: float | None = None
         self.run_ended = False
@@ -106,14 +109,23 @@ class ProcessLife:
 
     def _look(self) -> None:
         while (item := self._mailbox.take()) is not None:
-            if not isinstance(item, Alive):
-                self.run_ended = True
-                self.terminated.set()
-            elif item.up:
+            if isinstance(item, Received):
+                self._take_end(item)
+            elif isinstance(item, Alive) and item.up:
                 self._orchestrator_seen = True
                 self._gone_since_s = None
-            elif self._orchestrator_seen:
+            elif isinstance(item, Alive) and self._orchestrator_seen:
                 self._gone_since_s = self._mono_s()
+
+    def _take_end(self, item: Received) -> None:
+        try:
+            item.message()
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                logging.getLogger(self._setup.process_id).warning("%s", text)
+            return
+        self.run_ended = True
+        self.terminated.set()
 
 
 def run_process(

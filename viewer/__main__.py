@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, ask
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.live_viewer import (
@@ -66,6 +68,7 @@ class Recorder:
     ) -> None:
         self._messages = messages
         self._reported_dropped = 0
+        self._refusals = Refusals()
         self._reported_window = False
         self._flushed_s = time.monotonic()
         self._monitor = Monitor(
@@ -97,8 +100,9 @@ class Recorder:
         if isinstance(item, Received):
             try:
                 rows = self._monitor.handle(item.channel, item.message())
-            except ValueError as problem:
-                rows = self._monitor.note("error", str(problem))
+            except Refused as refused:
+                text = self._refusals.take(refused)
+                rows = self._monitor.note("error", text) if text else []
             self._write(rows)
         if time.monotonic() - self._flushed_s > FLUSH_PERIOD_S:
             self._report_troubles()

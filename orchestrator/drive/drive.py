@@ -93,6 +93,7 @@ class _Drive:
         self._interrupt = _Interrupt()
         self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
         self._vehicle_lost = False
+        self._failed_at_end = False
         self._given_up: set[str] = set()
         self._seen_alive: set[str] = set()
         self._silent_since_s: dict[str, float] = {}
@@ -133,7 +134,7 @@ class _Drive:
                     raise
                 finally:
                     self._end(bus, conductor, line, exit_word, started_s)
-        return code
+        return EXIT_FAILED if self._failed_at_end else code
 
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
@@ -265,8 +266,14 @@ class _Drive:
         killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s)
         if killed:
             log.warning("had to kill %s", ", ".join(killed))
-        while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
-            conductor.handle(item)
+        try:
+            while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
+                conductor.handle(item)
+        except Exception:
+            # An error of ours: what was found until here is written all the same.
+            log.exception("the last messages could not be taken")
+            exit_word = "failed"
+            self._failed_at_end = True
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()
         conductor.route.close()

@@ -65,6 +65,7 @@ def run_record(
             "failed_jobs": conductor.rounds.failed_jobs,
             "given_up_rounds": conductor.rounds.open.given_up,
         },
+        "refused": conductor.refusals.record(),
         "troubles": [conductor.tables.failed] if conductor.tables.failed else [],
         "off_road": [
             {

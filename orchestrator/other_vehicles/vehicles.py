@@ -86,7 +86,8 @@ class OtherVehicleFeed:
         bus.request("info", InfoRequest(), mailbox, tag=vehicle_id, vehicle=vehicle_id)
 
     def take_sample(self, vehicle_id: str, item: Received) -> None:
-        """Take a sample of a vehicle on the bus."""
+        """Take a sample of a vehicle on the bus; raises Refused for what the guard keeps out."""
+        item.message()
         source = self._sources.get(vehicle_id)
         if isinstance(source, LiveVehicle):
             source.take(item)

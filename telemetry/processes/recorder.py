@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.sequence_gaps import SequenceGaps
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.telemetry.logs.write_mcap import create
@@ -67,9 +69,8 @@ class RecorderProcess:
         # Apart, so that a flood of samples never drops an answer.
         self._answers = Mailbox(64)
         self._reported_lost = 0
-        self._unreadable = 0
-        self._lost = 0
-        self._next_seq: dict[str, int] = {}
+        self._refusals = Refusals()
+        self._gaps = SequenceGaps()
         self._asked_s: float | None = None
         self._informed = False
         self._flushed_s = mono_s()
@@ -119,9 +120,9 @@ class RecorderProcess:
             dict(self._recording.counts),
             self._recording.unwritten,
             dict(self._recording.refused),
-            self._lost,
+            self._gaps.lost,
             self._messages.dropped,
-            self._unreadable,
+            len(self._refusals),
             left,
         )
 
@@ -137,13 +138,15 @@ class RecorderProcess:
 
     def _write(self, item: Received) -> None:
         try:
-            seq, _, message = item.envelope()
-        except SchemaMismatch as problem:
-            self._unreadable += 1
-            log.warning("%s", problem)
+            envelope = item.envelope()
+        except Refused as refused:
+            if refused.header is not None:
+                self._gaps.take(item.key, refused.header.seq, sent_ns=refused.header.sent_ns)
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
             return
-        self._lost += max(0, seq - self._next_seq.get(item.key, seq))
-        self._next_seq[item.key] = seq + 1
+        self._gaps.take(item.key, envelope.seq, sent_ns=envelope.sent_ns)
+        message = envelope.message
         self._stamp_ns = message.stamp_ns
         self._publish(self._recording.add(item.channel, message))
 
@@ -165,10 +168,10 @@ class RecorderProcess:
         # Gaps in the sequence count what the mailbox dropped, and what the bus lost before it.
         # On a busy machine more are lost every second: told when there are twice as many.
         enough = self._reported_lost if at_the_end else 2 * self._reported_lost
-        if self._lost > enough:
-            self._reported_lost = self._lost
+        if self._gaps.lost > enough:
+            self._reported_lost = self._gaps.lost
             text = (
-                f"{self._lost} messages are missing in the recording so far"
+                f"{self._gaps.lost} messages are missing in the recording so far"
                 f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"
             )
             log.warning(text)
