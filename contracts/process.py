@@ -27,6 +27,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup, read_setup
+from foretwin.contracts.terminal import say
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
 
@@ -155,7 +156,7 @@ def run_process(
             serve(setup, bus, life)
     except (UserError, OSError) as problem:
         logging.getLogger(setup.process_id).exception("%s", problem)
-        print(f"{setup.process_id}: {problem}", file=sys.stderr)
+        say(f"{setup.process_id}: {problem}", error=True)
         code = 2
     except Exception:
         logging.getLogger(setup.process_id).exception("ended by an error")

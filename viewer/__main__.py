@@ -18,6 +18,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ViewerSetup
+from foretwin.contracts.terminal import say
 from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.live_viewer import (
     HOST,
@@ -206,7 +207,7 @@ def main(arguments: list[str] | None = None) -> int:
         # Leaves through os._exit: Rerun's flush at exit never ends with a frozen viewer.
         run_process(ViewerSetup, serve, ["--setup", str(given.setup)])
     except (OSError, ValueError) as problem:
-        print(f"viewer: {problem}", file=sys.stderr)
+        say(f"viewer: {problem}", error=True)
         return 2
     return 1
 

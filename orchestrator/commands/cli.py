@@ -11,6 +11,7 @@ import typer
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge, repeat
 from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
@@ -261,12 +262,12 @@ def run(arguments: list[str]) -> int:
         with contextlib.suppress(BrokenPipeError):  # whoever read it has seen enough
             sys.stdout.flush()
     except (UserError, *PATH_ERRORS) as error:
-        print(f"foretwin: {one_line(error)}", file=sys.stderr)
+        say(f"foretwin: {one_line(error)}", error=True)
         return EXIT_USER
     except OSError as error:
         if error.errno not in NO_PLACE:
             return report(error)
-        print(f"foretwin: {one_line(error)}", file=sys.stderr)
+        say(f"foretwin: {one_line(error)}", error=True)
         drop_output()
         return EXIT_USER
     except (KeyboardInterrupt, typer.Abort):
@@ -274,9 +275,9 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # of typer's own
             if line := usage_line(error, arguments):
-                print(line, file=sys.stderr)
+                say(line, error=True)
             return int(error.exit_code)
         return report(error)
     if result == EXIT_INTERRUPTED:  # as typer, too, answers Ctrl-C
-        print("foretwin: interrupted", file=sys.stderr)
+        say("foretwin: interrupted", error=True)
     return result if isinstance(result, int) else 0

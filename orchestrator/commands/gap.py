@@ -14,6 +14,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
 from foretwin.orchestrator.commands.progress_bar import progress_bar
@@ -122,11 +123,11 @@ def report_gap(
             report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
         )
     if as_json:
-        print(json.dumps(as_object(report), indent=2))
+        say(json.dumps(as_object(report), indent=2))
         return
-    print("\n".join(_lines(report)))
+    say("\n".join(_lines(report)))
     for plot in plots:
-        print(f"wrote {plot}")
+        say(f"wrote {plot}")
 
 
 def as_object(report: GapReport) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import datetime
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import msgspec
 
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
 from foretwin.orchestrator.config import DriveConfig
@@ -69,9 +69,9 @@ def judge(
         return code
     found = difference_of(read_judged(before), read_judged(after))
     if as_json:
-        print(json.dumps(found, indent=2, ensure_ascii=False))
+        say(json.dumps(found, indent=2, ensure_ascii=False))
     else:
-        print("\n".join(difference_lines(found)))
+        say("\n".join(difference_lines(found)))
     return 0
 
 
@@ -137,4 +137,4 @@ def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+    say(text, error=True)
