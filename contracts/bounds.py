@@ -125,7 +125,7 @@ ALL_OR_NONE: dict[type[msgspec.Struct], tuple[str, ...]] = {
 """Fields that are None together, or none of them is."""
 
 
-class Between(NamedTuple):
+class Within(NamedTuple):
     """A range, both ends included."""
 
     low: float
@@ -133,9 +133,9 @@ class Between(NamedTuple):
 
 
 ROAD_USER = {
-    "speed_mps": Between(-120.0, 120.0),
-    "length_m": Between(0.05, 100.0),
-    "width_m": Between(0.05, 30.0),
-    "yaw_rad": Between(-100.0, 100.0),
+    "speed_mps": Within(-120.0, 120.0),
+    "length_m": Within(0.05, 100.0),
+    "width_m": Within(0.05, 30.0),
+    "yaw_rad": Within(-100.0, 100.0),
 }
 """What a road user may be: a child's arm to the longest tram with its trailer, in any haste."""
