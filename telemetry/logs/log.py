@@ -18,6 +18,10 @@ from foretwin.contracts.errors import UserError
 Sample = tuple[str, msgspec.Struct]
 """Channel name of foretwin.contracts.keys and its message."""
 
+MOST_TIME_S = 4e9
+"""Seconds since a start, or since 1970 until the year 2096; beyond is no time."""
+MOST_LINE = 1000
+"""Characters of why a log cannot be read: libraries quote whole files."""
 POSITION_NOT_FINITE = "position not finite"
 POSITION_ZERO = "position (0, 0)"
 POSITION_OFF_EARTH = "position off Earth"

@@ -7,18 +7,23 @@ import struct
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
-from mcap.records import Channel, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
 from foretwin.telemetry.logs.log import LogError
 
 # What the mcap package raises over bytes that are no MCAP, or no longer.
-_BROKEN = (McapError, EOFError, ValueError, KeyError, struct.error, ZstdError)
+_BROKEN = (McapError, EOFError, ValueError, KeyError, struct.error, ZstdError, MemoryError)
+
+
+MOST_CHUNK_BYTES = 64 * 2**20
+MOST_RATIO = 200
+"""A chunk beyond both is a bomb: recordings are packed 2 to 20 times, in chunks of some MB."""
 
 
 class Record(NamedTuple):
@@ -58,6 +63,8 @@ def read_contents(path: Path) -> Contents:
         with contextlib.suppress(*_BROKEN, OSError, StopIteration):
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
+                for chunk in summary.chunk_indexes:
+                    _check_packing(path, chunk.compressed_size, chunk.uncompressed_size)
                 statistics = summary.statistics
                 schemas, counts = by_topic(
                     (
@@ -77,6 +84,15 @@ def read_contents(path: Path) -> Contents:
                     cut_short=False,
                 )
     return _read_through(path)
+
+
+def _check_packing(path: Path, packed: int, unpacked: int) -> None:
+    """Raise LogError for a chunk that says that it unpacks to far more than any log does."""
+    if unpacked > MOST_CHUNK_BYTES and unpacked > MOST_RATIO * packed:
+        raise LogError(
+            f"{path}: a chunk of {packed} bytes unpacks to {unpacked}: no log is packed "
+            f"{MOST_RATIO} times"
+        )
 
 
 def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record]:
@@ -156,7 +172,7 @@ class _Linear:
         channels: dict[int, Channel] = {}
         with self._path.open("rb") as file:
             try:
-                for item in StreamReader(file, validate_crcs=True).records:
+                for item in self._unpacked(file):
                     if isinstance(item, Schema):
                         by_id[item.id] = item
                     elif isinstance(item, Channel):
@@ -173,3 +189,11 @@ class _Linear:
                             yield Record(channel.topic, kind, item.log_time, item.data)
             except _BROKEN:
                 self.cut_short = True
+
+    def _unpacked(self, file: IO[bytes]) -> Iterator[McapRecord]:
+        for item in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+            if isinstance(item, Chunk):
+                _check_packing(self._path, len(item.data), item.uncompressed_size)
+                yield from breakup_chunk(item, validate_crc=True)
+            else:
+                yield item
