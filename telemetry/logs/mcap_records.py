@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import struct
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -60,7 +59,7 @@ def read_contents(path: Path) -> Contents:
             reader.get_header()
         except (*_BROKEN, StopIteration) as error:
             raise LogError(f"{path}: no MCAP file: {type(error).__name__} {error}") from None
-        with contextlib.suppress(*_BROKEN, OSError, StopIteration):
+        try:
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
                 for chunk in summary.chunk_indexes:
@@ -83,6 +82,10 @@ def read_contents(path: Path) -> Contents:
                     indexed=True,
                     cut_short=False,
                 )
+        except LogError:
+            raise
+        except (*_BROKEN, OSError, StopIteration):
+            pass  # It can still be read through.
     return _read_through(path)
 
 
@@ -187,6 +190,8 @@ class _Linear:
                         if channel.schema_id in by_id:
                             kind = by_id[channel.schema_id].name
                             yield Record(channel.topic, kind, item.log_time, item.data)
+            except LogError:
+                raise
             except _BROKEN:
                 self.cut_short = True
 
