@@ -1,6 +1,6 @@
 """How every process of a run lives: reads its setup, joins the bus, says it is alive, and leaves.
 
-A process leaves when the run ends (`run_end`), when it is told to (SIGTERM), or when the
+A process leaves when the run ends (`run_end`), when it is told to (SIGTERM, SIGHUP), or when the
 orchestrator is gone: at once where that has started it, after a grace where the link may come back.
 Ctrl-C is the orchestrator's business: children ignore SIGINT.
 """
@@ -22,6 +22,7 @@ from typing import TypeVar
 import msgspec
 
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
+from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
@@ -152,7 +153,7 @@ def run_process(
     try:
         with ZenohBus(setup.bus) as bus:
             life = ProcessLife(setup, bus)
-            signal.signal(signal.SIGTERM, lambda *_: life.terminated.set())
+            on_end_signals(life.terminated.set)
             serve(setup, bus, life)
     except (UserError, OSError) as problem:
         logging.getLogger(setup.process_id).exception("%s", problem)

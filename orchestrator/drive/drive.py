@@ -7,10 +7,10 @@ import datetime
 import logging
 import signal
 import time
-from types import FrameType
 
 from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
@@ -55,14 +55,15 @@ class DriveError(RuntimeError):
 
 
 class _Interrupt:
-    """Remembers Ctrl-C and SIGTERM; the loops ask, nothing is torn away in the middle."""
+    """Remembers Ctrl-C, SIGTERM and a closed terminal; the loops ask, nothing is torn away in the
+    middle."""
 
     def __init__(self) -> None:
         self.asked = False
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._remember)
+        signal.signal(signal.SIGINT, lambda *_: self._remember())
+        on_end_signals(self._remember)
 
-    def _remember(self, _number: int, _frame: FrameType | None) -> None:
+    def _remember(self) -> None:
         self.asked = True
 
 
