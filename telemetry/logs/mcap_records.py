@@ -16,9 +16,17 @@ from zstandard import ZstdError
 
 from foretwin.telemetry.logs.log import LogError
 
-# What the mcap package raises over bytes that are no MCAP, or no longer.
-_BROKEN = (McapError, EOFError, ValueError, KeyError, struct.error, ZstdError, MemoryError)
-
+BROKEN = (
+    McapError,
+    EOFError,
+    ValueError,
+    KeyError,
+    OverflowError,
+    struct.error,
+    ZstdError,
+    MemoryError,
+)
+"""What the mcap package raises over bytes that are no MCAP, or no longer."""
 
 MOST_CHUNK_BYTES = 64 * 2**20
 MOST_RATIO = 200
@@ -57,7 +65,7 @@ def read_contents(path: Path) -> Contents:
         try:
             reader = make_reader(file)
             reader.get_header()
-        except (*_BROKEN, StopIteration) as error:
+        except (*BROKEN, StopIteration) as error:
             raise LogError(f"{path}: no MCAP file: {type(error).__name__} {error}") from None
         try:
             summary = reader.get_summary()
@@ -84,7 +92,7 @@ def read_contents(path: Path) -> Contents:
                 )
         except LogError:
             raise
-        except (*_BROKEN, OSError, StopIteration):
+        except (*BROKEN, OSError, StopIteration):
             pass  # It can still be read through.
     return _read_through(path)
 
@@ -115,7 +123,7 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
             for schema, channel, message in reader.iter_messages(topics=topics):
                 if schema is not None:
                     yield Record(channel.topic, schema.name, message.log_time, message.data)
-        except _BROKEN as error:
+        except BROKEN as error:
             raise LogError(f"{path}: damaged MCAP: {type(error).__name__} {error}") from None
 
 
@@ -192,7 +200,7 @@ class _Linear:
                             yield Record(channel.topic, kind, item.log_time, item.data)
             except LogError:
                 raise
-            except _BROKEN:
+            except BROKEN:
                 self.cut_short = True
 
     def _unpacked(self, file: IO[bytes]) -> Iterator[McapRecord]:
