@@ -8,6 +8,8 @@ Ctrl-C is the orchestrator's business: children ignore SIGINT.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import fcntl
 import json
 import logging
 import os
@@ -130,6 +132,32 @@ class ProcessLife:
         self.terminated.set()
 
 
+def hold(setup_file: Path) -> int:
+    """Lock the file that a process was started with for as long as the process lives; returns the
+    descriptor that holds it.
+
+    So that whoever finds a run without its orchestrator sees who of it still writes; see `is_held`.
+    """
+    descriptor = os.open(setup_file, os.O_RDONLY | os.O_CLOEXEC)
+    with contextlib.suppress(OSError):  # not every file system can
+        fcntl.flock(descriptor, fcntl.LOCK_SH)
+    return descriptor
+
+
+def is_held(setup_file: Path) -> bool:
+    """Whether the process that was started with a file still lives."""
+    descriptor = os.open(setup_file, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False
+
+
 def run_process(
     kind: type[_Setup],
     serve: Callable[[_Setup, Bus, ProcessLife], None],
@@ -148,6 +176,7 @@ def run_process(
         setup = read_setup(file, kind)
     except (msgspec.DecodeError, OSError) as problem:
         parser.exit(2, f"{file}: {problem}\n")
+    hold(file)
     log_to_file(setup)
     code = 0
     try:

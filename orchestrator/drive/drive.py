@@ -25,12 +25,13 @@ from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.plan import make_plan, open_bus, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
-from foretwin.orchestrator.drive.run_record import reserve_record, run_record, write_record
+from foretwin.orchestrator.drive.run_record import reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, run_lock, write_record
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, fold_stderr
@@ -47,7 +48,7 @@ HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
 """A process whose token is gone for so long while it runs (a stopped one, say) is killed; one that
 gives way may have to wait for a processor that long."""
 
-EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
 
 
 class DriveError(RuntimeError):
@@ -80,10 +81,11 @@ def carry_out(plan: DrivePlan) -> int:
             process_id=ORCHESTRATOR,
             vehicle_id=plan.config.vehicle_id,
             bus=plan.bus,
-            log_file=str(plan.folder / "log.jsonl"),
+            log_file=str(plan.folder / LOG),
         )
     )
-    return _Drive(plan).run()
+    with run_lock(plan.folder):
+        return _Drive(plan).run()
 
 
 class _Drive:
@@ -114,7 +116,7 @@ class _Drive:
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with open_bus(plan) as bus:
             tables = ResultTables(
-                plan.folder / "results",
+                plan.folder / RESULTS,
                 {
                     "run_id": plan.run_id,
                     "attribution": plan.osm.attribution,
@@ -135,12 +137,14 @@ class _Drive:
                     raise
                 finally:
                     self._end(bus, conductor, line, exit_word, started_s)
-        return EXIT_FAILED if self._failed_at_end else code
+        if self._failed_at_end:
+            return EXIT_FAILED
+        return EXIT_PARTLY if tables.troubles and code == EXIT_DONE else code
 
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
         # A run that is listed can be spoken to: questions wait in the mailbox from here on.
-        reserve_record(self._plan, self._plan.folder / "run.json")
+        reserve_record(self._plan, self._plan.folder / RECORD)
         self._start_processes()
         conductor.rounds.draw_cases()  # while they come up
         if self._plan.config.resolved_source == "live":
@@ -234,6 +238,8 @@ class _Drive:
                 self._vehicle_lost = True
             else:
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
+        for text in conductor.tables.take_news():
+            conductor.tell(Notice("warning", text))
         self._end_the_hung(conductor, now_s)
 
     def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
@@ -279,17 +285,17 @@ class _Drive:
         conductor.beside.close()
         conductor.route.close()
         conductor.tables.close()
-        if conductor.tables.failed:
-            line.say(f"error: {conductor.tables.failed}")
         now_s, restarted = time.monotonic(), self._supervisor.restarted
         record = run_record(
             conductor, restarted, exit_word=exit_word, wall_s=now_s - started_s, mono_s=now_s
         )
-        write_record(record, plan.folder / "run.json")
+        write_record(record, plan.folder / RECORD)
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
-            fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
+            fold_stderr(plan.processes_dir, plan.folder / LOG)
         line.say(summary_text(record))
+        for trouble in conductor.tables.troubles:
+            line.say(f"error: {trouble}")
 
 
 def _nothing() -> None:

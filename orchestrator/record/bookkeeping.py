@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -89,8 +90,18 @@ class FuturesCount:
             own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
-        self._hash.update(own.digest())
         futures = sum(len(result.future_indices) for result in done.results)
+        self._add(own.digest(), futures, distinct, done.latency_ms)
+        return own.hexdigest()
+
+    def take_row(self, row: Mapping[str, Any]) -> None:
+        """Count one round as the table of rounds holds it."""
+        self.sim_seconds += row["sim_seconds"]
+        self.cpu_seconds += row["cpu_seconds"]
+        self._add(bytes.fromhex(row["sha256"]), row["futures"], row["distinct"], row["latency_ms"])
+
+    def _add(self, digest: bytes, futures: int, distinct: int, latency_ms: float) -> None:
+        self._hash.update(digest)
         self.count += futures
         self.rounds_of[futures] += 1
         self.rounds += 1
@@ -98,8 +109,7 @@ class FuturesCount:
         self.distinct_min = (
             distinct if self.distinct_min is None else min(self.distinct_min, distinct)
         )
-        self.latencies_ms.append(done.latency_ms)
-        return own.hexdigest()
+        self.latencies_ms.append(latency_ms)
 
     def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
         """Return the `futures` part of run.json; `rounds` counts the complete ones.

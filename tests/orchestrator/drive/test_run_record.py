@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from foretwin.orchestrator.drive.run_record import run_record, versions, write_record
+from foretwin.orchestrator.drive.run_record import run_record, versions
 from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.record.run_state import write_record
 from tests.orchestrator.house import House
 
 COVERS = ("foretwin.orchestrator.drive.summary",)
