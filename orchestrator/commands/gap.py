@@ -18,6 +18,7 @@ from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
@@ -112,6 +113,7 @@ def report_gap(
     parameters = load_vehicle(vehicle)
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
+    check_finished(recording if recording.is_dir() else recording.parent)
     log = open_log(recording, declaration=declaration)
     report = gap_of(log, parameters, name=str(recording), progress=True)
     plots: list[Path] = []

@@ -20,10 +20,12 @@ from foretwin.orchestrator.drive.drive import carry_out
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.orchestrator.processors import most_workers
+from foretwin.orchestrator.record.recovery import RECOVERED
+from foretwin.orchestrator.record.run_state import RECORD, check_finished
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 
-RECORD, DRIVE = "run.json", "drive.mcap"
+DRIVE = "drive.mcap"
 JUDGED = "judged"
 
 
@@ -58,7 +60,8 @@ def judge(
         _check_on_way(worlds, run, record)
     read_inputs(corrected)  # what is wrong with them is told before anything long begins
     before = run
-    if record["config"].get("speed") is not None or record.get("versions") != versions():
+    in_lock_step = record["config"].get("speed") is None and record.get("exit") != RECOVERED
+    if not in_lock_step or record.get("versions") != versions():
         _say(f"{run}: driven again as it was, in lock step, to compare with")
         code, before = _drive(again)
         if code:
@@ -81,6 +84,7 @@ def _drive(config: DriveConfig) -> tuple[int, Path]:
 
 
 def _record(run: Path) -> dict[str, Any]:
+    check_finished(run)
     for part in (RECORD, DRIVE):
         if not (run / part).is_file():
             raise FileNotFoundError(f"run {run}: no {part} in it")
