@@ -39,6 +39,10 @@ class Refusals:
         said = text.removeprefix(f"{PREFIX}/") or f"{sender}: {reason}"
         return f"refused: {said[:500]}; more of the kind are counted"
 
+    def counts(self) -> dict[str, int]:
+        """Return how often each was refused, by sender and reason in one text."""
+        return {f"{sender}: {reason}": count for (sender, reason), count in self._counts.items()}
+
     def record(self) -> dict[str, Any]:
         """Return the `refused` part of run.json."""
         return {

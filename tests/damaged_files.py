@@ -82,7 +82,7 @@ def _read(path: Path, reader: Callable[[Path], object]) -> str:
         reader(path)
     except (UserError, FileNotFoundError) as refused:
         text = str(refused)
-        return f"more than a line: {text!r}" if "\n" in text or len(text) > 2000 else ""
+        return f"more than a line: {text[:300]!r}" if "\n" in text or len(text) > 2000 else ""
     except Exception as error:
         trace = error.__traceback__
         where = ""

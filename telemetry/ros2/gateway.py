@@ -139,6 +139,7 @@ class Gateway:
             "lost": dict(self.inwards.lost),
             "sent": dict(self._sender.sent),
             "held": dict(self.held),
+            "refused": self.refusals.counts(),
             "gate": dict(self.gate.counts),
             "dropped": {
                 "samples": self._inbox.dropped,

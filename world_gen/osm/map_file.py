@@ -19,6 +19,8 @@ MOST_RATIO = 100
 """A packed map beyond both is a bomb: gzip packs OSM XML 8 to 15 times, bzip2 10 to 25 times; a
 bomb of zeros 1,000 times and more."""
 _STEP_BYTES = 2**20
+MOST_REASON = 500
+"""Characters of why a file is no map: a parser quotes what it cannot read, however long."""
 
 
 class MapHeader(NamedTuple):
@@ -71,7 +73,7 @@ def check_packing(path: Path, form: str) -> None:
 def unreadable(path: Path, error: BaseException) -> MapError:
     """Return the error of a damaged file, in one line."""
     # zlib and bzip2 may give no reason after their colon.
-    reason = " ".join(str(error).split()).rstrip(":")
+    reason = " ".join(str(error).split()).rstrip(":")[:MOST_REASON]
     return MapError(f"{path}: not a readable OSM file, cut off or damaged: {reason}")
 
 
