@@ -21,7 +21,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import geo_from_ecef
 from foretwin.telemetry.logs.columns import Stamps, stream_of, table_log
-from foretwin.telemetry.logs.log import MOST_LINE, MOST_TIME_S, Log, LogError
+from foretwin.telemetry.logs.log import MOST_TIME_S, Log, LogError
 
 
 def is_comma2k19(folder: Path) -> bool:
@@ -69,7 +69,7 @@ def _array(folder: Path, name: str, columns: int) -> Array | None:
         return array.reshape(len(array), columns)
     except Exception as error:  # NumPy evaluates a header, and raises what that raises
         text = f"{path}: no NumPy array of {columns} column(s): {one_line(error)}"
-        raise LogError(text[:MOST_LINE]) from None
+        raise LogError(text) from None
 
 
 def _timed(

@@ -47,7 +47,14 @@ _MOTION = (
 
 
 class LogError(UserError):
-    """A log that cannot be read: one line with the file, the line or field, and what would do."""
+    """A log that cannot be read: one line with the file, the line or field, and what would do.
+
+    Of a longer text, as libraries quote whole files, the beginning is kept.
+    """
+
+    def __init__(self, text: str) -> None:
+        line = " ".join(text.split("\n"))
+        super().__init__(line if len(line) <= MOST_LINE else f"{line[:MOST_LINE]} …")
 
 
 def check_undeclared(path: Path, declaration: Path | None, kind: str) -> None:

@@ -16,7 +16,7 @@ from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import ReaderError as Error2
 
 from foretwin.contracts.errors import one_line
-from foretwin.telemetry.logs.log import FILE_CUT_SHORT, MOST_LINE, LogError
+from foretwin.telemetry.logs.log import FILE_CUT_SHORT, LogError
 from foretwin.telemetry.logs.mcap_records import Contents, Record, by_topic
 from foretwin.telemetry.logs.ros_recording import NO_DEFINITION, ROS1, RosRecording
 
@@ -40,15 +40,13 @@ def bag_recording(path: Path) -> RosRecording:
             hint = "; `rosbag reindex` may mend it"
         elif path.is_dir() and any(path.glob("*.mcap")):
             hint = "; its .mcap files can be read one by one"
-        reason = " ".join(str(error).split())[:MOST_LINE]
-        raise LogError(f"{path}: unreadable bag: {reason}{hint}") from None
+        raise LogError(f"{path}: unreadable bag: {error}{hint}") from None
     except OSError as error:
         if error.errno != errno.EINVAL:  # a place that the file says it has and has not
             raise
         raise LogError(f"{path}: unreadable bag: damaged: {one_line(error)}") from None
     except Exception as error:  # whatever rosbags raises over bytes that are damaged
-        reason = one_line(error)[:MOST_LINE]
-        raise LogError(f"{path}: unreadable bag: damaged: {reason}") from None
+        raise LogError(f"{path}: unreadable bag: damaged: {one_line(error)}") from None
 
     def read(topics: set[str], skipped: Counter[str]) -> Iterator[Record]:
         try:

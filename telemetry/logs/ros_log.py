@@ -20,7 +20,6 @@ from foretwin.contracts.guard import Refused, admit
 from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
-    MOST_LINE,
     UNREADABLE_ROW,
     VALUE_NOT_FINITE,
     Log,
@@ -97,7 +96,7 @@ def _said(text: str, kind: type[_Kind], path: Path) -> _Kind:
         said: _Kind = admit(msgspec.json.decode(text, type=kind), where=str(path)).message
     except (msgspec.DecodeError, UnicodeError, Refused) as error:
         what = f"{path}: its {kind.__name__} is damaged: {one_line(error)}"
-        raise LogError(what[:MOST_LINE]) from None
+        raise LogError(what) from None
     return said
 
 

@@ -13,7 +13,7 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from foretwin.contracts.errors import one_line
-from foretwin.telemetry.logs.log import MOST_LINE, LogError
+from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.mcap_records import Contents, Record, read_contents, records
 from foretwin.telemetry.ros_messages.parts import schema_text, typestore
 
@@ -66,7 +66,7 @@ def decoder(recording: RosRecording, topics: set[str]) -> Callable[[Record], Any
         except Exception as error:  # rosbags raises many kinds over texts it cannot parse
             reason = str(error) if isinstance(error, LogError) else one_line(error)
             text = f"{recording.path}: topic {topic}: unreadable definition: {reason}"
-            raise LogError(text[:MOST_LINE]) from None
+            raise LogError(text) from None
     store = _store(frozenset((one.name, one.encoding, one.data) for one in schemas.values()))
     if any(schema.encoding == ROS1 for schema in schemas.values()):
         return lambda record: store.deserialize_ros1(record.data, record.kind)
