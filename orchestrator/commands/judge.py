@@ -60,8 +60,7 @@ def judge(
         _check_on_way(worlds, run, record)
     read_inputs(corrected)  # what is wrong with them is told before anything long begins
     before = run
-    in_lock_step = record["config"].get("speed") is None and record.get("exit") != RECOVERED
-    if not in_lock_step or record.get("versions") != versions():
+    if not _stands_for_itself(record):
         _say(f"{run}: driven again as it was, in lock step, to compare with")
         code, before = _drive(again)
         if code:
@@ -76,6 +75,14 @@ def judge(
     else:
         say("\n".join(difference_lines(found)))
     return 0
+
+
+def _stands_for_itself(record: dict[str, Any]) -> bool:
+    """Whether a run need not be driven again to be compared with: in lock step, of this version,
+    and to an end of its own."""
+    in_lock_step = record["config"].get("speed") is None
+    ended = record.get("exit") != RECOVERED
+    return in_lock_step and ended and record.get("versions") == versions()
 
 
 def _drive(config: DriveConfig) -> tuple[int, Path]:

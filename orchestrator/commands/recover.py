@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.record.recovery import recover
 
 SOME_LOST = 3
@@ -17,12 +18,12 @@ def recover_run(run: Path) -> int:
     """
     done = recover(run)
     if done.healthy:
-        print(f"{run}: whole (exit: {done.exit_word}); nothing to recover")
+        say(f"{run}: whole (exit: {done.exit_word}); nothing to recover")
         return 0
     for part in done.parts:
-        print(part.text)
+        say(part.text)
     if done.lost:
-        print(f"{run}: {done.exit_word}; lost in part: {len(done.lost)} of {len(done.parts)}")
+        say(f"{run}: {done.exit_word}; lost in part: {len(done.lost)} of {len(done.parts)}")
         return SOME_LOST
-    print(f"{run}: {done.exit_word}; all that was written can be read")
+    say(f"{run}: {done.exit_word}; all that was written can be read")
     return 0

@@ -56,8 +56,7 @@ class DriveError(RuntimeError):
 
 
 class _Interrupt:
-    """Remembers Ctrl-C, SIGTERM and a closed terminal; the loops ask, nothing is torn away in the
-    middle."""
+    """Remembers Ctrl-C, SIGTERM and a closed terminal for the loops; nothing is torn away."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -270,8 +269,7 @@ class _Drive:
         bus.publish("run_end", end, run=plan.run_id)
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
         quick = exit_word != "completed"
-        killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s)
-        if killed:
+        if killed := self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s):
             log.warning("had to kill %s", ", ".join(killed))
         try:
             while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:

@@ -166,7 +166,7 @@ class ResultTables:
 
     @property
     def _how(self) -> str:
-        return f"`foretwin recover {self._folder.parent}` makes it of what was"
+        return f"`foretwin recover {self._folder.parent}` makes it of what was written"
 
     def _moved(self) -> None:
         self._moved_s = _now_s()

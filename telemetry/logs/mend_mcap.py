@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -9,8 +10,10 @@ from typing import NamedTuple
 from mcap.records import Chunk, DataEnd, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from foretwin.telemetry.logs.mcap_records import BROKEN
+from foretwin.contracts.errors import one_line
 from foretwin.telemetry.logs.write_mcap import ENDING
+
+log = logging.getLogger("foretwin.telemetry.logs.mend_mcap")
 
 
 class FoundMcap(NamedTuple):
@@ -47,8 +50,10 @@ def look_through(path: Path) -> FoundMcap:
                 last_ns = max(last_ns, *stamps, 0)
                 data_bytes = file.tell()
             ended = True
-        except BROKEN:
-            pass
+        except OSError:
+            raise
+        except Exception as damage:  # whatever the mcap package makes of bytes that are none
+            log.info("%s: whole up to byte %d: %s", path, data_bytes, one_line(damage))
     torn = 0 if data_ended else size - data_bytes
     return FoundMcap(messages, last_ns, data_bytes, torn, ended)
 

@@ -12,8 +12,6 @@ from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_state import run_lock
 from tests.orchestrator.record.ended_badly import killed_run
 
-COVERS = ("foretwin.orchestrator.commands.recover",)
-
 
 def test_each_part_has_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = killed_run(tmp_path / "run")

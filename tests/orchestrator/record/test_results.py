@@ -87,3 +87,24 @@ def test_a_stream_that_cannot_be_written_is_said_and_the_others_are(tmp_path: Pa
     assert tables.take_news()[0].startswith("results cannot be written now, and wait: IsADir")
     assert any("1 rows are lost: they could not be written: IsADir" in t for t in tables.troubles)
     assert pq.read_table(tmp_path / "events.parquet").num_rows == 1
+
+
+def test_where_parquet_has_no_room_the_streams_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_room(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    tables = ResultTables(tmp_path / "results", {})
+    tables.add("events", [event(1)])
+    with monkeypatch.context() as patched:
+        patched.setattr(pq.ParquetWriter, "write_table", no_room)
+        tables.close()
+
+    (trouble,) = tables.troubles
+    assert trouble.startswith("not in Parquet: events, metrics: OSError: [Errno 28] No space left")
+    assert trouble.endswith(f"`foretwin recover {tmp_path}` makes it of what was written")
+    assert {path.name for path in (tmp_path / "results").glob("*.arrows")} == {
+        "events.arrows", "metrics.arrows",
+    }  # fmt: skip
+    assert not list((tmp_path / "results").glob("*.writing"))

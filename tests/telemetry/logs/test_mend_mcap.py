@@ -75,12 +75,18 @@ def test_a_recording_without_its_index_alone_has_lost_nothing(tmp_path: Path) ->
     assert sum(1 for _ in open_log(path).samples()) == SECONDS
 
 
-@pytest.mark.parametrize("damage", [b"\0", b"\xff"])
-def test_a_damaged_chunk_ends_a_recording_that_was_not_ended(tmp_path: Path, damage: bytes) -> None:
+@pytest.mark.parametrize(
+    ("at", "damage"),
+    [(60, bytes(30)), (60, b"\xff" * 30), (33, b"\x5a" * 4)],
+    ids=["zeros", "ones", "another checksum"],
+)
+def test_a_damaged_chunk_ends_a_recording_that_was_not_ended(
+    tmp_path: Path, at: int, damage: bytes
+) -> None:
     path = tmp_path / "drive.mcap"
     ends = write(path)
     data = bytearray(path.read_bytes()[: ends[-1]])
-    data[ends[3] + 60 : ends[3] + 90] = damage * 30  # in the compressed part of the fifth
+    data[ends[3] + at : ends[3] + at + len(damage)] = damage  # in the fifth chunk
     path.write_bytes(data)
 
     assert mend(path).messages == 4
