@@ -24,6 +24,9 @@ from foretwin.telemetry.logs.columns import Stamps, stream_of, table_log
 from foretwin.telemetry.logs.log import MOST_TIME_S, Log, LogError
 
 
+MOST_VALUE = 1e12
+
+
 def is_comma2k19(folder: Path) -> bool:
     """Tell whether a folder is a segment."""
     return (folder / "processed_log").is_dir() or (folder / "global_pose").is_dir()
@@ -66,7 +69,8 @@ def _array(folder: Path, name: str, columns: int) -> Array | None:
         if mapped.dtype.kind not in "fiu":
             raise TypeError(f"it holds {mapped.dtype}")
         array: Array = mapped.astype(np.float64)
-        return array.reshape(len(array), columns)
+        # Nothing that was measured is so large: it counts as no number, and is refused with those.
+        return np.where(np.abs(array) < MOST_VALUE, array, np.nan).reshape(len(array), columns)
     except Exception as error:  # NumPy evaluates a header, and raises what that raises
         text = f"{path}: no NumPy array of {columns} column(s): {one_line(error)}"
         raise LogError(text) from None

@@ -106,3 +106,32 @@ def test_a_drive_survives_a_stranger_and_counts_what_it_said(tmp_path: Path) -> 
     assert done.rows("rounds")
     lines = log_lines(done.run) if done.run else []
     assert not [line for line in lines if "traceback" in line]
+
+
+BROKEN_AT_THE_END = """
+import sys
+from foretwin.contracts.mailbox import Mailbox
+
+def broken(mailbox, quiet_s):
+    raise RuntimeError("an error of ours")
+
+Mailbox.take_last = broken
+from foretwin.__main__ import main
+
+sys.exit(main())
+"""
+
+
+def test_an_error_of_ours_in_the_last_mail_costs_no_table(tmp_path: Path) -> None:
+    out = tmp_path / "runs"
+    small = ("--speed", "max", "--futures", "6", "--workers", "1", "--rate", "0.5", "--end", "6")
+    with started(out, *small, entry=("-c", BROKEN_AT_THE_END)) as process:
+        screen, _ = process.communicate(timeout=240.0)
+    done = Finished(process.returncode, screen, run_folder(out))
+
+    assert done.code == 1, screen
+    assert done.record()["exit"] == "failed"
+    assert done.rows("rounds")
+    assert done.run is not None
+    (told,) = (line for line in log_lines(done.run) if "traceback" in line)
+    assert "an error of ours" in told["traceback"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
+import shutil
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from foretwin.telemetry.logs.opening import open_road_users
 from tests.damaged_files import read_damaged
 from tests.telemetry.whole_logs import whole_logs
 
-FEW, MANY = 400, 15_000
+FEW, MANY, MANY_REAL = 400, 14_000, 700
 
 
 def samples_of(path: Path) -> None:
@@ -59,5 +60,33 @@ def test_many_damaged_logs_are_read_or_refused(originals: list[Path], tmp_path: 
     seed = random.SystemRandom().randrange(2**32)
     print(f"seed {seed}")
     found = read_damaged(originals, READERS, folder=tmp_path, count=MANY, seed=seed)
+
+    assert found == [], f"seed {seed}"
+
+
+REAL = (
+    "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt",
+    "drives-hannover/2021_GoogleMaps.geojson",
+    "drive-comma2k19-sf/segment40",
+)
+REAL_BYTES = 200_000
+
+
+@pytest.mark.judge
+@pytest.mark.real_data
+@pytest.mark.timeout(3600)
+def test_damaged_logs_of_real_drives_are_read_or_refused(data_dir: Path, tmp_path: Path) -> None:
+    originals = []
+    for name in REAL:
+        copy = tmp_path / "whole" / Path(name).name
+        copy.parent.mkdir(exist_ok=True)
+        if (data_dir / name).is_dir():
+            shutil.copytree(data_dir / name, copy)
+        else:
+            copy.write_bytes((data_dir / name).read_bytes()[:REAL_BYTES])
+        originals.append(copy)
+    seed = random.SystemRandom().randrange(2**32)
+    print(f"seed {seed}")
+    found = read_damaged(originals, READERS, folder=tmp_path, count=MANY_REAL, seed=seed)
 
     assert found == [], f"seed {seed}"
