@@ -23,7 +23,6 @@ from foretwin.contracts.frames import geo_from_ecef
 from foretwin.telemetry.logs.columns import Stamps, stream_of, table_log
 from foretwin.telemetry.logs.log import MOST_TIME_S, Log, LogError
 
-
 MOST_VALUE = 1e12
 
 
