@@ -10,6 +10,8 @@ import pytest
 
 from foretwin.orchestrator.record.results import QUEUE_DEPTH, TABLES, ResultTables
 from foretwin.orchestrator.record.table_stream import StreamReader
+from tests.starvation import kept_waiting
+from tests.system.foretwin_command import wait_for
 
 
 def event(number: int) -> dict[str, object]:
@@ -26,6 +28,20 @@ def test_rows_are_written_in_order_with_their_origin(tmp_path: Path) -> None:
     table = pq.read_table(tmp_path / "events.parquet")
     assert table["stamp_ns"].to_pylist() == list(range(5000))
     assert table.schema.metadata[b"attribution"].decode() == "© OpenStreetMap contributors"
+
+
+def test_while_the_run_goes_on_a_row_is_in_its_file_within_a_second(tmp_path: Path) -> None:
+    def there() -> bool:
+        path = tmp_path / "events.arrows"
+        return path.exists() and any(rows.num_rows for rows in StreamReader(path).records())
+
+    tables = ResultTables(tmp_path, {})
+    with kept_waiting() as kept:
+        tables.add("events", [event(1)])
+        assert wait_for(there, "the row") < 1.0 + kept.seconds
+    assert not list(tmp_path.glob("*.parquet"))
+    tables.close()
+    assert not list(tmp_path.glob("*.arrows"))
 
 
 def test_a_live_drive_is_never_held_up(tmp_path: Path) -> None:
