@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from foretwin.contracts.codec import Envelope, decode, encode
+from foretwin.contracts.codec import Envelope, decode, encode, sender_of
 from foretwin.contracts.keys import CHANNELS
 
 _TURNS = 20
@@ -39,6 +39,11 @@ class Received:
     def message(self) -> Any:
         """Return the message alone; raises SchemaMismatch."""
         return self.envelope().message
+
+    @property
+    def sender(self) -> int:
+        """By whose numbering it is numbered; see foretwin.contracts.codec."""
+        return sender_of(self._payload)
 
 
 class Reply(NamedTuple):

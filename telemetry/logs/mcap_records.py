@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
-from mcap.records import Channel, Message, Metadata, Schema
+from mcap.records import Channel, Chunk, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from zstandard import ZstdError
 
@@ -77,6 +77,23 @@ def read_contents(path: Path) -> Contents:
                     cut_short=False,
                 )
     return _read_through(path)
+
+
+def read_metadata(path: Path, name: str) -> dict[str, str]:
+    """Return what stands under a name at the beginning of a file, before its first message.
+
+    Nothing where it is not there; raises LogError for a file that is no MCAP.
+    """
+    with path.open("rb") as file:
+        try:
+            for item in StreamReader(file, emit_chunks=True).records:
+                if isinstance(item, Metadata) and item.name == name:
+                    return dict(item.metadata)
+                if isinstance(item, Chunk):
+                    break
+        except (*_BROKEN, StopIteration, OSError) as error:
+            raise LogError(f"{path}: no MCAP file: {type(error).__name__} {error}") from None
+    return {}
 
 
 def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record]:

@@ -1,4 +1,4 @@
-"""The recorder process: what the vehicle sends, and the state estimated from it, to one MCAP file.
+"""The recorder process: what the vehicle sends, and the state estimated from it, to MCAP files.
 
 `python -m foretwin.telemetry.processes.recorder --setup FILE` (`RecorderSetup`).
 """
@@ -21,7 +21,6 @@ from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
-from foretwin.telemetry.logs.write_mcap import create
 from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.ros_messages.parts import typestore
 
@@ -68,14 +67,12 @@ class RecorderProcess:
         self._answers = Mailbox(64)
         self._reported_lost = 0
         self._unreadable = 0
-        self._lost = 0
-        self._next_seq: dict[str, int] = {}
         self._asked_s: float | None = None
         self._informed = False
         self._flushed_s = mono_s()
         self._stamp_ns = 0
         for channel in (*TELEMETRY_CHANNELS, "state"):
-            bus.subscribe(channel, self._messages, vehicle=vehicle_id)
+            bus.subscribe(channel, self._messages, recover=True, vehicle=vehicle_id)
         self._publish(recording.started())
         life.ready()
 
@@ -115,11 +112,11 @@ class RecorderProcess:
         self._report_losses(at_the_end=True)
         self._publish(self._recording.finish())
         log.info(
-            "recorded %s; unwritten %d, refused %s, missing %d, dropped %d, unreadable %d, left %d",
-            dict(self._recording.counts),
-            self._recording.unwritten,
-            dict(self._recording.refused),
-            self._lost,
+            "recorded %s; unwritten %s, refused %s, missing %d, dropped %d, unreadable %d, left %d",
+            self._recording.tally.recorded,
+            self._recording.tally.unwritten,
+            self._recording.tally.refused,
+            self._recording.missing,
             self._messages.dropped,
             self._unreadable,
             left,
@@ -137,15 +134,15 @@ class RecorderProcess:
 
     def _write(self, item: Received) -> None:
         try:
-            seq, _, message = item.envelope()
+            envelope = item.envelope()
         except SchemaMismatch as problem:
             self._unreadable += 1
             log.warning("%s", problem)
             return
-        self._lost += max(0, seq - self._next_seq.get(item.key, seq))
-        self._next_seq[item.key] = seq + 1
+        message = envelope.message
         self._stamp_ns = message.stamp_ns
-        self._publish(self._recording.add(item.channel, message))
+        numbered = {"sender": item.sender, "seq": envelope.seq}
+        self._publish(self._recording.add(item.channel, message, **numbered))
 
     def _take_answer(self, item: Any) -> None:
         if isinstance(item, Reply) and item.message is not None:
@@ -164,11 +161,12 @@ class RecorderProcess:
     def _report_losses(self, *, at_the_end: bool = False) -> None:
         # Gaps in the sequence count what the mailbox dropped, and what the bus lost before it.
         # On a busy machine more are lost every second: told when there are twice as many.
+        lost = self._recording.missing
         enough = self._reported_lost if at_the_end else 2 * self._reported_lost
-        if self._lost > enough:
-            self._reported_lost = self._lost
+        if lost > enough:
+            self._reported_lost = lost
             text = (
-                f"{self._lost} messages are missing in the recording so far"
+                f"{lost} messages are missing in the recording so far"
                 f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"
             )
             log.warning(text)
@@ -183,9 +181,8 @@ class RecorderProcess:
 def serve(setup: RecorderSetup, bus: Bus, life: ProcessLife) -> None:
     """Record until the run is over."""
     typestore()  # Costs a third of a second: before the first message, not at it.
-    path = Path(setup.file)
     process = RecorderProcess(
-        DriveRecording(lambda: create(path), name=path.name),
+        DriveRecording(Path(setup.file)),
         bus=bus,
         life=life,
         run_id=setup.run_id,

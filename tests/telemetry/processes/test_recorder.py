@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import signal
 import subprocess
 import sys
@@ -21,7 +20,6 @@ from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup, RecorderSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
-from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 from foretwin.telemetry.processes.recorder import RecorderProcess
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.contracts.bus_sides import DEADLINE_S
@@ -29,6 +27,7 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.own_recordings import read_drive
+from tests.telemetry.processes.test_recording import Disk
 
 ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
 RECORDER = alive_key(run="r1", process="recorder")
@@ -73,7 +72,7 @@ def publish_all(bus: MemoryBus | ZenohBus) -> None:
 def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
     bus, path, questions = MemoryBus(), tmp_path / "drive.mcap", Mailbox(4)
     bus.serve("info", questions, vehicle="car")
-    process = recorder(bus, DriveRecording(lambda: create(path), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(path))
     publish_all(bus)
     assert process.step()
     questions.take().reply(INFO)
@@ -91,7 +90,7 @@ def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: 
             return self.now_s
 
     bus, path = MemoryBus(), tmp_path / "drive.mcap"
-    recording = DriveRecording(lambda: create(path), name="drive.mcap")
+    recording = DriveRecording(path)
     process = recorder(bus, recording, mono_s=Slow())
     publish_all(bus)
     process.finish()
@@ -100,7 +99,7 @@ def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: 
 
 def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path) -> None:
     bus, path = MemoryBus(), tmp_path / "drive.mcap"
-    process = recorder(bus, DriveRecording(lambda: create(path), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(path))
     publish_all(bus)
     assert process.step()
     process.finish()
@@ -108,25 +107,9 @@ def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path)
 
 
 def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -> None:
-    class Broken:
-        def write(self, data: Any) -> int:
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        def tell(self) -> int:
-            return 0
-
-        def seek(self, offset: int) -> int:
-            return 0
-
-        def truncate(self, size: int) -> int:
-            return 0
-
-        def close(self) -> None:
-            pass
-
-    bus, events = MemoryBus(), Mailbox(10)
+    bus, events, disk = MemoryBus(), Mailbox(10), Disk(0)
     bus.subscribe("event", events, run="r1")
-    process = recorder(bus, DriveRecording(lambda: DriveWriter(Broken()), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(tmp_path / "drive.mcap", open_part=disk.open_part))
     publish_all(bus)
     assert process.step()
     event = events.take().message()
@@ -137,7 +120,7 @@ def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -
 
 def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path: Path) -> None:
     bus, wall = MemoryBus(), Wall()
-    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(tmp_path / "drive.mcap")
     process = recorder(bus, recording, mono_s=wall)
     wall.now_s = 100.0
     assert process.step(), "it never saw the orchestrator"
@@ -158,7 +141,7 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
 def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
     bus, events, wall = MemoryBus(), Mailbox(10), Wall()
     bus.subscribe("event", events, run="r1")
-    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(tmp_path / "drive.mcap")
     process = recorder(bus, recording, lossless=False, mono_s=wall)
     bus.publish("speed", SpeedSample(stamp_ns=START_NS, speed_mps=0.0), vehicle="car")
     assert process.step()
@@ -177,7 +160,7 @@ def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
 def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_path: Path) -> None:
     bus, events, wall = MemoryBus(), Mailbox(32), Wall()
     bus.subscribe("event", events, run="r1")
-    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(tmp_path / "drive.mcap")
     process = recorder(bus, recording, lossless=False, mono_s=wall)
     nobody = Mailbox(1)
     sample = SpeedSample(stamp_ns=START_NS, speed_mps=0.0)
