@@ -17,7 +17,7 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
+from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, VIEWER
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
@@ -91,6 +91,7 @@ class Conductor:
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
+        self._told_world: ActiveWorld | None = None
         self._on_message: dict[str, Callable[[Received], object]] = {
             **dict.fromkeys(keys.TELEMETRY_CHANNELS, self.take_telemetry),
             **dict.fromkeys(FINDINGS, self.tuning.heard),
@@ -234,6 +235,7 @@ class Conductor:
             return
         self._world_untold = False
         active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
+        self._told_world = active
         self.context.publish("active_world", active)
         self.questions.ask(MIRROR, "use_world", active)
 
@@ -262,10 +264,7 @@ class Conductor:
         process_id = keys.process_of_alive_key(item.key)
         if process_id == ORCHESTRATOR:
             return
-        if item.up:
-            self._process_up(process_id)
-        else:
-            self._process_down(process_id)
+        (self._process_up if item.up else self._process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:
         self.alive.add(process_id)
@@ -277,6 +276,8 @@ class Conductor:
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
+        elif process_id == VIEWER and self._told_world is not None:  # one that was started again
+            self.context.publish("active_world", self._told_world)
 
     def _worker_up(self, process_id: str) -> None:
         """Give a worker that has the parameters in force its Worlds, and jobs."""
