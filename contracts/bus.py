@@ -99,9 +99,9 @@ class ZenohSession:
 
     def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
         import zenoh
-        from zenoh import ext
+        import zenoh.ext
 
-        self._zenoh, self._ext = zenoh, ext
+        self._zenoh = zenoh
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
         try:
@@ -138,8 +138,9 @@ class ZenohSession:
     def _hear(self, key: str, land: Callable[[Any], None], *, history: bool) -> None:
         """Call `land` with each sample; with `history` also with what publishers have kept."""
         if history:
-            kept = self._ext.HistoryConfig(detect_late_publishers=True)
-            heard = self._ext.declare_advanced_subscriber(self._session, key, land, history=kept)
+            ext = self._zenoh.ext
+            kept = ext.HistoryConfig(detect_late_publishers=True)
+            heard = ext.declare_advanced_subscriber(self._session, key, land, history=kept)
         else:
             heard = self._session.declare_subscriber(key, land)
         self._declared.append(heard)
@@ -148,7 +149,7 @@ class ZenohSession:
         """Return the publisher of a key, which keeps its last `samples` for who missed them."""
         if key not in self._publishers:
             self._publishers[key] = (
-                keeping_publisher(self._ext, self._session, key, samples=samples, **qos)
+                keeping_publisher(self._zenoh, self._session, key, samples=samples, **qos)
                 if samples
                 else self._session.declare_publisher(key, **qos)
             )
@@ -211,7 +212,7 @@ class ZenohBus(ZenohSession):
             mailbox.put(Received(channel, str(sample.key_expr), sample.payload.to_bytes(), kind))
 
         self._declared.append(
-            recovering_subscriber(self._ext, self._session, full_key, land, samples=samples)
+            recovering_subscriber(self._zenoh, self._session, full_key, land, samples=samples)
             if samples
             else self._session.declare_subscriber(full_key, land)
         )

@@ -21,7 +21,8 @@ class Bus(Protocol):
     ) -> None:
         """Let every message of the channel land in `mailbox` as Received.
 
-        With `recover` also those that were missed and are still kept (`Qos.kept_s`), each once.
+        With `recover` also those that were missed and are still kept (`Qos.kept_s`): in any order,
+        and some twice.
         """
 
     def request(

@@ -16,7 +16,7 @@ import msgspec
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.segments import number_of, segments_of
-from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
+from foretwin.telemetry.logs.foreign_ros import Decode, open_foreign, time_base_of
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
     VALUE_NOT_FINITE,
@@ -27,7 +27,7 @@ from foretwin.telemetry.logs.log import (
 )
 from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.logs.mcap_records import read_metadata
-from foretwin.telemetry.logs.merge import in_parts, reordered
+from foretwin.telemetry.logs.merge import LATE_NS, in_parts, reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder, mcap_recording
 from foretwin.telemetry.logs.write_mcap import (
@@ -160,7 +160,7 @@ def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
         if contents.cut_short:
             skipped[FILE_CUT_SHORT] += 1
         samples = _own_samples(recording, topics, decode, frame, skipped)
-        return samples if contents.indexed else reordered(samples, window_ns=WINDOW_NS)
+        return samples if contents.indexed else reordered(samples, window_ns=LATE_NS)
 
     return Log(
         info=info,
