@@ -148,14 +148,15 @@ class DriveWriter:
         self.counts[channel] += 1
 
     def flush(self) -> None:
-        """End the chunk in progress, so that what was added so far survives a kill.
-
-        And put it on the disk, so that it survives a power cut.
-        """
+        """End the chunk in progress, so that what was added so far survives a kill."""
         with self._guarded():
             self._writer.flush()  # type: ignore[no-untyped-call]
-            self._stream.sync()
         self.held = 0
+
+    def sync(self) -> None:
+        """Put what was flushed on the disk, so that it survives a power cut."""
+        with self._guarded():
+            self._stream.sync()
 
     def finish(self) -> None:
         """End the file and close it; never raises: what went wrong stands in `error`."""

@@ -112,10 +112,12 @@ class DriveRecording:
     def flush(self) -> list[Event]:
         """Put what has been added so far on the disk; begin another file where one is large."""
         events = self._go_on() if self._writer is None else self._attempt(DriveWriter.flush)
+        # Before the disk is waited for: whoever is killed meanwhile has it in the file.
+        write_tally(self.tally, tally_file(self._path))
+        events += self._attempt(DriveWriter.sync)
         if self._writer is not None and self._writer.size_bytes >= self._roll_bytes:
             self._end_part()
             events += self._open()
-        write_tally(self.tally, tally_file(self._path))
         return events
 
     def finish(self) -> list[Event]:
