@@ -36,7 +36,7 @@ class OpenPart(Protocol):
         """Create it."""
 
 
-class _Waiting(NamedTuple):
+class _ToWrite(NamedTuple):
     channel: str
     message: msgspec.Struct
     sender: int
@@ -68,7 +68,7 @@ class DriveRecording:
         self.tally = (read_tally(tally_file(path)) if begun else None) or Tally()
         # What came is known at once, what became of it only when it is in the file.
         self._heard = msgspec.convert(msgspec.to_builtins(self.tally.settled), Numberings)
-        self._waiting: deque[_Waiting] = deque()
+        self._waiting: deque[_ToWrite] = deque()
         self._given = 0
         """So many of those that wait have been given to the file in progress."""
         self._writer: DriveWriter | None = None
@@ -99,7 +99,7 @@ class DriveRecording:
         self._stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if isinstance(message, DriveEnd):
             self._take_end(message, sender)
-        self._waiting.append(_Waiting(channel, message, sender, seq))
+        self._waiting.append(_ToWrite(channel, message, sender, seq))
         if len(self._waiting) > MOST_WAITING:
             self._give_up(self._waiting.popleft())
         return self._go_on() if self._writer is None else self._give()
@@ -180,7 +180,7 @@ class DriveRecording:
             self._settle()
         return events
 
-    def _refuse(self, one: _Waiting, error: ValueError) -> list[Event]:
+    def _refuse(self, one: _ToWrite, error: ValueError) -> list[Event]:
         del self._waiting[self._given]
         if self.tally.settle("refused", one.channel, one.sender, one.seq) > 1:
             return []
@@ -193,7 +193,7 @@ class DriveRecording:
             self._given -= 1
             self.tally.settle("recorded", one.channel, one.sender, one.seq)
 
-    def _give_up(self, one: _Waiting) -> None:
+    def _give_up(self, one: _ToWrite) -> None:
         self.tally.settle("unwritten", one.channel, one.sender, one.seq)
 
     def _attempt(self, step: Callable[[DriveWriter], None]) -> list[Event]:
