@@ -18,7 +18,8 @@ from typing import Any, Self
 import msgspec
 
 from foretwin.contracts.bus_calls import Bus, ask
-from foretwin.contracts.codec import MOST_SENDER, decode, encode
+from foretwin.contracts.codec import MOST_SENDER, encode
+from foretwin.contracts.guard import Refused, kept, opened, reason_in
 from foretwin.contracts.kept import keeping_publisher, most_kept, recovering_subscriber
 from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
@@ -205,11 +206,13 @@ class ZenohBus(ZenohSession):
         self, channel: str, mailbox: Mailbox, *, recover: bool = False, **ids: str
     ) -> None:
         """Receive into `mailbox`; see Bus."""
-        kind, full_key = CHANNELS[channel].kind, channel_key(channel, **ids)
+        kind, most = CHANNELS[channel].kind, CHANNELS[channel].most_bytes
+        full_key = channel_key(channel, **ids)
         samples = self._most_kept(channel) if recover else 0
 
         def land(sample: Any) -> None:
-            mailbox.put(Received(channel, str(sample.key_expr), sample.payload.to_bytes(), kind))
+            data = kept(sample.payload, most)
+            mailbox.put(Received(channel, str(sample.key_expr), data, kind))
 
         self._declared.append(
             recovering_subscriber(self._zenoh, self._session, full_key, land, samples=samples)
@@ -234,19 +237,19 @@ class ZenohBus(ZenohSession):
         full_key = channel_key(channel, **ids)
         answered = threading.Event()
 
-        def finish(reply: Any | None, error: str | None) -> None:
+        def finish(reply: Any | None, error: str | None, refused: Refused | None = None) -> None:
             if not answered.is_set():
                 answered.set()
-                mailbox.put(Reply(channel, tag, reply, error, time.monotonic_ns()))
+                mailbox.put(Reply(channel, tag, reply, error, time.monotonic_ns(), refused))
 
         def land(reply: Any) -> None:
             if reply.ok is None:
-                finish(None, reply.err.payload.to_bytes().decode(errors="replace"))
+                finish(None, reason_in(reply.err.payload))
                 return
             try:
-                finish(decode(reply.ok.payload.to_bytes(), kind, where=full_key).message, None)
-            except ValueError as problem:
-                finish(None, str(problem))
+                finish(opened(kept(reply.ok.payload), kind, where=full_key).message, None)
+            except Refused as refused:
+                finish(None, str(refused), refused)
 
         self._session.get(
             full_key,
@@ -268,7 +271,7 @@ class ZenohBus(ZenohSession):
                     else:
                         query.reply(full_key, data)
 
-            payload = query.payload.to_bytes() if query.payload is not None else b""
+            payload = b"" if query.payload is None else kept(query.payload)
             mailbox.put(Request(channel, full_key, payload, answer))
 
         self._declared.append(self._session.declare_queryable(full_key, land, complete=True))

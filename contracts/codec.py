@@ -27,7 +27,18 @@ Message = TypeVar("Message")
 
 
 class SchemaMismatch(ValueError):  # noqa: N818
-    """Bytes that are no message of this schema version."""
+    """Bytes that are no message of this schema version; `kind` says in which way."""
+
+    def __init__(self, text: str, *, kind: str = "no message") -> None:
+        super().__init__(text)
+        self.kind = kind
+
+
+class Header(NamedTuple):
+    """What stands before a message: its number by the sender's count, and the sender's clock."""
+
+    seq: int
+    sent_ns: int
 
 
 class Envelope(NamedTuple, Generic[Message]):
@@ -36,6 +47,8 @@ class Envelope(NamedTuple, Generic[Message]):
     seq: int
     sent_ns: int
     message: Message
+    left_out: int = 0
+    """Road users that the guard took out."""
 
 
 def _to_wire(value: Any) -> Any:
@@ -68,18 +81,25 @@ def sender_of(data: bytes) -> int:
     return int(_SENDER.unpack_from(data)[0]) if len(data) >= _HEADER.size else 0
 
 
-def decode(data: bytes, kind: type[Message], *, where: str = "message") -> Envelope[Message]:
-    """Return the message in `data`; `where` names the key or file in errors.
-
-    Raises SchemaMismatch for other versions, other data, and bodies that do not fit `kind`.
-    """
+def header_of(data: bytes, *, where: str) -> Header:
+    """Return what stands before a message; raises SchemaMismatch for other data or versions."""
     if len(data) < _HEADER.size or data[:4] != MAGIC:
         raise SchemaMismatch(f"{where}: not a foretwin message ({len(data)} bytes)")
     _, version, seq, sent_ns = _HEADER.unpack_from(data)
     if version != SCHEMA_VERSION:
         raise SchemaMismatch(
-            f"{where}: schema version {version}; this foretwin reads version {SCHEMA_VERSION}"
+            f"{where}: schema version {version}; this foretwin reads version {SCHEMA_VERSION}",
+            kind="another schema version",
         )
+    return Header(seq, sent_ns)
+
+
+def decode(data: bytes, kind: type[Message], *, where: str = "message") -> Envelope[Message]:
+    """Return the message in `data`; `where` names the key or file in errors.
+
+    Raises SchemaMismatch for other versions, other data, and bodies that do not fit `kind`.
+    """
+    seq, sent_ns = header_of(data, where=where)
     return Envelope(
         seq, sent_ns, decode_content(memoryview(data)[_HEADER.size :], kind, where=where)
     )
@@ -94,8 +114,10 @@ def decode_content(
         decoder = _decoders[kind] = msgspec.msgpack.Decoder(kind, dec_hook=_from_wire)
     try:
         message: Message = decoder.decode(data)
-    except (msgspec.DecodeError, ValueError, TypeError) as error:
-        raise SchemaMismatch(f"{where}: no valid {kind.__name__}: {error}") from error
+    except Exception as error:  # whatever bytes of strangers make of it, depth and sizes included
+        raise SchemaMismatch(
+            f"{where}: no valid {kind.__name__}: {error}", kind=f"no valid {kind.__name__}"
+        ) from error
     return message
 
 

@@ -22,6 +22,7 @@ from foretwin.contracts import (
     towards_vehicle,
     tuning,
 )
+from foretwin.contracts.bounds import MOST_BYTES, MOST_SAMPLE_BYTES
 
 PREFIX = "foretwin/v1"
 
@@ -63,6 +64,11 @@ class Channel(NamedTuple):
     reply: type[msgspec.Struct] | None = None
     key: str = ""
     qos: Qos = LIVE
+
+    @property
+    def most_bytes(self) -> int:
+        """How large a message may be."""
+        return MOST_SAMPLE_BYTES if self.qos == LIVE else MOST_BYTES
 
 
 _VEHICLE, _RUN = "vehicle/{vehicle}", "run/{run}"

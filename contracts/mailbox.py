@@ -14,7 +14,8 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from foretwin.contracts.codec import Envelope, decode, encode, sender_of
+from foretwin.contracts.codec import Envelope, encode, sender_of
+from foretwin.contracts.guard import Refused, opened
 from foretwin.contracts.keys import CHANNELS
 
 _TURNS = 20
@@ -23,44 +24,59 @@ _TURNS = 20
 class Received:
     """One message as it lay in the mailbox; `envelope()` decodes it."""
 
-    __slots__ = ("_kind", "_payload", "channel", "key", "received_mono_ns")
+    __slots__ = ("_kind", "_opened", "_payload", "channel", "key", "received_mono_ns")
 
-    def __init__(self, channel: str, key: str, payload: bytes, kind: type[msgspec.Struct]) -> None:
+    def __init__(
+        self, channel: str, key: str, payload: bytes | None, kind: type[msgspec.Struct]
+    ) -> None:
+        """`payload` is None where it was too large to be kept."""
         self.channel = channel
         self.key = key
         self.received_mono_ns = time.monotonic_ns()
         self._payload = payload
         self._kind = kind
+        self._opened: Envelope[Any] | None = None
 
     def envelope(self) -> Envelope[Any]:
-        """Return header and message; raises SchemaMismatch."""
-        return decode(self._payload, self._kind, where=self.key)
+        """Return header and message; raises Refused where the guard does not let it in."""
+        if self._opened is None:
+            most = CHANNELS[self.channel].most_bytes
+            self._opened = opened(self._payload, self._kind, where=self.key, most_bytes=most)
+        return self._opened
 
     def message(self) -> Any:
-        """Return the message alone; raises SchemaMismatch."""
+        """Return the message alone; raises Refused where the guard does not let it in."""
         return self.envelope().message
 
     @property
     def sender(self) -> int:
         """By whose numbering it is numbered; see foretwin.contracts.codec."""
-        return sender_of(self._payload)
+        return 0 if self._payload is None else sender_of(self._payload)
 
 
 class Reply(NamedTuple):
-    """The end of a request: a message, or None with the reason in `error`."""
+    """The end of a request: a message, or None with the reason in `error`.
+
+    `refused` is set where an answer came and the guard did not let it in.
+    """
 
     channel: str
     tag: Any
     message: Any | None
     error: str | None
     received_mono_ns: int
+    refused: Refused | None = None
 
 
 class Request:
     """A question to answer exactly once."""
 
     def __init__(
-        self, channel: str, key: str, payload: bytes, answer: Callable[[bytes | None, str], None]
+        self,
+        channel: str,
+        key: str,
+        payload: bytes | None,
+        answer: Callable[[bytes | None, str], None],
     ) -> None:
         self.channel = channel
         self.key = key
@@ -69,8 +85,9 @@ class Request:
         self._answer = answer
 
     def message(self) -> Any:
-        """Return the question; raises SchemaMismatch."""
-        return decode(self._payload, CHANNELS[self.channel].kind, where=self.key).message
+        """Return the question; raises Refused where the guard does not let it in."""
+        kind = CHANNELS[self.channel].kind
+        return opened(self._payload, kind, where=self.key).message
 
     def reply(self, message: msgspec.Struct) -> None:
         """Answer."""

@@ -1,6 +1,6 @@
 """How every process of a run lives: reads its setup, joins the bus, says it is alive, and leaves.
 
-A process leaves when the run ends (`run_end`), when it is told to (SIGTERM), or when the
+A process leaves when the run ends (`run_end`), when it is told to (SIGTERM, SIGHUP), or when the
 orchestrator is gone: at once where that has started it, after a grace where the link may come back.
 Ctrl-C is the orchestrator's business: children ignore SIGINT.
 """
@@ -8,6 +8,8 @@ Ctrl-C is the orchestrator's business: children ignore SIGINT.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import fcntl
 import json
 import logging
 import os
@@ -21,10 +23,14 @@ from typing import TypeVar
 
 import msgspec
 
-from foretwin.contracts.bus import Alive, Bus, Mailbox, ZenohBus
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
+from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup, read_setup
+from foretwin.contracts.terminal import say
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
 
@@ -75,6 +81,7 @@ class ProcessLife:
         self._mono_s = mono_s
         self._parent = os.getppid()
         self._mailbox = Mailbox(16)
+        self._refusals = Refusals()
         self._orchestrator_seen = False
         self._gone_since_s: float | None = None
         self.run_ended = False
@@ -106,14 +113,49 @@ class ProcessLife:
 
     def _look(self) -> None:
         while (item := self._mailbox.take()) is not None:
-            if not isinstance(item, Alive):
-                self.run_ended = True
-                self.terminated.set()
-            elif item.up:
+            if isinstance(item, Received):
+                self._take_end(item)
+            elif isinstance(item, Alive) and item.up:
                 self._orchestrator_seen = True
                 self._gone_since_s = None
-            elif self._orchestrator_seen:
+            elif isinstance(item, Alive) and self._orchestrator_seen:
                 self._gone_since_s = self._mono_s()
+
+    def _take_end(self, item: Received) -> None:
+        try:
+            item.message()
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                logging.getLogger(self._setup.process_id).warning("%s", text)
+            return
+        self.run_ended = True
+        self.terminated.set()
+
+
+def hold(setup_file: Path) -> int:
+    """Lock the file that a process was started with for as long as the process lives; returns the
+    descriptor that holds it.
+
+    So that whoever finds a run without its orchestrator sees who of it still writes; see `is_held`.
+    """
+    descriptor = os.open(setup_file, os.O_RDONLY | os.O_CLOEXEC)
+    with contextlib.suppress(OSError):  # not every file system can
+        fcntl.flock(descriptor, fcntl.LOCK_SH)
+    return descriptor
+
+
+def is_held(setup_file: Path) -> bool:
+    """Whether the process that was started with a file still lives."""
+    descriptor = os.open(setup_file, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False
 
 
 def run_process(
@@ -134,16 +176,17 @@ def run_process(
         setup = read_setup(file, kind)
     except (msgspec.DecodeError, OSError) as problem:
         parser.exit(2, f"{file}: {problem}\n")
+    hold(file)
     log_to_file(setup)
     code = 0
     try:
         with ZenohBus(setup.bus) as bus:
             life = ProcessLife(setup, bus)
-            signal.signal(signal.SIGTERM, lambda *_: life.terminated.set())
+            on_end_signals(life.terminated.set)
             serve(setup, bus, life)
     except (UserError, OSError) as problem:
         logging.getLogger(setup.process_id).exception("%s", problem)
-        print(f"{setup.process_id}: {problem}", file=sys.stderr)
+        say(f"{setup.process_id}: {problem}", error=True)
         code = 2
     except Exception:
         logging.getLogger(setup.process_id).exception("ended by an error")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 
-_ENDING = signal.SIGTERM, signal.SIGHUP
+from foretwin.contracts.end_signals import ignore_end_signals, on_end_signals
 
 
 def main() -> None:
@@ -14,18 +13,15 @@ def main() -> None:
     # Nothing here renders with MuJoCo, whose look for a window costs each process an interpreter.
     os.environ.setdefault("MUJOCO_GL", "disable")
 
-    for number in _ENDING:
-        if signal.getsignal(number) == signal.SIG_DFL:  # else nohup's: nothing ends it
-            signal.signal(number, _interrupt)
+    on_end_signals(_interrupt)
     from foretwin.orchestrator.commands.cli import run
 
     sys.exit(run(sys.argv[1:]))
 
 
-def _interrupt(*_: object) -> None:
+def _interrupt() -> None:
     """End as by Ctrl-C, with everything put away; a closed terminal says so twice."""
-    for number in _ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    ignore_end_signals()
     raise KeyboardInterrupt
 
 

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 from foretwin.checks import path_of
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.record.job_tables import table_at
+from foretwin.orchestrator.record.run_state import check_finished
 
 _RUN, _SWEEP = "run.json", "sweep.json"
 
@@ -39,8 +40,11 @@ class Recording:
 
 
 def open_run(folder: Path | str) -> Recording:
-    """Open what `foretwin drive` left; UserError where the folder holds no run."""
-    return Recording(path_of("folder", folder), _RUN)
+    """Open what `foretwin drive` left; UserError where the folder holds no run, or one that has
+    not come to its end."""
+    recording = Recording(path_of("folder", folder), _RUN)
+    check_finished(recording.folder)
+    return recording
 
 
 def open_sweep(folder: Path | str) -> Recording:

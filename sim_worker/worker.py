@@ -16,9 +16,11 @@ import scipy.spatial  # noqa: F401  A search for many points needs it: not withi
 from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.placement import PlaceRequest, WorldPlaces
 from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.runner import JobAnswer, JobRequest
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
@@ -85,6 +87,7 @@ class FuturesWorker:
 
     def __init__(self, setup: WorkerSetup) -> None:
         self._id = setup.process_id
+        self._refusals = Refusals()
         self._worlds_dir = Path(setup.worlds_dir)
         self._stages = SimulationCache(setup, setup.vehicle)
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
@@ -101,6 +104,11 @@ class FuturesWorker:
         """Answer one question; never raises: what cannot be answered is refused in one line."""
         try:
             answer = self.answer(request.channel, request.message())
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
+            request.refuse(one_line(refused))
+            return
         except Exception as error:
             # The run goes on without this answer; the traceback is for the log's reader.
             log.exception("%s refused", request.channel)

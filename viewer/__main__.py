@@ -14,9 +14,12 @@ from typing import NamedTuple
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, ask
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.segments import next_number, segment_file, segments_of
 from foretwin.contracts.setup import ViewerSetup
+from foretwin.contracts.terminal import say
 from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.live_viewer import (
     HOST,
@@ -67,6 +70,7 @@ class Recorder:
     ) -> None:
         self._messages = messages
         self._reported_dropped = 0
+        self._refusals = Refusals()
         self._reported_window = False
         self._flushed_s = time.monotonic()
         self._monitor = Monitor(
@@ -103,8 +107,9 @@ class Recorder:
         if isinstance(item, Received):
             try:
                 rows = self._monitor.handle(item.channel, item.message())
-            except ValueError as problem:
-                rows = self._monitor.note("error", str(problem))
+            except Refused as refused:
+                text = self._refusals.take(refused)
+                rows = self._monitor.note("error", text) if text else []
             self._write(rows)
         if time.monotonic() - self._flushed_s > FLUSH_PERIOD_S:
             self._report_troubles()
@@ -214,7 +219,7 @@ def main(arguments: list[str] | None = None) -> int:
         # Leaves through os._exit: Rerun's flush at exit never ends with a frozen viewer.
         run_process(ViewerSetup, serve, ["--setup", str(given.setup)])
     except (OSError, ValueError) as problem:
-        print(f"viewer: {problem}", file=sys.stderr)
+        say(f"viewer: {problem}", error=True)
         return 2
     return 1
 

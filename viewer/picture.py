@@ -14,6 +14,7 @@ import numpy as np
 from rerun.experimental import ViewerClient
 
 from foretwin.contracts.ports import free_port
+from foretwin.contracts.terminal import say
 from foretwin.viewer import blueprint
 from foretwin.viewer.blueprint import DetailView, MainView
 from foretwin.viewer.live_viewer import NoViewerError, address, start_program, wait_until_it_answers
@@ -139,7 +140,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         given.out.write_bytes(picture.window)
     except (OSError, ValueError) as problem:
-        print(f"foretwin.viewer.picture: {problem}", file=sys.stderr)
+        say(f"foretwin.viewer.picture: {problem}", error=True)
         return 2
     return 0
 

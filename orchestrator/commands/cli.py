@@ -11,7 +11,15 @@ import typer
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS
-from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge, repeat
+from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.cli_logs import (
+    convert,
+    gap,
+    identify,
+    judge,
+    recover,
+    repeat,
+)
 from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_set import set_value
@@ -230,7 +238,7 @@ def sweep(
     raise typer.Exit(run_sweep(spec, out=out, workers=workers, fresh=fresh, as_json=as_json))
 
 
-for about_logs in (convert, identify, gap, judge, repeat):
+for about_logs in (convert, identify, gap, judge, recover, repeat):
     app.command()(about_logs)
 
 app.command("set")(set_value)
@@ -261,12 +269,12 @@ def run(arguments: list[str]) -> int:
         with contextlib.suppress(BrokenPipeError):  # whoever read it has seen enough
             sys.stdout.flush()
     except (UserError, *PATH_ERRORS) as error:
-        print(f"foretwin: {one_line(error)}", file=sys.stderr)
+        say(f"foretwin: {one_line(error)}", error=True)
         return EXIT_USER
     except OSError as error:
         if error.errno not in NO_PLACE:
             return report(error)
-        print(f"foretwin: {one_line(error)}", file=sys.stderr)
+        say(f"foretwin: {one_line(error)}", error=True)
         drop_output()
         return EXIT_USER
     except (KeyboardInterrupt, typer.Abort):
@@ -274,9 +282,9 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # of typer's own
             if line := usage_line(error, arguments):
-                print(line, file=sys.stderr)
+                say(line, error=True)
             return int(error.exit_code)
         return report(error)
     if result == EXIT_INTERRUPTED:  # as typer, too, answers Ctrl-C
-        print("foretwin: interrupted", file=sys.stderr)
+        say("foretwin: interrupted", error=True)
     return result if isinstance(result, int) else 0

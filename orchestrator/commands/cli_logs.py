@@ -78,6 +78,15 @@ def repeat(
     raise typer.Exit(repeat_future(folder, future, as_json=as_json, view=view))
 
 
+def recover(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+) -> None:
+    """Make readable what a run left that was killed: exit code 3 where something of it is lost."""
+    from foretwin.orchestrator.commands.recover import recover_run
+
+    raise typer.Exit(recover_run(run))
+
+
 def gap(
     recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
     vehicle: Annotated[

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from foretwin.contracts.terminal import say
+
 
 def set_value(
     assignment: Annotated[
@@ -26,4 +28,4 @@ def set_value(
     """Change a running drive: a vehicle's role, the twins' correction, the car's parameters."""
     from foretwin.orchestrator.commands.set import set_in_drive
 
-    print(set_in_drive(assignment, run=run, out=out))
+    say(set_in_drive(assignment, run=run, out=out))

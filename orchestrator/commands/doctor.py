@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from foretwin.contracts.terminal import say
+
 Verdict = Literal["ok", "missing", "note"]
 
 _BUS_S = 20.0
@@ -32,7 +34,7 @@ def examine() -> int:
     findings = [check() for check in CHECKS]
     marks = {"ok": "ok     ", "missing": "MISSING", "note": "note   "}
     for finding in findings:
-        print(f"{marks[finding.verdict]}  {finding.what}: {finding.text}")
+        say(f"{marks[finding.verdict]}  {finding.what}: {finding.text}")
     return 3 if any(f.verdict == "missing" for f in findings) else 0
 
 

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from foretwin.contracts.terminal import say
+
 EXIT_INTERNAL = 1
 NO_PLACE = (
     errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.ELOOP,
@@ -52,10 +54,10 @@ def report(error: Exception) -> int:
         "w", prefix="foretwin-", suffix=".log", delete=False, encoding="utf-8"
     ) as file:
         traceback.print_exception(error, file=file)
-    print(
+    say(
         f"foretwin: internal error: {type(error).__name__}: {one_line(error)} "
         f"(traceback in {file.name})",
-        file=sys.stderr,
+        error=True,
     )
     return EXIT_INTERNAL
 

@@ -14,9 +14,11 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
@@ -111,6 +113,7 @@ def report_gap(
     parameters = load_vehicle(vehicle)
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
+    check_finished(recording if recording.is_dir() else recording.parent)
     log = open_log(recording, declaration=declaration)
     report = gap_of(log, parameters, name=str(recording), progress=True)
     plots: list[Path] = []
@@ -122,11 +125,11 @@ def report_gap(
             report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
         )
     if as_json:
-        print(json.dumps(as_object(report), indent=2))
+        say(json.dumps(as_object(report), indent=2))
         return
-    print("\n".join(_lines(report)))
+    say("\n".join(_lines(report)))
     for plot in plots:
-        print(f"wrote {plot}")
+        say(f"wrote {plot}")
 
 
 def as_object(report: GapReport) -> dict[str, Any]:

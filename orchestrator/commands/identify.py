@@ -15,6 +15,7 @@ from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.terminal import say
 from foretwin.contracts.tuning import Identification
 from foretwin.orchestrator.commands.output import print_json
 from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
@@ -72,9 +73,9 @@ def identify_log(
     if as_json:
         print_json(as_object(told))
     else:
-        print("\n".join(as_lines(told)))
+        say("\n".join(as_lines(told)))
         if out is not None:
-            print(f"{out}: vehicle.toml, identification.json and plots")
+            say(f"{out}: vehicle.toml, identification.json and plots")
     return 0
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import datetime
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import msgspec
 
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
 from foretwin.orchestrator.config import DriveConfig
@@ -20,10 +20,12 @@ from foretwin.orchestrator.drive.drive import carry_out
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.orchestrator.processors import most_workers
+from foretwin.orchestrator.record.recovery import RECOVERED
+from foretwin.orchestrator.record.run_state import RECORD, check_finished
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 
-RECORD, DRIVE = "run.json", "drive.mcap"
+DRIVE = "drive.mcap"
 JUDGED = "judged"
 
 
@@ -58,7 +60,7 @@ def judge(
         _check_on_way(worlds, run, record)
     read_inputs(corrected)  # what is wrong with them is told before anything long begins
     before = run
-    if record["config"].get("speed") is not None or record.get("versions") != versions():
+    if not _stands_for_itself(record):
         _say(f"{run}: driven again as it was, in lock step, to compare with")
         code, before = _drive(again)
         if code:
@@ -69,10 +71,18 @@ def judge(
         return code
     found = difference_of(read_judged(before), read_judged(after))
     if as_json:
-        print(json.dumps(found, indent=2, ensure_ascii=False))
+        say(json.dumps(found, indent=2, ensure_ascii=False))
     else:
-        print("\n".join(difference_lines(found)))
+        say("\n".join(difference_lines(found)))
     return 0
+
+
+def _stands_for_itself(record: dict[str, Any]) -> bool:
+    """Whether a run need not be driven again to be compared with: in lock step, of this version,
+    and to an end of its own."""
+    in_lock_step = record["config"].get("speed") is None
+    ended = record.get("exit") != RECOVERED
+    return in_lock_step and ended and record.get("versions") == versions()
 
 
 def _drive(config: DriveConfig) -> tuple[int, Path]:
@@ -81,6 +91,7 @@ def _drive(config: DriveConfig) -> tuple[int, Path]:
 
 
 def _record(run: Path) -> dict[str, Any]:
+    check_finished(run)
     for part in (RECORD, DRIVE):
         if not (run / part).is_file():
             raise FileNotFoundError(f"run {run}: no {part} in it")
@@ -137,4 +148,4 @@ def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+    say(text, error=True)

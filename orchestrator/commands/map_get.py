@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.terminal import console, described, plain, say, visible
 from foretwin.orchestrator.worlds.overpass import OverpassConfig, fetch_map, load_overpass_config
 from foretwin.orchestrator.worlds.overpass_query import (
     box_filter,
@@ -51,7 +52,7 @@ def get_map(area: str, *, out: Path, config: Path | None) -> None:
         packed.unlink(missing_ok=True)
     from foretwin.contracts.world import ATTRIBUTION
 
-    print(f"{out}: {counts['w']} ways, {counts['n']} nodes. {ATTRIBUTION}")
+    say(f"{out}: {counts['w']} ways, {counts['n']} nodes. {ATTRIBUTION}")
 
 
 def area_filter(area: str, *, margin_m: float) -> str:
@@ -64,19 +65,21 @@ def area_filter(area: str, *, margin_m: float) -> str:
 
 
 def _fetch(settings: OverpassConfig, query: str, answer: Path) -> None:
-    from rich.console import Console
-    from rich.progress import DownloadColumn, Progress, SpinnerColumn, TextColumn
+    from rich.progress import DownloadColumn, Progress, SpinnerColumn
 
-    console = Console(stderr=True)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), DownloadColumn())
-    bar = Progress(*columns, console=console, disable=not console.is_terminal)
+    shown = console(error=True)
+    columns = (SpinnerColumn(), described(), DownloadColumn())
+    bar = Progress(*columns, console=shown, disable=not shown.is_terminal)
     with bar, answer.open("w+b") as target:
-        task = bar.add_task(f"asking {settings.endpoint}", total=None)
+        task = bar.add_task(plain(f"asking {settings.endpoint}"), total=None)
 
         def show(done: int, total: int | None) -> None:
             bar.update(task, completed=done, total=total)
 
-        fetch_map(settings, query, target, progress=show, said=console.print)
+        def tell(text: str) -> None:
+            shown.print(visible(text))
+
+        fetch_map(settings, query, target, progress=show, said=tell)
 
 
 def _count(answer: Path, out: Path) -> dict[str, int]:

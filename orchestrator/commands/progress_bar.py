@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from foretwin.contracts.terminal import console, described, plain, visible
+
 PLAIN_PERIOD_S = 5.0
 """Between lines of progress where there is no terminal."""
 
@@ -15,25 +17,18 @@ def progress_bar(
     total: int, what: str
 ) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
     """Give a function that counts one more and one that prints a line beside the bar."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-    console = Console(stderr=True, highlight=False)
+    shown = console(error=True)
 
     def say(text: str) -> None:
-        console.print(text, soft_wrap=True, markup=False)
+        shown.print(visible(text), soft_wrap=True)
 
-    if console.is_terminal:
+    if shown.is_terminal:
         counted = BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        with Progress(TextColumn("{task.description}"), *counted, console=console) as bar:
+        with Progress(described(), *counted, console=shown) as bar:
             task = bar.add_task(what, total=total)
-            yield lambda name: bar.update(task, advance=1, description=name), say
+            yield lambda name: bar.update(task, advance=1, description=plain(name)), say
         return
     done, last_s = 0, time.monotonic()
 

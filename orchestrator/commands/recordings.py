@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.terminal import say
 
 
 def convert_log(
@@ -27,10 +28,10 @@ def convert_log(
         raise UserError(f"{target}: folder {target.parent} does not exist")
     report = convert(source, target, declaration=declaration, to=kind)
     kept = ", ".join(f"{count} {name}" for name, count in sorted(report.counts.items()))
-    print(f"{target}: {kept}")
+    say(f"{target}: {kept}")
     if report.skipped:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.skipped.items()))
-        print(f"left out: {left}")
+        say(f"left out: {left}")
 
 
 def open_view(run_folder: Path) -> int:

@@ -10,6 +10,7 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.record.job_tables import REPEATED
 from foretwin.orchestrator.record.recorded_jobs import RecordedFuture, recorded_future
 from foretwin.sim_worker.futures.future_rows import future_rows
@@ -38,18 +39,18 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
     result, after = play_again(recorded)
     if as_json:
         hashes = {"recorded_sha256": before, "sha256": after}
-        print(json.dumps({"future": future_id, **hashes, "equal": before == after}))
+        say(json.dumps({"future": future_id, **hashes, "equal": before == after}))
     elif before == after:
-        print(f"{future_id}: the same again, sha256 {after}")
+        say(f"{future_id}: the same again, sha256 {after}")
     else:
-        print(f"{future_id}: differs: recorded sha256 {before}, now {after}")
+        say(f"{future_id}: differs: recorded sha256 {before}, now {after}")
     if view and after is not None:
         from foretwin.sim_worker.futures.future_picture import write_future_picture
 
         picture = pictures / f"{future_id}.png"
         index = result.future_indices.index(recorded.row.index)
         write_future_picture(picture, recorded.job, result, index, recorded.world, recorded.vehicle)
-        print(picture)
+        say(picture)
     return 0 if before == after else DIFFERS
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, asked_junctions
 from foretwin.sim_worker.planners.registry import check_planner
@@ -53,8 +54,8 @@ def export_scenario(request: CaseRequest, out: Path) -> None:
     now, case = datetime.datetime.now(datetime.UTC), (found.played, found.scenario, found.world)
     roads = write_openscenario(*case, out, vehicle=vehicle, written_at=now)
     played = found.played
-    print(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
-    print(f"{roads}: its roads")
+    say(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
+    say(f"{roads}: its roads")
 
 
 def _check_roads(out: Path) -> None:
@@ -87,7 +88,7 @@ def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
     except ValueError as error:
         raise UserError(str(error)) from error
     write_case_picture(out, played, scenario, world, heedless, planned, planner=planner)
-    print(f"{out}: {scenario.id}, case {request.case}, at {played.place.junction_id}")
+    say(f"{out}: {scenario.id}, case {request.case}, at {played.place.junction_id}")
 
 
 def placed_case(request: CaseRequest) -> PlacedCase:

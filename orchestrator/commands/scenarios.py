@@ -11,6 +11,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.output import print_json, print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.worlds.choice import choose_junctions
@@ -72,7 +73,7 @@ def check_scenario_file(file: Path) -> None:
     """Print what a scenario file holds; UserError, in one line, where it holds none."""
     scenario = read_scenario(file)
     cases = len(draw_cases(scenario))
-    print(f"{file}: {scenario.id}, {scenario.title}: {cases} cases, {_where(scenario)}")
+    say(f"{file}: {scenario.id}, {scenario.title}: {cases} cases, {_where(scenario)}")
 
 
 def place_scenarios(request: PlacesAsked, *, as_json: bool) -> int:

@@ -18,6 +18,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.processors import trouble_with_workers
 from foretwin.orchestrator.record.job_tables import keep_vehicles
@@ -55,7 +56,7 @@ def sweep(
         with workers_for(loaded, out, workers) as runner:
             summary = run_sweep(loaded, out, runner, fresh=fresh)
     except NoWorkerError as error:
-        print(f"foretwin: {error}; what is done is kept", file=sys.stderr)
+        say(f"foretwin: {error}; what is done is kept", error=True)
         return SOME_FAILED
     if as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.world_files import write_each, write_report
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
@@ -121,7 +122,7 @@ def _write_one(world: World, request: WorldRequest, format_: Format, options: Ex
     place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
     counts = {"lanes": world.lanes, "buildings": world.buildings, "notes": world.notes}
     text = ", ".join(f"{len(those)} {name}" for name, those in counts.items())
-    print(f"{request.out}: {place}, {text}. {world.attribution}")
+    say(f"{request.out}: {place}, {text}. {world.attribution}")
     if request.report:
         write_report(world, request.out, show=True)
     return 0

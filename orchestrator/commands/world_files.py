@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.world_gen.junctions.intersections import Junction
@@ -63,7 +63,7 @@ def write_report(world: World, path: Path, *, show: bool) -> None:
     for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):
         path.with_name(path.name + ending).write_text(text, encoding="utf-8")
     if show:
-        print(report.as_text(), end="")
+        say(report.as_text().rstrip("\n"))
 
 
 def _summary(
@@ -71,15 +71,15 @@ def _summary(
 ) -> int:
     listed = folder / FAILURES_FILE
     listed.unlink(missing_ok=True)
-    print(f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}")
+    say(f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}")
     for kind, junctions in kinds.most_common(_SHOWN_KINDS):
-        print(f"  {junctions:6d}  {kind}")
+        say(f"  {junctions:6d}  {kind}")
     if len(kinds) > _SHOWN_KINDS:
-        print(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
+        say(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
     if not failures:
         return 0
     listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
-    print(f"{len(failures)} failed: {listed}", file=sys.stderr)
+    say(f"{len(failures)} failed: {listed}", error=True)
     return SOME_FAILED
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from foretwin.contracts import keys
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.guard import Refused, is_identifier
 from foretwin.contracts.simulation import ActiveWorld
 from foretwin.contracts.world import World
 from foretwin.orchestrator.context import DriveContext
@@ -19,6 +19,7 @@ from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, VIEWER
 from foretwin.orchestrator.drive.questions import Questions
+from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
@@ -37,10 +38,6 @@ log = logging.getLogger(ORCHESTRATOR)
 MAILBOX_DEPTH = 16384
 
 
-def _nothing(_: object) -> None:
-    """Take what nothing here listens to."""
-
-
 class Conductor:
     """The state of one drive between its messages."""
 
@@ -57,6 +54,7 @@ class Conductor:
             bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
         )
         self.tell = self.events.tell
+        self.refusals = RefusalHandler(self.tell)
         self.context = context = DriveContext(plan, bus, self.mailbox, tables, self.tell)
         self.worlds = WorldHandler(
             context, on_ready=self._world_ready, on_failed=self._world_failed
@@ -136,16 +134,24 @@ class Conductor:
     # Messages.
 
     def handle(self, item: object) -> None:
-        """Take one item of the mailbox; None, where nothing came, changes nothing."""
-        match item:
-            case Received():
-                self._on_message.get(item.channel, _nothing)(item)
-            case Reply():
-                self._on_reply.get(item.channel, _nothing)(item)
-            case Request(channel="set"):
-                self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
-            case Alive():
-                self._alive(item)
+        """Take one item of the mailbox; None, where nothing came, changes nothing.
+
+        What others sent and cannot be used is counted and told, and never raises.
+        """
+        try:
+            match item:
+                case Received(channel=channel) if channel in self._on_message:
+                    self._on_message[channel](item)
+                case Reply(channel=channel) if channel in self._on_reply:
+                    if item.refused is not None:
+                        self.refusals.take(item.refused)
+                    self._on_reply[channel](item)
+                case Request(channel="set"):
+                    self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
+                case Alive():
+                    self._alive(item)
+        except Refused as refused:
+            self.refusals.take(refused)
 
     def _build_reply(self, item: Reply) -> None:
         workers, builder_up = self.rounds.dispatcher.workers, BUILDER in self.alive
@@ -162,12 +168,9 @@ class Conductor:
         if sender != self.plan.config.vehicle_id:
             self.beside.take_sample(sender, item)
             return
-        try:
-            state = self.intake.take(item)
-        except SchemaMismatch as error:
-            if self.intake.refused == 1:
-                self.tell(Notice("error", str(error)))
-            return
+        state = self.intake.take(item)
+        if left_out := item.envelope().left_out:
+            self.refusals.leave_out(item.key, left_out)
         self.ads.take(state)
         if state is None:
             return
@@ -246,8 +249,6 @@ class Conductor:
         self.tell(Notice("error", f"no world for {junction_id}: {reason}"))
         self.mission.on_world_failed(junction_id)
 
-    # Changes.
-
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""
         if self.rounds.open:
@@ -262,9 +263,10 @@ class Conductor:
 
     def _alive(self, item: Alive) -> None:
         process_id = keys.process_of_alive_key(item.key)
-        if process_id == ORCHESTRATOR:
-            return
-        (self._process_up if item.up else self._process_down)(process_id)
+        if not is_identifier(process_id):
+            raise Refused(item.key, "a token of no plain name")
+        if process_id != ORCHESTRATOR:
+            (self._process_up if item.up else self._process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:
         self.alive.add(process_id)
@@ -289,11 +291,10 @@ class Conductor:
         self.rounds.dispatcher.give_out()
 
     def _process_down(self, process_id: str) -> None:
-        if process_id not in self.alive:
-            return
-        self.alive.discard(process_id)
-        self.tuning.process_down(process_id)
-        log.info("lost %s", process_id)
-        if process_id.startswith("w"):
-            self.worlds.worker_down(process_id)
-            self.rounds.worker_down(process_id)
+        if process_id in self.alive:
+            self.alive.discard(process_id)
+            self.tuning.process_down(process_id)
+            log.info("lost %s", process_id)
+            if process_id.startswith("w"):
+                self.worlds.worker_down(process_id)
+                self.rounds.worker_down(process_id)

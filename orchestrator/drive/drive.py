@@ -7,10 +7,10 @@ import datetime
 import logging
 import signal
 import time
-from types import FrameType
 
 from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
@@ -26,16 +26,12 @@ from foretwin.orchestrator.drive.plan import make_plan, open_bus, read_inputs
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
-from foretwin.orchestrator.drive.run_record import (
-    lost_lines,
-    reserve_record,
-    run_record,
-    write_record,
-)
+from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, run_lock, write_record
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, fold_stderr
@@ -57,14 +53,14 @@ class DriveError(RuntimeError):
 
 
 class _Interrupt:
-    """Remembers Ctrl-C and SIGTERM; the loops ask, nothing is torn away in the middle."""
+    """Remembers Ctrl-C, SIGTERM and a closed terminal for the loops; nothing is torn away."""
 
     def __init__(self) -> None:
         self.asked = False
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._remember)
+        signal.signal(signal.SIGINT, lambda *_: self._remember())
+        on_end_signals(self._remember)
 
-    def _remember(self, _number: int, _frame: FrameType | None) -> None:
+    def _remember(self) -> None:
         self.asked = True
 
 
@@ -81,10 +77,11 @@ def carry_out(plan: DrivePlan) -> int:
             process_id=ORCHESTRATOR,
             vehicle_id=plan.config.vehicle_id,
             bus=plan.bus,
-            log_file=str(plan.folder / "log.jsonl"),
+            log_file=str(plan.folder / LOG),
         )
     )
-    return _Drive(plan).run()
+    with run_lock(plan.folder):
+        return _Drive(plan).run()
 
 
 class _Drive:
@@ -95,6 +92,7 @@ class _Drive:
         self._interrupt = _Interrupt()
         self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
         self._watch = ProcessWatch(self._supervisor)
+        self._failed_at_end = False
         self._mission = Mission(
             WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
             MissionSettings(
@@ -111,7 +109,7 @@ class _Drive:
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with open_bus(plan) as bus:
             tables = ResultTables(
-                plan.folder / "results",
+                plan.folder / RESULTS,
                 {
                     "run_id": plan.run_id,
                     "attribution": plan.osm.attribution,
@@ -132,12 +130,14 @@ class _Drive:
                     raise
                 finally:
                     whole = self._end(bus, conductor, line, exit_word, started_s)
+        if self._failed_at_end:
+            return EXIT_FAILED
         return EXIT_PARTLY if code == EXIT_DONE and not whole else code
 
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
         # A run that is listed can be spoken to: questions wait in the mailbox from here on.
-        reserve_record(self._plan, self._plan.folder / "run.json")
+        reserve_record(self._plan, self._plan.folder / RECORD)
         self._start_processes()
         conductor.rounds.draw_cases()  # while they come up
         if self._plan.config.resolved_source == "live":
@@ -236,11 +236,16 @@ class _Drive:
         bus.publish("run_end", end, run=plan.run_id)
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
         quick = exit_word != "completed"
-        killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s)
-        if killed:
+        if killed := self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s):
             log.warning("had to kill %s", ", ".join(killed))
-        while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
-            conductor.handle(item)
+        try:
+            while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
+                conductor.handle(item)
+        except Exception:
+            # An error of ours: what was found until here is written all the same.
+            log.exception("the last messages could not be taken")
+            exit_word = "failed"
+            self._failed_at_end = True
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()
         conductor.route.close()
@@ -254,10 +259,10 @@ class _Drive:
             mono_s=now_s,
             troubles=self._watch.troubles,
         )
-        write_record(record, plan.folder / "run.json")
+        write_record(record, plan.folder / RECORD)
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
-            fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
+            fold_stderr(plan.processes_dir, plan.folder / LOG)
         line.say(summary_text(record))
         lost = lost_lines(record)
         for text in lost:

@@ -8,7 +8,6 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.bus import Received
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import (
     DriveEnd,
     PlannedTrajectory,
@@ -18,6 +17,7 @@ from foretwin.contracts.drive import (
     VehicleState,
     VehicleStatus,
 )
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
 from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
@@ -64,12 +64,14 @@ class Intake:
     def take(self, item: Received) -> VehicleState | None:
         """Take one sample; returns the new state where it gives one.
 
-        Raises SchemaMismatch for a sample of another schema, which is counted as refused.
+        Raises Refused for a sample that the guard does not let in, which is counted.
         """
         try:
             envelope = item.envelope()
-        except SchemaMismatch:
+        except Refused as refused:
             self.refused += 1
+            if refused.header is not None:  # it came: it is not lost as well
+                self.counts.came(key=item.key, channel=item.channel, **refused.header._asdict())
             raise
         message = envelope.message
         if self.first_stamp_ns is None:
@@ -77,8 +79,13 @@ class Intake:
         if isinstance(message, DriveEnd):
             self.end = message
             return None
-        age_ms = max(0.0, (time.time_ns() - envelope.sent_ns) / 1e6)
-        self.counts.take(key=item.key, channel=item.channel, seq=envelope.seq, age_ms=age_ms)
+        self.counts.take(
+            key=item.key,
+            channel=item.channel,
+            seq=envelope.seq,
+            sent_ns=envelope.sent_ns,
+            now_ns=time.time_ns(),
+        )
         if isinstance(message, PlannedTrajectory):
             self.plan = message
         elif isinstance(message, VehicleStatus):

@@ -55,7 +55,7 @@ class LockStepLoop:
             advanced = self._advanced
             assert advanced is not None
             for sample in self._in_order():
-                conductor.take_telemetry(sample)
+                conductor.handle(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
             conductor.announce_world()
             self._wait("the mirror", lambda: not conductor.questions.unanswered)
@@ -105,7 +105,7 @@ class LockStepLoop:
         def said() -> bool:
             nonlocal heard_ns, heard_s
             for sample in self._in_order():
-                conductor.take_telemetry(sample)
+                conductor.handle(sample)
             if conductor.mirror.stamp_ns != heard_ns:
                 heard_ns, heard_s = conductor.mirror.stamp_ns, time.monotonic()
             # What it still says after that is taken once it has ended.

@@ -51,6 +51,8 @@ class ProcessWatch:
                 self.vehicle_lost = True
             else:
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
+        for text in conductor.tables.take_news():
+            conductor.tell(Notice("warning", text))
         self._end_the_hung(conductor, now_s)
 
     def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import Literal
 
-from rich.console import Console
 from rich.status import Status
 
 from foretwin.contracts.keys import key
 from foretwin.contracts.simulation import Event, Progress, WorkerStatus
+from foretwin.contracts.terminal import console, plain, say, visible, words
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.plan import DrivePlan
@@ -26,7 +25,7 @@ class ProgressLine:
     def __init__(self, conductor: Conductor, mission: Mission) -> None:
         self._conductor = conductor
         self._mission = mission
-        self._console = Console(stderr=True, highlight=False)
+        self._console = console(error=True)
         self._status: Status | None = None
         self._last_s = 0.0
         self._last_plain_s = time.monotonic()
@@ -34,7 +33,7 @@ class ProgressLine:
 
     def __enter__(self) -> ProgressLine:
         if self._console.is_terminal:
-            self._status = self._console.status("starting", spinner="dots")
+            self._status = self._console.status(words("starting"), spinner="dots")
             self._status.start()
         return self
 
@@ -44,12 +43,12 @@ class ProgressLine:
 
     def say(self, text: str) -> None:
         """Print a line that stays."""
-        self._console.print(text, soft_wrap=True, markup=False)
+        self._console.print(visible(text), soft_wrap=True)
 
     def tell(self, event: Event) -> None:
         """Print what the engineer should know now: warnings and errors."""
         if event.level != "info":
-            self.say(f"{event.level}: {event.source}: {event.text}")
+            self.say(plain(f"{event.level}: {event.source}: {event.text}"))
 
     def update(self, now_s: float) -> None:
         """Renew the line and publish it, at most a few times a second."""
@@ -63,10 +62,10 @@ class ProgressLine:
             conductor.context.publish("worker_status", status)
         text = self._text(progress)
         if self._status is not None:
-            self._status.update(text)
+            self._status.update(words(text))
         elif now_s - self._last_plain_s >= PLAIN_PERIOD_S:
             self._last_plain_s = now_s
-            print(text, file=sys.stderr, flush=True)
+            say(text, error=True)
 
     def _progress(self, now_s: float) -> Progress:
         conductor, mission = self._conductor, self._mission

@@ -9,7 +9,6 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.bus import Bus, Mailbox, Received
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import local_from_geo
@@ -54,11 +53,11 @@ class RouteHandler:
             self._finder = self._thread.submit(lambda: WayFinder(RoadIndex(self._graph)))
 
     def take(self, item: Received) -> None:
-        """Take what the vehicle says; the same again, or of another schema, changes nothing."""
-        try:
-            said = item.message()
-        except SchemaMismatch:
-            return
+        """Take what the vehicle says; the same again changes nothing.
+
+        Raises Refused where the guard does not let it in.
+        """
+        said = item.message()
         if self._said is None or (said.start, said.goal) != (self._said.start, self._said.goal):
             self._said, self._route, self._wanted = said, None, True
 

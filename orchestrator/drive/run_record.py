@@ -13,6 +13,8 @@ from foretwin.contracts.tally import read_tally, tally_file
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
+from foretwin.orchestrator.record.durable import sync_folder, whole_file
+from foretwin.orchestrator.record.run_state import RUNNING
 from foretwin.orchestrator.record.telemetry_ledger import lost_telemetry_line, telemetry_ledger
 from foretwin.orchestrator.record.versions import versions
 
@@ -38,17 +40,7 @@ def run_record(
     if independent is None:
         independent = plan.commands_recorded
     return {
-        "run_id": plan.run_id,
-        "exit": exit_word,
-        "versions": versions(),
-        "map": {
-            "file": str(plan.map_file),
-            "sha256": plan.osm.sha256,
-            "attribution": plan.osm.attribution,
-        },
-        "seed": plan.config.seed,
-        "route_source": plan.route_source,
-        "config": msgspec.to_builtins(plan.config),
+        **_known_at_start(plan, exit_word),
         "intersections": mission.records(mono_s=mono_s),
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
@@ -78,7 +70,8 @@ def run_record(
             "failed_jobs": conductor.rounds.failed_jobs,
             "given_up_rounds": conductor.rounds.open.given_up,
         },
-        "troubles": [*troubles, *([conductor.tables.failed] if conductor.tables.failed else [])],
+        "refused": conductor.refusals.record(),
+        "troubles": [*troubles, *conductor.tables.troubles],
         "off_road": [
             {
                 "reason": stretch.reason,
@@ -90,6 +83,22 @@ def run_record(
         ],
         "drive_time_s": round(mission.drive_time_s, 3),
         "wall_s": round(wall_s, 3),
+    }
+
+
+def _known_at_start(plan: DrivePlan, exit_word: str) -> dict[str, Any]:
+    return {
+        "run_id": plan.run_id,
+        "exit": exit_word,
+        "versions": versions(),
+        "map": {
+            "file": str(plan.map_file),
+            "sha256": plan.osm.sha256,
+            "attribution": plan.osm.attribution,
+        },
+        "seed": plan.config.seed,
+        "route_source": plan.route_source,
+        "config": msgspec.to_builtins(plan.config),
     }
 
 
@@ -110,25 +119,17 @@ def lost_lines(record: dict[str, Any]) -> list[str]:
     found = [*record["troubles"]]
     if (line := lost_telemetry_line(record["ledger"]["telemetry"])) is not None:
         found.append(line)
-    if rows := record["dropped"]["result_rows"]:
-        found.append(f"{rows} rows of results are not in the tables: the disk was too slow")
     return [f"lost: {line}" for line in found]
 
 
 def reserve_record(plan: DrivePlan, file: Path) -> None:
-    """Write a run.json that says that the run goes on, and keeps room on the disk for the last.
+    """Write a run.json that says that the run goes on, and of what it is, for who may have to
+    complete it; it keeps room on the disk for the last.
 
     Whoever lists runs meanwhile sees the whole of it or nothing.
     """
-    begun = json.dumps({"run_id": plan.run_id, "exit": "running", "endpoint": plan.bus.endpoint})
-    partial = file.with_name(f"{file.name}.writing")
-    partial.write_text(begun.ljust(RESERVED_BYTES) + "\n", encoding="utf-8")
-    partial.replace(file)
-
-
-def write_record(record: dict[str, Any], file: Path) -> None:
-    """Write run.json over the reserved one; works on a full disk. Raises OSError."""
-    data = (json.dumps(record, indent=2, ensure_ascii=False) + "\n").encode()
-    with file.open("r+b" if file.exists() else "wb") as target:
-        target.write(data)
-        target.truncate()
+    begun = _known_at_start(plan, RUNNING) | {"endpoint": plan.bus.endpoint}
+    text = json.dumps(begun, ensure_ascii=False)
+    with whole_file(file) as partial:
+        partial.write_bytes(text.encode().ljust(RESERVED_BYTES) + b"\n")
+    sync_folder(file.parent)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from foretwin.contracts.terminal import plain
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines
 from foretwin.orchestrator.tuning.words import summary_lines
 
@@ -77,4 +78,4 @@ def summary_text(record: dict[str, object]) -> str:
     lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
     lines += summary_lines(record["tuning"])  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
-    return "\n".join([*lines, attribution])
+    return "\n".join(plain(line) for line in (*lines, attribution))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foretwin.contracts.bus import Received
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
@@ -39,11 +38,8 @@ class LiveVehicle(OtherVehicleSource):
         self._clock_reported = False
 
     def take(self, item: Received) -> None:
-        """Take a sample from the bus; one of another schema is passed over."""
-        try:
-            message = item.message()
-        except SchemaMismatch:
-            return
+        """Take a sample from the bus; raises Refused where the guard does not let it in."""
+        message = item.message()
         if self._measured is None:
             info = VehicleInfo(
                 vehicle_id=self._id, time_base="utc", start_stamp_ns=message.stamp_ns

@@ -5,11 +5,12 @@ Nothing is taken that is later than the car's own newest state.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.bus import Received
 from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
 from foretwin.contracts.frames import local_from_geo
@@ -86,7 +87,8 @@ class OtherVehicleFeed:
         bus.request("info", InfoRequest(), mailbox, tag=vehicle_id, vehicle=vehicle_id)
 
     def take_sample(self, vehicle_id: str, item: Received) -> None:
-        """Take a sample of a vehicle on the bus."""
+        """Take a sample of a vehicle on the bus; raises Refused for what the guard keeps out."""
+        item.message()
         source = self._sources.get(vehicle_id)
         if isinstance(source, LiveVehicle):
             source.take(item)
@@ -126,19 +128,23 @@ class OtherVehicleFeed:
         ]
         users = reports.road_users
         fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
+        seen = users.users if fresh and users is not None else ()
+        same = self._same(seen, mine)
         detected = [
             user
-            for user in (users.users if fresh and users is not None else ())
-            if user.user_id not in self._seen_as and not any(self._same(user, one) for one in mine)
+            for user, is_mine in zip(seen, same.tolist(), strict=True)
+            if user.user_id not in self._seen_as and not is_mine
         ]
         return reports._replace(
             road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine))
         )
 
-    def _same(self, one: RoadUser, other: RoadUser) -> bool:
-        frame = self._frame
-        a, b = (
-            local_from_geo(frame, user.position.lat_deg, user.position.lon_deg)
-            for user in (one, other)
-        )
-        return float(np.hypot(*(a - b))) < SAME_WITHIN_M
+    def _same(self, seen: Sequence[RoadUser], mine: Sequence[RoadUser]) -> Flags:
+        """Return which of those that were seen are vehicles that are known anyway, (N,)."""
+        apart = self._places(seen)[:, None] - self._places(mine)
+        same = np.hypot(apart[..., 0], apart[..., 1]) < SAME_WITHIN_M
+        return np.asarray(same.any(axis=1))
+
+    def _places(self, users: Sequence[RoadUser]) -> Array:
+        positions = [(user.position.lat_deg, user.position.lon_deg) for user in users]
+        return local_from_geo(self._frame, *np.array(positions).reshape(-1, 2).T)

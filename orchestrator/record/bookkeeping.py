@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from foretwin.contracts.sequence_gaps import SequenceGaps
 from foretwin.contracts.simulation import Comparison, PlanComparison
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
@@ -23,25 +25,33 @@ class TelemetryCount:
     """Samples by key: received, lost (gaps in the sender's numbering), and their age."""
 
     received: int = 0
-    lost: int = 0
+    lost_before: int = 0
+    """Beyond the gaps: what the vehicle says it sent, before the first sample or after the last."""
     by_channel: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    """Samples that came, each once, those that were refused included."""
     ages_ms: list[float] = field(default_factory=list)
-    _next: dict[str, int] = field(default_factory=dict)
+    gaps: SequenceGaps = field(default_factory=SequenceGaps)
 
-    def take(self, *, key: str, channel: str, seq: int, age_ms: float) -> None:
-        """Count one sample."""
-        expected = self._next.get(key)
-        if expected is not None and seq > expected:
-            self.lost += seq - expected
-        self._next[key] = seq + 1
+    @property
+    def lost(self) -> int:
+        """Samples that never came."""
+        return self.gaps.lost + self.lost_before
+
+    def take(self, *, key: str, channel: str, seq: int, sent_ns: int, now_ns: int) -> None:
+        """Count one sample that was sent and came at these instants of both UTC clocks."""
+        self.came(key=key, channel=channel, seq=seq, sent_ns=sent_ns)
         self.received += 1
-        self.by_channel[channel] += 1
-        self.ages_ms.append(age_ms)
+        self.ages_ms.append(max(0.0, (now_ns - sent_ns) / 1e6))
+
+    def came(self, *, key: str, channel: str, seq: int, sent_ns: int) -> None:
+        """Count a sample as not lost, whatever is made of it."""
+        if self.gaps.take(key, seq, sent_ns=sent_ns) != "doubled":
+            self.by_channel[channel] += 1
 
     def settle(self, published: dict[str, int]) -> None:
         """Count what the vehicle says it published and that never came, first samples included."""
         missing = sum(max(0, sent - self.by_channel[name]) for name, sent in published.items())
-        self.lost = max(self.lost, missing)
+        self.lost_before = max(self.lost_before, missing - self.gaps.lost)
 
     def record(self, skipped_invalid: int) -> dict[str, Any]:
         """Return the `telemetry` part of run.json."""
@@ -80,8 +90,18 @@ class FuturesCount:
             own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
-        self._hash.update(own.digest())
         futures = sum(len(result.future_indices) for result in done.results)
+        self._add(own.digest(), futures, distinct, done.latency_ms)
+        return own.hexdigest()
+
+    def take_row(self, row: Mapping[str, Any]) -> None:
+        """Count one round as the table of rounds holds it."""
+        self.sim_seconds += row["sim_seconds"]
+        self.cpu_seconds += row["cpu_seconds"]
+        self._add(bytes.fromhex(row["sha256"]), row["futures"], row["distinct"], row["latency_ms"])
+
+    def _add(self, digest: bytes, futures: int, distinct: int, latency_ms: float) -> None:
+        self._hash.update(digest)
         self.count += futures
         self.rounds_of[futures] += 1
         self.rounds += 1
@@ -89,8 +109,7 @@ class FuturesCount:
         self.distinct_min = (
             distinct if self.distinct_min is None else min(self.distinct_min, distinct)
         )
-        self.latencies_ms.append(done.latency_ms)
-        return own.hexdigest()
+        self.latencies_ms.append(latency_ms)
 
     def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
         """Return the `futures` part of run.json; `rounds` counts the complete ones.

@@ -24,6 +24,7 @@ from foretwin.orchestrator.record.job_tables import (
     processor,
     table_at,
 )
+from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.record.versions import versions
 from foretwin.sim_worker.world_file import load_world
 from foretwin.world_gen.build import with_id
@@ -73,6 +74,7 @@ def recorded_future(folder: Path, wanted: str) -> RecordedFuture:
     written, or was recorded with what is not here: another schema, other versions, another
     processor.
     """
+    check_finished(folder)
     file = _file_of(table_at(folder, "futures"), "future_id", wanted)
     row = _row(file, "future_id", wanted, FutureRow)
     jobs = table_at(folder, "jobs")

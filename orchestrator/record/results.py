@@ -1,4 +1,4 @@
-"""The run's tables: Parquet files written by a thread of their own: no disk blocks a drive."""
+"""The run's tables, written by a thread of their own: no disk blocks a drive."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import contextlib
 import logging
 import queue
 import threading
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.gap import GapSample
@@ -26,7 +25,10 @@ from foretwin.contracts.simulation import (
 )
 from foretwin.contracts.tuning import ParameterChange, ParameterEstimate
 from foretwin.orchestrator.record.columns import columns, columns_of, schema
+from foretwin.orchestrator.record.derive import derive, streams_in
+from foretwin.orchestrator.record.durable import sync_folder
 from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, played_with
+from foretwin.orchestrator.record.run_streams import Rows, RunStreams
 
 log = logging.getLogger("results")
 
@@ -92,82 +94,137 @@ TABLES: dict[str, pa.Schema] = {
 }
 """Every table of `results/` with its columns."""
 
-FLUSH_ROWS, FLUSH_JOBS = 2000, 128
+WRITE_S, SYNC_S = 0.5, 1.0
+"""How often rows are appended, which outlives a kill, and synced, which outlives a power cut."""
 QUEUE_DEPTH = 4096
 CLOSE_S, LOCK_STEP_CLOSE_S = 10.0, 120.0
-"""How long the last rows may take to be written, live and where nothing may be missing."""
+"""How long the disk may take nothing at the end, live and where nothing may be missing."""
 
 
 class ResultTables:
-    """Collects rows and writes them; `add` never raises, and blocks in lock step alone."""
+    """Collects rows and writes them; `add` never raises, and blocks in lock step alone.
+
+    While a run goes on, each table is a stream that only grows; at its end they become Parquet.
+    """
 
     def __init__(
         self, folder: Path, metadata: Mapping[str, str], *, lossless: bool = False
     ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
-        self._metadata = {**metadata, **played_with()}
-        self._queue: queue.Queue[tuple[str, Sequence[Mapping[str, Any]]] | None] = queue.Queue(
-            QUEUE_DEPTH
+        told = {**metadata, **played_with()}
+        self._streams = RunStreams(
+            folder, {name: schema.with_metadata(told) for name, schema in TABLES.items()}
         )
+        self._queue: queue.Queue[tuple[str, Rows] | None] = queue.Queue(QUEUE_DEPTH)
         self._lossless = lossless
-        self.dropped = 0
-        self.failed: str | None = None
+        self._dropped = 0
+        self.troubles: list[str] = []
+        """What is lost or not in Parquet, and why; complete once closed."""
+        self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._moved_s = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="results", daemon=True)
         self._thread.start()
         self.add("metrics", metric_rows())
 
-    def add(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    @property
+    def dropped(self) -> int:
+        """Rows that are lost, whatever the reason."""
+        return self._dropped + self._streams.lost.total()
+
+    def add(self, table: str, rows: Rows) -> None:
         """Hand over rows for one table of TABLES; what does not fit the queue is counted."""
         try:
             self._queue.put((table, rows), block=self._lossless and self._thread.is_alive())
         except queue.Full:
-            self.dropped += len(rows)
+            self._dropped += len(rows)
+
+    def take_news(self) -> list[str]:
+        """Return what newly goes wrong while the run goes on, or is well again."""
+        return [self._news.get() for _ in range(self._news.qsize())]
 
     def close(self, timeout_s: float | None = None) -> None:
-        """Write everything and close the files; `failed` says where that takes too long."""
+        """Write everything and make Parquet of it; `troubles` says what that did not come to.
+
+        Gives up where nothing moves for `timeout_s`: the streams stay, for `foretwin recover`.
+        """
         if timeout_s is None:
             timeout_s = LOCK_STEP_CLOSE_S if self._lossless else CLOSE_S
         with contextlib.suppress(queue.Full):
             self._queue.put(None, timeout=timeout_s)
-            self._thread.join(timeout_s)
+        self._moved()
+        while self._thread.is_alive() and (left_s := self._moved_s + timeout_s - _now_s()) > 0.0:
+            self._thread.join(left_s)
         if self._thread.is_alive():
-            self.failed = self.failed or f"results were not written within {timeout_s:g} s"
+            self.troubles.append(
+                f"results are not in Parquet: nothing was written for {timeout_s:g} s; {self._how}"
+            )
+        if self._dropped:
+            self.troubles.append(
+                f"{self._dropped} rows are lost: they came faster than they could be written"
+            )
+
+    @property
+    def _how(self) -> str:
+        return f"`foretwin recover {self._folder.parent}` makes it of what was written"
+
+    def _moved(self) -> None:
+        self._moved_s = _now_s()
 
     def _run(self) -> None:
-        writers = {}
-        pending: dict[str, list[Mapping[str, Any]]] = {name: [] for name in TABLES}
         try:
-            for name, schema in TABLES.items():
-                writers[name] = pq.ParquetWriter(
-                    self._folder / f"{name}.parquet",
-                    schema.with_metadata(self._metadata),
-                    compression="zstd",
-                )
-            while (item := self._queue.get()) is not None:
-                name, rows = item
-                pending[name].extend(rows)
-                if len(pending[name]) >= (FLUSH_JOBS if name == "jobs" else FLUSH_ROWS):
-                    _write(writers[name], name, pending[name])
-            for name, rows in pending.items():
-                _write(writers[name], name, rows)
+            self._write_streams()
+            self._make_parquet()
         except Exception as error:
-            self.failed = f"results cannot be written: {one_line(error)}"
-            log.error("%s", self.failed)
-        finally:
-            for writer in writers.values():
-                try:
-                    writer.close()
-                except (OSError, pa.ArrowException) as error:
-                    self.failed = self.failed or f"results cannot be closed: {error}"
+            log.exception("results cannot be written")
+            self.troubles.append(f"results cannot be written: {one_line(error)}")
+
+    def _write_streams(self) -> None:
+        """Append what comes until the end."""
+        streams = self._streams
+        write_s = sync_s = _now_s()
+        over = False
+        while not over:
+            with contextlib.suppress(queue.Empty):
+                item = self._queue.get(timeout=max(0.0, write_s - _now_s()))
+                if item is None:
+                    over = True
+                else:
+                    streams.take(*item)
+            if over or _now_s() >= write_s:
+                # At the end it is the Parquet files that are synced.
+                sync, before = not over and _now_s() >= sync_s, streams.failing
+                streams.write(sync=sync)
+                self._tell(before, streams.failing)
+                write_s = _now_s() + WRITE_S
+                sync_s = _now_s() + SYNC_S - WRITE_S if sync else sync_s
+        streams.close()
+        self.troubles += [f"{rows} rows are lost: {why}" for why, rows in streams.lost.items()]
+
+    def _tell(self, before: str | None, now: str | None) -> None:
+        if now is not None and before is None:
+            self._news.put(f"results cannot be written now, and wait: {now}")
+        elif now is None and before is not None:
+            self._news.put("results are written again")
+
+    def _make_parquet(self) -> None:
+        """Make Parquet of the streams, and remove those that are no longer needed."""
+        derived, left = [], {}
+        for stream in streams_in(self._folder):
+            try:
+                table = derive(stream, each_group=self._moved)
+            except (OSError, pa.ArrowException) as error:
+                left[stream.stem] = one_line(error)
+            else:
+                derived += [stream] if table.rows is not None else []
+            self._moved()
+        sync_folder(self._folder)
+        for stream in derived:
+            stream.unlink()
+        if left:
+            names, why = ", ".join(left), next(iter(left.values()))
+            self.troubles.append(f"not in Parquet: {names}: {why}; {self._how}")
 
 
-def _write(writer: pq.ParquetWriter, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    if rows:
-        writer.write_table(
-            pa.Table.from_pylist(list(rows), schema=TABLES[name]).replace_schema_metadata(
-                writer.schema.metadata
-            )
-        )
-        if isinstance(rows, list):
-            rows.clear()
+def _now_s() -> float:
+    return time.monotonic()

@@ -158,8 +158,12 @@ class RoundRunner:
         self.dispatcher.give_out()
 
     def reply(self, reply: Reply) -> None:
-        """Take a worker's answer."""
-        worker_id, _ = reply.tag
+        """Take a worker's answer; one that does not fit its job counts as refused."""
+        worker_id, task = reply.tag
+        if reply.message is not None:
+            misfit = self.open.misfit(task.key, reply.message.result)
+            if misfit:
+                reply = reply._replace(message=None, error=f"answer of no use: {misfit}")
         if reply.message is None:
             self.failed_jobs += 1
             if reply.error != NO_ANSWER:

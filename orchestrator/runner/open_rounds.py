@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from foretwin.contracts.futures import Future, FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.runner import Answer, Task, job_task
@@ -107,5 +109,35 @@ class OpenRounds:
             seconds=(answer.received_mono_ns - order.started_mono_ns) / 1e9,
         )
 
+    def misfit(self, key: str, result: FuturesResult | None) -> str:
+        """Return why an answer is not that of its job; empty where it is, or nobody waits for it.
+
+        A worker that is sick or somebody else must not end a drive.
+        """
+        for order in self._orders.values():
+            for job, named in zip(order.jobs, order.recorded, strict=True):
+                if named.sha256 == key:
+                    return _misfit(job, result)
+        return "" if result is not None else "rows where trajectories were asked for"
+
     def _close(self, order: RoundOrder) -> None:
         del self._orders[order.round_id], self._results[order.round_id]
+
+
+def _misfit(job: Job, result: FuturesResult | None) -> str:
+    if result is None:
+        return "rows where trajectories were asked for"
+    played = result.future_indices + tuple(index for index, _ in result.unplaced)
+    if sorted(played) != sorted(future.index for future in job.futures):
+        return "futures that were not asked for"
+    if result.world_id != job.world_id:
+        return f"World {result.world_id} instead of {job.world_id}"
+    time_s, until_s = result.trajectory.time_s, job.horizon_s
+    expected_s = np.arange(len(time_s)) * job.step_s
+    if not (len(time_s) and np.allclose(time_s, expected_s, atol=1e-6)):
+        return "instants that were not asked for"
+    if abs(time_s[-1] - until_s) > job.step_s:
+        return f"{time_s[-1]:g} s instead of {until_s:g} s"
+    if result.trajectory.stamp_ns != job.state.stamp_ns:
+        return "seeded by another state"
+    return ""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Request
 from foretwin.contracts.tuning import SetReply, SetRequest
 
@@ -80,12 +80,15 @@ class RuntimeConfiguration:
         return bool(self._waiting)
 
     def take(self, request: Request, *, stamp_ns: int) -> None:
-        """Let a question wait for `make`, or answer at once that it cannot be done."""
+        """Let a question wait for `make`, or answer at once that it cannot be done.
+
+        Raises Refused, once it has been answered, for what the guard does not let in.
+        """
         try:
             asked: SetRequest = request.message()
-        except SchemaMismatch as error:
-            request.refuse(one_line(error))
-            return
+        except Refused as refused:
+            request.refuse(one_line(refused))
+            raise
         try:
             prefix, name = self._split(asked.key)
             self._handlers[prefix].check(name, asked.value)

@@ -17,6 +17,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.placement import RecordedStart
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
@@ -64,6 +65,7 @@ def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedStarts
     does not go with the drive.
     """
     run = Path(recorded.run)
+    check_finished(run)
     for part in (_ROUNDS, Path(_DRIVE), Path(WORLDS)):
         if not (run / part).exists():
             raise FileNotFoundError(f"recorded.run {run}: no {part} in it")

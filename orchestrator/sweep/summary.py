@@ -7,6 +7,7 @@ import statistics
 from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.terminal import console, plain, say, words
 from foretwin.orchestrator.sweep.spec import SweepSpec
 from foretwin.sim_worker.futures.future_rows import Row
 
@@ -76,7 +77,6 @@ def _rounded(values: list[float], reduce: Any) -> float | None:
 
 def print_summary(out: Path, summary: dict[str, Any]) -> None:
     """Print a sweep's summary as a table."""
-    from rich.console import Console
     from rich.table import Column, Table
 
     named = (Column(name, no_wrap=True) for name in ("scenario", "planner"))
@@ -85,27 +85,27 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     for entry in summary["scenarios"]:
         clearance, score = entry["median_clearance_m"], entry["mean_score"]
         table.add_row(
-            entry["scenario"],
-            entry["planner"],
+            words(entry["scenario"]),
+            words(entry["planner"]),
             *(str(entry[name]) for name in COUNTS),
             "" if clearance is None else f"{clearance:.2f} m",
             "" if score is None else f"{score:.3f}",
         )
-    console = Console()
-    if not console.is_terminal:
-        console.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
-    console.print(table)
-    print(
+    shown = console()
+    if not shown.is_terminal:
+        shown.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
+    shown.print(table)
+    say(
         f"{out}: {summary['rows']} rows of {summary['worlds']} Worlds, {summary['jobs_played']} of "
         f"{summary['jobs']} jobs played now in {summary['playing_s']:.1f} s; "
         f"{len(summary['unplaced'])} unplaced"
     )
     if summary["placed_nowhere"]:
-        print(f"placed nowhere: {', '.join(summary['placed_nowhere'])}")
+        say(f"placed nowhere: {', '.join(summary['placed_nowhere'])}")
     for place, reason in summary["failures"].items():
-        print(f"failed: {place}: {reason}")
+        say(plain(f"failed: {place}: {reason}"))
     for entry in summary["scenarios"]:
         for reason, count in entry["reasons"].items():
-            print(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}")
-    print(f"sha256 of the rows: {summary['rows_sha256']}")
-    print(summary["attribution"])
+            say(plain(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}"))
+    say(f"sha256 of the rows: {summary['rows_sha256']}")
+    say(summary["attribution"])

@@ -5,19 +5,19 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from foretwin.contracts.terminal import console, described, plain, say
 from foretwin.world_gen.osm.map_store import MapStore
 
 
 def open_index(map_file: Path, folder: Path | None) -> MapStore:
     """Open the index of a map; where it is not there yet it is made behind a progress bar."""
-    from rich.console import Console
-    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn
 
-    console = Console(stderr=True)
-    shown = TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn()
-    bar = Progress(*shown, console=console, transient=True, disable=not console.is_terminal)
+    shown = console(error=True)
+    columns = described(), BarColumn(), DownloadColumn(), TimeRemainingColumn()
+    bar = Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal)
     with bar:
-        task = bar.add_task(f"reading {map_file.name}", total=None)
+        task = bar.add_task(plain(f"reading {map_file.name}"), total=None)
 
         def show(done: int, total: int) -> None:
             if done >= total:
@@ -33,13 +33,13 @@ def index_map_file(map_file: Path, *, folder: Path | None) -> None:
     begin_s = time.monotonic()
     store = open_index(map_file, folder)
     meta = store.meta
-    print(
+    say(
         f"{store.path}: {meta.ways} ways, {meta.nodes} nodes of {map_file} "
         f"({store.path.stat().st_size / 1e6:.1f} MB, {time.monotonic() - begin_s:.1f} s). "
         f"{meta.attribution}"
     )
     for note in meta.notes[:5]:
-        print(f"note: {note}")
+        say(f"note: {note}")
     if len(meta.notes) > 5:
-        print(f"note: and {len(meta.notes) - 5} more")
+        say(f"note: and {len(meta.notes) - 5} more")
     store.close()

@@ -11,7 +11,9 @@ from foretwin.contracts.bus import Bus, Mailbox, Received, Reply, Request
 from foretwin.contracts.drive import InfoRequest, VehicleInfo
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import TuningSetup
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
 from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
@@ -48,6 +50,7 @@ class TuningWorker:
 
     def __init__(self, setup: TuningSetup, bus: Bus, mailbox: Mailbox) -> None:
         self._setup = setup
+        self._refusals = Refusals()
         self._bus = bus
         self._mailbox = mailbox
         self._lock_step = setup.bus.lossless
@@ -71,6 +74,12 @@ class TuningWorker:
                 case Request(channel="use_vehicle"):
                     self._use(item)
             self._answer_if_all_is_there()
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
+            if isinstance(item, Request):
+                self._question = None if item is self._question else self._question
+                item.refuse(one_line(refused))
         except Exception as error:
             log.exception("%s passed over", getattr(item, "key", item))
             if isinstance(item, Request):

@@ -10,7 +10,9 @@ from pathlib import Path
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request
 from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.errors import one_line
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.roles import OtherVehicles, UseRoles
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import ActiveWorld
@@ -38,6 +40,7 @@ class MirrorWorker:
 
     def __init__(self, setup: WorkerSetup, bus: Bus) -> None:
         self._run_id = setup.run_id
+        self._refusals = Refusals()
         self._worlds_dir = Path(setup.worlds_dir)
         self._bus = bus
         self._waits = setup.bus.lossless and setup.commands_recorded
@@ -81,6 +84,11 @@ class MirrorWorker:
                 item.reply(message)
             else:
                 self._release()
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
+            if isinstance(item, Request):
+                item.refuse(one_line(refused))
         except Exception as error:
             log.exception("message on %s passed over", item.key)
             if isinstance(item, Request):

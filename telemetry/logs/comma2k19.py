@@ -18,9 +18,12 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import geo_from_ecef
 from foretwin.telemetry.logs.columns import Stamps, stream_of, table_log
-from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.log import MOST_TIME_S, Log, LogError
+
+MOST_VALUE = 1e12
 
 
 def is_comma2k19(folder: Path) -> bool:
@@ -60,10 +63,16 @@ def _array(folder: Path, name: str, columns: int) -> Array | None:
     if not path.is_file():
         return None
     try:
-        array: Array = np.load(path, allow_pickle=False).astype(np.float64)
-        return array.reshape(len(array), columns)
-    except (ValueError, TypeError, EOFError, OSError) as error:
-        raise LogError(f"{path}: no NumPy array of {columns} column(s): {error}") from None
+        # Mapped, it is as long as the file, whatever its header says.
+        mapped = np.load(path, allow_pickle=False, mmap_mode="r")
+        if mapped.dtype.kind not in "fiu":
+            raise TypeError(f"it holds {mapped.dtype}")
+        array: Array = mapped.astype(np.float64)
+        # Nothing that was measured is so large: it counts as no number, and is refused with those.
+        return np.where(np.abs(array) < MOST_VALUE, array, np.nan).reshape(len(array), columns)
+    except Exception as error:  # NumPy evaluates a header, and raises what that raises
+        text = f"{path}: no NumPy array of {columns} column(s): {one_line(error)}"
+        raise LogError(text) from None
 
 
 def _timed(
@@ -124,4 +133,5 @@ def _steering_wheel(folder: Path) -> tuple[Array, Array] | None:
 
 def _stamps_ns(time_s: Array) -> Stamps:
     # An unreadable time becomes one before zero, which is refused and counted with the others.
-    return np.round(np.where(np.isfinite(time_s), time_s * 1e9, -1.0)).astype(np.int64)
+    known = np.abs(time_s) < MOST_TIME_S  # false for NaN
+    return np.round(np.where(known, time_s, -1e-9) * 1e9).astype(np.int64)

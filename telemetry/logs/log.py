@@ -14,14 +14,20 @@ import numpy as np
 
 from foretwin.contracts import drive
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.guard import Refused, admit
 
 Sample = tuple[str, msgspec.Struct]
 """Channel name of foretwin.contracts.keys and its message."""
 
+MOST_TIME_S = 4e9
+"""Seconds since a start, or since 1970 until the year 2096; beyond is no time."""
+MOST_LINE = 1000
+"""Characters of why a log cannot be read: libraries quote whole files."""
 POSITION_NOT_FINITE = "position not finite"
 POSITION_ZERO = "position (0, 0)"
 POSITION_OFF_EARTH = "position off Earth"
 VALUE_NOT_FINITE = "value not finite"
+ROAD_USER_ODD = "road user that cannot be"
 TIME_BACKWARDS = "time backwards"
 TIME_DOUBLED = "time doubled"
 TIME_BEFORE_ZERO = "time before zero"
@@ -41,7 +47,14 @@ _MOTION = (
 
 
 class LogError(UserError):
-    """A log that cannot be read: one line with the file, the line or field, and what would do."""
+    """A log that cannot be read: one line with the file, the line or field, and what would do.
+
+    Of a longer text, as libraries quote whole files, the beginning is kept.
+    """
+
+    def __init__(self, text: str) -> None:
+        line = " ".join(text.split("\n"))
+        super().__init__(line if len(line) <= MOST_LINE else f"{line[:MOST_LINE]} …")
 
 
 def check_undeclared(path: Path, declaration: Path | None, kind: str) -> None:
@@ -71,6 +84,8 @@ class Log:
 def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample]:
     """Drop samples with impossible values, and those whose clock stands still or runs backwards.
 
+    The guard that live messages pass is passed here too.
+
     A doubled stamp is one within a channel (within a group for signals), a backwards one is before
     anything already given, so that what is yielded is in stamp order whatever the source does.
     """
@@ -84,6 +99,13 @@ def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sampl
             fault = TIME_BACKWARDS
         elif fault is None and stamp_ns == latest.get(stream):
             fault = TIME_DOUBLED
+        if fault is None:
+            try:
+                message, left_out = admit(message, where=channel)
+            except Refused as refused:
+                fault = refused.reason
+            else:
+                skipped.update({ROAD_USER_ODD: left_out} if left_out else {})
         if fault is not None:
             skipped[fault] += 1
             continue

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-import contextlib
 import struct
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
 from foretwin.telemetry.logs.log import LogError
 
-# What the mcap package raises over bytes that are no MCAP, or no longer.
-_BROKEN = (McapError, EOFError, ValueError, KeyError, struct.error, ZstdError)
+BROKEN = (
+    McapError,
+    EOFError,
+    ValueError,
+    KeyError,
+    OverflowError,
+    struct.error,
+    ZstdError,
+    MemoryError,
+)
+"""What the mcap package raises over bytes that are no MCAP, or no longer."""
+
+MOST_CHUNK_BYTES = 64 * 2**20
+MOST_RATIO = 200
+"""A chunk beyond both is a bomb: recordings are packed 2 to 20 times, in chunks of some MB."""
 
 
 class Record(NamedTuple):
@@ -53,11 +65,13 @@ def read_contents(path: Path) -> Contents:
         try:
             reader = make_reader(file)
             reader.get_header()
-        except (*_BROKEN, StopIteration) as error:
+        except (*BROKEN, StopIteration) as error:
             raise LogError(f"{path}: no MCAP file: {type(error).__name__} {error}") from None
-        with contextlib.suppress(*_BROKEN, OSError, StopIteration):
+        try:
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
+                for chunk in summary.chunk_indexes:
+                    _check_packing(path, chunk.compressed_size, chunk.uncompressed_size)
                 statistics = summary.statistics
                 schemas, counts = by_topic(
                     (
@@ -76,7 +90,20 @@ def read_contents(path: Path) -> Contents:
                     indexed=True,
                     cut_short=False,
                 )
+        except LogError:
+            raise
+        except (*BROKEN, OSError, StopIteration):
+            pass  # It can still be read through.
     return _read_through(path)
+
+
+def _check_packing(path: Path, packed: int, unpacked: int) -> None:
+    """Raise LogError for a chunk that says that it unpacks to far more than any log does."""
+    if unpacked > MOST_CHUNK_BYTES and unpacked > MOST_RATIO * packed:
+        raise LogError(
+            f"{path}: a chunk of {packed} bytes unpacks to {unpacked}: no log is packed "
+            f"{MOST_RATIO} times"
+        )
 
 
 def read_metadata(path: Path, name: str) -> dict[str, str]:
@@ -91,7 +118,7 @@ def read_metadata(path: Path, name: str) -> dict[str, str]:
                     return dict(item.metadata)
                 if isinstance(item, Chunk):
                     break
-        except (*_BROKEN, StopIteration, OSError) as error:
+        except (*BROKEN, StopIteration, OSError) as error:
             raise LogError(f"{path}: no MCAP file: {type(error).__name__} {error}") from None
     return {}
 
@@ -113,7 +140,7 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
             for schema, channel, message in reader.iter_messages(topics=topics):
                 if schema is not None:
                     yield Record(channel.topic, schema.name, message.log_time, message.data)
-        except _BROKEN as error:
+        except BROKEN as error:
             raise LogError(f"{path}: damaged MCAP: {type(error).__name__} {error}") from None
 
 
@@ -173,7 +200,7 @@ class _Linear:
         channels: dict[int, Channel] = {}
         with self._path.open("rb") as file:
             try:
-                for item in StreamReader(file, validate_crcs=True).records:
+                for item in self._unpacked(file):
                     if isinstance(item, Schema):
                         by_id[item.id] = item
                     elif isinstance(item, Channel):
@@ -188,5 +215,15 @@ class _Linear:
                         if channel.schema_id in by_id:
                             kind = by_id[channel.schema_id].name
                             yield Record(channel.topic, kind, item.log_time, item.data)
-            except _BROKEN:
+            except LogError:
+                raise
+            except BROKEN:
                 self.cut_short = True
+
+    def _unpacked(self, file: IO[bytes]) -> Iterator[McapRecord]:
+        for item in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+            if isinstance(item, Chunk):
+                _check_packing(self._path, len(item.data), item.uncompressed_size)
+                yield from breakup_chunk(item, validate_crc=True)
+            else:
+                yield item

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,8 +41,10 @@ def bag_recording(path: Path) -> RosRecording:
         elif path.is_dir() and any(path.glob("*.mcap")):
             hint = "; its .mcap files can be read one by one"
         raise LogError(f"{path}: unreadable bag: {error}{hint}") from None
-    except OSError:
-        raise
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # a place that the file says it has and has not
+            raise
+        raise LogError(f"{path}: unreadable bag: damaged: {one_line(error)}") from None
     except Exception as error:  # whatever rosbags raises over bytes that are damaged
         raise LogError(f"{path}: unreadable bag: damaged: {one_line(error)}") from None
 

@@ -9,16 +9,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import msgspec
 
 from foretwin.contracts import drive
+from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.guard import Refused, admit
 from foretwin.contracts.segments import number_of, segments_of
 from foretwin.telemetry.logs.foreign_ros import Decode, open_foreign, time_base_of
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
+    UNREADABLE_ROW,
     VALUE_NOT_FINITE,
     Log,
     LogError,
@@ -36,6 +39,7 @@ from foretwin.telemetry.logs.write_mcap import (
     INFO_METADATA,
     PART,
 )
+from foretwin.telemetry.ros_messages.foreign import UnusableError
 from foretwin.telemetry.ros_messages.table import (
     FRAME_TOPIC,
     INFO_TOPIC,
@@ -43,6 +47,8 @@ from foretwin.telemetry.ros_messages.table import (
     kind_of,
     message_of,
 )
+
+_Kind = TypeVar("_Kind")
 
 
 def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
@@ -61,7 +67,7 @@ def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     if FORMAT_METADATA in recording.contents.metadata:
         check_undeclared(path, declaration, "foretwin's own recording")
         return _open_own(recording, own)
-    return open_foreign(recording, declared_of(path, declaration), frame=own.frame())
+    return open_foreign(recording, declared_of(path, declaration), frame=own.frame(path))
 
 
 def _is_part(first: Path, path: Path) -> bool:
@@ -123,15 +129,26 @@ class _OwnMetadata(NamedTuple):
     frame_json: str | None
     info_json: str | None
 
-    def frame(self) -> LocalFrame | None:
-        if self.frame_json is None:
-            return None
-        return msgspec.json.decode(self.frame_json, type=LocalFrame)
+    def frame(self, path: Path) -> LocalFrame | None:
+        return None if self.frame_json is None else _said(self.frame_json, LocalFrame, path)
+
+    def info(self, path: Path) -> drive.VehicleInfo | None:
+        return None if self.info_json is None else _said(self.info_json, drive.VehicleInfo, path)
+
+
+def _said(text: str, kind: type[_Kind], path: Path) -> _Kind:
+    """Return what a file of ours says of itself; LogError where that is damaged."""
+    try:
+        said: _Kind = admit(msgspec.json.decode(text, type=kind), where=str(path)).message
+    except (msgspec.DecodeError, UnicodeError, Refused) as error:
+        what = f"{path}: its {kind.__name__} is damaged: {one_line(error)}"
+        raise LogError(what) from None
+    return said
 
 
 def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
     path, contents = recording.path, recording.contents
-    frame = own.frame()
+    frame = own.frame(path)
     topics = {
         topic
         for topic in contents.counts
@@ -141,8 +158,8 @@ def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
     channels = sorted({topic.removeprefix(TOPIC_PREFIX).removesuffix("_json") for topic in topics})
     if not channels:
         raise LogError(f"{path}: holds no telemetry")
-    if own.info_json is not None:
-        info = msgspec.json.decode(own.info_json, type=drive.VehicleInfo)
+    info = own.info(path)
+    if info is not None:
         info = msgspec.structs.replace(info, end_stamp_ns=contents.last_ns)
     else:
         info = drive.VehicleInfo(
@@ -181,3 +198,7 @@ def _own_samples(
         except msgspec.ValidationError:
             # JSON has no NaN: it stands as null where a number belongs.
             skipped[VALUE_NOT_FINITE] += 1
+        except UnusableError as reason:
+            skipped[str(reason)] += 1
+        except Exception:  # whatever is raised over broken bytes
+            skipped[UNREADABLE_ROW] += 1

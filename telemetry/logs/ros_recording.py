@@ -12,6 +12,7 @@ from typing import Any
 from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from foretwin.contracts.errors import one_line
 from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.mcap_records import Contents, Record, read_contents, records
 from foretwin.telemetry.ros_messages.parts import schema_text, typestore
@@ -63,8 +64,9 @@ def decoder(recording: RosRecording, topics: set[str]) -> Callable[[Record], Any
         try:
             _types(schema.name, schema.encoding, schema.data)
         except Exception as error:  # rosbags raises many kinds over texts it cannot parse
-            reason = error if isinstance(error, LogError) else f"unreadable definition: {error}"
-            raise LogError(f"{recording.path}: topic {topic}: {reason}") from None
+            reason = str(error) if isinstance(error, LogError) else one_line(error)
+            text = f"{recording.path}: topic {topic}: unreadable definition: {reason}"
+            raise LogError(text) from None
     store = _store(frozenset((one.name, one.encoding, one.data) for one in schemas.values()))
     if any(schema.encoding == ROS1 for schema in schemas.values()):
         return lambda record: store.deserialize_ros1(record.data, record.kind)

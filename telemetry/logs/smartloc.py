@@ -6,7 +6,6 @@ where the antenna sits on the car is unknown, so `body_from_antenna_m` is None.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_ecef
 from foretwin.telemetry.logs.columns import stream_of, table_log
-from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.log import MOST_TIME_S, Log, LogError
 
 KEYWORD = "point3"
 _COLUMNS = "point3 TIME_S X_M Y_M Z_M [9 covariances]"
@@ -39,7 +38,7 @@ def open_smartloc(path: Path) -> Log:
             except (ValueError, IndexError):
                 unreadable += 1
                 continue
-            if math.isfinite(row[0]):
+            if abs(row[0]) < MOST_TIME_S:  # false for NaN
                 rows.append(row)
             else:
                 unreadable += 1
@@ -61,9 +60,8 @@ def open_smartloc(path: Path) -> Log:
 def _geo_from_ecef_or_nan(xyz_m: Array) -> Array:
     """Convert (N, 3) ECEF; points below 1 km from the Earth's centre are no positions: NaN."""
     geo = np.full(xyz_m.shape, np.nan)
-    with np.errstate(invalid="ignore"):
-        good = np.linalg.norm(xyz_m, axis=1) > 1000.0
-    good &= np.isfinite(xyz_m).all(axis=1)
+    near = np.abs(xyz_m) < 1e9  # false for NaN
+    good = near.all(axis=1) & (np.linalg.norm(np.where(near, xyz_m, 0.0), axis=1) > 1000.0)
     if good.any():
         geo[good] = geo_from_ecef(xyz_m[good])
     return geo

@@ -32,6 +32,13 @@ PART = "part"
 """In FORMAT_METADATA: which part of a recording a file is, where it is not the first."""
 CHUNK_BYTES = 256 * 1024
 """Small, so that a killed recorder loses little."""
+_EMPTY_CRC, _NO_SUMMARY = bytes(4), bytes(20)
+ENDING = (
+    bytes([Opcode.DATA_END, *len(_EMPTY_CRC).to_bytes(8, "little"), *_EMPTY_CRC])
+    + bytes([Opcode.FOOTER, *len(_NO_SUMMARY).to_bytes(8, "little"), *_NO_SUMMARY])
+    + MCAP0_MAGIC
+)
+"""Ends a file after any whole record, without an index, which readers rebuild."""
 
 
 class _Whole:
@@ -185,13 +192,10 @@ class DriveWriter:
 
     def _end_after_last_chunk(self) -> None:
         """Cut off the broken record and end the file, so that it can still be read."""
-        empty_crc, no_summary = bytes(4), bytes(20)
-        end = bytes([Opcode.DATA_END]) + (4).to_bytes(8, "little") + empty_crc
-        footer = bytes([Opcode.FOOTER]) + (20).to_bytes(8, "little") + no_summary
         with contextlib.suppress(OSError):
             self._raw.truncate(self._whole_bytes)
             self._raw.seek(self._whole_bytes)
-            self._stream.write(end + footer + MCAP0_MAGIC)
+            self._stream.write(ENDING)
 
     def _frame_for(self, message: msgspec.Struct) -> LocalFrame | None:
         """Return the local frame, whose origin is the first position that comes along."""

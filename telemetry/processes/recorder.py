@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
@@ -66,7 +67,7 @@ class RecorderProcess:
         # Apart, so that a flood of samples never drops an answer.
         self._answers = Mailbox(64)
         self._reported_lost = 0
-        self._unreadable = 0
+        self._refusals = Refusals()
         self._asked_s: float | None = None
         self._informed = False
         self._flushed_s = mono_s()
@@ -118,7 +119,7 @@ class RecorderProcess:
             self._recording.tally.refused,
             self._recording.missing,
             self._messages.dropped,
-            self._unreadable,
+            len(self._refusals),
             left,
         )
 
@@ -135,9 +136,12 @@ class RecorderProcess:
     def _write(self, item: Received) -> None:
         try:
             envelope = item.envelope()
-        except SchemaMismatch as problem:
-            self._unreadable += 1
-            log.warning("%s", problem)
+        except Refused as refused:
+            if refused.header is not None:
+                seq = refused.header.seq
+                self._recording.refuse(item.channel, sender=item.sender, seq=seq)
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
             return
         message = envelope.message
         self._stamp_ns = message.stamp_ns

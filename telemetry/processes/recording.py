@@ -104,6 +104,11 @@ class DriveRecording:
             self._give_up(self._waiting.popleft())
         return self._go_on() if self._writer is None else self._give()
 
+    def refuse(self, channel: str, *, sender: int, seq: int) -> None:
+        """Count a message that came and is not taken."""
+        if self._heard.take(channel, sender, seq):
+            self.tally.settle("refused", channel, sender, seq)
+
     def set_info(self, info: VehicleInfo) -> list[Event]:
         """Write what is known of the vehicle, into each part."""
         self._info = info

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import msgspec
 
 from foretwin.contracts.bus import Bus, Mailbox, Request
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
 
 _TICK_S = 0.005
@@ -126,7 +126,7 @@ class VehicleProcess:
             case Request(channel="advance"):
                 try:
                     until_ns = item.message().until_stamp_ns
-                except SchemaMismatch as problem:
+                except Refused as problem:
                     item.refuse(str(problem))
                     return
                 self._publish_until(until_ns)

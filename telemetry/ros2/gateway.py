@@ -15,9 +15,10 @@ from typing import Any
 
 from foretwin.contracts import drive, gap
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.foreign_bus import ForeignBus
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.guard import Refused
+from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.simulation import Event, MirrorSample
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.contracts.vehicle import VehicleParameters
@@ -81,6 +82,8 @@ class Gateway:
         )
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self._last_ns: dict[str, int] = {}
+        self.refusals = Refusals()
+        """Of what came from the run's side."""
         self._mirrored = MirroredObjects(
             mapping.mirrored,
             car=car,
@@ -136,6 +139,7 @@ class Gateway:
             "lost": dict(self.inwards.lost),
             "sent": dict(self._sender.sent),
             "held": dict(self.held),
+            "refused": self.refusals.counts(),
             "gate": dict(self.gate.counts),
             "dropped": {
                 "samples": self._inbox.dropped,
@@ -164,7 +168,7 @@ class Gateway:
     def _take_orders(self) -> None:
         """Take all orders of the orchestrator, then look whether the gate may stay open."""
         while (item := self._orders.take()) is not None:
-            message = _decoded(item)
+            message = self._decoded(item)
             if isinstance(message, Authority):
                 self.gate.heartbeat(message.sent_mono_ns, now_ns=self._mono_ns())
             elif isinstance(message, VehicleCommand):
@@ -196,7 +200,7 @@ class Gateway:
         if isinstance(item, Request):
             self.introduction.take(item, now_ns=self._mono_ns())
             return
-        match _decoded(item):
+        match self._decoded(item):
             case drive.VehicleState() as state:
                 self._mirrored.take_state(state.stamp_ns)
                 self._send("state", lambda _: self._out.state(state), every_ns=_STATE_EVERY_NS)
@@ -213,6 +217,16 @@ class Gateway:
                 self._objects(lambda: users)
             case Event() | gap.GapAlarm() | gap.Verdict() as finding:
                 self._diagnostics.take(finding)
+
+    def _decoded(self, item: Any) -> Any:
+        if not isinstance(item, Received):
+            return None
+        try:
+            return item.message()
+        except Refused as refused:
+            if text := self.refusals.take(refused):
+                log.warning("%s", text)
+            return None
 
     def _objects(self, users: Callable[[], drive.RoadUsers]) -> None:
         """Send virtual road users together with those that others have said lately."""
@@ -267,12 +281,3 @@ class Gateway:
         levels = self._diagnostics.levels(self.report(), gate=self.gate)
         stamp_ns = self._wall_ns()
         self._send("diagnostics", lambda _: self._out.diagnostics(stamp_ns, levels))
-
-
-def _decoded(item: Any) -> Any:
-    if not isinstance(item, Received):
-        return None
-    try:
-        return item.message()
-    except SchemaMismatch:
-        return None

@@ -9,7 +9,8 @@ import msgspec
 
 from foretwin.contracts import drive
 from foretwin.contracts.foreign_bus import Arrived
-from foretwin.telemetry.logs.log import is_finite
+from foretwin.contracts.guard import Refused, admit
+from foretwin.contracts.sequence_gaps import SequenceGaps
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
 from foretwin.telemetry.ros2.mapping import InRow, Mapping
@@ -47,9 +48,7 @@ class Inwards:
         self._antenna_frame: str | None = None
         self.counts: Counter[str] = Counter()
         self.unused: Counter[str] = Counter()
-        self.lost: Counter[str] = Counter()
-        """By topic, samples that the sequence numbers of rmw_zenoh say went missing."""
-        self._next_seq: dict[tuple[str, bytes], int] = {}
+        self._gaps: dict[str, SequenceGaps] = {}
         self.first_stamp_ns: int | None = None
         self.tire_angle_rad: float | None = None
         """The newest measured angle at the tyres."""
@@ -66,6 +65,11 @@ class Inwards:
             Wanted(rmw_any_type_key(topic, domain=domain), row.is_latched)
             for topic, row in self._rows.items()
         ]
+
+    @property
+    def lost(self) -> Counter[str]:
+        """By topic, samples that the sequence numbers of rmw_zenoh say went missing."""
+        return Counter({topic: gaps.lost for topic, gaps in self._gaps.items() if gaps.lost})
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -101,6 +105,8 @@ class Inwards:
             return self._samples(row, ros, arrived)
         except UnusableError as reason:
             self.unused[f"{row.topic}: {reason}"] += 1
+        except Refused as refused:
+            self.unused[f"{row.topic}: {refused.reason}"] += 1
         except Exception as error:  # no message may end the gateway
             # Its text may differ each time, and this must stay small.
             self.unused[f"{row.topic}: {type(error).__name__}"] += 1
@@ -124,11 +130,8 @@ class Inwards:
         except ValueError:
             self.unused[f"{topic}: attachment not understood"] += 1
             return
-        sender = (topic, attachment.gid)
-        expected = self._next_seq.get(sender)
-        if expected is not None and 0 < attachment.seq - expected < 2**31:
-            self.lost[topic] += attachment.seq - expected
-        self._next_seq[sender] = max(attachment.seq + 1, expected or 0)
+        seq, sent_ns, gid = attachment
+        self._gaps.setdefault(topic, SequenceGaps()).take(gid, seq, sent_ns=sent_ns)
 
     def _samples(self, row: InRow, ros: Any, arrived: Arrived) -> Samples:
         if row.type == TF:
@@ -150,8 +153,9 @@ class Inwards:
             if isinstance(message, drive.VehicleStatus):
                 message = self._joiner.join(message)
             message = _in_our_units(message, row)
-            if not is_finite(message):
-                raise UnusableError("a number that is not finite")
+            message, left_out = admit(message, where=row.topic)
+            if left_out:
+                self.unused[f"{row.topic}: road users that cannot be"] += left_out
             self._note(message, arrived)
             channel = channel_of(message)
             samples.append((channel, message))

@@ -9,7 +9,8 @@ from typing import Any
 
 import msgspec
 
-from foretwin.contracts.codec import SchemaMismatch, decode, encode
+from foretwin.contracts.codec import encode
+from foretwin.contracts.guard import Refused, opened
 from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.mailbox import Alive, Mailbox, Received, Reply, Request
@@ -77,12 +78,13 @@ class MemoryBus:
             answered.set()
             reply: Any | None = None
             error: str | None = reason
+            refused: Refused | None = None
             if data is not None:
                 try:
-                    reply, error = decode(data, kind, where=full_key).message, None
-                except SchemaMismatch as problem:
-                    error = str(problem)
-            mailbox.put(Reply(channel, tag, reply, error, time.monotonic_ns()))
+                    reply, error = opened(data, kind, where=full_key).message, None
+                except Refused as problem:
+                    error, refused = str(problem), problem
+            mailbox.put(Reply(channel, tag, reply, error, time.monotonic_ns(), refused))
 
         if server is None:
             answer(None, "no answer")

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
-from foretwin.contracts.keys import alive_key
+from foretwin.contracts.keys import alive_key, key
+from foretwin.contracts.mailbox import Received
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
@@ -146,3 +147,21 @@ def test_it_waits_out_the_grace_once_the_orchestrator_is_gone() -> None:
     assert not life.over
     now_s += 0.1
     assert life.over
+
+
+def test_bytes_that_are_no_end_of_a_run_end_nothing(tmp_path: Path) -> None:
+    bus = MemoryBus()
+    setup = ProcessSetup(
+        run_id="r1", process_id="p0", vehicle_id="ego", bus=BusSetup(endpoint="none"),
+        log_file=str(tmp_path / "log.jsonl"),
+    )  # fmt: skip
+    life = ProcessLife(setup, bus)
+    for _, channel, mailbox in bus._subscribers:
+        assert channel == "run_end"
+        for on in (key("run_end", run="r1"), "**"):
+            mailbox.put(Received("run_end", on, b"hello", RunEnd))
+    assert not life.over
+
+    bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+    assert life.over
+    assert life.run_ended

@@ -153,6 +153,8 @@ class Worker(Process):
         self.jobs = 0
         self.remark = ""
         """What its planners say of each future."""
+        self.spoil: Callable[[FuturesResult], FuturesResult] = lambda result: result
+        """What a sick worker makes of its results."""
         self.diverges = False
         """Whether its simulations end in numbers that are none."""
         super().__init__(plan, bus, worker_id, ("prepare", "job"), at_once=at_once)
@@ -176,7 +178,7 @@ class Worker(Process):
         if self.diverges:
             futures.trajectory.states[:, 1:] = np.nan
             futures.outcome.valid[:] = False
-        request.reply(JobAnswer(result=futures))
+        request.reply(JobAnswer(result=self.spoil(futures)))
 
 
 class House:

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from mcap.reader import NonSeekingReader, make_reader
+from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.mcap_records import MOST_CHUNK_BYTES
 from foretwin.telemetry.logs.write_mcap import create
 from foretwin.telemetry.ros_messages.table import messages_from
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
@@ -202,3 +204,22 @@ def test_rerun_converts_it(recorded: Path, tmp_path: Path) -> None:
     assert rrd.stat().st_size > 1000
     for topic in ("gnss", "imu", "steering", "control", "plan", "state"):
         assert f"/foretwin/{topic}" in done.stderr + done.stdout
+
+
+@pytest.mark.parametrize("cut_bytes", [0, 20])
+def test_a_chunk_that_unpacks_to_far_more_than_any_log_is_refused(
+    tmp_path: Path, cut_bytes: int
+) -> None:
+    path = tmp_path / "bomb.mcap"
+    most = MOST_CHUNK_BYTES + 2**20
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=2 * most, compression=CompressionType.ZSTD)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/t", "cdr", schema)
+        writer.add_message(channel, log_time=1, data=bytes(most), publish_time=1)
+        writer.finish()  # type: ignore[no-untyped-call]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size - cut_bytes])
+
+    with pytest.raises(LogError, match=r"a chunk of \d+ bytes unpacks to \d+: no log is packed"):
+        open_log(path)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 
+import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.drive import GnssFix, SignalState, SpeedSample
+from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SignalState, SpeedSample
 from foretwin.contracts.frames import GeoPoint
-from foretwin.telemetry.logs.log import Sample, screened
+from foretwin.telemetry.logs.log import ROAD_USER_ODD, Sample, screened
 from foretwin.telemetry.logs.merge import merged, reordered, stamp_ns_of
 
 COVERS = (
@@ -63,3 +64,19 @@ def test_signals_of_several_groups_share_a_stamp() -> None:
     ]
     assert len(list(screened(iter(both), skipped))) == 2
     assert skipped == {"time doubled": 1}
+
+
+def test_a_log_passes_the_guard_that_live_messages_pass() -> None:
+    good = RoadUser(
+        user_id="7", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
+        length_m=4.0, width_m=1.8,
+    )  # fmt: skip
+    odd = msgspec.structs.replace(good, width_m=0.0)
+    skipped: Counter[str] = Counter()
+    seen = RoadUsers(stamp_ns=2, users=(good, odd))
+    samples = [("speed", SpeedSample(stamp_ns=1, speed_mps=1e6)), ("objects", seen)]
+
+    assert list(screened(iter(samples), skipped)) == [
+        ("objects", RoadUsers(stamp_ns=2, users=(good,)))
+    ]
+    assert skipped == {"SpeedSample: speed_mps out of bounds": 1, ROAD_USER_ODD: 1}

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import bz2
+import contextlib
+import gzip
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +14,13 @@ from foretwin.contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENER
 from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError
 
 HEAD_BYTES = 4096
+MOST_UNPACKED_BYTES = 128 * 2**20
+MOST_RATIO = 100
+"""A packed map beyond both is a bomb: gzip packs OSM XML 8 to 15 times, bzip2 10 to 25 times; a
+bomb of zeros 1,000 times and more."""
+_STEP_BYTES = 2**20
+MOST_REASON = 500
+"""Characters of why a file is no map: a parser quotes what it cannot read, however long."""
 
 
 class MapHeader(NamedTuple):
@@ -41,10 +52,28 @@ def format_of(path: Path, head: bytes) -> str:
     )
 
 
+def check_packing(path: Path, form: str) -> None:
+    """Raise MapError for a map that unpacks to far more than any map does; other faults pass."""
+    if form not in ("osm.gz", "osm.bz2"):
+        return
+    opened = gzip.open if form == "osm.gz" else bz2.open
+    unpacked, most = 0, max(MOST_UNPACKED_BYTES, MOST_RATIO * path.stat().st_size)
+    # Bytes that do not unpack are for the reader to tell of.
+    with contextlib.suppress(OSError, EOFError, zlib.error), opened(path) as file:
+        while step := len(file.read(_STEP_BYTES)):
+            unpacked += step
+            if unpacked > most:
+                break
+    if unpacked > most:
+        raise MapError(
+            f"{path}: {path.stat().st_size} bytes unpack to more than {most}: no map is packed so"
+        )
+
+
 def unreadable(path: Path, error: BaseException) -> MapError:
     """Return the error of a damaged file, in one line."""
     # zlib and bzip2 may give no reason after their colon.
-    reason = " ".join(str(error).split()).rstrip(":")
+    reason = " ".join(str(error).split()).rstrip(":")[:MOST_REASON]
     return MapError(f"{path}: not a readable OSM file, cut off or damaged: {reason}")
 
 

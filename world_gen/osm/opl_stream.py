@@ -14,7 +14,14 @@ from pathlib import Path
 from typing import IO
 
 from foretwin.contracts.world import ATTRIBUTION
-from foretwin.world_gen.osm.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
+from foretwin.world_gen.osm.map_file import (
+    HEAD_BYTES,
+    MapHeader,
+    check_packing,
+    file_fault,
+    format_of,
+    unreadable,
+)
 from foretwin.world_gen.osm.opl import OPL_OPTIONS
 
 Progress = Callable[[int, int], None]
@@ -37,6 +44,7 @@ class OplStream(contextlib.ExitStack):
                 self._file = opened.enter_context(path.open("rb"))
                 self._total = path.stat().st_size
                 form = format_of(path, self._file.read(HEAD_BYTES))
+                check_packing(path, form)
             except OSError as error:
                 raise file_fault(path, error) from None
             self._file.seek(0)

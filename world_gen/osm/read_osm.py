@@ -13,7 +13,14 @@ import osmium
 
 from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import MapObjects, assemble_map, sorted_positions
-from foretwin.world_gen.osm.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
+from foretwin.world_gen.osm.map_file import (
+    HEAD_BYTES,
+    MapHeader,
+    check_packing,
+    file_fault,
+    format_of,
+    unreadable,
+)
 from foretwin.world_gen.osm.opl_filter import decode
 from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
 
@@ -53,6 +60,7 @@ def read_map(path: Path) -> OsmMap:
     except OSError as error:
         raise file_fault(path, error) from None
     form = format_of(path, data[:HEAD_BYTES])
+    check_packing(path, form)
     try:
         header, text = _as_opl(data, form)
     except DECODE_ERRORS as error:

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -15,9 +16,11 @@ from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.world import StopLine, World
+from foretwin.orchestrator.commands import judge
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.record.versions import versions
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.write_mcap import create
 from foretwin.world_gen.world_store import WorldStore
@@ -63,6 +66,20 @@ def test_a_judgement_without_a_correction_is_refused(
     (tmp_path / "drive.mcap").write_bytes(b"")
     assert run(["judge", str(tmp_path)]) == 2
     assert "name what is corrected, by --map FILE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changed", "stands"),
+    [
+        ({}, True),
+        ({"config": {"speed": 1.0}}, False),
+        ({"exit": "recovered"}, False),
+        ({"versions": {"foretwin": "of old"}}, False),
+    ],
+)
+def test_what_a_run_is_compared_with(changed: dict[str, Any], stands: bool) -> None:
+    record = {"config": {"speed": None}, "exit": "completed", "versions": versions()}
+    assert judge._stands_for_itself(record | changed) is stands
 
 
 def test_a_world_beside_the_way_is_told_in_one_line(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
 from foretwin.contracts.codec import SchemaMismatch, encode
 from foretwin.contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Mailbox, Received
 from foretwin.orchestrator.drive.intake import Intake
 from tests.contracts.memory_bus import MemoryBus
@@ -92,6 +95,19 @@ def test_what_was_refused_is_summed_over_all_who_refuse() -> None:
     assert telemetry.intake.refused == 1
     assert telemetry.intake.skipped_invalid == 1 + 1 + 3
     assert telemetry.intake.counts.received == 6  # the end is no sample
+
+
+def test_a_sample_that_was_refused_is_not_lost_as_well() -> None:
+    telemetry = Telemetry()
+    telemetry.send(*FIXES[:2])
+    nowhere = msgspec.structs.replace(FIXES[2], position=GeoPoint(float("nan"), 0.0))
+    with pytest.raises(Refused):
+        telemetry.send(nowhere)
+    telemetry.send(*FIXES[3:5])
+    telemetry.intake.counts.settle({"gnss": 5})
+
+    assert (telemetry.intake.refused, telemetry.intake.counts.lost) == (1, 0)
+    assert telemetry.intake.counts.received == 4
 
 
 def test_an_age_is_never_negative() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -138,3 +139,22 @@ def test_who_waits_for_a_live_car_says_for_what_and_where(house: House) -> None:
     assert said.endswith(f"/vehicle/{vehicle}/telemetry/… on {where}")
     by_ros2 = replace(house.plan, ros2=read_mapping(Path("autoware")))
     assert "the ROS 2 topics of " in waiting_text(by_ros2)
+
+
+def test_a_street_named_like_markup_is_shown_as_it_is_named(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "[/a] Lane \x1b[2J"
+    monkeypatch.setattr(type(house.mission), "next_junction", (name, 5.0))
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    house.drive(5)
+    said = io.StringIO()
+    line = ProgressLine(house.conductor, house.mission)
+    line._console.file = said
+    with line:
+        line.update(100.0)
+        line.tell(Event(stamp_ns=0, level="error", source="[/b]", text=f"{name}\nfake: line"))
+
+    assert "[/a] Lane \\u001b[2J in 5 s" in said.getvalue()
+    assert "error: [/b]: [/a] Lane \\u001b[2J\\nfake: line" in said.getvalue()
+    assert "\x1b[2J" not in said.getvalue()

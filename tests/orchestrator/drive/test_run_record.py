@@ -10,13 +10,9 @@ from typing import Any
 import pytest
 
 from foretwin.contracts.tally import Tally, tally_file, write_tally
-from foretwin.orchestrator.drive.run_record import (
-    lost_lines,
-    run_record,
-    versions,
-    write_record,
-)
+from foretwin.orchestrator.drive.run_record import lost_lines, run_record, versions
 from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.record.run_state import write_record
 from tests.orchestrator.house import House
 
 COVERS = ("foretwin.orchestrator.drive.summary",)
@@ -84,9 +80,8 @@ def test_what_is_lost_is_in_the_record_and_in_its_last_lines(house: House) -> No
     (line,) = lost_lines(record)
     assert line.startswith(f"lost: {len(published)} of 200 telemetry samples are not recorded")
 
-    record["troubles"], record["dropped"]["result_rows"] = ["viewer ended with code -9"], 3
-    assert lost_lines(record)[0] == "lost: viewer ended with code -9"
-    assert lost_lines(record)[-1].startswith("lost: 3 rows of results")
+    record["troubles"] = ["viewer ended with code -9"]
+    assert lost_lines(record) == ["lost: viewer ended with code -9", line]
 
 
 @pytest.mark.parametrize("length", [0, 1, 100])

@@ -38,7 +38,6 @@ COVERS = (
     "foretwin.orchestrator.other_vehicles.detected",
     "foretwin.orchestrator.other_vehicles.live",
     "foretwin.orchestrator.other_vehicles.measured",
-    "foretwin.orchestrator.rounds.seen_users",
 )
 
 VAN = load_vehicle("vw_vanagon")

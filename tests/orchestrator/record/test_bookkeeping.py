@@ -21,8 +21,8 @@ from tests.orchestrator.futures_rounds import round_done, straight
 
 def counted(*seqs: int, key: str = "k") -> TelemetryCount:
     count = TelemetryCount()
-    for seq in seqs:
-        count.take(key=key, channel="gnss", seq=seq, age_ms=1.0)
+    for sent_ns, seq in enumerate(seqs):
+        count.take(key=key, channel="gnss", seq=seq, sent_ns=sent_ns, now_ns=sent_ns)
     return count
 
 
@@ -44,8 +44,8 @@ def test_what_arrives_and_what_is_lost_make_up_what_was_sent(arrived: set[int]) 
 
 def test_each_key_has_its_own_numbering() -> None:
     count = counted(0, 1, 2)
-    count.take(key="other", channel="imu", seq=40, age_ms=1.0)
-    count.take(key="other", channel="imu", seq=42, age_ms=1.0)
+    for seq in (40, 42):
+        count.take(key="other", channel="imu", seq=seq, sent_ns=seq, now_ns=seq)
 
     assert count.lost == 1
 
@@ -60,10 +60,27 @@ def test_what_the_vehicle_says_it_sent_settles_the_losses() -> None:
     assert count.lost == 15  # never fewer than known
 
 
+def test_a_sample_that_came_twice_stands_for_no_other() -> None:
+    count = counted(0, 1)
+    count.take(key="k", channel="gnss", seq=1, sent_ns=1, now_ns=1)
+    count.settle({"gnss": 3})
+
+    assert (count.received, count.lost) == (3, 1)
+
+
+def test_a_sample_that_was_refused_is_not_lost_as_well() -> None:
+    count = counted(0)
+    count.came(key="k", channel="gnss", seq=1, sent_ns=1)
+    count.take(key="k", channel="gnss", seq=2, sent_ns=2, now_ns=2)
+    count.settle({"gnss": 3})
+
+    assert (count.received, count.lost) == (2, 0)
+
+
 def test_ages_are_given_as_percentiles() -> None:
     count = TelemetryCount()
     for age in range(101):
-        count.take(key="k", channel="gnss", seq=age, age_ms=float(age))
+        count.take(key="k", channel="gnss", seq=age, sent_ns=0, now_ns=age * 1_000_000)
 
     record = count.record(skipped_invalid=4)
     assert (record["age_ms_p50"], record["age_ms_p95"]) == (50.0, 95.0)

@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.orchestrator.record.results import QUEUE_DEPTH, TABLES, ResultTables
+from foretwin.orchestrator.record.table_stream import StreamReader
 
 
 def event(number: int) -> dict[str, object]:
@@ -21,7 +22,7 @@ def test_rows_are_written_in_order_with_their_origin(tmp_path: Path) -> None:
     for number in range(5000):
         tables.add("events", [event(number)])
     tables.close()
-    assert (tables.dropped, tables.failed) == (0, None)
+    assert (tables.dropped, tables.troubles) == (0, [])
     table = pq.read_table(tmp_path / "events.parquet")
     assert table["stamp_ns"].to_pylist() == list(range(5000))
     assert table.schema.metadata[b"attribution"].decode() == "© OpenStreetMap contributors"
@@ -41,16 +42,20 @@ def test_every_table_exists_even_when_empty(tmp_path: Path) -> None:
     assert pq.read_table(tmp_path / "futures.parquet").num_rows == 0
 
 
-def test_a_row_that_no_table_holds_is_said(tmp_path: Path) -> None:
+def test_a_row_that_no_table_holds_costs_itself_alone(tmp_path: Path) -> None:
     tables = ResultTables(tmp_path, {})
-    tables.add("events", [event(2**70)])
+    tables.add("events", [event(1), event(2**70), event(3)])
+    tables.add("touches", [{"stamp_ns": 4, "one": "twin", "other": "ghost"}])
     tables.close()
-    assert tables.failed is not None
-    assert "results cannot be written: OverflowError" in tables.failed
-    assert pq.read_table(tmp_path / "rounds.parquet").num_rows == 0
+
+    (trouble,) = tables.troubles
+    assert trouble.startswith("1 rows are lost: the table of events cannot hold them: Overflow")
+    assert tables.dropped == 1
+    assert pq.read_table(tmp_path / "events.parquet")["stamp_ns"].to_pylist() == [1, 3]
+    assert pq.read_table(tmp_path / "touches.parquet").num_rows == 1
 
 
-def test_results_that_take_too_long_are_said(
+def test_results_that_take_too_long_are_said_and_stay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     disk_answers = threading.Event()
@@ -58,23 +63,48 @@ def test_results_that_take_too_long_are_said(
     monkeypatch.setattr(
         pq.ParquetWriter, "write_table", lambda *what: disk_answers.wait() and write(*what)
     )
-    tables = ResultTables(tmp_path, {})
+    tables = ResultTables(tmp_path / "results", {})
     tables.add("events", [event(1)])
     tables.close(0.2)
-    assert tables.failed == "results were not written within 0.2 s"
+    (trouble,) = tables.troubles
+    assert "nothing was written for 0.2 s" in trouble
+    assert f"foretwin recover {tmp_path}" in trouble
+    stream = StreamReader(tmp_path / "results" / "events.arrows")
+    assert sum(rows.num_rows for rows in stream.records()) == 1
+
     disk_answers.set()
     tables.close()
+    assert pq.read_table(tmp_path / "results" / "events.parquet").num_rows == 1
+
+
+def test_a_stream_that_cannot_be_written_is_said_and_the_others_are(tmp_path: Path) -> None:
+    (tmp_path / "rounds.arrows").mkdir()  # where a file should be
+    tables = ResultTables(tmp_path, {})
+    tables.add("events", [event(1)])
+    tables.add("rounds", [{"round_id": 1}])
+    tables.close()
+
+    assert tables.take_news()[0].startswith("results cannot be written now, and wait: IsADir")
+    assert any("1 rows are lost: they could not be written: IsADir" in t for t in tables.troubles)
     assert pq.read_table(tmp_path / "events.parquet").num_rows == 1
 
 
-def test_a_disk_that_cannot_be_written_is_said(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_where_parquet_has_no_room_the_streams_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / "results"
-    folder.mkdir()
-    (folder / "rounds.parquet").mkdir()  # where a file should be
-    tables = ResultTables(folder, {})
+    def no_room(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    tables = ResultTables(tmp_path / "results", {})
     tables.add("events", [event(1)])
-    tables.close()
-    assert tables.failed is not None
-    assert "results cannot be written" in tables.failed
+    with monkeypatch.context() as patched:
+        patched.setattr(pq.ParquetWriter, "write_table", no_room)
+        tables.close()
+
+    (trouble,) = tables.troubles
+    assert trouble.startswith("not in Parquet: events, metrics: OSError: [Errno 28] No space left")
+    assert trouble.endswith(f"`foretwin recover {tmp_path}` makes it of what was written")
+    assert {path.name for path in (tmp_path / "results").glob("*.arrows")} == {
+        "events.arrows", "metrics.arrows",
+    }  # fmt: skip
+    assert not list((tmp_path / "results").glob("*.writing"))

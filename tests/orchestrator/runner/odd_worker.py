@@ -1,4 +1,4 @@
-"""A worker that does with its process what a question says: `die`, `die once FILE`, `hang`, …"""
+"""A worker that does with its process what a question says: `die`, `die-once`, `hang`, …"""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def serve(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
         if not isinstance(request, Request):
             continue
         asked = request.message().world_id
-        word, *rest = asked.split()
-        if word == "die" and not (rest and Path(rest[1]).exists()):
-            if rest:
-                Path(rest[1]).write_text(setup.process_id)
+        died = Path(setup.worlds_dir) / "died"
+        if asked == "die" or (asked == "die-once" and not died.exists()):
+            if asked == "die-once":
+                died.write_text(setup.process_id)
             os.kill(os.getpid(), signal.SIGKILL)
-        if word == "hang":
+        if asked == "hang":
             threading.Event().wait()
-        if word == "refuse":
+        if asked == "refuse":
             request.refuse("no such World")
         else:
             request.reply(PrepareReply(world_id=asked, worker_id=setup.process_id, seconds=0.0))

@@ -214,7 +214,8 @@ def test_what_no_vehicle_can_be_is_held_and_counted(wrong: dict, why: str) -> No
     ground = Ground()
     ground.say(mirror(5 * S, msgspec.structs.replace(vehicle("van", "twin", x_m=3.0), **wrong)))
     assert ground.towards() == []
-    assert [name for name in ground.gateway.held if why in name]
+    report = ground.gateway.report()
+    assert [name for name in report["held"] | report["refused"] if why in name]
 
 
 def test_a_mirror_that_lags_is_held() -> None:

@@ -1,0 +1,58 @@
+"""The one place that writes to a terminal: what others wrote cannot command it there.
+
+Names of streets, ids and texts of logs and messages may hold anything: escape sequences that move
+the cursor, brackets that rich takes for markup, marks that turn the direction of writing. They are
+shown as they are spelt, in the escapes that JSON has too.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import TextColumn
+    from rich.text import Text
+
+_COMMANDS = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]"
+)
+"""Control characters, separators of lines, marks of direction, and halves of characters."""
+
+
+def visible(text: str) -> str:
+    """Return a text of several lines in which nothing commands a terminal."""
+    return _COMMANDS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def plain(text: str) -> str:
+    """Return a text as one line in which nothing commands a terminal."""
+    return visible(text).replace("\n", "\\n").replace("\t", " ")
+
+
+def say(text: object, *, error: bool = False) -> None:
+    """Print a line, or several; to stderr, at once, where it is an `error` or tells of progress."""
+    print(visible(str(text)), file=sys.stderr if error else sys.stdout, flush=error)
+
+
+def console(*, error: bool = False) -> Console:
+    """Return a console that takes nothing for markup; what it prints must be made `visible`."""
+    from rich.console import Console
+
+    return Console(stderr=error, markup=False, emoji=False, highlight=False)
+
+
+def words(text: str) -> Text:
+    """Return a text as rich shows it in one line: no markup, no commands."""
+    from rich.text import Text
+
+    return Text(plain(text))
+
+
+def described() -> TextColumn:
+    """Return the column of a progress bar that shows what a task is about."""
+    from rich.progress import TextColumn
+
+    return TextColumn("{task.description}", markup=False)

@@ -1,0 +1,155 @@
+"""A run that ended badly, made readable: tables up to their last whole record, what was recorded,
+and run.json."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.process import is_held
+from foretwin.orchestrator.record.derive import derive, streams_in
+from foretwin.orchestrator.record.durable import WRITING, sync_folder
+from foretwin.orchestrator.record.recovered_record import told_by_tables
+from foretwin.orchestrator.record.results import TABLES
+from foretwin.orchestrator.record.run_state import (
+    LOG,
+    PROCESSES,
+    RECORD,
+    RESULTS,
+    RUNNING,
+    is_unfinished,
+    read_record,
+    run_lock,
+    write_record,
+)
+from foretwin.orchestrator.runner.supervisor import fold_stderr
+from foretwin.telemetry.logs.mend_mcap import look_through, mend
+
+RECOVERED = "recovered"
+"""The `exit` of a run that did not come to an end of its own, and what says of it what is lost."""
+LEAVE_S = 20.0
+"""How long the other processes of a drive may take to leave once its orchestrator is gone: their
+grace, and what they then still write."""
+_LOOK_S = 0.1
+_RECORDINGS = "drive*.mcap"
+
+
+class Part(NamedTuple):
+    """What became of one part of a run, in words, and whether something of it is lost."""
+
+    text: str
+    lost: bool = False
+
+
+class Recovery(NamedTuple):
+    """A run's `exit` and its parts; `healthy` where there was nothing to do."""
+
+    exit_word: str
+    parts: tuple[Part, ...]
+    healthy: bool
+
+    @property
+    def lost(self) -> list[str]:
+        """What is lost, in words."""
+        return [part.text for part in self.parts if part.lost]
+
+
+def recover(run: Path) -> Recovery:
+    """Make readable what a run left; a healthy run is left as it is.
+
+    Can be done again after an interruption, with the same outcome. Raises UserError for a folder
+    that is none of a run, for a drive that still runs, and where nothing can be written: then what
+    was there is still there.
+    """
+    results = run / RESULTS
+    if not results.is_dir():
+        raise UserError(f"{run}: no folder of a run")
+    with run_lock(run):
+        record = read_record(run)
+        _let_leave(run)
+        torn = [file for file in sorted(run.glob(_RECORDINGS)) if not look_through(file).ended]
+        if record and not is_unfinished(run) and not torn:
+            parts = tuple(_in_parquet(results, TABLES))
+            healthy = not any(part.lost for part in parts)
+            return Recovery(str(record.get("exit")), parts, healthy=healthy)
+        try:
+            streams = streams_in(results)
+            others = [name for name in TABLES if name not in {stream.stem for stream in streams}]
+            recordings = map(_mended, sorted(run.glob(_RECORDINGS)))
+            parts = (*_in_parquet(results, others), *_derived(results), *recordings)
+            record = _completed(run, record, parts)
+            write_record(record, run / RECORD)
+            for stream in streams:
+                stream.unlink()
+            fold_stderr(run / PROCESSES, run / LOG)
+        except OSError as error:
+            raise UserError(f"{run}: cannot be recovered: {one_line(error)}") from error
+    return Recovery(str(record["exit"]), parts, healthy=False)
+
+
+def _let_leave(run: Path) -> None:
+    """Wait for the processes of a drive whose orchestrator is gone; UserError where they stay."""
+    deadline = time.monotonic() + LEAVE_S
+    while left := [file.stem for file in (run / PROCESSES).glob("*.json") if is_held(file)]:
+        if time.monotonic() > deadline:
+            raise UserError(f"{run}: {' and '.join(sorted(left))} of the drive still runs")
+        time.sleep(_LOOK_S)
+
+
+def _derived(results: Path) -> Iterator[Part]:
+    """Make Parquet of the streams, which stay."""
+    for partial in results.glob(f"*{WRITING}"):
+        partial.unlink()
+    for stream in streams_in(results):
+        table = derive(stream)
+        if table.rows is None:
+            yield Part(f"{table.name}: lost: not even its columns are whole", lost=True)
+        elif table.torn_bytes:
+            torn = f"a torn end of {table.torn_bytes} bytes is lost"
+            yield Part(f"{table.name}: {table.rows} rows; {torn}", lost=True)
+        else:
+            yield Part(f"{table.name}: {table.rows} rows")
+    sync_folder(results)
+
+
+def _in_parquet(results: Path, names: Iterable[str]) -> Iterator[Part]:
+    """Tell of the tables that are in Parquet already; older runs do not have all of today's."""
+    for name in names:
+        file = results / f"{name}.parquet"
+        if not file.exists():
+            continue
+        try:
+            yield Part(f"{name}: {pq.read_metadata(file).num_rows} rows, as they were")
+        except (OSError, pa.ArrowException) as error:
+            yield Part(f"{name}: lost: {one_line(error)}", lost=True)
+
+
+def _mended(file: Path) -> Part:
+    found = mend(file)
+    if not found.data_bytes:
+        return Part(f"{file.name}: lost: nothing of it is whole", lost=True)
+    text = f"{file.name}: {found.messages} messages, up to stamp {found.last_ns} ns"
+    if found.torn_bytes:
+        return Part(f"{text}; a torn end of {found.torn_bytes} bytes is lost", lost=True)
+    return Part(text)
+
+
+def _completed(run: Path, record: dict[str, Any], parts: tuple[Part, ...]) -> dict[str, Any]:
+    """Return the record of a run as far as it is known."""
+    before = (record.get(RECOVERED) or {}).get("lost", ())
+    lost = list(dict.fromkeys([*before, *(part.text for part in parts if part.lost)]))
+    if record.get("exit", RUNNING) != RUNNING:
+        return record | {RECOVERED: {"lost": lost}}
+    known = {name: value for name, value in record.items() if name != "endpoint"}
+    return {
+        **({"run_id": run.resolve().name} | known),
+        "exit": RECOVERED,
+        **told_by_tables(run / RESULTS),
+        RECOVERED: {"lost": lost},
+    }

@@ -1,0 +1,169 @@
+"""The guard at the boundary: what is let in, what is refused and why, and that nothing else comes
+out of it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import random
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.bounds import MOST_IDENTIFIER, MOST_USERS, SHAPES
+from foretwin.contracts.codec import encode
+from foretwin.contracts.drive import GnssFix, PlannedTrajectory, RoadUser, RoadUsers, SpeedSample
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.guard import Refused, admit, is_identifier, kept, opened, reason_in
+from foretwin.contracts.keys import CHANNELS
+from foretwin.contracts.simulation import WorldNotice
+from tests.contracts.hostile_messages import hostile_bytes
+
+COVERS = ("foretwin.contracts.bounds",)
+KEY = "foretwin/v1/vehicle/ego/telemetry/plan"
+HERE = GeoPoint(52.5, 13.4)
+
+
+def plan(**changed: Any) -> PlannedTrajectory:
+    fields = {name: np.ones(4) for name in SHAPES[PlannedTrajectory]}
+    return PlannedTrajectory(stamp_ns=1, **(fields | changed))
+
+
+def user(**changed: Any) -> RoadUser:
+    fields = {
+        "user_id": "7", "kind": "car", "position": HERE, "yaw_rad": 0.1, "speed_mps": 5.0,
+        "length_m": 4.0, "width_m": 1.8,
+    }  # fmt: skip
+    return RoadUser(**(fields | changed))
+
+
+def why(message: msgspec.Struct) -> str:
+    with pytest.raises(Refused) as refused:
+        admit(message, where=KEY)
+    assert str(refused.value).startswith(KEY)
+    return refused.value.reason
+
+
+def test_a_message_within_bounds_is_let_in_as_it_is() -> None:
+    message = plan()
+
+    assert admit(message, where=KEY) == (message, 0)
+
+
+def test_arrays_that_belong_together_have_one_length() -> None:
+    assert why(plan(yaw_rad=np.ones(3))) == "PlannedTrajectory: yaw_rad of another shape"
+    assert why(plan(lat_deg=np.ones((4, 1)))) == "PlannedTrajectory: lat_deg of another shape"
+    assert admit(plan(**{name: np.ones(0) for name in SHAPES[PlannedTrajectory]}), where=KEY)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_numbers_are_finite(value: float) -> None:
+    assert why(SpeedSample(stamp_ns=1, speed_mps=value)) == "SpeedSample: speed_mps not finite"
+    assert why(GnssFix(stamp_ns=1, position=GeoPoint(52.0, value))) == "GnssFix: lon_deg not finite"
+    assert why(plan(speed_mps=np.array([1.0, value, 1.0, 1.0]))).endswith("speed_mps not finite")
+
+
+def test_numbers_are_within_bounds() -> None:
+    assert (
+        why(GnssFix(stamp_ns=1, position=GeoPoint(90.1, 0.0))) == "GnssFix: lat_deg out of bounds"
+    )
+    assert why(GnssFix(stamp_ns=2**62 + 1, position=HERE)) == "GnssFix: stamp_ns out of bounds"
+    assert why(SpeedSample(stamp_ns=1, speed_mps=1e5)) == "SpeedSample: speed_mps out of bounds"
+    assert admit(GnssFix(stamp_ns=1, position=GeoPoint(90.0, -180.0)), where=KEY)
+
+
+def test_an_array_holds_floats() -> None:
+    assert why(plan(speed_mps=np.ones(4, dtype=bool))).endswith("speed_mps no array of floats")
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"speed_mps": math.nan}, {"yaw_rad": math.inf}, {"length_m": 0.0}, {"width_m": 0.0},
+        {"width_m": -1.0}, {"length_m": 1e6}, {"speed_mps": 1e3},
+        {"position": GeoPoint(math.nan, 13.4)}, {"position": GeoPoint(91.0, 13.4)},
+        {"user_id": "x" * 10_000},
+    ],
+)  # fmt: skip
+def test_of_road_users_those_that_cannot_be_are_left_out(changed: dict[str, Any]) -> None:
+    good = user()
+    seen = RoadUsers(stamp_ns=1, users=(user(**changed), good))
+
+    admitted = admit(seen, where=KEY)
+
+    assert admitted.message == RoadUsers(stamp_ns=1, users=(good,))
+    assert admitted.left_out == 1
+
+
+def test_too_many_road_users_are_no_message() -> None:
+    assert why(RoadUsers(stamp_ns=1, users=(user(),) * (MOST_USERS + 1))) == "too many road users"
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "a/b", "", ".", "a b", "\x1b[2J", "a\\b", "**", "x" * 300]
+)
+def test_what_names_a_file_or_a_process_is_a_plain_name(name: str) -> None:
+    assert not is_identifier(name)
+    assert why(WorldNotice(world_id=name, intersection_id="n4", file="f")).endswith("malformed")
+
+
+def test_a_plain_name_may_be_long() -> None:
+    assert is_identifier("w0")
+    assert is_identifier("x" * MOST_IDENTIFIER)
+
+
+def test_bytes_that_are_no_message_are_refused_with_why() -> None:
+    data = encode(SpeedSample(stamp_ns=1, speed_mps=2.0), seq=7, sent_ns=9)
+    other = data[:4] + b"\x63" + data[5:]
+    for wrong, reason in (
+        (b"hello", "no message"),
+        (other, "another schema version"),
+        (data[:-1], "no valid SpeedSample"),
+        (data[:24] + b"\x91" * 100_000, "no valid SpeedSample"),
+        (None, "too large"),
+        (b"x" * 200_001, "too large"),
+    ):
+        with pytest.raises(Refused) as refused:
+            opened(wrong, SpeedSample, where=KEY, most_bytes=200_000)
+        assert refused.value.reason == reason
+    assert opened(data, SpeedSample, where=KEY).seq == 7
+
+
+def test_a_sample_that_was_sent_to_many_keys_is_refused() -> None:
+    data = encode(SpeedSample(stamp_ns=1, speed_mps=2.0))
+    with pytest.raises(Refused, match="many keys"):
+        opened(data, SpeedSample, where="foretwin/v1/**")
+
+
+def test_what_was_refused_keeps_its_number() -> None:
+    data = encode(SpeedSample(stamp_ns=1, speed_mps=math.nan), seq=7, sent_ns=9)
+    with pytest.raises(Refused) as refused:
+        opened(data, SpeedSample, where=KEY)
+    assert refused.value.header == (7, 9)
+
+
+class Payload(bytes):
+    def to_bytes(self) -> bytes:  # type: ignore[override]
+        return bytes(self)
+
+
+def test_what_is_too_large_is_not_even_kept() -> None:
+    assert kept(Payload(b"12345"), 5) == b"12345"
+    assert kept(Payload(b"123456"), 5) is None
+    assert reason_in(Payload(b"no \xff World")) == "no \ufffd World"
+    assert reason_in(Payload(b"x" * 10**6)) == "a reason too long to be told"
+
+
+@pytest.mark.parametrize("channel", sorted(CHANNELS))
+def test_a_stranger_gets_a_refusal_or_a_message_and_nothing_else(channel: str) -> None:
+    chance = random.Random(channel)
+    kind = CHANNELS[channel].kind
+    let_in = 0
+    for _ in range(150):
+        with contextlib.suppress(Refused):
+            envelope = opened(hostile_bytes(kind, chance), kind, where=KEY)
+            assert isinstance(envelope.message, kind)
+            let_in += 1
+    assert let_in < 150
