@@ -187,6 +187,16 @@ def test_what_a_killed_recorder_had_and_nobody_has_any_more_is_missing(tmp_path:
     assert balances(again)
 
 
+def test_what_the_guard_does_not_let_in_is_counted_once(tmp_path: Path) -> None:
+    recording = DriveRecording(tmp_path / "drive.mcap")
+    recording.add("imu", imu(0), sender=7, seq=0)
+    for _ in range(2):
+        recording.refuse("imu", sender=7, seq=1)
+    recording.finish()
+    assert (recording.tally.recorded, recording.tally.refused) == ({"imu": 1}, {"imu": 1})
+    assert balances(recording)
+
+
 def test_large_files_are_ended_and_read_as_one_drive(tmp_path: Path) -> None:
     path = tmp_path / "drive.mcap"
     recording = DriveRecording(path, roll_bytes=2000)
