@@ -77,6 +77,10 @@ class Numberings(msgspec.Struct):
         self.streams[f"{channel} 0.{len(self.streams)}"] = self.streams.pop(f"{channel} 0")
         return self._of(channel, sender, first=seq).take(seq)
 
+    def begin(self, channel: str, sender: int, seq: int) -> None:
+        """Expect a sender's numbers from this one on, where it is not known yet."""
+        self._of(channel, sender, first=seq)
+
     def reach(self, channel: str, sender: int, count: int) -> None:
         """Count as missing what has not come of the first `count` messages of a sender."""
         self._of(channel, sender, first=0).reach(count)

@@ -94,7 +94,7 @@ class DriveRecording:
         """Write one message, unless it came before; without a number it is the next one."""
         if seq is None:
             seq = self._heard.published[channel]
-        if not self._heard.take(channel, sender, seq):
+        if not self._is_new(channel, sender, seq):
             return []
         self._stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if isinstance(message, DriveEnd):
@@ -106,8 +106,15 @@ class DriveRecording:
 
     def refuse(self, channel: str, *, sender: int, seq: int) -> None:
         """Count a message that came and is not taken."""
-        if self._heard.take(channel, sender, seq):
+        if self._is_new(channel, sender, seq):
             self.tally.settle("refused", channel, sender, seq)
+
+    def _is_new(self, channel: str, sender: int, seq: int) -> bool:
+        """Take a number; what becomes of it may be settled before that of numbers below it."""
+        new = self._heard.take(channel, sender, seq)
+        if new:
+            self.tally.settled.begin(channel, sender, seq)
+        return new
 
     def set_info(self, info: VehicleInfo) -> list[Event]:
         """Write what is known of the vehicle, into each part."""
