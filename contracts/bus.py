@@ -8,16 +8,19 @@ from __future__ import annotations
 import collections
 import itertools
 import json
+import secrets
 import threading
 import time
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import msgspec
 
-from foretwin.contracts.codec import encode
+from foretwin.contracts.bus_calls import Bus, ask
+from foretwin.contracts.codec import MOST_SENDER, encode
 from foretwin.contracts.guard import Refused, kept, opened, reason_in
+from foretwin.contracts.kept import keeping_publisher, most_kept, recovering_subscriber
 from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
@@ -60,53 +63,6 @@ class BusUnreachable(ConnectionError):  # noqa: N818
     """No router answers at the endpoint."""
 
 
-class Bus(Protocol):
-    """What processes need of a bus; `ids` are those of `foretwin.contracts.keys.key`."""
-
-    def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
-        """Send one message; never raises for a lost link."""
-
-    def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
-        """Let every message of the channel land in `mailbox` as Received."""
-
-    def request(
-        self,
-        channel: str,
-        message: msgspec.Struct,
-        mailbox: Mailbox,
-        *,
-        tag: Any = None,
-        timeout_s: float = 10.0,
-        **ids: str,
-    ) -> None:
-        """Ask; exactly one Reply lands in `mailbox`, also when nobody answers."""
-
-    def serve(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
-        """Let every question on the channel land in `mailbox` as Request."""
-
-    def declare_alive(self, alive_key: str) -> None:
-        """Hold a liveliness token until `close` or the process's end."""
-
-    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
-        """Let every appearance, past ones included, and every loss land in `mailbox` as Alive."""
-
-    def close(self) -> None:
-        """Undeclare everything."""
-
-
-def ask(
-    bus: Bus, channel: str, message: msgspec.Struct, *, timeout_s: float = 10.0, **ids: str
-) -> Any:
-    """Ask and return the answer; raises TimeoutError with the reason where there is none."""
-    mailbox = Mailbox(1)
-    bus.request(channel, message, mailbox, timeout_s=timeout_s, **ids)
-    reply = mailbox.take(timeout_s + 1.0)
-    if not isinstance(reply, Reply) or reply.message is None:
-        reason = reply.error if isinstance(reply, Reply) else "no reply"
-        raise TimeoutError(f"{channel_key(channel, **ids)}: {reason}")
-    return reply.message
-
-
 def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
     """Return the Zenoh configuration; docs/bus.md gives the reason for each setting."""
     import zenoh
@@ -144,6 +100,7 @@ class ZenohSession:
 
     def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
         import zenoh
+        import zenoh.ext
 
         self._zenoh = zenoh
         self._publishers: dict[str, Any] = {}
@@ -182,17 +139,21 @@ class ZenohSession:
     def _hear(self, key: str, land: Callable[[Any], None], *, history: bool) -> None:
         """Call `land` with each sample; with `history` also with what publishers have kept."""
         if history:
-            from zenoh import ext
-
+            ext = self._zenoh.ext
             kept = ext.HistoryConfig(detect_late_publishers=True)
             heard = ext.declare_advanced_subscriber(self._session, key, land, history=kept)
         else:
             heard = self._session.declare_subscriber(key, land)
         self._declared.append(heard)
 
-    def _publisher(self, key: str, **qos: Any) -> Any:
+    def _publisher(self, key: str, *, samples: int = 0, **qos: Any) -> Any:
+        """Return the publisher of a key, which keeps its last `samples` for who missed them."""
         if key not in self._publishers:
-            self._publishers[key] = self._session.declare_publisher(key, **qos)
+            self._publishers[key] = (
+                keeping_publisher(self._zenoh, self._session, key, samples=samples, **qos)
+                if samples
+                else self._session.declare_publisher(key, **qos)
+            )
         return self._publishers[key]
 
     def close(self) -> None:
@@ -211,6 +172,7 @@ class ZenohBus(ZenohSession):
         self._lossless = setup.lossless
         self._sent: dict[str, Iterator[int]] = collections.defaultdict(itertools.count)
         """The next sequence number of each key."""
+        self._sender = 1 + secrets.randbelow(MOST_SENDER)
         self._lock = threading.Lock()
 
     def _qos(self, qos: Qos) -> dict[str, Any]:
@@ -221,27 +183,42 @@ class ZenohBus(ZenohSession):
             "express": qos.express,
         }
 
+    def _most_kept(self, channel: str) -> int:
+        """Return how many samples of a channel are kept; where nobody drops any, none."""
+        return 0 if self._lossless else most_kept(CHANNELS[channel])
+
     def _encoded(self, full_key: str, message: msgspec.Struct) -> bytes:
         with self._lock:
             seq = next(self._sent[full_key])
-        return encode(message, seq=seq, sent_ns=time.time_ns())
+        return encode(message, seq=seq, sent_ns=time.time_ns(), sender=self._sender)
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; see Bus."""
         full_key = channel_key(channel, **ids)
         with self._lock:
-            publisher = self._publisher(full_key, **self._qos(CHANNELS[channel].qos))
+            samples = self._most_kept(channel)
+            publisher = self._publisher(
+                full_key, samples=samples, **self._qos(CHANNELS[channel].qos)
+            )
         publisher.put(self._encoded(full_key, message))
 
-    def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+    def subscribe(
+        self, channel: str, mailbox: Mailbox, *, recover: bool = False, **ids: str
+    ) -> None:
         """Receive into `mailbox`; see Bus."""
         kind, most = CHANNELS[channel].kind, CHANNELS[channel].most_bytes
+        full_key = channel_key(channel, **ids)
+        samples = self._most_kept(channel) if recover else 0
 
         def land(sample: Any) -> None:
             data = kept(sample.payload, most)
             mailbox.put(Received(channel, str(sample.key_expr), data, kind))
 
-        self._declared.append(self._session.declare_subscriber(channel_key(channel, **ids), land))
+        self._declared.append(
+            recovering_subscriber(self._zenoh, self._session, full_key, land, samples=samples)
+            if samples
+            else self._session.declare_subscriber(full_key, land)
+        )
 
     def request(
         self,

@@ -1,7 +1,8 @@
 """Messages to bytes and back: a fixed header with the schema version, then msgpack.
 
-Header (little-endian, 24 bytes): magic `FTw1`, schema version u16, 2 bytes of zeros, sequence
-number u64, the sender's wall clock in ns i64. A message of another schema version is refused.
+Header (little-endian, 24 bytes): magic `FTw1`, schema version u16, sender u16, sequence number u64,
+the sender's wall clock in ns i64. A message of another schema version is refused. The sender is a
+random number of who numbers, 0 where none is told: who begins anew numbers from 0 as another one.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from foretwin.contracts.arrays import array_from_wire, array_to_wire
 SCHEMA_VERSION = 2
 MAGIC = b"FTw1"
 _HEADER = struct.Struct("<4sHxxQq")
+_NUMBERED_HEADER = struct.Struct("<4sHHQq")
+_SENDER = struct.Struct("<6xH")
+MOST_SENDER = 2**16 - 1
 
 Message = TypeVar("Message")
 
@@ -66,9 +70,15 @@ _encoder = msgspec.msgpack.Encoder(enc_hook=_to_wire, order="deterministic")
 _decoders: dict[Any, msgspec.msgpack.Decoder[Any]] = {}
 
 
-def encode(message: msgspec.Struct, *, seq: int = 0, sent_ns: int = 0) -> bytes:
+def encode(message: msgspec.Struct, *, seq: int = 0, sent_ns: int = 0, sender: int = 0) -> bytes:
     """Return header and body of one message."""
-    return _HEADER.pack(MAGIC, SCHEMA_VERSION, seq, sent_ns) + _encoder.encode(message)
+    header = _NUMBERED_HEADER.pack(MAGIC, SCHEMA_VERSION, sender, seq, sent_ns)
+    return header + _encoder.encode(message)
+
+
+def sender_of(data: bytes) -> int:
+    """Return by whose numbering a message is numbered, 0 where that is not told."""
+    return int(_SENDER.unpack_from(data)[0]) if len(data) >= _HEADER.size else 0
 
 
 def header_of(data: bytes, *, where: str) -> Header:

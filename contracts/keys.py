@@ -30,14 +30,22 @@ Priority = Literal["real_time", "interactive_high", "data_high", "data", "backgr
 
 
 class Qos(NamedTuple):
-    """Zenoh's priority, whether a full queue drops or blocks, and whether batching is skipped."""
+    """Zenoh's priority, whether a full queue drops or blocks, and whether batching is skipped.
+
+    Live, who sends keeps the last `kept_s` seconds at the usual rate, for who asks for what it
+    missed.
+    """
 
     priority: Priority
     block: bool
     express: bool
+    kept_s: float = 0.0
 
 
 LIVE = Qos("interactive_high", block=False, express=False)
+RECORDED = LIVE._replace(kept_s=20.0)
+"""Longer than a recorder that hangs takes to be killed (4 s) and to be there again (2 s), with room
+for a car that sends twice as often as usual."""
 RESULT = Qos("data_high", block=False, express=False)
 WATCH = Qos("data", block=False, express=False)
 REQUEST = Qos("interactive_high", block=True, express=True)
@@ -68,7 +76,7 @@ _WORKER = f"{_RUN}/worker/{{process}}"
 
 _TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
     # What the vehicle sends.
-    (f"{_VEHICLE}/telemetry", LIVE): {
+    (f"{_VEHICLE}/telemetry", RECORDED): {
         "gnss": Channel(drive.GnssFix, 10, "antenna position"),
         "imu": Channel(drive.ImuSample, 100, "specific force and rates"),
         "speed": Channel(drive.SpeedSample, 50, "wheel speed"),
@@ -82,8 +90,10 @@ _TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
         "end": Channel(drive.DriveEnd, None, "the drive is over"),
     },
     # What is derived from it.
-    (_VEHICLE, LIVE): {
+    (_VEHICLE, RECORDED): {
         "state": Channel(drive.VehicleState, 50, "estimated state"),
+    },
+    (_VEHICLE, LIVE): {
         "route": Channel(drive.RouteToGoal, 1, "where the ADS goes"),
     },
     # Questions to the vehicle's process.

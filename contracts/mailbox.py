@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from foretwin.contracts.codec import Envelope, encode
+from foretwin.contracts.codec import Envelope, encode, sender_of
 from foretwin.contracts.guard import Refused, opened
 from foretwin.contracts.keys import CHANNELS
 
@@ -47,6 +47,11 @@ class Received:
     def message(self) -> Any:
         """Return the message alone; raises Refused where the guard does not let it in."""
         return self.envelope().message
+
+    @property
+    def sender(self) -> int:
+        """By whose numbering it is numbered; see foretwin.contracts.codec."""
+        return 0 if self._payload is None else sender_of(self._payload)
 
 
 class Reply(NamedTuple):

@@ -88,6 +88,11 @@ class DrivePlan(DriveInputs):
         return self.folder / "processes"
 
     @property
+    def recording(self) -> Path:
+        """What the vehicle sent; where it has several parts, the first of them."""
+        return self.folder / "drive.mcap"
+
+    @property
     def standin_path_file(self) -> Path:
         """What the stand-in car drives."""
         return self.processes_dir / "standin_path.json"

@@ -17,6 +17,7 @@ from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.segments import next_number, segment_file, segments_of
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
 from foretwin.viewer.blueprint import drive_blueprint
@@ -82,8 +83,13 @@ class Recorder:
         self.channels = self._monitor.channels
         blueprint = drive_blueprint()
         self._live_viewer = live_viewer(setup.live)
+        first = Path(setup.file)
+        # What one that died has shown is left as it is.
         self._file = FileStream(
-            Path(setup.file), recording_id=setup.run_id, title=setup.title, blueprint=blueprint
+            segment_file(first, next_number(first)),
+            recording_id=setup.run_id,
+            title=setup.title,
+            blueprint=blueprint,
         )
         self._live = (
             None
@@ -177,7 +183,7 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
 
 
 def show(recording: Path) -> None:
-    """Become the native viewer of `recording`, which holds its layout."""
+    """Become the native viewer of `recording`, which holds its layout, and of its later parts."""
     if not recording.is_file():
         raise FileNotFoundError(f"no recording {recording}")
     if not has_display():
@@ -186,12 +192,18 @@ def show(recording: Path) -> None:
             f"`python -m foretwin.viewer.picture {recording} OUT.png` renders a picture without one"
         )
     program = str(rerun_program())
-    if not is_complete(recording):
-        copy = Path(tempfile.mkdtemp(prefix="foretwin-")) / recording.name
-        copy_with_blueprint(recording, copy, drive_blueprint())
-        recording = copy
-    arguments = [program, "--bind", HOST, "--port", "auto", str(recording)]
+    parts = [_complete(part) for part in segments_of(recording)]
+    arguments = [program, "--bind", HOST, "--port", "auto", *map(str, parts)]
     os.execve(program, arguments, offline_environment())
+
+
+def _complete(recording: Path) -> Path:
+    """Return a recording with its layout, in a copy where a killed viewer left it without."""
+    if is_complete(recording):
+        return recording
+    copy = Path(tempfile.mkdtemp(prefix="foretwin-")) / recording.name
+    copy_with_blueprint(recording, copy, drive_blueprint())
+    return copy
 
 
 def main(arguments: list[str] | None = None) -> int:

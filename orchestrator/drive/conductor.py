@@ -17,7 +17,7 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
+from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, VIEWER
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
@@ -89,6 +89,7 @@ class Conductor:
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
+        self._told_world: ActiveWorld | None = None
         self._on_message: dict[str, Callable[[Received], object]] = {
             **dict.fromkeys(keys.TELEMETRY_CHANNELS, self.take_telemetry),
             **dict.fromkeys(FINDINGS, self.tuning.heard),
@@ -237,6 +238,7 @@ class Conductor:
             return
         self._world_untold = False
         active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
+        self._told_world = active
         self.context.publish("active_world", active)
         self.questions.ask(MIRROR, "use_world", active)
 
@@ -246,8 +248,6 @@ class Conductor:
     def _world_failed(self, junction_id: str, reason: str) -> None:
         self.tell(Notice("error", f"no world for {junction_id}: {reason}"))
         self.mission.on_world_failed(junction_id)
-
-    # Changes.
 
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""
@@ -278,6 +278,8 @@ class Conductor:
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
+        elif process_id == VIEWER and self._told_world is not None:  # one that was started again
+            self.context.publish("active_world", self._told_world)
 
     def _worker_up(self, process_id: str) -> None:
         """Give a worker that has the parameters in force its Worlds, and jobs."""
@@ -289,11 +291,10 @@ class Conductor:
         self.rounds.dispatcher.give_out()
 
     def _process_down(self, process_id: str) -> None:
-        if process_id not in self.alive:
-            return
-        self.alive.discard(process_id)
-        self.tuning.process_down(process_id)
-        log.info("lost %s", process_id)
-        if process_id.startswith("w"):
-            self.worlds.worker_down(process_id)
-            self.rounds.worker_down(process_id)
+        if process_id in self.alive:
+            self.alive.discard(process_id)
+            self.tuning.process_down(process_id)
+            log.info("lost %s", process_id)
+            if process_id.startswith("w"):
+                self.worlds.worker_down(process_id)
+                self.rounds.worker_down(process_id)

@@ -23,12 +23,12 @@ from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.lock_step import LockStepLoop
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.plan import make_plan, open_bus, read_inputs
+from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
-from foretwin.orchestrator.drive.run_record import reserve_record, run_record
+from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
-from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, run_lock, write_record
@@ -44,9 +44,6 @@ END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
 LAST_WORDS_S = 0.1
 """How long nothing may come from processes that have ended before all is taken for heard."""
 INTERRUPT_GRACE_S = 1.2
-HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
-"""A process whose token is gone for so long while it runs (a stopped one, say) is killed; one that
-gives way may have to wait for a processor that long."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
 
@@ -94,11 +91,8 @@ class _Drive:
         self._plan = plan
         self._interrupt = _Interrupt()
         self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
-        self._vehicle_lost = False
+        self._watch = ProcessWatch(self._supervisor)
         self._failed_at_end = False
-        self._given_up: set[str] = set()
-        self._seen_alive: set[str] = set()
-        self._silent_since_s: dict[str, float] = {}
         self._mission = Mission(
             WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
             MissionSettings(
@@ -135,10 +129,10 @@ class _Drive:
                     log.exception("the drive ended by an error")
                     raise
                 finally:
-                    self._end(bus, conductor, line, exit_word, started_s)
+                    whole = self._end(bus, conductor, line, exit_word, started_s)
         if self._failed_at_end:
             return EXIT_FAILED
-        return EXIT_PARTLY if tables.troubles and code == EXIT_DONE else code
+        return EXIT_PARTLY if code == EXIT_DONE and not whole else code
 
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
@@ -168,7 +162,7 @@ class _Drive:
                 conductor, housekeeping=housekeeping, stop=self._stop, each_turn=in_charge
             )
         ended = loop.run()
-        if self._vehicle_lost and not self._interrupt.asked:
+        if self._watch.vehicle_lost and not self._interrupt.asked:
             raise DriveError("the vehicle's process died; see log.jsonl")
         if not ended:
             return "interrupted", EXIT_INTERRUPTED
@@ -176,7 +170,7 @@ class _Drive:
         return "completed", EXIT_DONE
 
     def _stop(self) -> bool:
-        return self._interrupt.asked or self._vehicle_lost
+        return self._interrupt.asked or self._watch.vehicle_lost
 
     def _start_processes(self) -> None:
         for row in PROCESSES:
@@ -193,8 +187,8 @@ class _Drive:
                 return False
             self._look_after(conductor, time.monotonic())
             missing = ", ".join(sorted(expected - conductor.alive))
-            if self._given_up & expected:
-                dead = ", ".join(sorted(self._given_up & expected))
+            if self._watch.given_up & expected:
+                dead = ", ".join(sorted(self._watch.given_up & expected))
                 raise DriveError(f"cannot be started: {dead}; see log.jsonl")
             if time.monotonic() > deadline:
                 raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
@@ -226,35 +220,7 @@ class _Drive:
         return False
 
     def _look_after(self, conductor: Conductor, now_s: float) -> None:
-        for death in self._supervisor.poll(now_s):
-            text = f"{death.process_id} ended with code {death.exit_code}"
-            if not death.restarted:
-                self._given_up.add(death.process_id)
-            if death.restarted:
-                conductor.tell(Notice("warning", f"{text}; started again"))
-            elif death.row.when_dead == "end_drive":
-                conductor.tell(Notice("error", text))
-                self._vehicle_lost = True
-            else:
-                conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
-        for text in conductor.tables.take_news():
-            conductor.tell(Notice("warning", text))
-        self._end_the_hung(conductor, now_s)
-
-    def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
-        """Kill processes that were alive, run still, and have not answered for a while."""
-        for process_id in self._supervisor.running():
-            if process_id in conductor.alive:
-                self._silent_since_s.pop(process_id, None)
-                self._seen_alive.add(process_id)
-            elif process_id in self._seen_alive:
-                since_s = self._silent_since_s.setdefault(process_id, now_s)
-                row = self._supervisor.row(process_id)
-                patience_s = GIVES_WAY_HUNG_AFTER_S if row.nice else HUNG_AFTER_S
-                if row.when_dead == "restart" and now_s - since_s > patience_s:
-                    log.warning("%s hangs: killed", process_id)
-                    self._supervisor.kill(process_id)
-                    self._seen_alive.discard(process_id)
+        self._watch.look_after(conductor, now_s)
 
     def _end(
         self,
@@ -263,7 +229,8 @@ class _Drive:
         line: ProgressLine,
         exit_word: str,
         started_s: float,
-    ) -> None:
+    ) -> bool:
+        """End everything and say how it went; returns whether nothing of the run is lost."""
         plan = self._plan
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
@@ -283,17 +250,24 @@ class _Drive:
         conductor.beside.close()
         conductor.route.close()
         conductor.tables.close()
-        now_s, restarted = time.monotonic(), self._supervisor.restarted
+        now_s = time.monotonic()
         record = run_record(
-            conductor, restarted, exit_word=exit_word, wall_s=now_s - started_s, mono_s=now_s
+            conductor,
+            self._supervisor.restarted,
+            exit_word=exit_word,
+            wall_s=now_s - started_s,
+            mono_s=now_s,
+            troubles=self._watch.troubles,
         )
         write_record(record, plan.folder / RECORD)
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / LOG)
         line.say(summary_text(record))
-        for trouble in conductor.tables.troubles:
-            line.say(f"error: {trouble}")
+        lost = lost_lines(record)
+        for text in lost:
+            line.say(text)
+        return not lost
 
 
 def _nothing() -> None:

@@ -24,6 +24,7 @@ from foretwin.orchestrator.runner.supervisor import WhenDead
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"
 MIRROR = "mirror"
+RECORDER, VIEWER = "recorder", "viewer"
 TUNING = "tuning"
 VEHICLE = "vehicle"
 ROS2_BESIDE = "ros2-beside"
@@ -107,7 +108,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
 def _recorder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return RecorderSetup(
         **_base(plan, process_id),
-        file=str(plan.folder / "drive.mcap"),
+        file=str(plan.recording),
     )
 
 
@@ -184,8 +185,8 @@ PROCESSES = (
     ProcessRow("w", "sim_worker", "restart", _worker, how_many=lambda plan: plan.config.workers),
     ProcessRow(MIRROR, "sim_worker", "restart", _worker),
     ProcessRow(TUNING, "sim_worker.analysis.process", "restart", _tuning, nice=10, runs=_tunes),
-    ProcessRow("recorder", "telemetry.processes.recorder", "report", _recorder),
-    ProcessRow("viewer", "viewer", "report", _viewer, nice=10),
+    ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _recorder),
+    ProcessRow(VIEWER, "viewer", "restart", _viewer, nice=10),
     ProcessRow(VEHICLE, _REPLAY, "end_drive", _replay, runs=_source_is("log")),
     ProcessRow(VEHICLE, _STANDIN, "end_drive", _standin, runs=_source_is("standin")),
     # Never started again: what has stopped towards a vehicle must not resume by itself.
@@ -208,7 +209,7 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
 
     In lock step nobody may begin in the middle who answers for all samples from the first one on.
     """
-    if row.name == TUNING and plan.config.lock_step:
+    if row.name in (TUNING, RECORDER, VIEWER) and plan.config.lock_step:
         return row._replace(when_dead="report")
     return row
 

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from foretwin.contracts.tally import read_tally, tally_file
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.durable import sync_folder, whole_file
 from foretwin.orchestrator.record.run_state import RUNNING
+from foretwin.orchestrator.record.telemetry_ledger import lost_telemetry_line, telemetry_ledger
 from foretwin.orchestrator.record.versions import versions
 
 RESERVED_BYTES = 65536
 
 
 def run_record(
-    conductor: Conductor, restarted: int, *, exit_word: str, wall_s: float, mono_s: float
+    conductor: Conductor,
+    restarted: int,
+    *,
+    exit_word: str,
+    wall_s: float,
+    mono_s: float,
+    troubles: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Return everything that run.json says; `restarted` counts processes started again."""
+    """Return everything that run.json says; `restarted` counts processes started again.
+
+    `troubles` are what is missing since processes died.
+    """
     plan, mission, futures = conductor.plan, conductor.mission, conductor.rounds.futures
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror.independent
@@ -32,6 +44,7 @@ def run_record(
         "intersections": mission.records(mono_s=mono_s),
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
+        "ledger": {"telemetry": telemetry_of(conductor)},
         "tuning": conductor.tuning.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
@@ -58,7 +71,7 @@ def run_record(
             "given_up_rounds": conductor.rounds.open.given_up,
         },
         "refused": conductor.refusals.record(),
-        "troubles": conductor.tables.troubles,
+        "troubles": [*troubles, *conductor.tables.troubles],
         "off_road": [
             {
                 "reason": stretch.reason,
@@ -87,6 +100,26 @@ def _known_at_start(plan: DrivePlan, exit_word: str) -> dict[str, Any]:
         "route_source": plan.route_source,
         "config": msgspec.to_builtins(plan.config),
     }
+
+
+def telemetry_of(conductor: Conductor) -> dict[str, Any]:
+    """Return the ledger of the vehicle's telemetry.
+
+    A car that is not ours may have begun to count before the run: what was heard of it counts.
+    """
+    plan, intake = conductor.plan, conductor.intake
+    published = intake.counts.by_channel
+    if intake.end is not None and plan.config.resolved_source != "live":
+        published = intake.end.published
+    return telemetry_ledger(read_tally(tally_file(plan.recording)), published)
+
+
+def lost_lines(record: dict[str, Any]) -> list[str]:
+    """Return what a run says last where something of it is lost."""
+    found = [*record["troubles"]]
+    if (line := lost_telemetry_line(record["ledger"]["telemetry"])) is not None:
+        found.append(line)
+    return [f"lost: {line}" for line in found]
 
 
 def reserve_record(plan: DrivePlan, file: Path) -> None:

@@ -28,13 +28,15 @@ log = logging.getLogger("orchestrator")
 
 GIVES_WAY_AFTER_S = 1.0
 """So long after its death a process may still count as alive."""
-RESTARTS_WITHIN_S = 30.0
+RESTARTS_WITHIN_S = 60.0
 TERM_S = 5.0
 """What a process that was told to leave has for its last words: on a busy machine one that writes a
 file is slow, not stuck."""
 _REAP_S = 30.0
 MAX_RESTARTS = 5
 """More deaths than this within RESTARTS_WITHIN_S and a process is given up."""
+FIRST_PAUSE_S = 1.0
+"""From the second death within RESTARTS_WITHIN_S to the start after it; then twice as long."""
 
 
 WhenDead = Literal["restart", "report", "end_drive"]
@@ -120,6 +122,8 @@ class Death:
     row: SupervisedRow
     exit_code: int
     restarted: bool
+    """Whether it is started again, `pause_s` after its death."""
+    pause_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -128,6 +132,8 @@ class _Managed:
     setup: ProcessSetup
     child: Child
     gone: bool = False
+    due_s: float | None = None
+    """When one that died is started again."""
 
 
 @dataclass(slots=True)
@@ -151,25 +157,32 @@ class Supervisor:
         self.started += 1
 
     def poll(self, now_s: float) -> list[Death]:
-        """Return the processes that died since the last call, restarted where the table says so."""
+        """Return the processes that died since the last call, restarted where the table says so.
+
+        At once after the first death, then after pauses that grow.
+        """
         deaths = []
         for process_id, managed in self._managed.items():
-            if managed.gone:
-                continue
             exit_code = managed.child.poll()
-            if exit_code is None:
-                continue
-            again = managed.row.when_dead == "restart" and self._may_restart(process_id, now_s)
-            if again:
-                managed.child = self.launch(module=managed.row.module, setup=managed.setup)
-                if managed.row.nice:
-                    self._to_give_way[process_id] = now_s + GIVES_WAY_AFTER_S
-                log.info("started %s again as process %d", process_id, managed.child.pid)
-                self.restarted += 1
-            else:
-                managed.gone = True
-            deaths.append(Death(process_id, managed.row, exit_code, again))
+            if not managed.gone and managed.due_s is None and exit_code is not None:
+                pause_s = None
+                if managed.row.when_dead == "restart":
+                    pause_s = self._pause_s(process_id, now_s)
+                managed.gone = pause_s is None
+                managed.due_s = None if pause_s is None else now_s + pause_s
+                again = not managed.gone
+                deaths.append(Death(process_id, managed.row, exit_code, again, pause_s or 0.0))
+            if managed.due_s is not None and now_s >= managed.due_s:
+                self._start_again(managed, now_s)
         return deaths
+
+    def _start_again(self, managed: _Managed, now_s: float) -> None:
+        process_id, managed.due_s = managed.setup.process_id, None
+        managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+        if managed.row.nice:
+            self._to_give_way[process_id] = now_s + GIVES_WAY_AFTER_S
+        log.info("started %s again as process %d", process_id, managed.child.pid)
+        self.restarted += 1
 
     def let_give_way(self, alive: Collection[str], now_s: float) -> None:
         """Let those of the processes `alive` give way that shall; call it as often as `poll`.
@@ -183,12 +196,15 @@ class Supervisor:
             if gives_way(managed.child.pid, managed.row.nice):
                 del self._to_give_way[process_id]
 
-    def _may_restart(self, process_id: str, now_s: float) -> bool:
+    def _pause_s(self, process_id: str, now_s: float) -> float | None:
+        """Return how long to wait before another start, None where there is to be none."""
         recent = self._deaths[process_id]
         recent.append(now_s)
         while recent and now_s - recent[0] > RESTARTS_WITHIN_S:
             recent.popleft()
-        return len(recent) <= MAX_RESTARTS
+        if len(recent) > MAX_RESTARTS:
+            return None
+        return 0.0 if len(recent) == 1 else FIRST_PAUSE_S * 2.0 ** (len(recent) - 2)
 
     def running(self) -> list[str]:
         """Return the ids of processes that have not ended."""

@@ -106,6 +106,23 @@ def _check_packing(path: Path, packed: int, unpacked: int) -> None:
         )
 
 
+def read_metadata(path: Path, name: str) -> dict[str, str]:
+    """Return what stands under a name at the beginning of a file, before its first message.
+
+    Nothing where it is not there; raises LogError for a file that is no MCAP.
+    """
+    with path.open("rb") as file:
+        try:
+            for item in StreamReader(file, emit_chunks=True).records:
+                if isinstance(item, Metadata) and item.name == name:
+                    return dict(item.metadata)
+                if isinstance(item, Chunk):
+                    break
+        except (*BROKEN, StopIteration, OSError) as error:
+            raise LogError(f"{path}: no MCAP file: {type(error).__name__} {error}") from None
+    return {}
+
+
 def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record]:
     """Yield the messages of `topics`: by log time where the file is indexed, else in file order.
 

@@ -1,11 +1,19 @@
-"""Bringing samples of several sensors into the order of their stamps."""
+"""Bringing samples of several sensors, or files, into the order of their stamps."""
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 
-from foretwin.telemetry.logs.log import Sample
+import msgspec
+
+from foretwin.telemetry.logs.log import FILE_CUT_SHORT, Log, Sample
+
+LATE_NS = 30_000_000_000
+"""What a recorder catches up on, in a part of its own, is older than the end of the part before by
+at most this."""
 
 
 def stamp_ns_of(sample: Sample) -> int:
@@ -33,3 +41,22 @@ def reordered(samples: Iterable[Sample], *, window_ns: int) -> Iterator[Sample]:
             yield heapq.heappop(waiting)[2]
     while waiting:
         yield heapq.heappop(waiting)[2]
+
+
+def in_parts(logs: Sequence[Log], *, unreadable: int = 0) -> Log:
+    """Return the parts of one recording as one drive; `unreadable` parts count as cut short."""
+    ends = [log.info.end_stamp_ns for log in logs]
+    sends = tuple(dict.fromkeys(name for log in logs for name in log.info.sends))
+    info = msgspec.structs.replace(
+        logs[0].info,
+        end_stamp_ns=None if None in ends else max(end for end in ends if end is not None),
+        sends=sends,
+    )
+
+    def read(skipped: Counter[str]) -> Iterator[Sample]:
+        if unreadable:
+            skipped[FILE_CUT_SHORT] += unreadable
+        parts = (log.read(skipped) for log in logs)
+        return reordered(itertools.chain.from_iterable(parts), window_ns=LATE_NS)
+
+    return Log(info=info, read=read)

@@ -7,7 +7,7 @@ INFO_TOPIC and FRAME_TOPIC, since bags of ROS 1 have no metadata.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -17,7 +17,8 @@ from foretwin.contracts import drive
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import Refused, admit
-from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
+from foretwin.contracts.segments import number_of, segments_of
+from foretwin.telemetry.logs.foreign_ros import Decode, open_foreign, time_base_of
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
     UNREADABLE_ROW,
@@ -28,10 +29,16 @@ from foretwin.telemetry.logs.log import (
     check_undeclared,
 )
 from foretwin.telemetry.logs.map_origin import declared_of
-from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.mcap_records import read_metadata
+from foretwin.telemetry.logs.merge import LATE_NS, in_parts, reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder, mcap_recording
-from foretwin.telemetry.logs.write_mcap import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
+from foretwin.telemetry.logs.write_mcap import (
+    FORMAT_METADATA,
+    FRAME_METADATA,
+    INFO_METADATA,
+    PART,
+)
 from foretwin.telemetry.ros_messages.foreign import UnusableError
 from foretwin.telemetry.ros_messages.table import (
     FRAME_TOPIC,
@@ -47,17 +54,56 @@ _Kind = TypeVar("_Kind")
 def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     """Open an MCAP file; raises LogError where it is none or holds no positions.
 
-    `declaration` is that of foretwin.telemetry.logs.map_origin, for files of other programs.
+    The first part of a recording of ours (foretwin.contracts.segments) is read with all others,
+    as one drive. `declaration` is that of foretwin.telemetry.logs.map_origin, for files of other
+    programs.
     """
+    parts = [path, *(part for part in segments_of(path)[1:] if _is_part(path, part))]
+    if len(parts) > 1:
+        check_undeclared(path, declaration, "foretwin's own recording")
+        return _open_parts(parts)
     recording = mcap_recording(path)
-    metadata = recording.contents.metadata
-    own = _OwnMetadata(
-        *(metadata.get(name, {}).get("json") for name in (FRAME_METADATA, INFO_METADATA))
-    )
-    if FORMAT_METADATA in metadata:
+    own = _metadata_of(recording)
+    if FORMAT_METADATA in recording.contents.metadata:
         check_undeclared(path, declaration, "foretwin's own recording")
         return _open_own(recording, own)
     return open_foreign(recording, declared_of(path, declaration), frame=own.frame(path))
+
+
+def _is_part(first: Path, path: Path) -> bool:
+    """Whether a file says itself that it is the part that its name makes it."""
+    try:
+        said = read_metadata(path, FORMAT_METADATA).get(PART)
+    except LogError:
+        return False
+    return said == str(number_of(first, path))
+
+
+def _open_parts(parts: Sequence[Path]) -> Log:
+    """Open the parts of a recording as one drive; a kill can leave one with nothing in it yet."""
+    recordings, logs, problems = [], [], []
+    for part in parts:
+        try:
+            recordings.append(mcap_recording(part))
+        except LogError as problem:
+            problems.append(problem)
+    said = [_metadata_of(recording) for recording in recordings]
+    info_json = next((own.info_json for own in said if own.info_json is not None), None)
+    for recording, own in zip(recordings, said, strict=True):
+        try:
+            logs.append(_open_own(recording, own._replace(info_json=info_json)))
+        except LogError as problem:
+            problems.append(problem)
+    if not logs:
+        raise problems[0]
+    return in_parts(logs, unreadable=len(problems))
+
+
+def _metadata_of(recording: RosRecording) -> _OwnMetadata:
+    metadata = recording.contents.metadata
+    return _OwnMetadata(
+        *(metadata.get(name, {}).get("json") for name in (FRAME_METADATA, INFO_METADATA))
+    )
 
 
 def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
@@ -131,7 +177,7 @@ def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
         if contents.cut_short:
             skipped[FILE_CUT_SHORT] += 1
         samples = _own_samples(recording, topics, decode, frame, skipped)
-        return samples if contents.indexed else reordered(samples, window_ns=WINDOW_NS)
+        return samples if contents.indexed else reordered(samples, window_ns=LATE_NS)
 
     return Log(
         info=info,

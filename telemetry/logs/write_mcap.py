@@ -28,6 +28,8 @@ FORMAT_METADATA = "foretwin.format"
 INFO_METADATA = "foretwin.vehicle_info"
 FRAME_METADATA = "foretwin.frame"
 LIBRARY = "foretwin"
+PART = "part"
+"""In FORMAT_METADATA: which part of a recording a file is, where it is not the first."""
 CHUNK_BYTES = 256 * 1024
 """Small, so that a killed recorder loses little."""
 _EMPTY_CRC, _NO_SUMMARY = bytes(4), bytes(20)
@@ -60,6 +62,11 @@ class _Whole:
     def flush(self) -> None:
         """Nothing waits here."""
 
+    def sync(self) -> None:
+        """Wait until what was written would survive a power cut; memory has nothing to sync."""
+        with contextlib.suppress(io.UnsupportedOperation):
+            os.fdatasync(self._raw.fileno())
+
 
 class DriveWriter:
     """Writes messages of a drive; a context manager that finishes the file.
@@ -68,9 +75,14 @@ class DriveWriter:
     there, without the index, which readers rebuild; later messages are refused with the same error.
     """
 
-    def __init__(self, raw: io.FileIO, *, info: drive.VehicleInfo | None = None) -> None:
+    def __init__(
+        self, raw: io.FileIO, *, info: drive.VehicleInfo | None = None, part: int = 1
+    ) -> None:
+        """`part` is the number of the file where a recording has several."""
         self.counts: Counter[str] = Counter()
         """Messages accepted, by channel."""
+        self.held = 0
+        """Of them, how many wait in the chunk in progress: an error or a kill loses them."""
         self.error: OSError | None = None
         self._raw = raw
         self._stream = _Whole(raw)
@@ -87,7 +99,8 @@ class DriveWriter:
         )
         with self._guarded():
             self._writer.start(profile="ros2", library=LIBRARY)
-            self._writer.add_metadata(FORMAT_METADATA, {"version": "1"})
+            part_of = {} if part == 1 else {PART: str(part)}
+            self._writer.add_metadata(FORMAT_METADATA, {"version": "1", **part_of})
         if info is not None:
             self.set_info(info)
 
@@ -107,29 +120,50 @@ class DriveWriter:
         with self._guarded():
             self._writer.add_metadata(INFO_METADATA, {"json": msgspec.json.encode(info).decode()})
 
-    def add(self, channel: str, message: msgspec.Struct) -> None:
-        """Write one message.
+    @property
+    def size_bytes(self) -> int:
+        """How much is in the file so far."""
+        return self._whole_bytes
+
+    def add(self, channel: str, message: msgspec.Struct, *, sequence: int | None = None) -> None:
+        """Write one message, numbered by its sender, else as it comes.
 
         Raises OSError where the file cannot grow, and ValueError for what
         `foretwin.telemetry.ros_messages.table.messages_from` refuses.
         """
         parts = messages_from(channel, message, self._frame_for(message))
         stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        number = self.counts[channel] if sequence is None else sequence
+        held, size = self.held + 1, self._whole_bytes
         with self._guarded():
             for topic, kind, data in parts:
+                channel_id = self._channel_id(topic, kind)
+                before = self._stream.tell()
                 self._writer.add_message(
-                    channel_id=self._channel_id(topic, kind),
+                    channel_id=channel_id,
                     log_time=stamp_ns,
                     publish_time=stamp_ns,
                     data=data,
-                    sequence=self.counts[channel] & 0xFFFFFFFF,
+                    sequence=number & 0xFFFFFFFF,
                 )
+                if before > size:  # by the definition of the topic, before this message
+                    held = 1
+                size = self._stream.tell()
+                # A chunk that is full has been written, and all so far is in it.
+                held = 0 if size > before else max(held, 1)
+        self.held = held
         self.counts[channel] += 1
 
     def flush(self) -> None:
         """End the chunk in progress, so that what was added so far survives a kill."""
         with self._guarded():
             self._writer.flush()  # type: ignore[no-untyped-call]
+        self.held = 0
+
+    def sync(self) -> None:
+        """Put what was flushed on the disk, so that it survives a power cut."""
+        with self._guarded():
+            self._stream.sync()
 
     def finish(self) -> None:
         """End the file and close it; never raises: what went wrong stands in `error`."""
@@ -199,7 +233,11 @@ def position_of(message: msgspec.Struct) -> GeoPoint | None:
         return None
 
 
-def create(path: Path, *, info: drive.VehicleInfo | None = None) -> DriveWriter:
+def create(path: Path, *, info: drive.VehicleInfo | None = None, part: int = 1) -> DriveWriter:
     """Create a file to write to; raises OSError where that is impossible."""
     raw = io.FileIO(os.fspath(path), "w")
-    return DriveWriter(raw, info=info)
+    try:
+        return DriveWriter(raw, info=info, part=part)
+    except OSError:
+        raw.close()
+        raise

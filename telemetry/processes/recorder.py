@@ -1,4 +1,4 @@
-"""The recorder process: what the vehicle sends, and the state estimated from it, to one MCAP file.
+"""The recorder process: what the vehicle sends, and the state estimated from it, to MCAP files.
 
 `python -m foretwin.telemetry.processes.recorder --setup FILE` (`RecorderSetup`).
 """
@@ -20,10 +20,8 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
-from foretwin.contracts.sequence_gaps import SequenceGaps
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
-from foretwin.telemetry.logs.write_mcap import create
 from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.ros_messages.parts import typestore
 
@@ -70,13 +68,12 @@ class RecorderProcess:
         self._answers = Mailbox(64)
         self._reported_lost = 0
         self._refusals = Refusals()
-        self._gaps = SequenceGaps()
         self._asked_s: float | None = None
         self._informed = False
         self._flushed_s = mono_s()
         self._stamp_ns = 0
         for channel in (*TELEMETRY_CHANNELS, "state"):
-            bus.subscribe(channel, self._messages, vehicle=vehicle_id)
+            bus.subscribe(channel, self._messages, recover=True, vehicle=vehicle_id)
         self._publish(recording.started())
         life.ready()
 
@@ -116,11 +113,11 @@ class RecorderProcess:
         self._report_losses(at_the_end=True)
         self._publish(self._recording.finish())
         log.info(
-            "recorded %s; unwritten %d, refused %s, missing %d, dropped %d, unreadable %d, left %d",
-            dict(self._recording.counts),
-            self._recording.unwritten,
-            dict(self._recording.refused),
-            self._gaps.lost,
+            "recorded %s; unwritten %s, refused %s, missing %d, dropped %d, unreadable %d, left %d",
+            self._recording.tally.recorded,
+            self._recording.tally.unwritten,
+            self._recording.tally.refused,
+            self._recording.missing,
             self._messages.dropped,
             len(self._refusals),
             left,
@@ -141,14 +138,15 @@ class RecorderProcess:
             envelope = item.envelope()
         except Refused as refused:
             if refused.header is not None:
-                self._gaps.take(item.key, refused.header.seq, sent_ns=refused.header.sent_ns)
+                seq = refused.header.seq
+                self._recording.refuse(item.channel, sender=item.sender, seq=seq)
             if text := self._refusals.take(refused):
                 log.warning("%s", text)
             return
-        self._gaps.take(item.key, envelope.seq, sent_ns=envelope.sent_ns)
         message = envelope.message
         self._stamp_ns = message.stamp_ns
-        self._publish(self._recording.add(item.channel, message))
+        numbered = {"sender": item.sender, "seq": envelope.seq}
+        self._publish(self._recording.add(item.channel, message, **numbered))
 
     def _take_answer(self, item: Any) -> None:
         if isinstance(item, Reply) and item.message is not None:
@@ -167,11 +165,12 @@ class RecorderProcess:
     def _report_losses(self, *, at_the_end: bool = False) -> None:
         # Gaps in the sequence count what the mailbox dropped, and what the bus lost before it.
         # On a busy machine more are lost every second: told when there are twice as many.
+        lost = self._recording.missing
         enough = self._reported_lost if at_the_end else 2 * self._reported_lost
-        if self._gaps.lost > enough:
-            self._reported_lost = self._gaps.lost
+        if lost > enough:
+            self._reported_lost = lost
             text = (
-                f"{self._gaps.lost} messages are missing in the recording so far"
+                f"{lost} messages are missing in the recording so far"
                 f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"
             )
             log.warning(text)
@@ -186,9 +185,8 @@ class RecorderProcess:
 def serve(setup: RecorderSetup, bus: Bus, life: ProcessLife) -> None:
     """Record until the run is over."""
     typestore()  # Costs a third of a second: before the first message, not at it.
-    path = Path(setup.file)
     process = RecorderProcess(
-        DriveRecording(lambda: create(path), name=path.name),
+        DriveRecording(Path(setup.file)),
         bus=bus,
         life=life,
         run_id=setup.run_id,

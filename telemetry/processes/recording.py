@@ -1,110 +1,260 @@
-"""What a recorder does with messages, without a bus: write them, and survive a full disk."""
+"""What a recorder does with messages, without a bus: write them, and outlast a full disk."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
-from collections import Counter
+import time
+from collections import deque
 from collections.abc import Callable
-from typing import Literal
+from pathlib import Path
+from typing import Literal, NamedTuple, Protocol
 
 import msgspec
 
-from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.drive import DriveEnd, VehicleInfo
+from foretwin.contracts.segments import next_number, segment_file
 from foretwin.contracts.simulation import Event
-from foretwin.telemetry.logs.write_mcap import DriveWriter
+from foretwin.contracts.tally import Numberings, Tally, read_tally, tally_file, write_tally
+from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 
 SOURCE = "recorder"
+ROLL_BYTES = 64 * 2**20
+"""A file that is so large is ended and the next one begun: an hour of a car, some seconds to read
+where it was cut short."""
+MOST_WAITING = 20_000
+"""Messages that are kept for a disk that has no room: more than a minute of a car."""
+RETRY_S = 1.0
 
 log = logging.getLogger("foretwin.telemetry.processes.recorder")
+
+
+class OpenPart(Protocol):
+    """Creates the file of one part of a recording; may raise OSError."""
+
+    def __call__(self, path: Path, *, part: int) -> DriveWriter:
+        """Create it."""
+
+
+class _ToWrite(NamedTuple):
+    channel: str
+    message: msgspec.Struct
+    sender: int
+    seq: int
 
 
 class DriveRecording:
     """Writes the messages of one drive; what goes wrong becomes events, never an exception.
 
-    Each call returns the events to publish. After the first write error nothing more is written
-    and messages are counted in `unwritten`; `create` is called once and may raise OSError.
+    Each call returns the events to publish. Where a file cannot grow, messages wait in memory, the
+    newest `MOST_WAITING`, and go into the next part (foretwin.contracts.segments) as soon as there
+    is room; the others are counted. What is in a file or lost for good stands in the tally
+    (foretwin.contracts.tally), which is written with each flush: who goes on with a recording
+    takes nothing twice.
     """
 
-    def __init__(self, create: Callable[[], DriveWriter], *, name: str) -> None:
-        self.unwritten = 0
-        """Messages that came after a write error."""
-        self.refused: Counter[str] = Counter()
-        """Messages that no MCAP can hold, by channel."""
-        self._name = name
-        self._stamp_ns = 0
+    def __init__(
+        self,
+        path: Path,
+        *,
+        open_part: OpenPart = create,
+        mono_s: Callable[[], float] = time.monotonic,
+        roll_bytes: int = ROLL_BYTES,
+    ) -> None:
+        self._path, self._open_part = path, open_part
+        self._mono_s, self._roll_bytes = mono_s, roll_bytes
+        self._part = next_number(path)
+        begun = self._part > 1
+        self.tally = (read_tally(tally_file(path)) if begun else None) or Tally()
+        # What came is known at once, what became of it only when it is in the file.
+        self._heard = msgspec.convert(msgspec.to_builtins(self.tally.settled), Numberings)
+        self._waiting: deque[_ToWrite] = deque()
+        self._given = 0
+        """So many of those that wait have been given to the file in progress."""
         self._writer: DriveWriter | None = None
-        self._pending: list[Event] = []
-        try:
-            self._writer = create()
-        except OSError as error:
-            self._pending = [self._event("error", f"{name} cannot be written: {error}")]
+        self._info: VehicleInfo | None = None
+        self._retry_s = 0.0
+        self._outages = 0
+        self._out = False
+        self._stamp_ns = 0
+        self._pending = self._open()
 
     @property
-    def counts(self) -> Counter[str]:
-        """Messages written, by channel."""
-        return Counter() if self._writer is None else self._writer.counts
-
-    @property
-    def writes(self) -> bool:
-        """Whether messages still reach the file."""
-        return self._writer is not None and self._writer.error is None
+    def missing(self) -> int:
+        """Messages that have not come, by their senders' numbers."""
+        return self._heard.missing.total()
 
     def started(self) -> list[Event]:
         """Return what went wrong at the start."""
         return self._pending
 
-    def add(self, channel: str, message: msgspec.Struct) -> list[Event]:
-        """Write one message."""
-        self._stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
-        if self._writer is None or not self.writes:
-            self.unwritten += 1
+    def add(
+        self, channel: str, message: msgspec.Struct, *, sender: int = 0, seq: int | None = None
+    ) -> list[Event]:
+        """Write one message, unless it came before; without a number it is the next one."""
+        if seq is None:
+            seq = self._heard.published[channel]
+        if not self._is_new(channel, sender, seq):
             return []
-        try:
-            self._writer.add(channel, message)
-        except OSError as error:
-            self.unwritten += 1
-            return [self._stopped(error)]
-        except ValueError as error:
-            self.refused[channel] += 1
-            if self.refused[channel] > 1:
-                return []
-            return [self._event("warning", f"not recorded: {error}")]
-        return []
+        self._stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        if isinstance(message, DriveEnd):
+            self._take_end(message, sender)
+        self._waiting.append(_ToWrite(channel, message, sender, seq))
+        if len(self._waiting) > MOST_WAITING:
+            self._give_up(self._waiting.popleft())
+        return self._go_on() if self._writer is None else self._give()
+
+    def refuse(self, channel: str, *, sender: int, seq: int) -> None:
+        """Count a message that came and is not taken."""
+        if self._is_new(channel, sender, seq):
+            self.tally.settle("refused", channel, sender, seq)
+
+    def _is_new(self, channel: str, sender: int, seq: int) -> bool:
+        """Take a number; what becomes of it may be settled before that of numbers below it."""
+        new = self._heard.take(channel, sender, seq)
+        if new:
+            self.tally.settled.begin(channel, sender, seq)
+        return new
 
     def set_info(self, info: VehicleInfo) -> list[Event]:
-        """Write what is known of the vehicle."""
+        """Write what is known of the vehicle, into each part."""
+        self._info = info
         return self._attempt(lambda writer: writer.set_info(info))
 
     def flush(self) -> list[Event]:
-        """Put what has been added so far on the disk."""
-        return self._attempt(DriveWriter.flush)
+        """Put what has been added so far on the disk; begin another file where one is large."""
+        events = self._go_on() if self._writer is None else self._attempt(DriveWriter.flush)
+        # Before the disk is waited for: whoever is killed meanwhile has it in the file.
+        write_tally(self.tally, tally_file(self._path))
+        events += self._attempt(DriveWriter.sync)
+        if self._writer is not None and self._writer.size_bytes >= self._roll_bytes:
+            self._end_part()
+            events += self._open()
+        return events
 
     def finish(self) -> list[Event]:
-        """End the file."""
-        writer, wrote = self._writer, self.writes
-        if writer is None:
+        """End the file; what could not be written by now is lost."""
+        self._retry_s = 0.0
+        events = self.flush()
+        self._end_part()
+        while self._waiting:
+            self._give_up(self._waiting.popleft())
+        write_tally(self.tally, tally_file(self._path))
+        return events
+
+    def _take_end(self, end: DriveEnd, sender: int) -> None:
+        """Count as missing what the vehicle says it sent and that never came."""
+        for channel, count in end.published.items():
+            self._heard.reach(channel, sender, count)
+            self.tally.settled.reach(channel, sender, count)
+
+    def _open(self) -> list[Event]:
+        """Begin a part and give it all that waits."""
+        try:
+            path = segment_file(self._path, self._part)
+            self._writer = self._open_part(path, part=self._part)
+        except OSError as error:
+            self._discard()
+            return self._stopped(error)
+        if self._info is not None:
+            self._attempt(lambda writer: writer.set_info(self._info))  # type: ignore[arg-type]
+        return self._give()
+
+    def _go_on(self) -> list[Event]:
+        """Try again to write, where it is time to."""
+        if self._mono_s() < self._retry_s:
             return []
-        writer.finish()
-        if wrote and writer.error is not None:
-            return [self._stopped(writer.error)]
-        return []
+        events = self._open()
+        if self._out and self._writer is not None:
+            events += self._attempt(DriveWriter.flush)
+        if self._out and self._writer is not None:
+            self._out = False
+            name = segment_file(self._path, self._part).name
+            lost = sum(self.tally.unwritten.values())
+            text = f"{name}: the recording goes on; {lost} messages could not be written so far"
+            if _is_told(self._outages):
+                events.append(self._event("warning", text))
+        return events
+
+    def _give(self) -> list[Event]:
+        """Give the file what it has not been given yet."""
+        events: list[Event] = []
+        while self._writer is not None and self._given < len(self._waiting):
+            one = self._waiting[self._given]
+            try:
+                self._writer.add(one.channel, one.message, sequence=one.seq)
+            except OSError as error:
+                return events + self._stopped(error)
+            except ValueError as error:
+                events += self._refuse(one, error)
+                continue
+            self._given += 1
+            self._settle()
+        return events
+
+    def _refuse(self, one: _ToWrite, error: ValueError) -> list[Event]:
+        del self._waiting[self._given]
+        if self.tally.settle("refused", one.channel, one.sender, one.seq) > 1:
+            return []
+        return [self._event("warning", f"not recorded: {error}")]
+
+    def _settle(self) -> None:
+        """Count what is in the file by now."""
+        while self._writer is not None and self._given > self._writer.held:
+            one = self._waiting.popleft()
+            self._given -= 1
+            self.tally.settle("recorded", one.channel, one.sender, one.seq)
+
+    def _give_up(self, one: _ToWrite) -> None:
+        self.tally.settle("unwritten", one.channel, one.sender, one.seq)
 
     def _attempt(self, step: Callable[[DriveWriter], None]) -> list[Event]:
-        if self._writer is None or not self.writes:
+        if self._writer is None:
             return []
         try:
             step(self._writer)
         except OSError as error:
-            return [self._stopped(error)]
+            return self._stopped(error)
+        self._settle()
         return []
 
-    def _stopped(self, error: OSError) -> Event:
+    def _end_part(self) -> None:
+        """End the file in progress; a part without a message gives way to the next attempt."""
+        writer, self._writer, self._given = self._writer, None, 0
+        if writer is None:
+            return
+        writer.finish()
+        if writer.counts.total() > writer.held:
+            self._part += 1
+        else:
+            self._discard()
+
+    def _discard(self) -> None:
+        """Remove a later part that holds nothing; the first keeps its name whatever comes."""
+        if self._part > 1:
+            with contextlib.suppress(OSError):
+                segment_file(self._path, self._part).unlink()
+
+    def _stopped(self, error: OSError) -> list[Event]:
+        """Keep what comes until there is room; told for the first, second, fourth time ..."""
+        name = segment_file(self._path, self._part).name
+        self._end_part()
+        self._retry_s = self._mono_s() + RETRY_S
+        if self._out:
+            return []
+        self._out = True
+        self._outages += 1
+        if not _is_told(self._outages):
+            return []
         reason = error.strerror or str(error)
-        return self._event(
-            "error",
-            f"{self._name} ends here: {reason}; the drive goes on without being recorded",
-        )
+        text = f"{name} cannot be written: {reason}; tried again, {MOST_WAITING} messages wait"
+        return [self._event("error", text)]
 
     def _event(self, level: Literal["warning", "error"], text: str) -> Event:
         log.log(logging.ERROR if level == "error" else logging.WARNING, text)
         return Event(stamp_ns=self._stamp_ns, level=level, source=SOURCE, text=text)
+
+
+def _is_told(times: int) -> bool:
+    """Whether what happens again and again is told this time: when it is twice as often."""
+    return times & (times - 1) == 0

@@ -47,7 +47,9 @@ class MemoryBus:
         for mailbox in receivers:
             mailbox.put(Received(channel, full_key, data, CHANNELS[channel].kind))
 
-    def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+    def subscribe(
+        self, channel: str, mailbox: Mailbox, *, recover: bool = False, **ids: str
+    ) -> None:
         """Receive into `mailbox`; see Bus."""
         with self._lock:
             self._subscribers.append((channel_key(channel, **ids), channel, mailbox))

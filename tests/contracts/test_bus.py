@@ -23,6 +23,8 @@ from tests.contracts.bus_sides import (
     zenoh_sides,
 )
 
+COVERS = ("foretwin.contracts.bus_calls",)
+
 W0 = {"run": "r1", "process": "w0"}
 PREPARE = PrepareRequest(world_id="abc")
 

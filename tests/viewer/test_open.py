@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+from foretwin.viewer import __main__ as viewer
 from foretwin.viewer.__main__ import main
 from foretwin.viewer.live_viewer import offline_environment
 
@@ -27,6 +29,20 @@ def test_without_a_display_a_picture_is_offered(
     told = capsys.readouterr().err
     assert told.count("\n") == 1
     assert "foretwin.viewer.picture" in told
+
+
+def test_all_parts_of_a_recording_are_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(viewer, "is_complete", lambda recording: True)
+    monkeypatch.setattr(os, "execve", lambda program, arguments, _: shown.extend(arguments))
+    parts = [tmp_path / name for name in ("monitor.rrd", "monitor-002.rrd")]
+    for part in parts:
+        part.write_bytes(b"RRF2")
+    viewer.show(parts[0])
+    assert shown[-2:] == [str(part) for part in parts]
 
 
 def test_the_viewer_is_kept_from_the_internet(monkeypatch: pytest.MonkeyPatch) -> None:

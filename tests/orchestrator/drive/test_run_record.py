@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from foretwin.orchestrator.drive.run_record import run_record, versions
+from foretwin.contracts.tally import Tally, tally_file, write_tally
+from foretwin.orchestrator.drive.run_record import lost_lines, run_record, versions
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.record.run_state import write_record
 from tests.orchestrator.house import House
@@ -19,7 +20,7 @@ COVERS = ("foretwin.orchestrator.drive.summary",)
 PROMISED = {
     "run_id", "exit", "versions", "map", "seed", "route_source", "config", "intersections",
     "telemetry", "futures", "state_to_result_ms_p50", "state_to_result_ms_p95", "comparison",
-    "workers", "dropped",
+    "workers", "dropped", "ledger",
 }  # fmt: skip
 
 
@@ -61,6 +62,26 @@ def test_the_promised_keys_are_there_and_filled_by_a_drive(house: House) -> None
     assert record["telemetry"]["received"] == 200
     assert record["state_to_result_ms_p50"] <= record["state_to_result_ms_p95"]
     assert record["wall_s"] == 12.346
+
+
+def test_what_is_lost_is_in_the_record_and_in_its_last_lines(house: House) -> None:
+    assert lost_lines(record_of(house)) == []
+    house.drive(200, round_every=5)
+    house.end()
+    tally, published = Tally(), dict(house.conductor.intake.counts.by_channel)
+    for channel, count in published.items():
+        for seq in range(count):
+            tally.settle("recorded" if seq else "unwritten", channel, 7, seq)
+    write_tally(tally, tally_file(house.plan.recording))
+    record = record_of(house)
+    ledger = record["ledger"]["telemetry"]
+    assert (ledger["published"], ledger["recorded"]) == (200, 200 - len(published))
+    assert ledger["published"] == ledger["recorded"] + ledger["lost"]
+    (line,) = lost_lines(record)
+    assert line.startswith(f"lost: {len(published)} of 200 telemetry samples are not recorded")
+
+    record["troubles"] = ["viewer ended with code -9"]
+    assert lost_lines(record) == ["lost: viewer ended with code -9", line]
 
 
 @pytest.mark.parametrize("length", [0, 1, 100])

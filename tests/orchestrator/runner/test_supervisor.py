@@ -63,16 +63,16 @@ def supervised() -> tuple[Supervisor, list[FakeChild]]:
     return Supervisor(launch), children
 
 
-def test_a_dead_worker_is_started_again_and_a_dead_viewer_reported() -> None:
+def test_a_dead_worker_is_started_again_and_a_dead_vehicle_reported() -> None:
     supervisor, children = supervised()
     supervisor.start(row("w"), setup("w0"))
-    supervisor.start(row("viewer"), setup("viewer"))
+    supervisor.start(row("vehicle"), setup("vehicle"))
     children[0].exit_code = -9
     children[1].exit_code = 1
     deaths = supervisor.poll(0.0)
     assert [(d.process_id, d.exit_code, d.restarted) for d in deaths] == [
         ("w0", -9, True),
-        ("viewer", 1, False),
+        ("vehicle", 1, False),
     ]
     assert (len(children), supervisor.restarted) == (3, 1)
     assert supervisor.poll(0.1) == []
@@ -95,23 +95,45 @@ def test_who_writes_for_later_gives_way() -> None:
         child.communicate(b"\n")
 
 
-def test_who_watches_the_vehicle_is_started_again_but_not_in_lock_step() -> None:
-    tuning = row("tuning")
+def test_who_watches_and_records_is_started_again_but_not_in_lock_step() -> None:
     live, stepped = (Namespace(config=Namespace(lock_step=step)) for step in (False, True))
-    assert row_of(tuning, live).when_dead == "restart"  # type: ignore[arg-type]
-    assert row_of(tuning, stepped).when_dead == "report"  # type: ignore[arg-type]
-    others = [one for one in PROCESSES if one.name != "tuning"]
+    watching = [row(name) for name in ("tuning", "recorder", "viewer")]
+    assert {row_of(one, live).when_dead for one in watching} == {"restart"}  # type: ignore[arg-type]
+    assert {row_of(one, stepped).when_dead for one in watching} == {"report"}  # type: ignore[arg-type]
+    others = [one for one in PROCESSES if one not in watching]
     assert [row_of(one, stepped) for one in others] == others  # type: ignore[arg-type]
 
 
-def test_a_worker_that_keeps_dying_is_given_up() -> None:
+def test_who_keeps_dying_is_started_after_pauses_that_grow_and_then_given_up() -> None:
     supervisor, children = supervised()
-    supervisor.start(row("w"), setup("w0"))
-    for attempt in range(MAX_RESTARTS + 1):
+    supervisor.start(row("recorder"), setup("recorder"))
+    now_s, pauses = 0.0, []
+    for _ in range(MAX_RESTARTS):
         children[-1].exit_code = 1
-        (death,) = supervisor.poll(float(attempt))
+        (death,) = supervisor.poll(now_s)
+        assert death.restarted
+        assert supervisor.poll(now_s + 0.9 * death.pause_s) == [], "told once"
+        assert (len(children) == supervisor.restarted + 1) is True
+        now_s += death.pause_s
+        assert supervisor.poll(now_s) == []
+        assert supervisor.running() == ["recorder"]
+        pauses.append(death.pause_s)
+    assert pauses == [0.0, 1.0, 2.0, 4.0, 8.0]
+    assert supervisor.restarted == MAX_RESTARTS
+    children[-1].exit_code = 1
+    (death,) = supervisor.poll(now_s)
     assert not death.restarted
+    assert supervisor.poll(now_s + 100.0) == []
     assert supervisor.running() == []
+
+
+def test_a_death_long_ago_is_forgotten() -> None:
+    supervisor, children = supervised()
+    supervisor.start(row("viewer"), setup("viewer"))
+    for day in range(2 * MAX_RESTARTS):
+        children[-1].exit_code = -9
+        (death,) = supervisor.poll(day * 86_400.0)
+        assert (death.restarted, death.pause_s) == (True, 0.0)
 
 
 def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import signal
 import subprocess
 import sys
@@ -13,15 +12,12 @@ from typing import Any
 
 import pytest
 
-from foretwin.contracts.bus import Alive, Mailbox, Received, ZenohBus
+from foretwin.contracts.bus import Mailbox, Received, ZenohBus
 from foretwin.contracts.drive import SpeedSample
-from foretwin.contracts.keys import alive_key
-from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
-from foretwin.contracts.setup import BusSetup, ProcessSetup, RecorderSetup, write_setup
+from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
-from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 from foretwin.telemetry.processes.recorder import RecorderProcess
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.contracts.bus_sides import DEADLINE_S
@@ -29,9 +25,8 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.own_recordings import read_drive
-
-ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
-RECORDER = alive_key(run="r1", process="recorder")
+from tests.telemetry.processes.recorder_process import ORCHESTRATOR, recorder_process
+from tests.telemetry.processes.small_disk import Disk
 
 
 class Wall:
@@ -73,7 +68,7 @@ def publish_all(bus: MemoryBus | ZenohBus) -> None:
 def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
     bus, path, questions = MemoryBus(), tmp_path / "drive.mcap", Mailbox(4)
     bus.serve("info", questions, vehicle="car")
-    process = recorder(bus, DriveRecording(lambda: create(path), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(path))
     publish_all(bus)
     assert process.step()
     questions.take().reply(INFO)
@@ -91,7 +86,7 @@ def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: 
             return self.now_s
 
     bus, path = MemoryBus(), tmp_path / "drive.mcap"
-    recording = DriveRecording(lambda: create(path), name="drive.mcap")
+    recording = DriveRecording(path)
     process = recorder(bus, recording, mono_s=Slow())
     publish_all(bus)
     process.finish()
@@ -100,7 +95,7 @@ def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: 
 
 def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path) -> None:
     bus, path = MemoryBus(), tmp_path / "drive.mcap"
-    process = recorder(bus, DriveRecording(lambda: create(path), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(path))
     publish_all(bus)
     assert process.step()
     process.finish()
@@ -108,25 +103,9 @@ def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path)
 
 
 def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -> None:
-    class Broken:
-        def write(self, data: Any) -> int:
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        def tell(self) -> int:
-            return 0
-
-        def seek(self, offset: int) -> int:
-            return 0
-
-        def truncate(self, size: int) -> int:
-            return 0
-
-        def close(self) -> None:
-            pass
-
-    bus, events = MemoryBus(), Mailbox(10)
+    bus, events, disk = MemoryBus(), Mailbox(10), Disk(0)
     bus.subscribe("event", events, run="r1")
-    process = recorder(bus, DriveRecording(lambda: DriveWriter(Broken()), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(tmp_path / "drive.mcap", open_part=disk.open_part))
     publish_all(bus)
     assert process.step()
     event = events.take().message()
@@ -137,7 +116,7 @@ def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -
 
 def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path: Path) -> None:
     bus, wall = MemoryBus(), Wall()
-    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(tmp_path / "drive.mcap")
     process = recorder(bus, recording, mono_s=wall)
     wall.now_s = 100.0
     assert process.step(), "it never saw the orchestrator"
@@ -158,7 +137,7 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
 def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
     bus, events, wall = MemoryBus(), Mailbox(10), Wall()
     bus.subscribe("event", events, run="r1")
-    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(tmp_path / "drive.mcap")
     process = recorder(bus, recording, lossless=False, mono_s=wall)
     bus.publish("speed", SpeedSample(stamp_ns=START_NS, speed_mps=0.0), vehicle="car")
     assert process.step()
@@ -177,7 +156,7 @@ def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
 def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_path: Path) -> None:
     bus, events, wall = MemoryBus(), Mailbox(32), Wall()
     bus.subscribe("event", events, run="r1")
-    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(tmp_path / "drive.mcap")
     process = recorder(bus, recording, lossless=False, mono_s=wall)
     nobody = Mailbox(1)
     sample = SpeedSample(stamp_ns=START_NS, speed_mps=0.0)
@@ -199,30 +178,9 @@ def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_p
 
 @pytest.fixture
 def started(tmp_path: Path) -> Iterator[tuple[ZenohBus, Mailbox, Any]]:
-    """A router with an orchestrator's token, what lands there, and a recorder that is ready."""
-    setup = RecorderSetup(
-        run_id="r1",
-        process_id="recorder",
-        vehicle_id="car",
-        bus=BusSetup(endpoint=free_endpoint(), lossless=True),
-        log_file=str(tmp_path / "log"),
-        file=str(tmp_path / "drive.mcap"),
-    )
-    write_setup(setup, tmp_path / "setup.json")
-    with ZenohBus(setup.bus, router=True) as bus:
-        bus.declare_alive(ORCHESTRATOR)
-        landed = Mailbox(100)
-        bus.watch_alive(RECORDER, landed)
-        command = [sys.executable, "-m", "foretwin.telemetry.processes.recorder", "--setup"]
-        process = subprocess.Popen([*command, str(tmp_path / "setup.json")])
-        try:
-            alive = landed.take(DEADLINE_S)
-            assert isinstance(alive, Alive)
-            assert alive.up
-            yield bus, landed, process
-        finally:
-            process.kill()
-            process.wait()
+    """See recorder_process."""
+    with recorder_process(tmp_path) as everything:
+        yield everything
 
 
 @pytest.mark.parametrize("by", ["run_end", "SIGTERM"])

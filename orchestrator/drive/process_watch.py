@@ -1,0 +1,71 @@
+"""Who of a drive's processes died or hangs, what follows from it, and what is missing after it."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.processes import ORCHESTRATOR, VIEWER
+from foretwin.orchestrator.instructions import Notice
+from foretwin.orchestrator.runner.supervisor import Supervisor
+
+log = logging.getLogger(ORCHESTRATOR)
+
+HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
+"""A process whose token is gone for so long while it runs (a stopped one, say) is killed; one that
+gives way may have to wait for a processor that long."""
+
+
+@dataclass(slots=True)
+class ProcessWatch:
+    """Tells of each death once, and ends those that hang; call `look_after` ten times a second."""
+
+    supervisor: Supervisor
+    vehicle_lost: bool = False
+    given_up: set[str] = field(default_factory=set)
+    """Processes that are not started any more."""
+    troubles: list[str] = field(default_factory=list)
+    """Deaths after which something is missing. Of a recorder that is there again the ledger of the
+    telemetry tells what."""
+    _seen_alive: set[str] = field(default_factory=set)
+    _silent_since_s: dict[str, float] = field(default_factory=dict)
+
+    def look_after(self, conductor: Conductor, now_s: float) -> None:
+        """Take notice of deaths and of who hangs."""
+        for death in self.supervisor.poll(now_s):
+            # One that is started again is not silent before it was heard.
+            self._seen_alive.discard(death.process_id)
+            self._silent_since_s.pop(death.process_id, None)
+            text = f"{death.process_id} ended with code {death.exit_code}"
+            if death.restarted:
+                after = f" in {death.pause_s:g} s" if death.pause_s else ""
+                conductor.tell(Notice("warning", f"{text}; started again{after}"))
+                if death.process_id == VIEWER:
+                    self.troubles.append(f"{text}: what it did not show is missing in monitor.rrd")
+                continue
+            self.given_up.add(death.process_id)
+            self.troubles.append(f"{text} and was not started again")
+            if death.row.when_dead == "end_drive":
+                conductor.tell(Notice("error", text))
+                self.vehicle_lost = True
+            else:
+                conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
+        for text in conductor.tables.take_news():
+            conductor.tell(Notice("warning", text))
+        self._end_the_hung(conductor, now_s)
+
+    def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
+        """Kill processes that were alive, run still, and have not answered for a while."""
+        for process_id in self.supervisor.running():
+            if process_id in conductor.alive:
+                self._silent_since_s.pop(process_id, None)
+                self._seen_alive.add(process_id)
+            elif process_id in self._seen_alive:
+                since_s = self._silent_since_s.setdefault(process_id, now_s)
+                row = self.supervisor.row(process_id)
+                patience_s = GIVES_WAY_HUNG_AFTER_S if row.nice else HUNG_AFTER_S
+                if row.when_dead == "restart" and now_s - since_s > patience_s:
+                    log.warning("%s hangs: killed", process_id)
+                    self.supervisor.kill(process_id)
+                    self._seen_alive.discard(process_id)
