@@ -38,8 +38,6 @@ log = logging.getLogger("orchestrator")
 
 ROUND_DEADLINE_S = 10.0
 """A live round that is not complete after so long is given up, and its jobs with it."""
-_REFUSALS = 3
-"""A job that workers refuse so often would be refused for ever."""
 
 
 class _Seed(NamedTuple):
@@ -64,7 +62,10 @@ class RoundRunner:
         self.open = OpenRounds()
         plan = context.plan
         self.dispatcher = BusDispatcher(
-            context.bus, context.mailbox, run_id=plan.run_id, refusals=_REFUSALS
+            context.bus,
+            context.mailbox,
+            run_id=plan.run_id,
+            expected=(f"w{number}" for number in range(plan.config.workers)),
         )
         self.futures = FuturesCount()
         self.comparisons = ComparisonCount()
