@@ -17,11 +17,12 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
+from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, expected_ids
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
+from foretwin.orchestrator.drive.strangers import Strangers
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
 from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, NotReady, UseWorld
@@ -66,6 +67,7 @@ class Conductor:
         )
         self.ads = SideBySideHandler(context, self.intake, mission)
         self.alive: set[str] = set()
+        self.strangers = Strangers(expected_ids(plan), self.tell)
         self.missed_rounds = 0
         self.spared_rounds = 0
         """Rounds that were not due since the machine is too slow for them."""
@@ -265,7 +267,7 @@ class Conductor:
         process_id = keys.process_of_alive_key(item.key)
         if not is_identifier(process_id):
             raise Refused(item.key, "a token of no plain name")
-        if process_id != ORCHESTRATOR:
+        if process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
             (self._process_up if item.up else self._process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:

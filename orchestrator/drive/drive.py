@@ -186,7 +186,7 @@ class _Drive:
 
     def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
         """Wait until every process is there and the vehicle has introduced itself."""
-        expected = {one for row in PROCESSES for one in process_ids(row, self._plan)}
+        expected = conductor.strangers.expected
         deadline = time.monotonic() + START_TIMEOUT_S
         while not expected <= conductor.alive:
             if self._stop():

@@ -49,6 +49,7 @@ def run_record(
             "started": plan.config.workers,
             "restarted": restarted,
             "requeued_jobs": conductor.rounds.dispatcher.dispatch.requeued,
+            "strangers": conductor.strangers.count,
             "late_results": conductor.rounds.dispatcher.dispatch.late,
         },
         "dropped": {
