@@ -68,11 +68,6 @@ class Conductor:
         self.ads = SideBySideHandler(context, self.intake, mission)
         self.alive: set[str] = set()
         self.strangers = Strangers(expected_ids(plan), self.tell)
-        self.missed_rounds = 0
-        self.spared_rounds = 0
-        """Rounds that were not due since the machine is too slow for them."""
-        self.unseeded_rounds = 0
-        """Rounds that no machine could have run: no heading known yet, or no road ahead."""
         self.questions = Questions(context, self.alive)
         self.mirror = MirrorHandler(tables, self.tell)
         self.roles = roles.RolesInForce(
@@ -191,20 +186,18 @@ class Conductor:
             self.tell(Notice("warning", text))
 
     def start_round(self) -> bool:
-        """Start a round where the mission wants one; returns whether it did."""
+        """Start a round that was counted as due; returns whether it did."""
         started_mono_ns = time.monotonic_ns()
-        intent = self.mission.plan_round()
-        latest = self.intake.latest
-        if intent is None or latest is None:
-            return False
-        if isinstance(intent, NotReady):
-            if intent.world_late:
-                self.missed_rounds += 1
-            else:
-                self.unseeded_rounds += 1
-            return False
-        reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
-        self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
+        with self.rounds.tally.starting():
+            intent = self.mission.plan_round()
+            latest = self.intake.latest
+            if intent is None or latest is None:
+                return False
+            if isinstance(intent, NotReady):
+                self.rounds.tally.not_ready(world_late=intent.world_late)
+                return False
+            reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+            self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:

@@ -25,7 +25,7 @@ from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.plan import make_plan, open_bus, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
-from foretwin.orchestrator.drive.run_record import reserve_record, run_record
+from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.instructions import Notice
@@ -135,10 +135,9 @@ class _Drive:
                     log.exception("the drive ended by an error")
                     raise
                 finally:
-                    self._end(bus, conductor, line, exit_word, started_s)
-        if self._failed_at_end:
-            return EXIT_FAILED
-        return EXIT_PARTLY if tables.troubles and code == EXIT_DONE else code
+                    whole = self._end(bus, conductor, line, exit_word, started_s)
+        code = EXIT_FAILED if self._failed_at_end else code
+        return EXIT_PARTLY if code == EXIT_DONE and not whole else code
 
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
@@ -163,7 +162,8 @@ class _Drive:
         if self._plan.config.lock_step:
             loop = LockStepLoop(conductor, housekeeping=housekeeping, stop=self._stop)
         else:
-            in_charge = InCharge(bus, self._plan).say if self._plan.towards_vehicle else _nothing
+            towards = self._plan.towards_vehicle
+            in_charge = InCharge(bus, self._plan).say if towards else lambda: None
             loop = LiveLoop(
                 conductor, housekeeping=housekeeping, stop=self._stop, each_turn=in_charge
             )
@@ -230,6 +230,7 @@ class _Drive:
             text = f"{death.process_id} ended with code {death.exit_code}"
             if not death.restarted:
                 self._given_up.add(death.process_id)
+                conductor.rounds.never_again(death.process_id)
             if death.restarted:
                 conductor.tell(Notice("warning", f"{text}; started again"))
             elif death.row.when_dead == "end_drive":
@@ -263,7 +264,8 @@ class _Drive:
         line: ProgressLine,
         exit_word: str,
         started_s: float,
-    ) -> None:
+    ) -> bool:
+        """End everything and say how it went; returns whether nothing of the run is lost."""
         plan = self._plan
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
@@ -279,6 +281,7 @@ class _Drive:
             log.exception("the last messages could not be taken")
             exit_word = "failed"
             self._failed_at_end = True
+        conductor.rounds.close()
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()
         conductor.route.close()
@@ -291,10 +294,6 @@ class _Drive:
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / LOG)
-        line.say(summary_text(record))
-        for trouble in conductor.tables.troubles:
-            line.say(f"error: {trouble}")
-
-
-def _nothing() -> None:
-    """Say nothing towards a vehicle."""
+        lost = lost_lines(record)
+        line.say("\n".join([summary_text(record), *lost]))
+        return not lost

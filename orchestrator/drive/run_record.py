@@ -12,6 +12,7 @@ from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.durable import sync_folder, whole_file
+from foretwin.orchestrator.record.ledger import Ledger, jobs_ledger, lost_rounds_line
 from foretwin.orchestrator.record.run_state import RUNNING
 from foretwin.orchestrator.record.versions import versions
 
@@ -23,6 +24,8 @@ def run_record(
 ) -> dict[str, Any]:
     """Return everything that run.json says; `restarted` counts processes started again."""
     plan, mission, futures = conductor.plan, conductor.mission, conductor.rounds.futures
+    tally, dispatch = conductor.rounds.tally, conductor.rounds.dispatcher.dispatch
+    ledger = Ledger(rounds=tally.ledger(), jobs=jobs_ledger(dispatch.count))
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror.independent
     if independent is None:
@@ -35,10 +38,11 @@ def run_record(
         "tuning": conductor.tuning.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
-            missed=conductor.missed_rounds,
-            spared=conductor.spared_rounds,
-            unseeded=conductor.unseeded_rounds,
+            missed=tally.missed,
+            spared=tally.spared,
+            unseeded=tally.unseeded,
         ),
+        "ledger": msgspec.to_builtins(ledger),
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
         "comparison": conductor.rounds.comparisons.record(independent=independent),
@@ -48,18 +52,23 @@ def run_record(
         "workers": {
             "started": plan.config.workers,
             "restarted": restarted,
-            "requeued_jobs": conductor.rounds.dispatcher.dispatch.requeued,
+            "requeued_jobs": dispatch.requeued,
+            "late_results": dispatch.late,
+            "refusals": dispatch.sickness.record(),
             "strangers": conductor.strangers.count,
-            "late_results": conductor.rounds.dispatcher.dispatch.late,
         },
         "dropped": {
             "orchestrator_mailbox": conductor.mailbox.dropped,
             "result_rows": conductor.tables.dropped,
             "failed_jobs": conductor.rounds.failed_jobs,
-            "given_up_rounds": conductor.rounds.open.given_up,
+            "given_up_rounds": tally.failed,
+            "last_given_up": tally.last_failure,
         },
         "refused": conductor.refusals.record(),
-        "troubles": conductor.tables.troubles,
+        "troubles": [
+            *conductor.tables.troubles,
+            *(f"the ledger of {name} does not balance" for name in ledger.unbalanced()),
+        ],
         "off_road": [
             {
                 "reason": stretch.reason,
@@ -88,6 +97,13 @@ def _known_at_start(plan: DrivePlan, exit_word: str) -> dict[str, Any]:
         "route_source": plan.route_source,
         "config": msgspec.to_builtins(plan.config),
     }
+
+
+def lost_lines(record: dict[str, Any]) -> list[str]:
+    """Return what a run says last where something of it is lost."""
+    line = lost_rounds_line(record)
+    rounds = [] if line is None else [f"lost: {line}"]
+    return [*(f"error: {trouble}" for trouble in record["troubles"]), *rounds]
 
 
 def reserve_record(plan: DrivePlan, file: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from foretwin.orchestrator.drive.run_record import run_record, versions
+from foretwin.orchestrator.drive.run_record import lost_lines, run_record, versions
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.record.run_state import write_record
 from tests.orchestrator.house import House
@@ -87,6 +87,40 @@ def test_a_record_replaces_what_was_there(tmp_path: Path) -> None:
 
     assert json.loads(file.read_text(encoding="utf-8")) == {"run_id": "r", "name": "Straße"}
     assert [p.name for p in tmp_path.iterdir()] == ["run.json"]
+
+
+def test_the_ledger_says_what_became_of_rounds_and_jobs(house: House) -> None:
+    house.drive(100, round_every=5)
+    assert house.conductor.rounds.tally.run > 10
+    house.drive(105)
+    assert house.conductor.start_round()
+    house.workers[0].answer()
+    house.settle()
+    house.conductor.rounds.close()
+    tally = house.conductor.rounds.tally
+    tally.due = tally.run + tally.missed + tally.unseeded + 1
+    record = record_of(house)
+
+    assert record["ledger"]["rounds"]["given_up"] == 1
+    jobs = record["ledger"]["jobs"]
+    assert jobs == {
+        "given": 2 * tally.run + 2,
+        "results": 2 * tally.run + 1,
+        "refused": 0,
+        "lost": 1,
+    }
+    assert record["troubles"] == []
+    assert lost_lines(record) == []  # the end came first, nothing failed
+    tally.due += 1
+    assert record_of(house)["troubles"] == ["the ledger of rounds does not balance"]
+
+
+def test_what_a_drive_lost_is_said_last(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.conductor.rounds.tally.fail("3 workers died of it")
+    (said,) = [line for line in lost_lines(record_of(house)) if "rounds are" in line]
+    assert said.startswith("lost: 1 of ")
+    assert said.endswith(", the last since: 3 workers died of it")
 
 
 def test_versions_name_what_decides_results() -> None:

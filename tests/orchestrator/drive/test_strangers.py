@@ -31,7 +31,7 @@ def test_a_process_that_this_run_did_not_start_is_given_nothing(house: House) ->
     assert house.conductor.strangers.count == 3
     (told,) = (e.text for e in house.watched("event") if e.level == "warning")
     assert told.startswith("'w42' says that it belongs to this run")
-    assert house.conductor.rounds.futures.rounds == 1
+    assert house.conductor.rounds.tally.run == 1
 
 
 def test_a_strangers_name_is_told_so_that_a_terminal_shows_it() -> None:
