@@ -62,6 +62,8 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     user_xy_m: Array32
     touch_xy_m: Array32
     touch_names: tuple[str, ...]
+    late: bool = False
+    """Complete after the next round was due: nothing here is current any more."""
 
 
 class HorizonError(msgspec.Struct, frozen=True, kw_only=True):
@@ -203,7 +205,8 @@ class WorkerStatus(msgspec.Struct, frozen=True, kw_only=True):
 
     stamp_ns: int
     worker_id: str
-    state: Literal["starting", "idle", "busy", "dead"]
+    state: Literal["starting", "idle", "busy", "sick", "dead"]
+    """A `sick` one refuses jobs; it is tried again after a pause."""
     rtf: float | None = None
 
 

@@ -13,6 +13,7 @@ WORKER_COLOURS = {
     "starting": 0x607D8BFF,
     "idle": 0x90A4AEFF,
     "busy": 0x43A047FF,
+    "sick": 0xFB8C00FF,
     "dead": 0xE53935FF,
 }
 LEVELS = {

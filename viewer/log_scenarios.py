@@ -58,7 +58,13 @@ def criticality_colours(criticality: Array | Array32) -> npt.NDArray[np.uint8]:
 
 
 def rows_of_round(view: RoundView, drive_ns: int) -> list[Row]:
-    """Return the futures as one entity, their ends, and the table of the worst."""
+    """Return the futures as one entity, their ends, and the table of the worst.
+
+    Of a late round only that it was late: its futures would be taken for those from now on.
+    """
+    if view.late:
+        text = f"the last round was complete after {view.latency_ms:.0f} ms: too late to be shown"
+        return [*no_futures(drive_ns), Row("scenarios/table", drive_ns, document(text))]
     table = Row("scenarios/table", drive_ns, document(scenario_table(view)))
     return [*_futures(view, drive_ns), table]
 

@@ -17,11 +17,18 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, VIEWER
+from foretwin.orchestrator.drive.processes import (
+    BUILDER,
+    MIRROR,
+    ORCHESTRATOR,
+    VIEWER,
+    expected_ids,
+)
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
+from foretwin.orchestrator.drive.strangers import Strangers
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
 from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, NotReady, UseWorld
@@ -42,8 +49,7 @@ class Conductor:
     """The state of one drive between its messages."""
 
     def __init__(self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables) -> None:
-        self.plan = plan
-        self.bus = bus
+        self.plan, self.bus = plan, bus
         self.mission = mission
         self.tables = tables
         self.mailbox = Mailbox(
@@ -66,11 +72,7 @@ class Conductor:
         )
         self.ads = SideBySideHandler(context, self.intake, mission)
         self.alive: set[str] = set()
-        self.missed_rounds = 0
-        self.spared_rounds = 0
-        """Rounds that were not due since the machine is too slow for them."""
-        self.unseeded_rounds = 0
-        """Rounds that no machine could have run: no heading known yet, or no road ahead."""
+        self.strangers = Strangers(expected_ids(plan), self.tell)
         self.questions = Questions(context, self.alive)
         self.mirror = MirrorHandler(tables, self.tell)
         self.roles = roles.RolesInForce(
@@ -190,20 +192,18 @@ class Conductor:
             self.tell(Notice("warning", text))
 
     def start_round(self) -> bool:
-        """Start a round where the mission wants one; returns whether it did."""
+        """Start a round that was counted as due; returns whether it did."""
         started_mono_ns = time.monotonic_ns()
-        intent = self.mission.plan_round()
-        latest = self.intake.latest
-        if intent is None or latest is None:
-            return False
-        if isinstance(intent, NotReady):
-            if intent.world_late:
-                self.missed_rounds += 1
-            else:
-                self.unseeded_rounds += 1
-            return False
-        reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
-        self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
+        with self.rounds.tally.starting():
+            intent = self.mission.plan_round()
+            latest = self.intake.latest
+            if intent is None or latest is None:
+                return False
+            if isinstance(intent, NotReady):
+                self.rounds.tally.not_ready(world_late=intent.world_late)
+                return False
+            reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+            self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:
@@ -265,7 +265,7 @@ class Conductor:
         process_id = keys.process_of_alive_key(item.key)
         if not is_identifier(process_id):
             raise Refused(item.key, "a token of no plain name")
-        if process_id != ORCHESTRATOR:
+        if process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
             (self._process_up if item.up else self._process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:
@@ -278,7 +278,7 @@ class Conductor:
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
-        elif process_id == VIEWER and self._told_world is not None:  # one that was started again
+        elif process_id == VIEWER and self._told_world is not None:  # one started again
             self.context.publish("active_world", self._told_world)
 
     def _worker_up(self, process_id: str) -> None:

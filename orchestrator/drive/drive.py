@@ -157,7 +157,8 @@ class _Drive:
         if self._plan.config.lock_step:
             loop = LockStepLoop(conductor, housekeeping=housekeeping, stop=self._stop)
         else:
-            in_charge = InCharge(bus, self._plan).say if self._plan.towards_vehicle else _nothing
+            towards = self._plan.towards_vehicle
+            in_charge = InCharge(bus, self._plan).say if towards else lambda: None
             loop = LiveLoop(
                 conductor, housekeeping=housekeeping, stop=self._stop, each_turn=in_charge
             )
@@ -180,7 +181,7 @@ class _Drive:
 
     def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
         """Wait until every process is there and the vehicle has introduced itself."""
-        expected = {one for row in PROCESSES for one in process_ids(row, self._plan)}
+        expected = conductor.strangers.expected
         deadline = time.monotonic() + START_TIMEOUT_S
         while not expected <= conductor.alive:
             if self._stop():
@@ -246,6 +247,7 @@ class _Drive:
             log.exception("the last messages could not be taken")
             exit_word = "failed"
             self._failed_at_end = True
+        conductor.rounds.close()
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()
         conductor.route.close()
@@ -263,12 +265,6 @@ class _Drive:
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / LOG)
-        line.say(summary_text(record))
         lost = lost_lines(record)
-        for text in lost:
-            line.say(text)
+        line.say("\n".join([summary_text(record), *lost]))
         return not lost
-
-
-def _nothing() -> None:
-    """Say nothing towards a vehicle."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +10,6 @@ from dataclasses import dataclass
 from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.orchestrator.drive.conductor import Conductor
-from foretwin.orchestrator.rounds.runner import ROUND_DEADLINE_S
 
 HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
@@ -23,11 +23,12 @@ STALE_AFTER_S = 1.0
 class LiveLoop:
     """Runs a conductor until the vehicle's drive ends or `stop` says so.
 
-    A round falls due `rate_hz` times a wall second. It starts with the first state received from
-    then on, so that a slow GNSS does not make results older than need be, and at the latest half
-    a period later. A round that is not complete when the next one should start has missed its
-    deadline: it counts as missed, is let finish, and the next one is left out. `round_pace`
-    then makes the rounds after it smaller or rarer, so that a slow machine gives less, not late.
+    A round falls due `rate_hz` times a wall second where the mission wants rounds. It starts with
+    the first state received from then on, so that a slow GNSS does not make results older than
+    need be, and at the latest half a period later. A round that is not complete when the next one
+    should start has passed its deadline: it is let finish, is late, and the next one is missed.
+    `pace` then makes the rounds after it smaller or rarer, so that a slow machine gives less, not
+    late. What fell due while nothing of this ran (the machine slept, we were behind) is missed.
     """
 
     conductor: Conductor
@@ -35,7 +36,7 @@ class LiveLoop:
     stop: Callable[[], bool]
     each_turn: Callable[[], None] = lambda: None
     """Called at least every 50 ms, unless the loop itself is held up."""
-    _started_s: float = 0.0
+    _next_due_s: float = 0.0
 
     @property
     def _period_s(self) -> float:
@@ -44,8 +45,7 @@ class LiveLoop:
     def run(self) -> bool:
         """Return True where the drive ended by itself, False where it was stopped."""
         conductor = self.conductor
-        next_due_s = time.monotonic()
-        next_housekeeping_s = next_due_s
+        next_housekeeping_s = self._next_due_s = time.monotonic()
         while not self.stop():
             self.each_turn()
             conductor.make_changes()
@@ -54,7 +54,7 @@ class LiveLoop:
                 self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             seen = conductor.intake.states
-            wake_s = min(next_housekeeping_s, next_due_s + 0.5 * self._period_s, now_s + SILENCE_S)
+            wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
             item = conductor.mailbox.take(max(0.0, wake_s - now_s))
             now_s = time.monotonic()
             if item is not None:
@@ -63,41 +63,61 @@ class LiveLoop:
             else:
                 conductor.watch_telemetry(round(now_s * 1e9))
             fresh = conductor.intake.states > seen
-            due = fresh or now_s >= next_due_s + 0.5 * self._period_s
-            # New parameters take workers a few milliseconds; no round may be half of one kind.
-            if now_s >= next_due_s and due and conductor.tuning.parameters.settled:
-                # A machine that was asleep does not catch up on rounds; the grid stays.
-                one_of = conductor.rounds.pace.now.one_of
-                left_out = int((now_s - next_due_s) / (one_of * self._period_s))
-                next_due_s += (left_out + 1) * one_of * self._period_s
-                if self._start_round(now_s):
-                    conductor.missed_rounds += left_out
-                    conductor.spared_rounds += one_of - 1
+            if now_s >= self._next_due_s and (fresh or now_s >= self._at_the_latest_s):
+                # Where the machine is too slow, one round follows the other without a turn between.
+                conductor.make_changes()
+                # New parameters take workers a few milliseconds; no round may be half of one kind.
+                if conductor.tuning.parameters.settled and self._fall_due(now_s):
+                    self._start_round(now_s)
             if conductor.intake.end is not None and not self._telemetry_waits():
+                self._leave_out(now_s)
                 self._let_finish()
                 return True
+        self._leave_out(time.monotonic())
         return False
 
-    def _start_round(self, now_s: float) -> bool:
-        """Start a round if one can be; returns whether rounds are due here at all."""
-        conductor = self.conductor
-        latest = conductor.intake.latest
-        if latest is None:
+    @property
+    def _at_the_latest_s(self) -> float:
+        """When the next round starts if no fresh state comes before."""
+        return self._next_due_s + 0.5 * self._period_s
+
+    def _fall_due(self, now_s: float) -> bool:
+        """Count the rounds due by now; returns whether one of them can be run.
+
+        All but the last are left out: a machine that was asleep does not catch up. The grid stays.
+        """
+        one_of = self.conductor.rounds.pace.now.one_of
+        turns = 1 + int((now_s - self._next_due_s) / (one_of * self._period_s))
+        self._next_due_s += turns * one_of * self._period_s
+        if not self.conductor.mission.wants_rounds:
             return False
-        speed = conductor.plan.config.speed or 1.0
-        if (now_s - latest.receipt_mono_ns / 1e9) * speed > STALE_AFTER_S:
-            return False
-        if conductor.rounds.open:
-            conductor.missed_rounds += 1
-            if now_s - self._started_s > ROUND_DEADLINE_S:
-                conductor.rounds.drop()
-            return True
-        # Where the machine is too slow, one round follows the other without a turn between.
-        conductor.make_changes()
-        if not (conductor.tuning.parameters.settled and conductor.start_round()):
-            return False
-        self._started_s = now_s
+        tally = self.conductor.rounds.tally
+        tally.due += turns * one_of
+        tally.missed += turns - 1
+        tally.spared += turns * (one_of - 1)
         return True
+
+    def _start_round(self, now_s: float) -> None:
+        """Start the round that is due, or count why it is not."""
+        conductor = self.conductor
+        rounds, latest = conductor.rounds, conductor.intake.latest
+        if rounds.open:
+            rounds.next_is_due()
+        speed = conductor.plan.config.speed or 1.0
+        age_s = math.inf if latest is None else now_s - latest.receipt_mono_ns / 1e9
+        if rounds.open:
+            rounds.tally.missed += 1
+        elif age_s * speed <= STALE_AFTER_S:
+            conductor.start_round()
+        elif self._telemetry_waits():
+            rounds.tally.missed += 1  # we are behind
+        else:
+            rounds.tally.unseeded += 1  # the vehicle says nothing
+
+    def _leave_out(self, now_s: float) -> None:
+        """Count a round that is due and will not be started: the drive is over."""
+        if now_s >= self._at_the_latest_s and self._fall_due(now_s):
+            self.conductor.rounds.tally.missed += 1
 
     def _telemetry_waits(self) -> bool:
         return len(self.conductor.mailbox) > 0

@@ -65,8 +65,10 @@ class LockStepLoop:
             self._wait("changes", lambda: not questions.unanswered and parameters.settled)
             # Weighed while the round and the next step go on; counts from the step after.
             conductor.tuning.weigh(advanced.published)
-            if not advanced.ended and conductor.start_round():
-                self._wait("the round", lambda: not conductor.rounds.open)
+            if not advanced.ended:
+                conductor.rounds.tally.due += conductor.mission.wants_rounds
+                if conductor.start_round():
+                    self._wait("the round", lambda: not conductor.rounds.open)
             if self.stop():
                 return False
             if advanced.ended:

@@ -162,12 +162,17 @@ class Mission:
         visits = [self._visits.get(junction_id) for junction_id in dict.fromkeys(ids)]
         return [v.world.id for v in visits if v is not None and v.load and v.world is not None]
 
+    @property
+    def wants_rounds(self) -> bool:
+        """Whether rounds are due where the car is: a junction is within the look-ahead."""
+        if self.state != "following" or self._car is None:
+            return False
+        return self._current is not None or bool(self._within_look_ahead())
+
     def plan_round(self) -> RoundIntent | NotReady | None:
         """Return the round to run now; None where no junction is within the look-ahead."""
         car = self._car
-        if self.state != "following" or car is None:
-            return None
-        if self._current is None and not self._within_look_ahead():
+        if car is None or not self.wants_rounds:
             return None
         visit = self._visits.latest(self._current) if self._current else None
         if visit is None or visit.world is None:

@@ -45,6 +45,7 @@ class ProcessWatch:
                     self.troubles.append(f"{text}: what it did not show is missing in monitor.rrd")
                 continue
             self.given_up.add(death.process_id)
+            conductor.rounds.never_again(death.process_id)
             self.troubles.append(f"{text} and was not started again")
             if death.row.when_dead == "end_drive":
                 conductor.tell(Notice("error", text))

@@ -214,6 +214,11 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     return row
 
 
+def expected_ids(plan: DrivePlan) -> frozenset[str]:
+    """Return the ids of all processes that a drive starts."""
+    return frozenset(one for row in PROCESSES for one in process_ids(row, plan))
+
+
 def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:
     """Return the ids of a row's processes in a drive."""
     if not row.runs(plan):

@@ -91,14 +91,15 @@ class ProgressLine:
 
     def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
         dispatch = self._conductor.rounds.dispatcher.dispatch
-        busy = dispatch.busy
+        busy, sick = dispatch.busy, dispatch.sickness.sick
         count = self._conductor.plan.config.workers
         up = set(dispatch.workers)
         statuses = []
         for worker_id in (f"w{index}" for index in range(count)):
-            state: Literal["idle", "busy", "dead"] = "dead"
+            state: Literal["idle", "busy", "sick", "dead"] = "dead"
             if worker_id in up:
                 state = "busy" if worker_id in busy else "idle"
+                state = "sick" if worker_id in sick else state
             statuses.append(
                 WorkerStatus(
                     stamp_ns=stamp_ns,
@@ -111,6 +112,8 @@ class ProgressLine:
 
     def _text(self, progress: Progress) -> str:
         conductor = self._conductor
+        dispatch = conductor.rounds.dispatcher.dispatch
+        sick = " ".join(name for name in dispatch.workers if name in dispatch.sickness.sick)
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
             ahead = f"{progress.next_intersection} in {progress.arrival_in_s:.0f} s"
@@ -118,8 +121,9 @@ class ProgressLine:
         return (
             f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  {short}"
             f"{progress.futures_per_s:.0f} futures/s  "
-            f"workers {len(conductor.rounds.dispatcher.workers)}/{conductor.plan.config.workers}  "
-            f"missed {conductor.missed_rounds}  "
+            f"workers {len(dispatch.workers)}/{conductor.plan.config.workers}"
+            f"{f' ({sick} sick)' if sick else ''}  "
+            f"missed {conductor.rounds.tally.missed}  "
             f"dropped {progress.dropped}"
         )
 

@@ -14,6 +14,7 @@ from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.durable import sync_folder, whole_file
+from foretwin.orchestrator.record.ledger import Ledger, jobs_ledger, lost_rounds_line
 from foretwin.orchestrator.record.run_state import RUNNING
 from foretwin.orchestrator.record.telemetry_ledger import lost_telemetry_line, telemetry_ledger
 from foretwin.orchestrator.record.versions import versions
@@ -35,6 +36,8 @@ def run_record(
     `troubles` are what is missing since processes died.
     """
     plan, mission, futures = conductor.plan, conductor.mission, conductor.rounds.futures
+    tally, dispatch = conductor.rounds.tally, conductor.rounds.dispatcher.dispatch
+    ledger = Ledger(rounds=tally.ledger(), jobs=jobs_ledger(dispatch.count))
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror.independent
     if independent is None:
@@ -44,14 +47,14 @@ def run_record(
         "intersections": mission.records(mono_s=mono_s),
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
-        "ledger": {"telemetry": telemetry_of(conductor)},
         "tuning": conductor.tuning.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
-            missed=conductor.missed_rounds,
-            spared=conductor.spared_rounds,
-            unseeded=conductor.unseeded_rounds,
+            missed=tally.missed,
+            spared=tally.spared,
+            unseeded=tally.unseeded,
         ),
+        "ledger": {"telemetry": telemetry_of(conductor), **msgspec.to_builtins(ledger)},
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
         "comparison": conductor.rounds.comparisons.record(independent=independent),
@@ -61,17 +64,24 @@ def run_record(
         "workers": {
             "started": plan.config.workers,
             "restarted": restarted,
-            "requeued_jobs": conductor.rounds.dispatcher.dispatch.requeued,
-            "late_results": conductor.rounds.dispatcher.dispatch.late,
+            "requeued_jobs": dispatch.requeued,
+            "late_results": dispatch.late,
+            "refusals": dispatch.sickness.record(),
+            "strangers": conductor.strangers.count,
         },
         "dropped": {
             "orchestrator_mailbox": conductor.mailbox.dropped,
             "result_rows": conductor.tables.dropped,
             "failed_jobs": conductor.rounds.failed_jobs,
-            "given_up_rounds": conductor.rounds.open.given_up,
+            "given_up_rounds": tally.failed,
+            "last_given_up": tally.last_failure,
         },
         "refused": conductor.refusals.record(),
-        "troubles": [*troubles, *conductor.tables.troubles],
+        "troubles": [
+            *troubles,
+            *conductor.tables.troubles,
+            *(f"the ledger of {name} does not balance" for name in ledger.unbalanced()),
+        ],
         "off_road": [
             {
                 "reason": stretch.reason,
@@ -116,10 +126,11 @@ def telemetry_of(conductor: Conductor) -> dict[str, Any]:
 
 def lost_lines(record: dict[str, Any]) -> list[str]:
     """Return what a run says last where something of it is lost."""
-    found = [*record["troubles"]]
-    if (line := lost_telemetry_line(record["ledger"]["telemetry"])) is not None:
-        found.append(line)
-    return [f"lost: {line}" for line in found]
+    lost = lost_telemetry_line(record["ledger"]["telemetry"]), lost_rounds_line(record)
+    return [
+        *(f"error: {trouble}" for trouble in record["troubles"]),
+        *(f"lost: {line}" for line in lost if line is not None),
+    ]
 
 
 def reserve_record(plan: DrivePlan, file: Path) -> None:

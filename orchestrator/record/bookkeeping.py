@@ -77,6 +77,8 @@ class FuturesCount:
     latencies_ms: list[float] = field(default_factory=list)
     rounds_of: Counter[int] = field(default_factory=Counter)
     """Complete rounds by the number of their futures."""
+    late_rounds: int = 0
+    """Complete rounds that were so after the next one was due."""
     off_lanes_rounds: int = 0
     """Rounds whose paths are driven in part where their World has no lane that way."""
     _hash: Any = field(default_factory=hashlib.sha256)
@@ -90,6 +92,7 @@ class FuturesCount:
             own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
+        self.late_rounds += done.late
         futures = sum(len(result.future_indices) for result in done.results)
         self._add(own.digest(), futures, distinct, done.latency_ms)
         return own.hexdigest()
@@ -98,6 +101,7 @@ class FuturesCount:
         """Count one round as the table of rounds holds it."""
         self.sim_seconds += row["sim_seconds"]
         self.cpu_seconds += row["cpu_seconds"]
+        self.late_rounds += bool(row["late"])  # null where an older foretwin wrote it
         self._add(bytes.fromhex(row["sha256"]), row["futures"], row["distinct"], row["latency_ms"])
 
     def _add(self, digest: bytes, futures: int, distinct: int, latency_ms: float) -> None:
@@ -114,7 +118,8 @@ class FuturesCount:
     def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
         """Return the `futures` part of run.json; `rounds` counts the complete ones.
 
-        `missed_rounds` were due and late, `unseeded_rounds` had nothing to start from. Since the
+        Of these, `late_rounds` were complete after the next was due. `missed_rounds` were due and
+        not begun, `unseeded_rounds` had nothing to start from. Since the
         machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
         were not run. In `off_lanes_rounds` the path leaves the lanes of the World.
         """
@@ -130,6 +135,7 @@ class FuturesCount:
             "unseeded_rounds": unseeded,
             "off_lanes_rounds": self.off_lanes_rounds,
             "rounds": self.rounds,
+            "late_rounds": self.late_rounds,
             "sim_seconds": round(self.sim_seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3),
             "sha256": self._hash.hexdigest(),

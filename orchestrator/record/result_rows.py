@@ -82,6 +82,7 @@ def round_row(
         "cpu_seconds": sum(r.cpu_seconds for r in done.results),
         "sha256": sha256,
         "vehicle_version": done.results[0].vehicle_version,
+        "late": done.late,
     }
 
 

@@ -85,7 +85,7 @@ _COLUMNS = {
 _ROUNDS = columns(
     "round_id:int stamp_ns:int drive_time_s:float intersection_id:str world_id:str futures:int "
     "distinct:int collided:int cruise_speed_mps:float latency_ms:float sim_seconds:float "
-    "cpu_seconds:float sha256:str vehicle_version:int"
+    "cpu_seconds:float sha256:str vehicle_version:int late:bool"
 )
 TABLES: dict[str, pa.Schema] = {
     "rounds": schema(_ROUNDS),

@@ -21,6 +21,7 @@ from foretwin.orchestrator.instructions import LatestReports, LatestState, Notic
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
+from foretwin.orchestrator.record.ledger import RoundTally
 from foretwin.orchestrator.record.result_rows import (
     plan_row,
     round_futures,
@@ -28,6 +29,7 @@ from foretwin.orchestrator.record.result_rows import (
 )
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
+from foretwin.orchestrator.rounds.news import RoundNews
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
@@ -36,10 +38,8 @@ from foretwin.sim_worker.metrics.comparison import compare_plan
 
 log = logging.getLogger("orchestrator")
 
-ROUND_DEADLINE_S = 10.0
+GIVEN_UP_AFTER_S = 10.0
 """A live round that is not complete after so long is given up, and its jobs with it."""
-_REFUSALS = 3
-"""A job that workers refuse so often would be refused for ever."""
 
 
 class _Seed(NamedTuple):
@@ -63,9 +63,11 @@ class RoundRunner:
     ) -> None:
         self.open = OpenRounds()
         plan = context.plan
+        self._expected = frozenset(f"w{number}" for number in range(plan.config.workers))
         self.dispatcher = BusDispatcher(
-            context.bus, context.mailbox, run_id=plan.run_id, refusals=_REFUSALS
+            context.bus, context.mailbox, run_id=plan.run_id, expected=self._expected
         )
+        self.tally = RoundTally()
         self.futures = FuturesCount()
         self.comparisons = ComparisonCount()
         self.plans = PlanCount()
@@ -88,7 +90,7 @@ class RoundRunner:
         self._next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
         self._slow_reported = False
-        self._planners_reported: set[str] = set()
+        self._news = RoundNews(self._tell)
 
     @property
     def short_of(self) -> str:
@@ -110,7 +112,8 @@ class RoundRunner:
         """Open a round and give its jobs out."""
         self.futures.off_lanes_rounds += intent.off_lanes_m > 0.0
         round_id, self._next_round_id = self._next_round_id, self._next_round_id + 1
-        pace = self.pace.now
+        pace, lock_step = self.pace.now, self._plan.config.lock_step
+        period_ns = round(1e9 / self._plan.config.rate_hz)
         jobs = self._planner.plan(
             round_id,
             intent,
@@ -129,24 +132,40 @@ class RoundRunner:
             receipt_mono_ns=latest.receipt_mono_ns,
             started_mono_ns=started_mono_ns,
             jobs=jobs,
-        )
-        self.open.open(order)
-        for task in order.tasks:
             # In lock step nothing hurries; a drive that stands still ends by itself.
-            self.dispatcher.submit(
-                task, within_s=None if self._plan.config.lock_step else ROUND_DEADLINE_S
-            )
+            deadline_mono_ns=None if lock_step else started_mono_ns + pace.one_of * period_ns,
+        )
+        for task in order.tasks:
+            self.dispatcher.submit(task, within_s=None if lock_step else GIVEN_UP_AFTER_S)
         self.dispatcher.give_out()
+        self.open.open(order)  # last: what raises before is no round
 
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
         """Plan rounds for these parameters from now on, which workers have as `version`."""
         self._planner.use_vehicle(vehicle, version)
         keep_vehicles(self._plan.folder, [vehicle])
 
-    def drop(self) -> None:
-        """Give up the open rounds: they take too long."""
+    def next_is_due(self) -> None:
+        """Give up the round that is open at its deadline where nobody will or can complete it."""
+        for order in self.open.orders:
+            for named in order.recorded:
+                self._take(self.dispatcher.without_takers(named.sha256))
+        for order in self.open.orders:
+            if _took_s(order) > GIVEN_UP_AFTER_S:
+                self.open.drop()
+                self._fail(order, f"not complete within {GIVEN_UP_AFTER_S:g} s")
+
+    def close(self) -> None:
+        """End what the drive's end finds open."""
         for order in self.open.drop():
-            self._forget(order, late=True)
+            log.info("round %d is open at the drive's end", order.round_id)
+            self.tally.cut_off += 1
+        self.dispatcher.close()
+
+    def never_again(self, worker_id: str) -> None:
+        """A worker is not started any more: nothing waits for it."""
+        self._expected -= {worker_id}
+        self._take(self.dispatcher.expect(self._expected))
 
     def worker_up(self, worker_id: str) -> None:
         """A worker can take jobs, as soon as these are given out."""
@@ -167,10 +186,12 @@ class RoundRunner:
         if reply.message is None:
             self.failed_jobs += 1
             if reply.error != NO_ANSWER:
-                self._tell(Notice("error", f"{worker_id}: {reply.error}"))
+                log.warning("%s refuses a job: %s", worker_id, reply.error)
         elif (result := reply.message.result).cpu_seconds > 0.0:
             self.rtf[worker_id] = result.sim_seconds / result.cpu_seconds
-        self._take(self.dispatcher.reply(reply))
+        answers = self.dispatcher.reply(reply)
+        self._news.health(self.dispatcher.dispatch.sickness.sick)
+        self._take(answers)
         self.dispatcher.give_out()
 
     def _take(self, answers: list[Answer]) -> None:
@@ -179,16 +200,16 @@ class RoundRunner:
                 case RoundDone() as done:
                     self._take_apart(done)
                 case RoundGivenUp(order):
-                    log.warning("round %d is given up: %s", order.round_id, answer.failure)
-                    took_s = (time.monotonic_ns() - order.started_mono_ns) * 1e-9
-                    self._forget(order, late=took_s >= ROUND_DEADLINE_S)
+                    self._fail(order, answer.failure)
 
-    def _forget(self, order: RoundOrder, *, late: bool) -> None:
-        """Cancel the jobs of a round that is given up; was it late, the next are smaller."""
+    def _fail(self, order: RoundOrder, reason: str) -> None:
+        """Cancel the jobs of a round that is given up; was it slow, the next are smaller."""
+        self._news.given_up(order, reason)
+        self.tally.fail(reason)
         for named in order.recorded:
             self.dispatcher.cancel(named.sha256)
         pace = self._seeds.pop(order.round_id).pace
-        if late:
+        if _took_s(order) >= GIVEN_UP_AFTER_S:
             self._take_time(pace, math.inf)
 
     def take_state(self, state: VehicleState) -> None:
@@ -209,6 +230,7 @@ class RoundRunner:
         for expired in [r for r in self._seeds if r < order.round_id]:
             del self._seeds[expired]
         self._take_time(seed.pace, done.seconds)
+        self.tally.run += 1
         world = self._world_of(order.world_id)
         futures, rows, distinct = round_futures(done, vehicle=self._plan.vehicle.name)
         sha = self.futures.take(done, distinct=distinct)
@@ -227,22 +249,11 @@ class RoundRunner:
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame)
         self._context.publish("round", view)
-        self._report_planners(done)
+        self._news.planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
-
-    def _report_planners(self, done: RoundDone) -> None:
-        """Say once of each planner that it failed, or that another one had to act for it."""
-        planners = iter(future.planner for future in done.order.futures)
-        for result in done.results:
-            failures, remarks = result.outcome.failures, result.outcome.remarks
-            for place, planner in zip(range(len(result.future_indices)), planners, strict=False):
-                words = (failures[place] if failures else "") or (remarks[place] if remarks else "")
-                if words and planner not in self._planners_reported:
-                    self._planners_reported.add(planner)
-                    self._tell(Notice("warning", f"a future driven by {planner}: {words}"))
 
     def _take_time(self, pace: Pace, seconds: float) -> None:
         """Count how long a round took, and tell where the next ones have another pace."""
@@ -271,9 +282,14 @@ class RoundRunner:
         if compared is not None:
             self.plans.take(compared)
             self._tables.add("plan_comparisons", [plan_row(compared)])
-            self._context.publish("plan_comparison", compared)
+            if not done.late:
+                self._context.publish("plan_comparison", compared)
 
     def _keep(self, comparison: Comparison) -> None:
         self.comparisons.take(comparison)
         self._tables.add("comparisons", [row_of(comparison)])
         self._context.publish("comparison", comparison)
+
+
+def _took_s(order: RoundOrder) -> float:
+    return (time.monotonic_ns() - order.started_mono_ns) * 1e-9

@@ -57,6 +57,7 @@ def round_view(
         user_xy_m=in_drive(met.tracks_m),
         touch_xy_m=in_drive(met.touches_m),
         touch_names=met.touch_names,
+        late=done.late,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 
 from foretwin.contracts.bus import Bus, Mailbox, Reply
 from foretwin.contracts.runner import Answer, Task
@@ -17,12 +18,22 @@ by then, and where its connection was lost and came back, it may answer nothing 
 
 
 class BusDispatcher:
-    """The tasks of a run and its workers; see Dispatch."""
+    """The tasks of a run and its workers, of which it gives to those `expected` alone.
+
+    See Dispatch.
+    """
 
     def __init__(
-        self, bus: Bus, mailbox: Mailbox, *, run_id: str, in_flight: int = 1, refusals: int = 1
+        self,
+        bus: Bus,
+        mailbox: Mailbox,
+        *,
+        run_id: str,
+        expected: Iterable[str],
+        in_flight: int = 1,
     ) -> None:
-        self.dispatch = Dispatch(in_flight=in_flight, refusals=refusals)
+        self.dispatch = Dispatch(in_flight=in_flight)
+        self.dispatch.expect(expected)
         self._bus, self._mailbox, self._run_id = bus, mailbox, run_id
         self._allowed: dict[str, tuple[float, float]] = {}
         """Of tasks with a deadline: when it is, and how long that was from their start."""
@@ -44,6 +55,10 @@ class BusDispatcher:
         self._allowed.pop(key, None)
         self.dispatch.cancel(key)
 
+    def expect(self, worker_ids: Iterable[str]) -> list[Answer]:
+        """Give to these workers alone from now on; returns what is given up since they are few."""
+        return self._answers(self.dispatch.expect(worker_ids))
+
     def worker_up(self, worker_id: str) -> list[Answer]:
         """A worker is there; returns what is given up since its earlier life has died of it."""
         self._silent_since_s.pop(worker_id, None)
@@ -58,6 +73,15 @@ class BusDispatcher:
         """Try a task no more; returns what that comes to."""
         return self._answers(self.dispatch.give_up(key, reason))
 
+    def without_takers(self, key: str) -> list[Answer]:
+        """Give a task up that all workers which are up refused; returns what that comes to."""
+        return self._answers(self.dispatch.without_takers(key))
+
+    def close(self) -> None:
+        """Forget every task: the run is over."""
+        self._allowed.clear()
+        self.dispatch.close()
+
     def give_out(self) -> None:
         """Send waiting tasks to free workers; call it often."""
         now_s = time.monotonic()
@@ -65,7 +89,7 @@ class BusDispatcher:
             if now_s - since_s > _SILENT_S:
                 del self._silent_since_s[worker_id]
                 self.dispatch.trust(worker_id)
-        for worker_id, task in self.dispatch.assignments():
+        for worker_id, task in self.dispatch.assignments(now_s=now_s):
             until_s, _ = self._allowed.get(task.key, (now_s + _FOR_EVER_S, 0.0))
             self._bus.request(
                 task.channel,
@@ -95,7 +119,8 @@ class BusDispatcher:
             self._silent_since_s.setdefault(worker_id, time.monotonic())
             return []
         else:
-            given_up = self.dispatch.refused(worker_id, task.key, reply.error or "")
+            reason, now_s = reply.error or "", time.monotonic()
+            given_up = self.dispatch.refused(worker_id, task.key, reason, now_s=now_s)
         return self._answers(given_up)
 
     def _answers(self, given_up: list[GivenUp]) -> list[Answer]:

@@ -1,15 +1,18 @@
 """Which worker is given which task: of the rounds of a drive and of the jobs of a sweep alike.
 
-Pure: no bus, no clock. A task lost with its worker goes to another one; an answer counts once.
+Pure: no bus, no clock. A task lost with its worker or refused by it goes to another one; an answer
+counts once, and every task ends in exactly one way.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict, deque
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from foretwin.contracts.runner import Task
+from foretwin.orchestrator.runner.sickness import Sickness
 
 ATTEMPTS = 3
 """A task of which so many workers died is given up."""
@@ -43,22 +46,40 @@ class _Open:
     task: Task
     waits: bool = True
     deaths: int = 0
-    refusals: int = 0
+    refused_by: set[str] = field(default_factory=set)
+    """Workers that are not asked for it again."""
+    refusal: str = ""
+    """The last of their reasons."""
+
+
+@dataclass(slots=True)
+class TaskCount:
+    """What became of the tasks taken: `given` is what ended in one of three ways, and the open."""
+
+    given: int = 0
+    results: int = 0
+    refused: int = 0
+    """Ended since every worker refused them."""
+    lost: int = 0
+    """Ended in no answer: their workers died, they came too late, or were wanted no more."""
 
 
 @dataclass(slots=True)
 class Dispatch:
-    """Holds the tasks that are not answered, and the workers that are up.
+    """Holds the tasks that are not ended, and the workers that are up.
 
-    A worker is given up to `in_flight` tasks; more than one only while so many wait that no other
-    worker lacks work for it. A task that was refused `refusals` times is given up.
+    Only workers that are expected are given anything. One is given up to `in_flight` tasks; more
+    than one only while so many wait that no other worker lacks work for it. A task that every
+    expected worker has refused is given up; until then each of them is asked once.
     """
 
     in_flight: int = 1
-    refusals: int = 1
     requeued: int = 0
     late: int = 0
     """Answers to tasks that were answered or cancelled before."""
+    count: TaskCount = field(default_factory=TaskCount)
+    sickness: Sickness = field(default_factory=Sickness)
+    _expected: frozenset[str] = frozenset()
     _open: dict[str, _Open] = field(default_factory=dict)
     _waiting: OrderedDict[str, deque[Task]] = field(default_factory=OrderedDict)
     """By World, none of them empty."""
@@ -83,17 +104,36 @@ class Dispatch:
         """Take a task; raises ValueError for one whose key is open already."""
         if task.key in self._open:
             raise ValueError(f"task {task.key} is submitted twice")
+        self.count.given += 1
         self._open[task.key] = _Open(task)
         self._waiting.setdefault(task.world_id, deque()).append(task)
 
     def cancel(self, key: str) -> None:
         """Forget a task; a worker that is at it is let finish, and its answer is late."""
-        if (known := self._open.pop(key, None)) is not None:
-            self._no_longer_waits(known)
+        if self._ends(key) is not None:
+            self.count.lost += 1
+
+    def close(self) -> None:
+        """Forget every task: the run is over."""
+        for key in list(self._open):
+            self.cancel(key)
+
+    def expect(self, worker_ids: Iterable[str]) -> list[GivenUp]:
+        """Give work to these workers alone from now on, once they are up."""
+        self._expected = frozenset(worker_ids)
+        given_up = []
+        for worker_id in sorted(self._workers.keys() - self._expected):
+            given_up += self.worker_down(worker_id)
+        for key in list(self._open):
+            given_up += self._refused_by(self._expected, key)
+        return given_up
 
     def worker_up(self, worker_id: str) -> list[GivenUp]:
         """A worker is there; what an earlier life of it held is given out again."""
+        if worker_id not in self._expected:
+            return []
         lost = self.worker_down(worker_id)
+        self.sickness.well(worker_id)
         self._workers[worker_id] = _Worker()
         return lost
 
@@ -108,8 +148,7 @@ class Dispatch:
             known.deaths += 1
             if known.deaths >= ATTEMPTS and not self._at_work(at.key):
                 last = f", the last by {how}" if how else ""
-                given_up.append(GivenUp(at, f"{ATTEMPTS} workers died of it{last}"))
-                self.cancel(at.key)
+                given_up += self.give_up(at.key, f"{ATTEMPTS} workers died of it{last}")
         for task in reversed(worker.at_work):
             self._wait_again(task.key)
         return given_up
@@ -121,39 +160,48 @@ class Dispatch:
             self._leaves(worker_id, key)
             self._wait_again(key)
 
-    def assignments(self) -> list[Assignment]:
+    def assignments(self, *, now_s: float) -> list[Assignment]:
         """Give waiting tasks to workers: of a worker's World first, then of one no other is at."""
         given = []
-        while (worker_id := self._free()) is not None:
-            worker = self._workers[worker_id]
-            task = self._next(worker)
-            worker.at_work.append(task)
-            worker.world_id = task.world_id
-            given.append(Assignment(worker_id, task))
+        while (one := self._assignment(now_s)) is not None:
+            worker = self._workers[one.worker_id]
+            self._no_longer_waits(self._open[one.task.key])
+            worker.at_work.append(one.task)
+            worker.world_id = one.task.world_id
+            given.append(one)
         return given
 
     def answered(self, worker_id: str, key: str) -> bool:
         """Take note of an answer; returns whether it counts."""
         self._leaves(worker_id, key)
-        known = self._open.pop(key, None)
-        if known is None:
+        self.sickness.well(worker_id)
+        if self._ends(key) is None:
             self.late += 1
             return False
-        self._no_longer_waits(known)
+        self.count.results += 1
         return True
 
-    def refused(self, worker_id: str, key: str, reason: str) -> list[GivenUp]:
-        """Take note that a worker tried a task and could not; returns it where it is given up."""
+    def refused(self, worker_id: str, key: str, reason: str, *, now_s: float) -> list[GivenUp]:
+        """Take note that a worker tried a task and could not; returns it where nobody else can."""
         self._leaves(worker_id, key)
         known = self._open.get(key)
-        if known is None:
+        if known is None:  # nor does it tell of the worker: a question may have timed out
             self.late += 1
             return []
-        known.refusals += 1
-        if known.refusals >= self.refusals:
-            return self.give_up(key, reason)
+        self.sickness.refused(worker_id, key, reason, now_s=now_s)
+        known.refused_by.add(worker_id)
+        known.refusal = reason
         self._wait_again(key)
-        return []
+        return self._refused_by(self._expected, key)
+
+    def without_takers(self, key: str) -> list[GivenUp]:
+        """Give a task up that every worker which is up has refused; returns it where that is so."""
+        return self._refused_by(self._workers, key)
+
+    @property
+    def most_refusals(self) -> int:
+        """By how many workers a task that waits has been refused, at most."""
+        return max((len(one.refused_by) for one in self._open.values() if one.waits), default=0)
 
     def unanswered(self, worker_id: str, key: str) -> None:
         """Take note that a question ended without an answer: its worker may be dead.
@@ -166,32 +214,51 @@ class Dispatch:
 
     def give_up(self, key: str, reason: str) -> list[GivenUp]:
         """Try a task no more; returns it where it was open."""
-        known = self._open.get(key)
-        self.cancel(key)
-        return [] if known is None else [GivenUp(known.task, reason)]
+        known = self._ends(key)
+        if known is None:
+            return []
+        self.count.lost += 1
+        return [GivenUp(known.task, reason)]
 
-    def _free(self) -> str | None:
-        """Return the worker to be given the next task, the idlest first."""
+    def _refused_by(self, workers: Collection[str], key: str) -> list[GivenUp]:
+        """Give an open task up that all of some workers have refused: it is no fault of theirs."""
+        known = self._open.get(key)
+        if known is None or not known.refused_by or not known.refused_by.issuperset(workers):
+            return []
+        self._ends(key)
+        self.count.refused += 1
+        self.sickness.forgive(known.refused_by, key)
+        return [GivenUp(known.task, known.refusal)]
+
+    def _ends(self, key: str) -> _Open | None:
+        known = self._open.pop(key, None)
+        if known is not None:
+            self._no_longer_waits(known)
+        return known
+
+    def _assignment(self, now_s: float) -> Assignment | None:
+        """Return the next task to be given, to the idlest worker that has not refused it."""
         waiting = sum(map(len, self._waiting.values()))
         most = self.in_flight if waiting >= len(self._workers) else 1
+        may_hold = self.sickness.may_hold(self._workers, most, now_s=now_s)
         free = [
             (len(worker.at_work), worker_id)
             for worker_id, worker in self._workers.items()
-            if not worker.silent and len(worker.at_work) < most
+            if not worker.silent and len(worker.at_work) < may_hold[worker_id]
         ]
-        return min(free)[1] if free and waiting else None
+        for _, worker_id in sorted(free):
+            if (task := self._next(worker_id)) is not None:
+                return Assignment(worker_id, task)
+        return None
 
-    def _next(self, worker: _Worker) -> Task:
-        taken = {other.world_id for other in self._workers.values() if other is not worker}
-        world_id = worker.world_id
-        if world_id not in self._waiting:
-            first = next(iter(self._waiting))
-            world_id = next((name for name in self._waiting if name not in taken), first)
-        task = self._waiting[world_id].popleft()
-        self._open[task.key].waits = False
-        if not self._waiting[world_id]:
-            del self._waiting[world_id]
-        return task
+    def _next(self, worker_id: str) -> Task | None:
+        own = self._workers[worker_id].world_id
+        taken = {one.world_id for name, one in self._workers.items() if name != worker_id}
+        for world_id in sorted(self._waiting, key=lambda name: (name != own, name in taken)):
+            for task in self._waiting[world_id]:
+                if worker_id not in self._open[task.key].refused_by:
+                    return task
+        return None
 
     def _leaves(self, worker_id: str, key: str) -> None:
         worker = self._workers.get(worker_id)
@@ -216,7 +283,10 @@ class Dispatch:
     def _no_longer_waits(self, known: _Open) -> None:
         if not known.waits:
             return
+        known.waits = False
         world_id, key = known.task.world_id, known.task.key
-        left = deque(task for task in self._waiting.pop(world_id) if task.key != key)
+        left = deque(task for task in self._waiting[world_id] if task.key != key)
         if left:
             self._waiting[world_id] = left
+        else:
+            del self._waiting[world_id]

@@ -14,7 +14,10 @@ from foretwin.contracts.runner import Answer, Task, job_task
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoundOrder:
-    """A round to run: its jobs, and when the sample that seeds it was received."""
+    """A round to run: its jobs, and when the sample that seeds it was received.
+
+    What is complete after `deadline_mono_ns` is late; in lock step nothing is.
+    """
 
     round_id: int
     stamp_ns: int
@@ -23,6 +26,7 @@ class RoundOrder:
     receipt_mono_ns: int
     started_mono_ns: int
     jobs: tuple[Job, ...]
+    deadline_mono_ns: int | None = None
     recorded: tuple[JobBytes, ...] = field(init=False)
     """The jobs as they are recorded."""
 
@@ -48,12 +52,14 @@ class RoundDone:
     """A complete round: results in the order of its jobs, and how long it took.
 
     `latency_ms` from the receipt of the state to the last result, `seconds` from the round's start.
+    A `late` one was complete after the next was due: it is recorded, and never shown as current.
     """
 
     order: RoundOrder
     results: tuple[FuturesResult, ...]
     latency_ms: float
     seconds: float
+    late: bool = False
 
 
 class RoundGivenUp(NamedTuple):
@@ -66,12 +72,16 @@ class RoundGivenUp(NamedTuple):
 class OpenRounds:
     """Holds the open rounds; live there is one at most."""
 
-    given_up: int = 0
     _orders: dict[int, RoundOrder] = field(default_factory=dict)
     _results: dict[int, dict[str, FuturesResult]] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         return bool(self._orders)
+
+    @property
+    def orders(self) -> tuple[RoundOrder, ...]:
+        """The rounds that are open, the oldest first."""
+        return tuple(self._orders.values())
 
     def open(self, order: RoundOrder) -> None:
         """Begin a round."""
@@ -80,7 +90,7 @@ class OpenRounds:
 
     def drop(self) -> tuple[RoundOrder, ...]:
         """Give up every open round and return them; what their workers still send is late."""
-        dropped = tuple(self._orders.values())
+        dropped = self.orders
         self._orders.clear()
         self._results.clear()
         return dropped
@@ -95,18 +105,19 @@ class OpenRounds:
             return None
         if answer.message is None:
             self._close(order)
-            self.given_up += 1
             return RoundGivenUp(order)
         results = self._results[order.round_id]
         results[key] = answer.message.result
         if len(results) < len(order.jobs):
             return None
         self._close(order)
+        deadline_ns = order.deadline_mono_ns
         return RoundDone(
             order=order,
             results=tuple(results[named.sha256] for named in order.recorded),
             latency_ms=(answer.received_mono_ns - order.receipt_mono_ns) / 1e6,
             seconds=(answer.received_mono_ns - order.started_mono_ns) / 1e9,
+            late=deadline_ns is not None and answer.received_mono_ns > deadline_ns,
         )
 
     def misfit(self, key: str, result: FuturesResult | None) -> str:

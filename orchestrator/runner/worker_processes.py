@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from pathlib import Path
@@ -23,6 +24,8 @@ from foretwin.orchestrator.runner.supervisor import (
     WhenDead,
     fold_stderr,
 )
+
+log = logging.getLogger("orchestrator")
 
 IN_FLIGHT = 2
 """Tasks at a worker: one is played, the next lies there already."""
@@ -50,9 +53,9 @@ class WorkerProcesses:
     """Up to `count` workers, each started when there is a task for it; see Runner.
 
     `setup` is that of each but for its id and the bus, which is theirs alone. A task is given up
-    where its worker does not answer within `task_timeout_s` of beginning it, or after
-    `dispatch.ATTEMPTS` workers died of it. Use it as a context: whatever ends it, all processes
-    end. `folder` takes their files.
+    where its worker does not answer within `task_timeout_s` of beginning it, after
+    `dispatch.ATTEMPTS` workers died of it, or once every worker refused it. Use it as a context:
+    whatever ends it, all processes end. `folder` takes their files.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class WorkerProcesses:
         launch: Launcher | None = None,
     ) -> None:
         self._count, self._timeout_s, self._folder = count, task_timeout_s, folder
+        self._names = tuple(f"w{number}" for number in range(count))
         self._setup = msgspec.structs.replace(
             setup, bus=BusSetup(endpoint=free_endpoint(), lossless=True)
         )
@@ -73,6 +77,7 @@ class WorkerProcesses:
         self._supervisor = Supervisor(FreshInterpreter(folder) if launch is None else launch)
         self._answers: deque[Answer] = deque()
         self._up: set[str] = set()
+        self._strangers = 0
         self._failed_starts: dict[str, int] = {}
         self._at: dict[str, tuple[str, float]] = {}
         """At which task each worker is, and since when."""
@@ -83,7 +88,11 @@ class WorkerProcesses:
         self._bus = ZenohBus(self._setup.bus, router=True)
         run_id = self._setup.run_id
         self._dispatcher = BusDispatcher(
-            self._bus, self._mailbox, run_id=run_id, in_flight=IN_FLIGHT
+            self._bus,
+            self._mailbox,
+            run_id=run_id,
+            expected=self._names,
+            in_flight=IN_FLIGHT,
         )
         self._bus.watch_alive(alive_key(run=run_id, process="*"), self._mailbox)
         return self
@@ -143,7 +152,11 @@ class WorkerProcesses:
             self._answers.extend(self._dispatcher.reply(item))
         elif isinstance(item, Alive):
             worker_id = process_of_alive_key(item.key)
-            if item.up:
+            if worker_id not in self._names:
+                self._strangers += item.up
+                if item.up and self._strangers == 1:
+                    log.warning("%s is no worker of this sweep: it gets no work", ascii(worker_id))
+            elif item.up:
                 self._up.add(worker_id)
                 self._failed_starts.pop(worker_id, None)
                 self._answers.extend(self._dispatcher.worker_up(worker_id))
@@ -175,17 +188,17 @@ class WorkerProcesses:
             self._answers.extend(self._dispatcher.worker_down(worker_id, how=_how(death)))
 
     def _start_missing(self) -> None:
-        """Start as many workers as there is work for."""
+        """Start as many workers as there is work for, one of them for what all others refused."""
         running = set(self._supervisor.running())
         able = [
-            name
-            for name in (f"w{number}" for number in range(self._count))
-            if self._failed_starts.get(name, 0) < MAX_FAILED_STARTS
+            name for name in self._names if self._failed_starts.get(name, 0) < MAX_FAILED_STARTS
         ]
         if not able and not running:
             raise NoWorkerError(f"no worker can be started; see {self._setup.log_file}")
-        missing = min(self._count, self._dispatcher.dispatch.open) - len(running)
-        for name in [name for name in able if name not in running][: max(missing, 0)]:
+        self._answers.extend(self._dispatcher.expect({*able, *running}))
+        dispatch = self._dispatcher.dispatch
+        wanted = min(self._count, max(dispatch.open, dispatch.most_refusals + 1))
+        for name in [name for name in able if name not in running][: max(wanted - len(running), 0)]:
             self._supervisor.start(
                 _WorkerRow(), msgspec.structs.replace(self._setup, process_id=name)
             )

@@ -71,4 +71,4 @@ def test_what_a_full_disk_cost_is_counted_and_said_last(tmp_path: Path) -> None:
         f"{lost} rows are lost: they could not be written: "
         "OSError: [Errno 28] No space left on device"
     )
-    assert done.screen.splitlines()[-1] == f"lost: {trouble}"
+    assert done.screen.splitlines()[-1] == f"error: {trouble}"

@@ -19,7 +19,7 @@ from foretwin.viewer.log_scenarios import CRITICAL, SAFE, criticality_colours, s
 from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.rows import plain_text
 from tests.viewer import scene
-from tests.viewer.shown import Shown, monitor_of
+from tests.viewer.shown import Shown, monitor_of, text_of
 
 COVERS = (
     "foretwin.viewer.log_drive",
@@ -107,6 +107,14 @@ def test_futures_are_one_entity_with_the_nominal_thickest() -> None:
     assert len(futures.strips.as_arrow_array()) == 64
     radii = np.array(futures.radii.as_arrow_array().to_pylist())
     assert int(np.argmax(radii)) == scene.round_at(3.0).nominal_index
+
+
+def test_a_late_round_takes_the_futures_away_and_shows_none_of_its_own() -> None:
+    late = msgspec.structs.replace(scene.round_at(3.0), late=True, latency_ms=734.0)
+    shown = Shown(monitor_of().handle("round", late))
+    assert shown.paths == ["world/futures", "scenarios/table"]
+    assert shown["world/futures"].is_recursive.as_arrow_array().to_pylist() == [True]
+    assert "734 ms: too late" in text_of(shown["scenarios/table"])
 
 
 def test_a_diverged_future_is_left_out() -> None:

@@ -171,7 +171,7 @@ def test_a_whole_drive_leaves_its_rounds_in_the_tables(house: House) -> None:
     counted = {r["id"]: r["rounds"] for r in records}
     told = [r["intersection_id"] for r in rows["rounds"]]
     assert counted == {name: told.count(name) for name in counted}
-    assert house.conductor.missed_rounds == 0
+    assert house.conductor.rounds.tally.missed == 0
     # These futures go straight on at the car's speed: they are the constant-velocity baseline.
     for row in rows["comparisons"]:
         assert row["nominal_ade_m"] == pytest.approx(row["constant_velocity_ade_m"], abs=0.01)
@@ -204,28 +204,6 @@ def test_a_worker_that_dies_at_work_costs_no_future_and_counts_none_twice(house:
     assert house.workers[1].jobs == 2
 
 
-def test_a_job_that_every_worker_refuses_ends_its_round_and_not_the_drive(house: House) -> None:
-    house.drive(20)
-    assert house.conductor.start_round()
-    refused = 0
-    while requests := house.workers[0].take() + house.workers[1].take():
-        refused += len(requests)
-        assert refused < 100
-        for request in requests:
-            request.refuse("path has no length")
-        house.settle()
-
-    assert not house.conductor.rounds.open
-    assert house.conductor.rounds.open.given_up == 1
-    assert {e.text.split(": ", 1)[1] for e in house.watched("event") if e.level == "error"} == {
-        "path has no length"
-    }
-    house.drive(30)
-    assert house.conductor.start_round()
-    house.work()
-    assert house.conductor.rounds.futures.rounds == 1
-
-
 def test_a_round_whose_world_is_late_is_missed_and_one_without_heading_is_not(house: House) -> None:
     assert not house.conductor.start_round()
     house.drive(1, working=False)
@@ -233,12 +211,14 @@ def test_a_round_whose_world_is_late_is_missed_and_one_without_heading_is_not(ho
     house.drive(20, working=False)
     house.conductor.start_round()
 
-    assert house.conductor.missed_rounds == 2  # near a junction, and nobody has built its World
+    assert (
+        house.conductor.rounds.tally.missed == 2
+    )  # near a junction, and nobody has built its World
     house.work()
     house.send(house.states[20])
     house.settle()
     assert house.conductor.start_round()
-    assert (house.conductor.missed_rounds, house.conductor.unseeded_rounds) == (2, 0)
+    assert (house.conductor.rounds.tally.missed, house.conductor.rounds.tally.unseeded) == (2, 0)
 
 
 def test_the_reference_point_of_a_source_that_keeps_it_to_itself_is_mentioned(house: House) -> None:

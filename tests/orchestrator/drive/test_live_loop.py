@@ -12,6 +12,7 @@ import pytest
 
 from foretwin.orchestrator.drive import live_loop
 from foretwin.orchestrator.drive.live_loop import LiveLoop
+from foretwin.orchestrator.record.ledger import RoundTally
 from foretwin.orchestrator.rounds.pace import Pace
 
 
@@ -39,6 +40,7 @@ class Mailbox:
         until_s = self._clock.now_s + max(timeout_s, 1e-4)
         if self._items and self._items[0][0] <= until_s:
             at_s, item = self._items.popleft()
+            self.arrived_s = at_s
             self._clock.now_s = max(self._clock.now_s, at_s)
             return item
         self._clock.now_s = until_s
@@ -59,7 +61,11 @@ class Conductor:
         handling: Callable[[float], None] = lambda _: None,
         one_of: int = 1,
         settled_s: float = 0.0,
+        received: bool = False,
+        wants_rounds: bool = True,
     ) -> None:
+        self._received = received
+        """Whether a state counts as received when it came, not when it is handled."""
         self._clock = clock
         self._round_s = round_s
         self._handling = handling
@@ -71,7 +77,8 @@ class Conductor:
         self.tuning = SimpleNamespace(parameters=self)
         pace = SimpleNamespace(now=Pace(64, one_of))
         self.rounds, self.pace = self, pace
-        self.missed_rounds = self.spared_rounds = 0
+        self.mission = SimpleNamespace(wants_rounds=wants_rounds)
+        self.tally = RoundTally()
         self.started_s: list[float] = []
         self.dropped_s: list[float] = []
         self.watched_s: list[float] = []
@@ -85,15 +92,17 @@ class Conductor:
     def settled(self) -> bool:
         return self._clock.now_s >= 100.0 + self._settled_s
 
-    def drop(self) -> None:
-        self.dropped_s.append(self._clock.now_s - 100)
-        self._open_until_s = None
+    def next_is_due(self) -> None:
+        if self._clock.now_s - 100 - self.started_s[-1] > 10.0:
+            self.dropped_s.append(self._clock.now_s - 100)
+            self._open_until_s = None
 
     def handle(self, item: str) -> None:
         self._handling(self._clock.now_s - 100)
         if item == "state":
             self.intake.states += 1
-            self.intake.latest = SimpleNamespace(receipt_mono_ns=self._clock.now_s * 1e9)
+            at_s = self.mailbox.arrived_s if self._received else self._clock.now_s
+            self.intake.latest = SimpleNamespace(receipt_mono_ns=at_s * 1e9)
         else:
             self.intake.end = True
 
@@ -106,6 +115,7 @@ class Conductor:
     def start_round(self) -> bool:
         self.started_s.append(self._clock.now_s - 100)
         self._open_until_s = self._clock.now_s + self._round_s
+        self.tally.run += 1
         return True
 
 
@@ -117,6 +127,7 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> Any:
         conductor = Conductor(clock, **settings)
         loop = LiveLoop(conductor, housekeeping=lambda _: None, stop=lambda: False)  # type: ignore[arg-type]
         assert loop.run()
+        assert conductor.tally.ledger().balanced()
         return conductor
 
     return drive
@@ -132,7 +143,7 @@ def test_rounds_start_on_the_grid(driven: Any) -> None:
     assert len(conductor.started_s) == 20
     for number, started_s in enumerate(conductor.started_s):
         assert started_s == pytest.approx(0.5 * number, abs=0.021)
-    assert conductor.missed_rounds == 0
+    assert conductor.tally.missed == 0
 
 
 def test_no_round_starts_while_workers_take_new_parameters(driven: Any) -> None:
@@ -157,7 +168,7 @@ def test_a_late_round_counts_as_missed_and_the_next_is_left_out(driven: Any) -> 
     conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
 
     assert len(conductor.started_s) == 10
-    assert conductor.missed_rounds == 10
+    assert conductor.tally.missed == 10
     assert conductor.started_s[:3] == pytest.approx([0.0, 1.0, 2.0], abs=0.03)
     assert conductor.dropped_s == []
 
@@ -167,7 +178,7 @@ def test_a_round_that_never_ends_is_given_up(driven: Any) -> None:
 
     assert conductor.dropped_s == pytest.approx([10.5, 21.5], abs=0.6)
     assert len(conductor.started_s) == 3
-    assert conductor.missed_rounds > 40
+    assert conductor.tally.missed > 40
 
 
 def test_a_machine_that_slept_does_not_catch_up_and_owns_up(driven: Any) -> None:
@@ -179,7 +190,19 @@ def test_a_machine_that_slept_does_not_catch_up_and_owns_up(driven: Any) -> None
 
     around = [started_s for started_s in conductor.started_s if 2.9 < started_s < 8.1]
     assert around == pytest.approx([7.3, 7.5, 8.0], abs=0.03)
-    assert conductor.missed_rounds == 8  # those due at 3.5, 4.0 and so on until 7.0
+    assert conductor.tally.missed == 8  # those due at 3.5, 4.0 and so on until 7.0
+
+
+def test_a_slow_machine_that_slept_leaves_out_both_what_it_spares_and_what_it_missed(
+    driven: Any,
+) -> None:
+    def sleep_once(at_s: float) -> None:
+        if 3.0 <= at_s < 3.02:
+            live_loop.time.now_s += 4.3  # type: ignore[attr-defined]
+
+    tally = driven(states_s=every(0.02, 10.0), end_s=10.0, one_of=2, handling=sleep_once).tally
+    # Of 20 every other one; those due at 3, 4, 5 and 6 found it asleep.
+    assert (tally.due, tally.run, tally.spared, tally.missed) == (20, 6, 10, 4)
 
 
 def test_no_round_starts_from_a_state_that_is_old(driven: Any) -> None:
@@ -187,6 +210,31 @@ def test_no_round_starts_from_a_state_that_is_old(driven: Any) -> None:
 
     assert not [s for s in conductor.started_s if 3.01 < s < 6.0]
     assert [s for s in conductor.started_s if s >= 6.0]
+    # From 3.0 to 5.5: the vehicle said nothing.
+    assert (conductor.tally.unseeded, conductor.tally.missed) == (6, 0)
+
+
+def test_rounds_due_while_messages_wait_and_the_state_is_old_are_missed(driven: Any) -> None:
+    def slowly(at_s: float) -> None:
+        if at_s >= 3.0:
+            live_loop.time.now_s += 0.5  # type: ignore[attr-defined]
+
+    conductor = driven(states_s=every(0.02, 4.0), end_s=4.0, handling=slowly, received=True)
+
+    assert conductor.tally.due > 40
+    assert conductor.tally.missed > 30
+    assert conductor.tally.unseeded == 0
+
+
+def test_no_round_is_due_where_the_mission_wants_none(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 4.0), end_s=4.0, wants_rounds=False)
+    assert (conductor.started_s, conductor.tally.due) == ([], 0)
+
+
+def test_what_is_due_at_the_end_and_cannot_start_is_missed(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 3.9), end_s=3.9, settled_s=1e6)
+    assert conductor.started_s == []
+    assert conductor.tally.due == conductor.tally.missed == 8
 
 
 def test_no_round_starts_before_the_first_state(driven: Any) -> None:
@@ -219,8 +267,8 @@ def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(dri
     conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7, one_of=2)
 
     assert conductor.started_s == pytest.approx([*range(10)], abs=0.03)
-    assert conductor.missed_rounds == 0
-    assert conductor.spared_rounds == 10
+    assert conductor.tally.missed == 0
+    assert conductor.tally.spared == 10
 
 
 def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.MonkeyPatch) -> None:

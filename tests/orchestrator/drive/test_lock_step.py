@@ -113,9 +113,10 @@ def test_a_drive_goes_to_its_end_with_a_round_every_period(houses: Any) -> None:
     assert loop(house).run()
     rounds = house.conductor.rounds
     # One for each second but those before the heading is known and the last.
-    assert rounds.futures.rounds + house.conductor.unseeded_rounds in (11, 12, 13)
+    assert rounds.futures.rounds + house.conductor.rounds.tally.unseeded in (11, 12, 13)
     assert rounds.futures.rounds >= 10
-    assert house.conductor.missed_rounds == 0
+    ledger = house.conductor.rounds.tally.ledger()
+    assert (ledger.balanced(), ledger.missed, ledger.run) == (True, 0, rounds.futures.rounds)
     assert house.conductor.intake.counts.received == car.published["gnss"] + car.published["speed"]
     assert house.conductor.intake.counts.lost == 0
     assert [world for world in told if world] == list(dict.fromkeys(w for w in told if w))

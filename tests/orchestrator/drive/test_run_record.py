@@ -77,11 +77,11 @@ def test_what_is_lost_is_in_the_record_and_in_its_last_lines(house: House) -> No
     ledger = record["ledger"]["telemetry"]
     assert (ledger["published"], ledger["recorded"]) == (200, 200 - len(published))
     assert ledger["published"] == ledger["recorded"] + ledger["lost"]
-    (line,) = lost_lines(record)
+    (line,) = [one for one in lost_lines(record) if "telemetry" in one]
     assert line.startswith(f"lost: {len(published)} of 200 telemetry samples are not recorded")
 
     record["troubles"] = ["viewer ended with code -9"]
-    assert lost_lines(record) == ["lost: viewer ended with code -9", line]
+    assert lost_lines(record) == ["error: viewer ended with code -9", line]
 
 
 @pytest.mark.parametrize("length", [0, 1, 100])
@@ -108,6 +108,41 @@ def test_a_record_replaces_what_was_there(tmp_path: Path) -> None:
 
     assert json.loads(file.read_text(encoding="utf-8")) == {"run_id": "r", "name": "Straße"}
     assert [p.name for p in tmp_path.iterdir()] == ["run.json"]
+
+
+def test_the_ledger_says_what_became_of_rounds_and_jobs(house: House) -> None:
+    house.drive(100, round_every=5)
+    assert house.conductor.rounds.tally.run > 10
+    house.drive(105)
+    assert house.conductor.start_round()
+    house.workers[0].answer()
+    house.settle()
+    house.conductor.rounds.close()
+    tally = house.conductor.rounds.tally
+    tally.due = tally.run + tally.missed + tally.unseeded + 1
+    record = record_of(house)
+
+    assert record["ledger"]["rounds"]["given_up"] == 1
+    jobs = record["ledger"]["jobs"]
+    assert jobs == {
+        "given": 2 * tally.run + 2,
+        "results": 2 * tally.run + 1,
+        "refused": 0,
+        "lost": 1,
+    }
+    assert record["troubles"] == []
+    # The end came first, nothing failed; a recorder there was none.
+    assert [line for line in lost_lines(record) if "telemetry" not in line] == []
+    tally.due += 1
+    assert record_of(house)["troubles"] == ["the ledger of rounds does not balance"]
+
+
+def test_what_a_drive_lost_is_said_last(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.conductor.rounds.tally.fail("3 workers died of it")
+    (said,) = [line for line in lost_lines(record_of(house)) if "rounds are" in line]
+    assert said.startswith("lost: 1 of ")
+    assert said.endswith(", the last since: 3 workers died of it")
 
 
 def test_versions_name_what_decides_results() -> None:

@@ -113,13 +113,13 @@ def test_a_worker_that_comes_up_gets_no_job_before_it_has_what_counts(house: Hou
     set_mass(house)
     house.conductor.make_changes()
     answer(first)
-    late = asked(house, "w9")
-    worker = Worker(house.plan, house.bus, "w9")
+    late = asked(house, "w1")
+    worker = Worker(house.plan, house.bus, "w1")
     house.settle()
-    assert "w9" not in house.conductor.rounds.dispatcher.workers
+    assert "w1" not in house.conductor.rounds.dispatcher.workers
     assert answer(late).version == 1
     house.settle()
-    assert "w9" in house.conductor.rounds.dispatcher.workers
+    assert "w1" in house.conductor.rounds.dispatcher.workers
     worker.die()
 
 

@@ -56,7 +56,7 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
         "seed": 7,
         "futures": {
             "count": 36, "rounds_by_futures": {"12": 3}, "distinct": 33,
-            "distinct_min_per_round": 10, "rounds": 3, "sim_seconds": 288.0,
+            "distinct_min_per_round": 10, "rounds": 3, "late_rounds": 0, "sim_seconds": 288.0,
             "cpu_seconds": 0.75, "sha256": digest.hexdigest(),
         },
         "state_to_result_ms_p50": 101.0,

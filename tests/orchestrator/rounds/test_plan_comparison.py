@@ -67,6 +67,22 @@ def test_a_nominal_future_that_diverged_is_compared_with_nothing(house: House) -
     assert house.conductor.rounds.comparisons.record(independent=True)["ade_m"] == {}
 
 
+def test_what_a_late_round_says_of_a_plan_is_recorded_and_not_told(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = [10**9]
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns[0])
+    house.drive(49)
+    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
+    house.drive(50)
+    assert house.conductor.start_round()
+    now_ns[0] += 10**10
+    house.work()
+
+    assert house.watched("plan_comparison") == []
+    assert house.conductor.rounds.plans.record()["count"] == 1
+
+
 def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
     house.bus.publish("plan", car_plan(house, 0, left_m=1.0), vehicle="ego")
     house.drive(30)

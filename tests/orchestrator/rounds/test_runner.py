@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.simulation import Event
@@ -119,12 +120,33 @@ def test_late_rounds_make_the_next_ones_smaller_and_say_so(
     assert (record["smaller_rounds"], record["rounds_by_futures"]) == (2, {"32": 2, "64": 5})
 
 
+@pytest.mark.parametrize(("seconds", "late"), [(0.4, False), (0.6, True)])
+def test_a_round_that_is_complete_after_its_deadline_is_told_as_late(
+    seconds: float, late: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = [10**9]
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns[0])
+    house = House(tmp_path, rate_hz=2.0)
+    house.drive(20)
+    assert house.conductor.start_round()
+    now_ns[0] += round(seconds * 1e9)
+    house.work()
+    (view,) = house.watched("round")
+    house.end()
+
+    assert view.late is late
+    assert house.conductor.rounds.futures.late_rounds == int(late)
+    (row,) = pq.read_table(house.plan.folder / "results" / "rounds.parquet").to_pylist()
+    assert row["late"] is late
+
+
 def test_in_lock_step_late_rounds_change_nothing(tmp_path: Path) -> None:
     house = House(tmp_path, speed=None, rate_hz=50.0, least_futures=1)
     house.drive(40, round_every=1)
     house.end()
 
     assert house.conductor.rounds.futures.rounds_of.keys() == {6}
+    assert house.conductor.rounds.futures.late_rounds == 0
 
 
 def test_who_acts_for_a_planner_is_said_once_for_each(tmp_path: Path) -> None:

@@ -31,7 +31,8 @@ def serve(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         if asked == "hang":
             threading.Event().wait()
-        if asked == "refuse":
+        word, *who = asked.split("-")
+        if word == "refuse" and (not who or setup.process_id in who):
             request.refuse("no such World")
         else:
             request.reply(PrepareReply(world_id=asked, worker_id=setup.process_id, seconds=0.0))

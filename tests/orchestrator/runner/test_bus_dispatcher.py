@@ -11,6 +11,7 @@ from foretwin.contracts.runner import Answer, Task
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.orchestrator.runner import bus_dispatcher
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
+from foretwin.orchestrator.runner.sickness import FIRST_PAUSE_S
 from tests.contracts.memory_bus import MemoryBus
 
 A = Task("a", "prepare", "w", PrepareRequest(world_id="a"))
@@ -19,11 +20,11 @@ A = Task("a", "prepare", "w", PrepareRequest(world_id="a"))
 class Bench:
     """A dispatcher with one worker `w0` that a test lets answer, and a clock that it moves."""
 
-    def __init__(self, **settings: int) -> None:
+    def __init__(self) -> None:
         self.now_s = 100.0
         self.bus, self.mailbox, self.asked = MemoryBus(), Mailbox(16), Mailbox(16)
         self.bus.serve("prepare", self.asked, run="r1", process="w0")
-        self.dispatcher = BusDispatcher(self.bus, self.mailbox, run_id="r1", **settings)
+        self.dispatcher = BusDispatcher(self.bus, self.mailbox, run_id="r1", expected=["w0", "w1"])
         self.dispatcher.worker_up("w0")
 
     def question(self) -> Request:
@@ -40,7 +41,7 @@ class Bench:
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
-    made = Bench(refusals=2)
+    made = Bench()
     monkeypatch.setattr(bus_dispatcher, "time", SimpleNamespace(monotonic=lambda: made.now_s))
     return made
 
@@ -54,12 +55,38 @@ def test_an_answer_comes_with_its_task_and_who_gave_it(bench: Bench) -> None:
     assert (answer.worker_id, answer.received_mono_ns > 0) == ("w0", True)
 
 
-def test_a_refusal_is_the_reason_once_it_was_refused_often_enough(bench: Bench) -> None:
+def test_a_refusal_is_the_reason_once_nobody_is_left_to_ask(bench: Bench) -> None:
     bench.dispatcher.submit(A)
     bench.question().refuse("no path")
     assert bench.reply() == []
+    bench.now_s += 1e6
+    bench.dispatcher.give_out()
+    assert bench.asked.take() is None
+    assert bench.dispatcher.expect(["w0"]) == [Answer(A, None, "no path")]
+
+
+def test_a_worker_that_refused_is_asked_for_others_when_its_pause_is_over(bench: Bench) -> None:
+    bench.dispatcher.submit(A)
     bench.question().refuse("no path")
-    assert bench.reply() == [Answer(A, None, "no path")]
+    bench.reply()
+    bench.bus.serve("prepare", Mailbox(16), run="r1", process="w1")
+    bench.dispatcher.worker_up("w1")
+    bench.dispatcher.give_out()  # the other has it now
+    other = A._replace(key="b")
+    bench.dispatcher.submit(other)
+    bench.dispatcher.give_out()
+    assert bench.asked.take() is None
+    bench.now_s += FIRST_PAUSE_S
+    bench.question().reply(PrepareReply(world_id="a", worker_id="w0", seconds=1.0))
+    assert [answer.task for answer in bench.reply()] == [other]
+
+
+def test_a_deadline_finds_what_all_that_are_up_have_refused(bench: Bench) -> None:
+    bench.dispatcher.submit(A, within_s=10.0)
+    assert bench.dispatcher.without_takers("a") == []
+    bench.question().refuse("no path")
+    bench.reply()
+    assert bench.dispatcher.without_takers("a") == [Answer(A, None, "no path")]
 
 
 def test_a_task_that_is_not_answered_by_its_deadline_is_given_up(bench: Bench) -> None:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from foretwin.contracts.runner import Task
 from foretwin.contracts.simulation import PrepareRequest
-from foretwin.orchestrator.runner.dispatch import ATTEMPTS, Dispatch
+from foretwin.orchestrator.runner.dispatch import ATTEMPTS, Dispatch, TaskCount
+from foretwin.orchestrator.runner.sickness import FIRST_PAUSE_S
 
 
 def task(key: str, world_id: str = "w") -> Task:
     return Task(key, "job", world_id, PrepareRequest(world_id=world_id))
 
 
-def begun(*keys: str, workers: int = 2, in_flight: int = 1, refusals: int = 1) -> Dispatch:
+def begun(*keys: str, workers: int = 2, in_flight: int = 1) -> Dispatch:
     """Tasks `world:number` or mere keys, submitted to workers that are up."""
-    dispatch = Dispatch(in_flight=in_flight, refusals=refusals)
+    dispatch = Dispatch(in_flight=in_flight)
+    dispatch.expect(f"w{number}" for number in range(workers))
     for number in range(workers):
         dispatch.worker_up(f"w{number}")
     for key in keys:
@@ -25,8 +25,8 @@ def begun(*keys: str, workers: int = 2, in_flight: int = 1, refusals: int = 1) -
     return dispatch
 
 
-def given_out(dispatch: Dispatch) -> list[tuple[str, str]]:
-    return [(one.worker_id, one.task.key) for one in dispatch.assignments()]
+def given_out(dispatch: Dispatch, *, now_s: float = 0.0) -> list[tuple[str, str]]:
+    return [(one.worker_id, one.task.key) for one in dispatch.assignments(now_s=now_s)]
 
 
 def test_idle_workers_are_given_the_oldest_tasks() -> None:
@@ -81,15 +81,96 @@ def test_only_what_a_worker_was_at_has_cost_its_life() -> None:
     assert given_out(dispatch) == [("w0", "b"), ("w0", "c")]
 
 
-def test_a_task_that_is_refused_is_tried_elsewhere_so_often_and_then_given_up() -> None:
-    dispatch = begun("a", workers=1, refusals=3)
-    for _ in range(2):
-        assert given_out(dispatch) == [("w0", "a")]
-        assert dispatch.refused("w0", "a", "no path") == []
+def test_a_task_that_is_refused_goes_to_the_other_worker_though_the_first_is_idle() -> None:
+    dispatch = begun("a")
+    assert given_out(dispatch) == [("w0", "a")]
+    assert dispatch.refused("w0", "a", "no disk", now_s=0.0) == []
+    assert given_out(dispatch) == [("w1", "a")]
+    assert dispatch.answered("w1", "a")
+    assert dispatch.count == TaskCount(given=1, results=1)
+
+
+def test_a_task_that_every_expected_worker_refused_is_given_up_and_blames_none() -> None:
+    dispatch = begun("a", "b")
     given_out(dispatch)
-    (lost,) = dispatch.refused("w0", "a", "no path")
-    assert (lost.task.key, lost.reason) == ("a", "no path")
-    assert dispatch.open == 0
+    assert dispatch.answered("w1", "b")
+    assert dispatch.refused("w0", "a", "no path", now_s=0.0) == []
+    assert dispatch.sickness.sick == {"w0": "no path"}
+    given_out(dispatch)
+    ((lost, reason),) = dispatch.refused("w1", "a", "no path at all", now_s=0.0)
+    assert (lost.key, reason, dispatch.open) == ("a", "no path at all", 0)
+    assert dispatch.sickness.sick == {}
+    assert dispatch.count == TaskCount(given=2, results=1, refused=1)
+
+
+def test_who_refuses_what_is_wanted_no_more_is_late_and_not_sick() -> None:
+    dispatch = begun("a")
+    given_out(dispatch)
+    dispatch.cancel("a")
+    assert dispatch.refused("w0", "a", "Timeout", now_s=0.0) == []
+    assert (dispatch.late, dispatch.sickness.sick, dispatch.sickness.refusals) == (1, {}, {})
+
+
+def test_a_worker_that_is_down_may_yet_take_what_the_others_refused() -> None:
+    dispatch = begun("a")
+    dispatch.worker_down("w1")
+    given_out(dispatch)
+    assert dispatch.refused("w0", "a", "no disk", now_s=0.0) == []
+    assert given_out(dispatch, now_s=1e6) == []
+    dispatch.worker_up("w1")
+    assert given_out(dispatch) == [("w1", "a")]
+
+
+def test_what_nobody_that_is_up_will_do_can_be_given_up_at_a_deadline() -> None:
+    dispatch = begun("a", "b")
+    dispatch.worker_down("w1")
+    given_out(dispatch)
+    dispatch.refused("w0", "a", "no disk", now_s=0.0)
+    assert dispatch.without_takers("b") == []
+    ((lost, reason),) = dispatch.without_takers("a")
+    assert (lost.key, reason) == ("a", "no disk")
+    assert dispatch.count == TaskCount(given=2, refused=1)
+
+
+def test_a_worker_that_never_comes_back_is_waited_for_no_more() -> None:
+    dispatch = begun("a")
+    dispatch.worker_down("w1")
+    given_out(dispatch)
+    dispatch.refused("w0", "a", "no disk", now_s=0.0)
+    ((lost, _),) = dispatch.expect(["w0"])
+    assert (lost.key, dispatch.count.refused) == ("a", 1)
+
+
+def test_a_sick_worker_is_given_nothing_for_a_while_and_then_one_task() -> None:
+    dispatch = begun("a", in_flight=2)
+    given_out(dispatch)
+    dispatch.refused("w0", "a", "no disk", now_s=10.0)
+    for key in "bcdefg":
+        dispatch.submit(task(key))
+    assert {name for name, _ in given_out(dispatch, now_s=10.0 + 0.9 * FIRST_PAUSE_S)} == {"w1"}
+    # Tried again, with one alone.
+    ((tried, key),) = given_out(dispatch, now_s=10.0 + FIRST_PAUSE_S)
+    assert tried == "w0"
+    assert dispatch.answered("w0", key)
+    assert [name for name, _ in given_out(dispatch, now_s=11.0)] == ["w0", "w0"]
+
+
+def test_who_was_not_started_by_this_run_is_given_nothing() -> None:
+    dispatch = begun("a", workers=1)
+    dispatch.worker_down("w0")
+    assert dispatch.worker_up("w9") == []
+    assert dispatch.workers == ()
+    assert given_out(dispatch) == []
+
+
+def test_every_task_left_at_the_end_is_lost() -> None:
+    dispatch = begun("a", "b", "c")
+    given_out(dispatch)
+    dispatch.answered("w0", "a")
+    dispatch.close()
+    assert dispatch.count == TaskCount(given=3, results=1, lost=2)
+    assert not dispatch.answered("w1", "b")
+    assert (dispatch.count.results, dispatch.late) == (1, 1)
 
 
 def test_who_leaves_a_question_unanswered_gets_it_again_once_it_is_known_to_live() -> None:
@@ -149,34 +230,3 @@ def test_a_worker_holds_two_tasks_while_enough_wait_and_no_other_lacks_them_at_t
     assert given_out(dispatch) == []
     dispatch.answered("w0", "e")
     assert given_out(dispatch) == [("w0", "f")]
-
-
-_EVENTS = [f"{what}{number}" for what in ("die", "back", "answer", "silent") for number in "01"]
-
-
-@given(st.lists(st.sampled_from(_EVENTS)), st.sampled_from([1, 2]))
-def test_no_order_of_deaths_loses_or_doubles_a_task(events: list[str], in_flight: int) -> None:
-    dispatch = begun(*"abcdef", in_flight=in_flight)
-    at_work: dict[str, list[str]] = {"w0": [], "w1": []}
-    ended: list[str] = []
-
-    def give() -> None:
-        for worker_id, key in given_out(dispatch):
-            at_work[worker_id].append(key)
-
-    give()
-    ends = ["back0", "back1", *["answer0", "answer1"] * 6]
-    for event in [*events, *ends]:
-        what, worker_id = event[:-1], f"w{event[-1]}"
-        if what == "silent" and at_work[worker_id]:
-            dispatch.unanswered(worker_id, at_work[worker_id].pop())
-        elif what in ("die", "back"):
-            at_work[worker_id] = []
-            call = dispatch.worker_down if what == "die" else dispatch.worker_up
-            ended += [one.task.key for one in call(worker_id)]
-        elif what == "answer" and at_work[worker_id]:
-            key = at_work[worker_id].pop(0)
-            ended += [key] if dispatch.answered(worker_id, key) else []
-        give()
-    assert sorted(ended) == list("abcdef")
-    assert dispatch.open == 0

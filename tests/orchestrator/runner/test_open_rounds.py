@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint
@@ -22,7 +23,7 @@ STATE = VehicleState(
 )  # fmt: skip
 
 
-def order(round_id: int, jobs: int = 2) -> RoundOrder:
+def order(round_id: int, jobs: int = 2, *, deadline_ns: int | None = None) -> RoundOrder:
     return RoundOrder(
         round_id=round_id,
         stamp_ns=round_id * 500_000_000,
@@ -30,6 +31,7 @@ def order(round_id: int, jobs: int = 2) -> RoundOrder:
         world_id="w",
         receipt_mono_ns=1_000_000,
         started_mono_ns=2_000_000,
+        deadline_mono_ns=deadline_ns,
         jobs=tuple(
             Job(
                 round_id=round_id, job_index=index, world_id="w", state=STATE,
@@ -80,13 +82,31 @@ def test_a_round_is_complete_with_its_last_result_in_the_order_of_its_jobs() -> 
     assert not rounds
 
 
+@pytest.mark.parametrize(("at_ns", "late"), [(5_000_000, False), (5_000_001, True)])
+def test_a_round_whose_last_result_comes_after_its_deadline_is_late(at_ns: int, late: bool) -> None:
+    rounds, asked = OpenRounds(), order(0, deadline_ns=5_000_000)
+    rounds.open(asked)
+    rounds.take(answer(asked, 0, at_ns=1))
+    done = rounds.take(answer(asked, 1, at_ns=at_ns))
+    assert isinstance(done, RoundDone)
+    assert done.late is late
+
+
+def test_without_a_deadline_nothing_is_late() -> None:
+    rounds, asked = OpenRounds(), order(0, jobs=1)
+    rounds.open(asked)
+    done = rounds.take(answer(asked, 0, at_ns=10**18))
+    assert isinstance(done, RoundDone)
+    assert not done.late
+
+
 def test_a_round_ends_with_a_job_that_is_given_up() -> None:
     rounds, asked = OpenRounds(), order(0)
     rounds.open(asked)
     rounds.take(answer(asked, 0))
     ended = rounds.take(answer(asked, 1, failure="no path"))
     assert ended == RoundGivenUp(asked)
-    assert (bool(rounds), rounds.given_up) == (False, 1)
+    assert not rounds
 
 
 def test_what_comes_of_a_round_that_was_dropped_completes_nothing() -> None:

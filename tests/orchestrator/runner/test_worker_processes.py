@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.keys import alive_key
 from foretwin.contracts.runner import Task, answers
 from foretwin.contracts.setup import BusSetup, ProcessSetup, WorkerSetup
 from foretwin.contracts.simulation import PrepareRequest
@@ -89,6 +90,32 @@ def test_a_task_without_an_answer_in_time_is_given_up(tmp_path: Path) -> None:
 
 def test_a_task_that_is_refused_is_not_tried_again(tmp_path: Path) -> None:
     assert asked(runner(tmp_path, workers=1), "refuse", "a") == ["no such World", "a"]
+
+
+def test_what_one_worker_refuses_another_does_though_none_other_was_wanted_yet(
+    tmp_path: Path,
+) -> None:
+    workers = runner(tmp_path, workers=2)
+    assert asked(workers, "refuse-w0") == ["refuse-w0"]
+
+
+def test_a_sick_worker_costs_no_task(tmp_path: Path) -> None:
+    questions = [f"refuse-w0-{number}" for number in range(8)]
+    assert asked(runner(tmp_path, workers=2), *questions) == questions
+
+
+def test_a_task_fails_once_every_worker_refused_it(tmp_path: Path) -> None:
+    found = asked(runner(tmp_path, workers=2), "refuse", "a", "refuse-w0-w1", "b")
+    assert found == ["no such World", "a", "no such World", "b"]
+
+
+def test_a_stranger_on_the_bus_is_given_nothing(tmp_path: Path) -> None:
+    workers = runner(tmp_path, workers=1)
+    with workers:
+        assert workers._bus is not None
+        workers._bus.declare_alive(alive_key(run="r1", process="w9"))
+        assert [a.worker_id for a in answers(workers, tasks("a", "b", "c"))] == ["w0"] * 3
+        assert workers.workers == ("w0",)
 
 
 def test_a_worker_that_was_killed_from_outside_is_replaced(tmp_path: Path) -> None:

@@ -1,0 +1,45 @@
+"""What happens again and again is told once."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from foretwin.orchestrator.instructions import Notice
+from foretwin.orchestrator.rounds.news import RoundNews
+from tests.orchestrator.futures_rounds import round_done, straight
+
+ORDER = round_done(straight()).order
+
+
+def test_a_reason_for_giving_up_is_told_once_and_always_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    told: list[Notice] = []
+    news = RoundNews(told.append)
+    with caplog.at_level(logging.WARNING):
+        for reason in ("no path", "no disk", "no path"):
+            news.given_up(ORDER, reason)
+    assert [one.text for one in told] == [
+        "round 0 is given up: no path", "round 0 is given up: no disk",
+    ]  # fmt: skip
+    assert len(caplog.records) == 3
+
+
+def test_reasons_that_are_always_new_are_not_told_for_ever() -> None:
+    told: list[Notice] = []
+    news = RoundNews(told.append)
+    for number in range(1000):
+        news.given_up(ORDER, f"at 0x{number:x}")
+    assert len(told) < 20
+
+
+def test_who_is_sick_is_told_when_it_begins_and_when_it_is_over() -> None:
+    told: list[Notice] = []
+    news = RoundNews(told.append)
+    for sick in ({"w0": "no disk"}, {"w0": "no memory"}, {}, {"w0": "no disk"}):
+        news.health(sick)
+    assert [(one.level, one.text.split(",")[0]) for one in told] == [
+        ("warning", "w0 is sick"), ("info", "w0 is given jobs again"), ("warning", "w0 is sick"),
+    ]  # fmt: skip
