@@ -97,10 +97,19 @@ class SequenceGaps:
         return heard
 
     def _filled(self, known: list[_Numbering], seq: int, sent_ns: int) -> _Numbering | None:
-        """Return the numbering in which this number was missing, and now is not."""
+        """Return the numbering in which this number was missing, and now is not.
+
+        What was sent after all of a numbering, and begins or continues a newer one, is of that.
+        """
         for one in reversed(known):
-            begins_anew = seq <= _BEGINS_BELOW and sent_ns > one.newest_sent_ns
-            if not begins_anew and one.fill(seq):
+            newer = sent_ns > one.newest_sent_ns and (
+                seq <= _BEGINS_BELOW
+                or any(
+                    other.newest_sent_ns > one.newest_sent_ns and 0 <= other.ahead(seq) <= MOST_GAP
+                    for other in known
+                )
+            )
+            if not newer and one.fill(seq):
                 return one
         return None
 
