@@ -247,7 +247,7 @@ def test_rolling_back_twice_reaches_the_file() -> None:
     [
         ("steering_wheel", 1.0, "no parameter of a vehicle"),
         ("name", 1.0, "no parameter of a vehicle"),
-        ("mass_kg", -1.0, "must be more than zero"),
+        ("mass_kg", -1.0, "implausible; it must be"),
         ("understeer_gradient_rad_per_mps2", 0.001, "follows from the stiffnesses"),
     ],
 )
