@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from contextlib import ExitStack
 
@@ -27,6 +28,16 @@ from tests.contracts.bus_sides import (
 from tests.starvation import kept_waiting
 
 W0 = {"run": "r1", "process": "w0"}
+
+
+@pytest.mark.parametrize("router", [True, False])
+def test_nobody_looks_for_others_or_is_found_by_them(router: bool) -> None:
+    """Who is met by scouting speaks past the router, and past what it forbids."""
+    config = zenoh_config(BusSetup(endpoint="tcp/127.0.0.1:1"), router=router)
+
+    for setting in ("multicast/enabled", "gossip/enabled"):
+        assert config.get_json(f"scouting/{setting}") == "false", setting
+    assert bool(json.loads(config.get_json("listen/endpoints"))) is router
 
 
 def test_a_killed_process_is_seen_at_once_and_its_questions_end() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -132,6 +133,27 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
     wall.now_s += 1.1 * ORCHESTRATOR_GRACE_S
     assert not process.step()
     process.finish()
+
+
+def test_what_came_is_in_the_file_and_on_the_disk_a_second_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill, or a power cut, takes along what came in the last second alone."""
+    bus, wall, path = MemoryBus(), Wall(), tmp_path / "drive.mcap"
+    on_the_disk: list[list[str]] = []
+    monkeypatch.setattr(os, "fdatasync", lambda _: on_the_disk.append(channels_in(path)))
+    process = recorder(bus, DriveRecording(path), lossless=False, mono_s=wall)
+    publish_all(bus)
+    assert process.step()
+    assert on_the_disk == []
+    wall.now_s = 1.0
+    assert process.step()
+    assert on_the_disk == [[channel for channel, _ in every_channel()]]
+    process.finish()
+
+
+def channels_in(path: Path) -> list[str]:
+    return [channel for channel, _ in read_drive(path)]
 
 
 def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:

@@ -91,6 +91,42 @@ def test_the_first_command_starts_from_the_measured_angle() -> None:
     assert first.tire_angle_rad == pytest.approx(0.2 - LIMITS.max_tire_rate_radps / 50.0)
 
 
+@pytest.mark.parametrize(
+    ("ago_ns", "admitted"),
+    [(0, True), (DEAD_MAN_NS, True), (DEAD_MAN_NS + 1, False), (-2 * MS, False)],
+)
+def test_a_command_is_as_fresh_as_the_word_must_be(ago_ns: int, admitted: bool) -> None:
+    now = 10 * DEAD_MAN_NS
+    gate = open_gate(now)
+    assert (admit(gate, command(now - ago_ns), now) is not None) is admitted
+    assert gate.state == "open", "a replayed command shuts nothing"
+    assert gate.counts["command too old"] == (not admitted)
+
+
+@pytest.mark.parametrize("measured", [0.51, -0.51, math.nan, math.inf, None])
+def test_no_first_command_from_an_angle_beyond_the_bound_or_unknown(measured: float | None) -> None:
+    gate = open_gate()
+    sent = gate.admit(command(0), now_ns=0, link_up=True, tire_angle_rad=measured)
+    assert sent is None
+    within = gate.admit(command(0), now_ns=0, link_up=True, tire_angle_rad=0.5)
+    assert within is not None
+    assert within.tire_angle_rad == pytest.approx(0.5 - LIMITS.max_tire_rate_radps / 50.0)
+
+
+@pytest.mark.parametrize("wished", [-30.0, 30.0])
+def test_who_asks_for_too_much_for_long_gets_the_bound_and_no_more(wished: float) -> None:
+    """Bounds of change alone let any value through in the end."""
+    gate = open_gate()
+    for tick in range(150):
+        now = tick * 20 * MS
+        gate.heartbeat(now, now_ns=now)
+        sent = admit(gate, command(now, tire=wished, accel=wished, speed=wished), now)
+        assert sent is not None
+    assert sent.accel_mps2 == (-4.0 if wished < 0.0 else 1.5)
+    assert sent.tire_angle_rad == math.copysign(0.5, wished)
+    assert sent.speed_mps == (0.0 if wished < 0.0 else 8.0)
+
+
 @pytest.mark.parametrize("name", LIMITS.__struct_fields__)
 def test_limits_are_positive(name: str) -> None:
     with pytest.raises(ValueError, match=name):
