@@ -71,7 +71,8 @@ class Intake:
         except Refused as refused:
             self.refused += 1
             if refused.header is not None:  # it came: it is not lost as well
-                self.counts.came(key=item.key, channel=item.channel, **refused.header._asdict())
+                numbered = {"sender": item.sender, **refused.header._asdict()}
+                self.counts.came(item.channel, **numbered)
             raise
         message = envelope.message
         if self.first_stamp_ns is None:
@@ -80,8 +81,8 @@ class Intake:
             self.end = message
             return None
         self.counts.take(
-            key=item.key,
-            channel=item.channel,
+            item.channel,
+            sender=item.sender,
             seq=envelope.seq,
             sent_ns=envelope.sent_ns,
             now_ns=time.time_ns(),

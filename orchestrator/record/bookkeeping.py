@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from foretwin.contracts.sequence_gaps import SequenceGaps
+from foretwin.contracts.numbering import Numberings
 from foretwin.contracts.simulation import Comparison, PlanComparison
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
@@ -30,28 +30,28 @@ class TelemetryCount:
     by_channel: dict[str, int] = field(default_factory=lambda: defaultdict(int))
     """Samples that came, each once, those that were refused included."""
     ages_ms: list[float] = field(default_factory=list)
-    gaps: SequenceGaps = field(default_factory=SequenceGaps)
+    numbers: Numberings = field(default_factory=Numberings)
 
     @property
     def lost(self) -> int:
         """Samples that never came."""
-        return self.gaps.lost + self.lost_before
+        return self.numbers.missing.total() + self.lost_before
 
-    def take(self, *, key: str, channel: str, seq: int, sent_ns: int, now_ns: int) -> None:
+    def take(self, channel: str, *, sender: int, seq: int, sent_ns: int, now_ns: int) -> None:
         """Count one sample that was sent and came at these instants of both UTC clocks."""
-        self.came(key=key, channel=channel, seq=seq, sent_ns=sent_ns)
+        self.came(channel, sender=sender, seq=seq, sent_ns=sent_ns)
         self.received += 1
         self.ages_ms.append(max(0.0, (now_ns - sent_ns) / 1e6))
 
-    def came(self, *, key: str, channel: str, seq: int, sent_ns: int) -> None:
+    def came(self, channel: str, *, sender: int, seq: int, sent_ns: int) -> None:
         """Count a sample as not lost, whatever is made of it."""
-        if self.gaps.take(key, seq, sent_ns=sent_ns) != "doubled":
+        if self.numbers.take(channel, seq, sender=sender, sent_ns=sent_ns) is not None:
             self.by_channel[channel] += 1
 
     def settle(self, published: dict[str, int]) -> None:
         """Count what the vehicle says it published and that never came, first samples included."""
         missing = sum(max(0, sent - self.by_channel[name]) for name, sent in published.items())
-        self.lost_before = max(self.lost_before, missing - self.gaps.lost)
+        self.lost_before = max(self.lost_before, missing - self.numbers.missing.total())
 
     def record(self, skipped_invalid: int) -> dict[str, Any]:
         """Return the `telemetry` part of run.json."""

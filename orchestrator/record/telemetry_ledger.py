@@ -19,7 +19,7 @@ def telemetry_ledger(tally: Tally | None, published: Mapping[str, int]) -> dict[
     never came to it.
     """
     tally = tally or Tally()
-    known, missing = tally.settled.published, tally.settled.missing
+    known, missing = tally.numbers.published, tally.numbers.missing
     lost_by = {
         "never_came": sum(
             missing[name] + max(0, published.get(name, 0) - known[name]) for name in _COUNTED

@@ -138,14 +138,14 @@ class RecorderProcess:
             envelope = item.envelope()
         except Refused as refused:
             if refused.header is not None:
-                seq = refused.header.seq
-                self._recording.refuse(item.channel, sender=item.sender, seq=seq)
+                numbered = {"sender": item.sender, **refused.header._asdict()}
+                self._recording.refuse(item.channel, **numbered)
             if text := self._refusals.take(refused):
                 log.warning("%s", text)
             return
         message = envelope.message
         self._stamp_ns = message.stamp_ns
-        numbered = {"sender": item.sender, "seq": envelope.seq}
+        numbered = {"sender": item.sender, "seq": envelope.seq, "sent_ns": envelope.sent_ns}
         self._publish(self._recording.add(item.channel, message, **numbered))
 
     def _take_answer(self, item: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
@@ -15,7 +15,7 @@ import msgspec
 from foretwin.contracts.drive import DriveEnd, VehicleInfo
 from foretwin.contracts.segments import next_number, segment_file
 from foretwin.contracts.simulation import Event
-from foretwin.contracts.tally import Numberings, Tally, read_tally, tally_file, write_tally
+from foretwin.contracts.tally import Tally, read_tally, tally_file, write_tally
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 
 SOURCE = "recorder"
@@ -39,7 +39,7 @@ class OpenPart(Protocol):
 class _ToWrite(NamedTuple):
     channel: str
     message: msgspec.Struct
-    sender: int
+    numbering: str
     seq: int
 
 
@@ -66,8 +66,6 @@ class DriveRecording:
         self._part = next_number(path)
         begun = self._part > 1
         self.tally = (read_tally(tally_file(path)) if begun else None) or Tally()
-        # What came is known at once, what became of it only when it is in the file.
-        self._heard = msgspec.convert(msgspec.to_builtins(self.tally.settled), Numberings)
         self._waiting: deque[_ToWrite] = deque()
         self._given = 0
         """So many of those that wait have been given to the file in progress."""
@@ -82,39 +80,39 @@ class DriveRecording:
     @property
     def missing(self) -> int:
         """Messages that have not come, by their senders' numbers."""
-        return self._heard.missing.total()
+        return self.tally.numbers.missing.total()
 
     def started(self) -> list[Event]:
         """Return what went wrong at the start."""
         return self._pending
 
     def add(
-        self, channel: str, message: msgspec.Struct, *, sender: int = 0, seq: int | None = None
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        *,
+        sender: int = 0,
+        seq: int | None = None,
+        sent_ns: int = 0,
     ) -> list[Event]:
         """Write one message, unless it came before; without a number it is the next one."""
         if seq is None:
-            seq = self._heard.published[channel]
-        if not self._is_new(channel, sender, seq):
+            seq = self.tally.numbers.published[channel]
+        numbering = self.tally.numbers.take(channel, seq, sender=sender, sent_ns=sent_ns)
+        if numbering is None:
             return []
         self._stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if isinstance(message, DriveEnd):
             self._take_end(message, sender)
-        self._waiting.append(_ToWrite(channel, message, sender, seq))
+        self._waiting.append(_ToWrite(channel, message, numbering, seq))
         if len(self._waiting) > MOST_WAITING:
             self._give_up(self._waiting.popleft())
         return self._go_on() if self._writer is None else self._give()
 
-    def refuse(self, channel: str, *, sender: int, seq: int) -> None:
+    def refuse(self, channel: str, *, sender: int, seq: int, sent_ns: int = 0) -> None:
         """Count a message that came and is not taken."""
-        if self._is_new(channel, sender, seq):
-            self.tally.settle("refused", channel, sender, seq)
-
-    def _is_new(self, channel: str, sender: int, seq: int) -> bool:
-        """Take a number; what becomes of it may be settled before that of numbers below it."""
-        new = self._heard.take(channel, sender, seq)
-        if new:
-            self.tally.settled.begin(channel, sender, seq)
-        return new
+        if self.tally.numbers.take(channel, seq, sender=sender, sent_ns=sent_ns) is not None:
+            self.tally.settle("refused", channel)
 
     def set_info(self, info: VehicleInfo) -> list[Event]:
         """Write what is known of the vehicle, into each part."""
@@ -125,7 +123,7 @@ class DriveRecording:
         """Put what has been added so far on the disk; begin another file where one is large."""
         events = self._go_on() if self._writer is None else self._attempt(DriveWriter.flush)
         # Before the disk is waited for: whoever is killed meanwhile has it in the file.
-        write_tally(self.tally, tally_file(self._path))
+        self._write_tally()
         events += self._attempt(DriveWriter.sync)
         if self._writer is not None and self._writer.size_bytes >= self._roll_bytes:
             self._end_part()
@@ -139,14 +137,20 @@ class DriveRecording:
         self._end_part()
         while self._waiting:
             self._give_up(self._waiting.popleft())
-        write_tally(self.tally, tally_file(self._path))
+        self._write_tally()
         return events
+
+    def _write_tally(self) -> None:
+        """Write what is in a file or lost for good; what waits has not come, for who goes on."""
+        waiting: dict[str, list[int]] = defaultdict(list)
+        for one in self._waiting:
+            waiting[one.numbering].append(one.seq)
+        write_tally(self.tally.without(waiting), tally_file(self._path))
 
     def _take_end(self, end: DriveEnd, sender: int) -> None:
         """Count as missing what the vehicle says it sent and that never came."""
         for channel, count in end.published.items():
-            self._heard.reach(channel, sender, count)
-            self.tally.settled.reach(channel, sender, count)
+            self.tally.numbers.reach(channel, count, sender=sender)
 
     def _open(self) -> list[Event]:
         """Begin a part and give it all that waits."""
@@ -194,7 +198,7 @@ class DriveRecording:
 
     def _refuse(self, one: _ToWrite, error: ValueError) -> list[Event]:
         del self._waiting[self._given]
-        if self.tally.settle("refused", one.channel, one.sender, one.seq) > 1:
+        if self.tally.settle("refused", one.channel) > 1:
             return []
         return [self._event("warning", f"not recorded: {error}")]
 
@@ -203,10 +207,10 @@ class DriveRecording:
         while self._writer is not None and self._given > self._writer.held:
             one = self._waiting.popleft()
             self._given -= 1
-            self.tally.settle("recorded", one.channel, one.sender, one.seq)
+            self.tally.settle("recorded", one.channel)
 
     def _give_up(self, one: _ToWrite) -> None:
-        self.tally.settle("unwritten", one.channel, one.sender, one.seq)
+        self.tally.settle("unwritten", one.channel)
 
     def _attempt(self, step: Callable[[DriveWriter], None]) -> list[Event]:
         if self._writer is None:

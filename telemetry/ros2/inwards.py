@@ -10,7 +10,7 @@ import msgspec
 from foretwin.contracts import drive
 from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.guard import Refused, admit
-from foretwin.contracts.sequence_gaps import SequenceGaps
+from foretwin.contracts.numbering import Numberings
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
 from foretwin.telemetry.ros2.mapping import InRow, Mapping
@@ -48,7 +48,7 @@ class Inwards:
         self._antenna_frame: str | None = None
         self.counts: Counter[str] = Counter()
         self.unused: Counter[str] = Counter()
-        self._gaps: dict[str, SequenceGaps] = {}
+        self._numbers = Numberings()
         self.first_stamp_ns: int | None = None
         self.tire_angle_rad: float | None = None
         """The newest measured angle at the tyres."""
@@ -69,7 +69,7 @@ class Inwards:
     @property
     def lost(self) -> Counter[str]:
         """By topic, samples that the sequence numbers of rmw_zenoh say went missing."""
-        return Counter({topic: gaps.lost for topic, gaps in self._gaps.items() if gaps.lost})
+        return +self._numbers.missing
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -130,8 +130,7 @@ class Inwards:
         except ValueError:
             self.unused[f"{topic}: attachment not understood"] += 1
             return
-        seq, sent_ns, gid = attachment
-        self._gaps.setdefault(topic, SequenceGaps()).take(gid, seq, sent_ns=sent_ns)
+        self._numbers.take(topic, attachment.seq, sender=attachment.gid.hex())
 
     def _samples(self, row: InRow, ros: Any, arrived: Arrived) -> Samples:
         if row.type == TF:

@@ -71,7 +71,8 @@ def test_what_is_lost_is_in_the_record_and_in_its_last_lines(house: House) -> No
     tally, published = Tally(), dict(house.conductor.intake.counts.by_channel)
     for channel, count in published.items():
         for seq in range(count):
-            tally.settle("recorded" if seq else "unwritten", channel, 7, seq)
+            tally.numbers.take(channel, seq, sender=7)
+            tally.settle("recorded" if seq else "unwritten", channel)
     write_tally(tally, tally_file(house.plan.recording))
     record = record_of(house)
     ledger = record["ledger"]["telemetry"]

@@ -19,10 +19,10 @@ from foretwin.orchestrator.record.bookkeeping import (
 from tests.orchestrator.futures_rounds import round_done, straight
 
 
-def counted(*seqs: int, key: str = "k") -> TelemetryCount:
+def counted(*seqs: int) -> TelemetryCount:
     count = TelemetryCount()
     for sent_ns, seq in enumerate(seqs):
-        count.take(key=key, channel="gnss", seq=seq, sent_ns=sent_ns, now_ns=sent_ns)
+        count.take("gnss", sender=0, seq=seq, sent_ns=sent_ns, now_ns=sent_ns)
     return count
 
 
@@ -45,7 +45,7 @@ def test_what_arrives_and_what_is_lost_make_up_what_was_sent(arrived: set[int]) 
 def test_each_key_has_its_own_numbering() -> None:
     count = counted(0, 1, 2)
     for seq in (40, 42):
-        count.take(key="other", channel="imu", seq=seq, sent_ns=seq, now_ns=seq)
+        count.take("imu", sender=0, seq=seq, sent_ns=seq, now_ns=seq)
 
     assert count.lost == 1
 
@@ -62,7 +62,7 @@ def test_what_the_vehicle_says_it_sent_settles_the_losses() -> None:
 
 def test_a_sample_that_came_twice_stands_for_no_other() -> None:
     count = counted(0, 1)
-    count.take(key="k", channel="gnss", seq=1, sent_ns=1, now_ns=1)
+    count.take("gnss", sender=0, seq=1, sent_ns=1, now_ns=1)
     count.settle({"gnss": 3})
 
     assert (count.received, count.lost) == (3, 1)
@@ -70,8 +70,8 @@ def test_a_sample_that_came_twice_stands_for_no_other() -> None:
 
 def test_a_sample_that_was_refused_is_not_lost_as_well() -> None:
     count = counted(0)
-    count.came(key="k", channel="gnss", seq=1, sent_ns=1)
-    count.take(key="k", channel="gnss", seq=2, sent_ns=2, now_ns=2)
+    count.came("gnss", sender=0, seq=1, sent_ns=1)
+    count.take("gnss", sender=0, seq=2, sent_ns=2, now_ns=2)
     count.settle({"gnss": 3})
 
     assert (count.received, count.lost) == (2, 0)
@@ -80,7 +80,7 @@ def test_a_sample_that_was_refused_is_not_lost_as_well() -> None:
 def test_ages_are_given_as_percentiles() -> None:
     count = TelemetryCount()
     for age in range(101):
-        count.take(key="k", channel="gnss", seq=age, sent_ns=0, now_ns=age * 1_000_000)
+        count.take("gnss", sender=0, seq=age, sent_ns=0, now_ns=age * 1_000_000)
 
     record = count.record(skipped_invalid=4)
     assert (record["age_ms_p50"], record["age_ms_p95"]) == (50.0, 95.0)

@@ -9,12 +9,12 @@ from foretwin.orchestrator.record.telemetry_ledger import lost_telemetry_line, t
 def tally() -> Tally:
     """Of ten numbers two never came, one could not be written, one fit no file."""
     found = Tally()
-    for seq in (0, 1, 2, 5, 6, 7):
-        found.settle("recorded", "imu", 7, seq)
-    found.settle("unwritten", "imu", 7, 8)
-    found.settle("refused", "imu", 7, 9)
-    found.settle("recorded", "state", 9, 0)
-    found.settle("recorded", "end", 7, 0)
+    for seq in (0, 1, 2, 5, 6, 7, 8, 9):
+        found.numbers.take("imu", seq, sender=7)
+        found.settle({8: "unwritten", 9: "refused"}.get(seq, "recorded"), "imu")
+    for channel, sender in (("state", 9), ("end", 7)):
+        found.numbers.take(channel, 0, sender=sender)
+        found.settle("recorded", channel)
     return found
 
 

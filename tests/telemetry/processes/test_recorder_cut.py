@@ -61,7 +61,7 @@ def test_a_cut_of_the_cars_link_for_a_second_and_a_half_loses_nothing(tmp_path: 
     found = read_tally(tally)
     assert found is not None
     assert {name: found.recorded[name] for name in published} == published
-    assert found.settled.missing.total() == 0
+    assert found.numbers.missing.total() == 0
     samples = Counter(channel for channel, _ in read_drive(tmp_path / "drive.mcap"))
     assert {name: samples[name] for name in published} == published
 

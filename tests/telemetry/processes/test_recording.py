@@ -45,7 +45,7 @@ def recorded(path: Path) -> list[ImuSample]:
 def balances(recording: DriveRecording) -> bool:
     tally = recording.tally
     known = Counter(tally.recorded) + Counter(tally.unwritten) + Counter(tally.refused)
-    return tally.settled.published == known + tally.settled.missing
+    return tally.numbers.published == known + tally.numbers.missing
 
 
 @pytest.mark.parametrize("room", [40, 900, 60_000, 100_000])
@@ -182,8 +182,8 @@ def test_what_a_killed_recorder_had_and_nobody_has_any_more_is_missing(tmp_path:
     end = DriveEnd(stamp_ns=START_NS + 20, published={"imu": 15, "speed": 3})
     again.add("end", end, sender=7, seq=0)
     again.finish()
-    assert again.tally.settled.missing == {"imu": 4, "speed": 3, "end": 0}
-    assert again.tally.settled.published["imu"] == 15
+    assert again.tally.numbers.missing == {"imu": 4, "speed": 3, "end": 0}
+    assert again.tally.numbers.published["imu"] == 15
     assert balances(again)
 
 
