@@ -7,16 +7,13 @@ tire_angle_rad, accel_mps2. `STATE_COLUMNS` names them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 import msgspec
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
-from foretwin.contracts.errors import UserError
-from foretwin.contracts.numbers import FUTURE_NUMBERS, NEUTRAL, out_of_range
-from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.contracts.scenario import Scenario
 
 _POSE = ("x_m", "y_m", "yaw_rad")
 STATE_COLUMNS = (*_POSE, "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2")
@@ -58,39 +55,6 @@ class Future(msgspec.Struct, frozen=True, kw_only=True):
     values: dict[str, float] = {}
     place_rank: int = 0
     place: str = ""
-
-
-def numbers_of(future: Future) -> dict[str, float]:
-    """Return all numbers of a future by name: its own, joined with those that its scenario draws
-    and held within their ranges.
-
-    Raises UserError for a name that the table lacks and for an own value that is out of range.
-    """
-    if unknown := future.numbers.keys() - FUTURE_NUMBERS.keys():
-        raise UserError(
-            f"future {future.name!r} has a number {min(unknown)!r}; known: "
-            f"{', '.join(FUTURE_NUMBERS)}"
-        )
-    for name, value in future.numbers.items():
-        if wrong := out_of_range(name, value, value):
-            raise UserError(f"future {future.name!r}: {name} {wrong}")
-    drawn = future.values if future.scenario_id else {}
-    return dict(NEUTRAL) | {
-        name: row.joined(
-            drawn.get(f"{FAULTS}.{name}", row.neutral), future.numbers.get(name, row.neutral)
-        )
-        for name, row in FUTURE_NUMBERS.items()
-        if name in future.numbers or f"{FAULTS}.{name}" in drawn
-    }
-
-
-def check_futures(futures: Sequence[Future]) -> None:
-    """Raise UserError for two futures of one index, and what `numbers_of` raises."""
-    indices = [future.index for future in futures]
-    if twice := sorted({index for index in indices if indices.count(index) > 1}):
-        raise UserError(f"futures: two of index {twice[0]}; each needs one of its own")
-    for future in futures:
-        numbers_of(future)
 
 
 class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):

@@ -19,6 +19,7 @@ from foretwin.contracts.frames import (
     geo_from_local_yaw,
     local_from_geo,
 )
+from foretwin.contracts.future_numbers import check_futures
 from foretwin.contracts.futures import (
     PATH_BEHIND_M,
     RESULT_STEP_S,
@@ -26,7 +27,6 @@ from foretwin.contracts.futures import (
     FuturesResult,
     Job,
     PathAhead,
-    check_futures,
 )
 from foretwin.contracts.job_identity import job_bytes, vehicle_digest
 from foretwin.contracts.numbers import MAX_HORIZON_S, MAX_SEED, out_of_range

@@ -10,12 +10,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from foretwin.contracts.future_numbers import numbers_of
 from foretwin.contracts.futures import (
     COLLISION_WITH,
     Future,
     FuturesResult,
     Job,
-    numbers_of,
 )
 from foretwin.contracts.job_identity import future_id
 from foretwin.contracts.numbers import FUTURE_NUMBERS

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
-from foretwin.contracts.futures import Future, numbers_of
+from foretwin.contracts.future_numbers import changed_numbers
+from foretwin.contracts.futures import Future
 from foretwin.contracts.numbers import FUTURE_NUMBERS, Quantity
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import PlannerOutput
@@ -77,7 +78,8 @@ class NumberColumns:
 
 def number_columns(futures: Sequence[Future]) -> NumberColumns:
     """Lay the numbers of S futures out; raises ValueError for one that the table lacks."""
-    rows = [numbers_of(future) for future in futures]
-    return NumberColumns(
-        {name: np.array([row[name] for row in rows], dtype=np.float64) for name in FUTURE_NUMBERS}
-    )
+    columns = {name: np.full(len(futures), row.neutral) for name, row in FUTURE_NUMBERS.items()}
+    for place, future in enumerate(futures):
+        for name, value in changed_numbers(future).items():
+            columns[name][place] = value
+    return NumberColumns(columns)

@@ -1,40 +1,8 @@
-"""The numbers of a future: its own, and those that its scenario draws."""
+"""What futures are made of."""
 
 from __future__ import annotations
 
-import pytest
-
-from foretwin.contracts.futures import STATE_COLUMNS, Future, numbers_of
-from foretwin.contracts.numbers import FUTURE_NUMBERS
-
-
-def test_the_nominal_future_has_neutral_numbers() -> None:
-    neutral = {name: row.neutral for name, row in FUTURE_NUMBERS.items()}
-    assert numbers_of(Future(index=0, name="nominal")) == neutral
-
-
-def test_a_number_of_its_own_joins_that_of_its_scenario() -> None:
-    found = numbers_of(
-        Future(
-            index=1,
-            name="slippery",
-            numbers={"friction_factor": 0.5, "steering_offset_rad": 0.1},
-            scenario_id="ice",
-            values={"faults.friction_factor": 0.4, "faults.steering_offset_rad": 0.2},
-        )
-    )
-    assert found["friction_factor"] == 0.5 * 0.4
-    assert found["steering_offset_rad"] == pytest.approx(0.3)
-
-
-def test_what_no_scenario_draws_does_not_count() -> None:
-    future = Future(index=1, name="plain", values={"faults.friction_factor": 0.4})
-    assert numbers_of(future)["friction_factor"] == 1.0
-
-
-def test_an_unknown_number_is_named_with_those_that_are_known() -> None:
-    with pytest.raises(ValueError, match="'grip'; known: target_speed_factor"):
-        numbers_of(Future(index=1, name="x", numbers={"grip": 1.0}))
+from foretwin.contracts.futures import STATE_COLUMNS
 
 
 def test_the_columns_of_a_state() -> None:

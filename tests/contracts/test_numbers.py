@@ -8,7 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foretwin.contracts.futures import Future, numbers_of
+from foretwin.contracts.future_numbers import numbers_of
+from foretwin.contracts.futures import Future
 from foretwin.contracts.numbers import (
     FUTURE_NUMBERS,
     MAX_EXTRA_DELAY_S,

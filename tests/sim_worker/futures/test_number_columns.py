@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from foretwin.contracts import futures, numbers
+from foretwin.contracts import future_numbers, numbers
 from foretwin.contracts.futures import Future
 from foretwin.sim_worker.futures import number_columns as module
 from foretwin.sim_worker.futures.number_columns import number_columns
@@ -45,7 +45,7 @@ def test_a_new_fault_of_a_known_quantity_is_one_row(monkeypatch: pytest.MonkeyPa
             "1", "multiply", "command.accel_mps2", "of what is commanded", numbers.Range(0.0, 1.0)
         )
     }
-    for place in (numbers, futures, module):
+    for place in (numbers, future_numbers, module):
         monkeypatch.setattr(place, "FUTURE_NUMBERS", MappingProxyType(more))
     columns = number_columns([future(0, weak_engine_gain=0.5)])
     accel, _ = columns.spoil(PlannerOutput(np.array([2.0]), np.zeros(1)))
