@@ -29,10 +29,10 @@ def changed_numbers(future: Future) -> dict[str, float]:
         if wrong := out_of_range(name, value, value):
             raise UserError(f"future {future.name!r}: {name} {wrong}")
     theirs = {_FAULT_NUMBERS[key]: drawn[key] for key in drawn.keys() & _FAULT_NUMBERS.keys()}
-    rows = {name: FUTURE_NUMBERS[name] for name in own | theirs}
-    return {
-        name: row.joined(theirs.get(name, row.neutral), own.get(name, row.neutral))
-        for name, row in rows.items()
+    rows = FUTURE_NUMBERS
+    return own | {
+        name: rows[name].joined(value, own.get(name, rows[name].neutral))
+        for name, value in theirs.items()
     }
 
 
