@@ -176,6 +176,8 @@ def _near(
     vehicle: VehicleParameters, states: Array, users: Array, user_size_m: Array, *, tick_s: float
 ) -> tuple[Indices, Indices, Indices]:
     """Return future, tick and user of all pairs whose circles may meet before the next tick."""
+    if not users.size:
+        return (np.zeros(0, dtype=np.intp),) * 3
     radius = np.hypot(user_size_m[..., 0], user_size_m[..., 1]) / 2.0
     reach = radius + math.hypot(vehicle.length_m.value, vehicle.width_m.value) / 2.0
     reach += MAX_CLOSING_MPS * tick_s / 2.0
