@@ -25,6 +25,7 @@ from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
 from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.trace import span
 
 __all__ = [
     "Alive",
@@ -200,7 +201,8 @@ class ZenohBus(ZenohSession):
             publisher = self._publisher(
                 full_key, samples=samples, **self._qos(CHANNELS[channel].qos)
             )
-        publisher.put(self._encoded(full_key, message))
+        with span("publish " + channel):
+            publisher.put(self._encoded(full_key, message))
 
     def subscribe(
         self, channel: str, mailbox: Mailbox, *, recover: bool = False, **ids: str
@@ -247,7 +249,9 @@ class ZenohBus(ZenohSession):
                 finish(None, reason_in(reply.err.payload))
                 return
             try:
-                finish(opened(kept(reply.ok.payload), kind, where=full_key).message, None)
+                with span("decode an answer", bytes=len(reply.ok.payload)):
+                    message = opened(kept(reply.ok.payload), kind, where=full_key).message
+                finish(message, None)
             except Refused as refused:
                 finish(None, str(refused), refused)
 

@@ -17,6 +17,7 @@ import msgspec
 from foretwin.contracts.codec import Envelope, encode, sender_of
 from foretwin.contracts.guard import Refused, opened
 from foretwin.contracts.keys import CHANNELS
+from foretwin.contracts.trace import span
 
 _TURNS = 20
 
@@ -41,7 +42,8 @@ class Received:
         """Return header and message; raises Refused where the guard does not let it in."""
         if self._opened is None:
             most = CHANNELS[self.channel].most_bytes
-            self._opened = opened(self._payload, self._kind, where=self.key, most_bytes=most)
+            with span("decode " + self.channel):
+                self._opened = opened(self._payload, self._kind, where=self.key, most_bytes=most)
         return self._opened
 
     def message(self) -> Any:
@@ -91,7 +93,9 @@ class Request:
 
     def reply(self, message: msgspec.Struct) -> None:
         """Answer."""
-        self._answer(encode(message, sent_ns=time.time_ns()), "")
+        with span("encode an answer"):
+            data = encode(message, sent_ns=time.time_ns())
+        self._answer(data, "")
 
     def refuse(self, reason: str) -> None:
         """Answer that it cannot be done, and why."""

@@ -23,6 +23,7 @@ from typing import TypeVar
 
 import msgspec
 
+from foretwin.contracts import trace
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.errors import UserError
@@ -178,6 +179,8 @@ def run_process(
         parser.exit(2, f"{file}: {problem}\n")
     hold(file)
     log_to_file(setup)
+    if setup.trace_dir is not None:
+        trace.begin(Path(setup.trace_dir), setup.process_id)
     code = 0
     try:
         with ZenohBus(setup.bus) as bus:
@@ -191,6 +194,7 @@ def run_process(
     except Exception:
         logging.getLogger(setup.process_id).exception("ended by an error")
         code = 1
+    trace.end()
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()

@@ -30,6 +30,8 @@ class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     vehicle_id: str
     bus: BusSetup
     log_file: str
+    trace_dir: str | None = None
+    """Where it leaves what it did when; None: nowhere. See foretwin.contracts.trace."""
 
 
 class ReplaySetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

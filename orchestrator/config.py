@@ -112,6 +112,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Others in the mirror besides the car, each with a role of its own."""
     view: View = "auto"
     out: str = "runs"
+    trace: bool = False
+    """Whether all processes leave what they did when, as `trace.json`; docs/trace.md."""
     radius_m: float = 150.0
     service_roads: bool = False
     """Whether driveways and parking aisles make junctions even where no given route uses them."""

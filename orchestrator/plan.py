@@ -9,6 +9,7 @@ from typing import NamedTuple
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.trace import TRACE_PARTS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
 from foretwin.orchestrator.routing.road_index import RoadIndex
@@ -86,6 +87,11 @@ class DrivePlan(DriveInputs):
     def processes_dir(self) -> Path:
         """Where the setups of this run's processes lie."""
         return self.folder / "processes"
+
+    @property
+    def trace_dir(self) -> Path | None:
+        """Where processes leave what they do when, None where nobody asked for it."""
+        return self.folder / TRACE_PARTS if self.config.trace else None
 
     @property
     def recording(self) -> Path:

@@ -24,6 +24,7 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.runner import JobAnswer, JobRequest
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
+from foretwin.contracts.trace import came, since, span
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
@@ -57,6 +58,14 @@ class SimulationCache:
         if world_id in self._stages:
             self._stages.move_to_end(world_id)
             return self._stages[world_id]
+        with span("compile a World", world=world_id):
+            prepared = self._compiled(world_id)
+        self._stages[world_id] = prepared
+        while len(self._stages) > self._setup.kept_worlds:
+            self._stages.popitem(last=False)
+        return prepared
+
+    def _compiled(self, world_id: str) -> _Prepared:
         setup, world = self._setup, load_world(Path(self._setup.worlds_dir), world_id)
         stage = BatchSimulation(
             world,
@@ -65,10 +74,7 @@ class SimulationCache:
             control_hz=setup.control_hz,
             threads=setup.threads,
         )
-        self._stages[world_id] = prepared = _Prepared(stage, SceneMaker(world))
-        while len(self._stages) > setup.kept_worlds:
-            self._stages.popitem(last=False)
-        return prepared
+        return _Prepared(stage, SceneMaker(world))
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Change the parameters of the vehicle on every stage; Worlds stay compiled."""
@@ -102,6 +108,11 @@ class FuturesWorker:
 
     def handle(self, request: Request) -> None:
         """Answer one question; never raises: what cannot be answered is refused in one line."""
+        since("in the queue", request.received_mono_ns, channel=request.channel)
+        with span(request.channel):
+            self._handle(request)
+
+    def _handle(self, request: Request) -> None:
         try:
             answer = self.answer(request.channel, request.message())
         except Refused as refused:
@@ -138,7 +149,9 @@ class FuturesWorker:
 
     def _job(self, question: msgspec.Struct) -> JobAnswer:
         assert isinstance(question, JobRequest)
-        job = question.decoded()
+        came("job", question.sha256)
+        with span("decode a job"):
+            job = question.decoded()
         if job.vehicle_version != self._version:
             raise ValueError(
                 f"job for version {job.vehicle_version} of the vehicle's parameters at a "

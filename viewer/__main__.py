@@ -20,6 +20,7 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.segments import next_number, segment_file, segments_of
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
+from foretwin.contracts.trace import span, traced
 from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.live_viewer import (
     HOST,
@@ -106,7 +107,8 @@ class Recorder:
     def _take(self, item: object) -> bool:
         if isinstance(item, Received):
             try:
-                rows = self._monitor.handle(item.channel, item.message())
+                with span(item.channel):
+                    rows = self._monitor.handle(item.channel, item.message())
             except Refused as refused:
                 text = self._refusals.take(refused)
                 rows = self._monitor.note("error", text) if text else []
@@ -134,6 +136,7 @@ class Recorder:
                 _log.info("the live view missed %d rows; the file has them", self._live.dropped)
             self._live_viewer.end(keep_window)
 
+    @traced("write rows")
     def _write(self, rows: list[Row]) -> None:
         self._file.write(rows)
         if self._live is not None:

@@ -16,6 +16,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
@@ -64,6 +65,7 @@ class OpenWindows:
         self._last_ns: int | None = None
         self.judged: list[Judged] = []
 
+    @traced("agreement: take a state")
     def take(self, said: LatestReports, state: VehicleState) -> None:
         """Take where the car is, and what it newly saw and heard."""
         if self._states and state.stamp_ns < self._states[-1].stamp_ns - _SPARE_NS:
@@ -85,6 +87,7 @@ class OpenWindows:
             self._settle(self._waiting.popleft())
         self._forget(state.stamp_ns)
 
+    @traced("agreement: take a round")
     def take_round(self, done: RoundDone, path: PathAhead, world: World) -> None:
         """Take a round's nominal future, the first of its first job."""
         result = done.results[0]

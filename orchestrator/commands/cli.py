@@ -98,6 +98,9 @@ def drive(
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
+    trace: Annotated[
+        bool, typer.Option("--trace", help="what each process does when, as RUN/trace.json")
+    ] = False,
     ros2: Annotated[
         str | None, typer.Option(help="mapping of the live car's ROS 2 topics, TOML, or autoware")
     ] = None,
@@ -112,6 +115,7 @@ def drive(
     settings = locals()  # named as the fields of DriveConfig, but for two
     settings["map"] = settings.pop("map_file")
     settings["towards_vehicle"] = towards_vehicle or None
+    settings["trace"] = trace or None
     from foretwin.orchestrator.config import load_config
     from foretwin.orchestrator.drive.drive import drive as run_drive
 

@@ -18,6 +18,7 @@ from foretwin.contracts.drive import (
     VehicleStatus,
 )
 from foretwin.contracts.guard import Refused
+from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
 from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
@@ -61,6 +62,7 @@ class Intake:
         """Turn steering wheels into tyres with these parameters from now on."""
         self._vehicle = vehicle
 
+    @traced("take a sample")
     def take(self, item: Received) -> VehicleState | None:
         """Take one sample; returns the new state where it gives one.
 

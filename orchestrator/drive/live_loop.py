@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.contracts.trace import item_name, span
 from foretwin.orchestrator.drive.conductor import Conductor
 
 HOUSEKEEPING_S = 0.1
@@ -51,14 +52,16 @@ class LiveLoop:
             conductor.make_changes()
             now_s = time.monotonic()
             if now_s >= next_housekeeping_s:
-                self.housekeeping(now_s)
+                with span("housekeeping"):
+                    self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             seen = conductor.intake.states
             wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
             item = conductor.mailbox.take(max(0.0, wake_s - now_s))
             now_s = time.monotonic()
             if item is not None:
-                conductor.handle(item)
+                with span(item_name(item)):
+                    conductor.handle(item)
                 now_s = time.monotonic()
             else:
                 conductor.watch_telemetry(round(now_s * 1e9))
@@ -108,7 +111,8 @@ class LiveLoop:
         if rounds.open:
             rounds.tally.missed += 1
         elif age_s * speed <= STALE_AFTER_S:
-            conductor.start_round()
+            with span("start a round"):
+                conductor.start_round()
         elif self._telemetry_waits():
             rounds.tally.missed += 1  # we are behind
         else:

@@ -15,6 +15,7 @@ from foretwin.contracts.bus import Received, Reply
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import AdvanceReply, AdvanceRequest
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.contracts.trace import item_name, span
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.live_loop import is_telemetry
 
@@ -54,8 +55,9 @@ class LockStepLoop:
                 return False
             advanced = self._advanced
             assert advanced is not None
-            for sample in self._in_order():
-                conductor.handle(sample)
+            with span("samples of a step"):
+                for sample in self._in_order():
+                    conductor.handle(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
             conductor.announce_world()
             self._wait("the mirror", lambda: not conductor.questions.unanswered)
@@ -142,7 +144,8 @@ class LockStepLoop:
                 else:
                     self._vehicle_failed = item.error
             else:
-                conductor.handle(item)
+                with span(item_name(item)):
+                    conductor.handle(item)
 
     def _in_order(self) -> list[Received]:
         """Return the samples laid aside by stamp, then channel, then number."""

@@ -52,6 +52,7 @@ def _base(plan: DrivePlan, process_id: str) -> dict[str, Any]:
         "vehicle_id": plan.config.vehicle_id,
         "bus": plan.bus,
         "log_file": str(plan.folder / "log.jsonl"),
+        "trace_dir": None if plan.trace_dir is None else str(plan.trace_dir),
     }
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.process import is_held
 from foretwin.orchestrator.record.derive import derive, streams_in
@@ -88,6 +89,8 @@ def recover(run: Path) -> Recovery:
             for stream in streams:
                 stream.unlink()
             fold_stderr(run / PROCESSES, run / LOG)
+            if (run / trace.TRACE_PARTS).is_dir():
+                trace.joined(run / trace.TRACE_PARTS, run / trace.TRACE)
         except OSError as error:
             raise UserError(f"{run}: cannot be recovered: {one_line(error)}") from error
     return Recovery(str(record["exit"]), parts, healthy=False)

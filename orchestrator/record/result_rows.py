@@ -8,6 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.simulation import PlanComparison
+from foretwin.contracts.trace import traced
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import PLAN
 from foretwin.orchestrator.runner.open_rounds import RoundDone
@@ -34,6 +35,7 @@ class FutureRows(NamedTuple):
     distinct: int
 
 
+@traced("rows of a round")
 def round_futures(done: RoundDone, *, vehicle: str = "") -> FutureRows:
     """Return the futures of a round as rows, each with its difference from the nominal one."""
     joined = RoundFutures(

@@ -23,6 +23,7 @@ from foretwin.contracts.simulation import (
     MirrorSample,
     PlanComparison,
 )
+from foretwin.contracts.trace import span, traced
 from foretwin.contracts.tuning import ParameterChange, ParameterEstimate
 from foretwin.orchestrator.record.columns import columns, columns_of, schema
 from foretwin.orchestrator.record.derive import derive, streams_in
@@ -132,6 +133,7 @@ class ResultTables:
         """Rows that are lost, whatever the reason."""
         return self._dropped + self._streams.lost.total()
 
+    @traced("rows to a table")
     def add(self, table: str, rows: Rows) -> None:
         """Hand over rows for one table of TABLES; what does not fit the queue is counted."""
         try:
@@ -194,7 +196,8 @@ class ResultTables:
             if over or _now_s() >= write_s:
                 # At the end it is the Parquet files that are synced.
                 sync, before = not over and _now_s() >= sync_s, streams.failing
-                streams.write(sync=sync)
+                with span("write tables", sync=sync):
+                    streams.write(sync=sync)
                 self._tell(before, streams.failing)
                 write_s = _now_s() + WRITE_S
                 sync_s = _now_s() + SYNC_S - WRITE_S if sync else sync_s

@@ -16,6 +16,7 @@ from foretwin.contracts.frames import (
     target_from_source,
 )
 from foretwin.contracts.simulation import HORIZONS_S, Comparison
+from foretwin.contracts.trace import traced
 from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
@@ -88,6 +89,7 @@ class OpenComparisons:
             done += self._compare(*self._waiting.popleft())
         return done
 
+    @traced("compare a round")
     def _compare(self, nominal: NominalTrack, order: RoundOrder) -> list[Comparison]:
         # The same stretch whenever this is called: unwrapping angles from another start would
         # change their last digits, and a cut log the results before the cut.

@@ -20,6 +20,7 @@ from foretwin.contracts.futures import (
 )
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
@@ -84,6 +85,7 @@ class RoundPlanner:
         for scenario in self._scenarios:
             cases_of(scenario, self._config.seed)
 
+    @traced("plan jobs")
     def plan(
         self,
         round_id: int,

@@ -12,6 +12,7 @@ from foretwin.contracts.bus import Reply
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState
 from foretwin.contracts.runner import Answer
 from foretwin.contracts.simulation import Comparison
+from foretwin.contracts.trace import since, traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
@@ -212,6 +213,7 @@ class RoundRunner:
         if _took_s(order) >= GIVEN_UP_AFTER_S:
             self._take_time(pace, math.inf)
 
+    @traced("comparisons due")
     def take_state(self, state: VehicleState) -> None:
         """Add where the car is: comparisons fall due."""
         for comparison in self._open_comparisons.take_state(state):
@@ -224,8 +226,10 @@ class RoundRunner:
         rows = [judged_row(o, start_stamp_ns=self.start_stamp_ns) for o in self.windows.finish()]
         self._tables.add("agreement", rows)
 
+    @traced("take a round apart")
     def _take_apart(self, done: RoundDone) -> None:
         order = done.order
+        since("round", order.receipt_mono_ns, id=order.round_id, futures=len(order.futures))
         seed = self._seeds.pop(order.round_id)
         for expired in [r for r in self._seeds if r < order.round_id]:
             del self._seeds[expired]

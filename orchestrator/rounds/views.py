@@ -10,6 +10,7 @@ from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.frames import LocalFrame, target_from_source
 from foretwin.contracts.futures import COLLISION_WITH
 from foretwin.contracts.simulation import RoundView
+from foretwin.contracts.trace import traced
 from foretwin.orchestrator.record.result_rows import RoundFutures
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
@@ -21,6 +22,7 @@ _SHOWN_FROM = 0.3
 _ROAD_USER = COLLISION_WITH.index("road_user")
 
 
+@traced("view of a round")
 def round_view(
     done: RoundDone,
     futures: RoundFutures,

@@ -8,6 +8,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, target_from_source_m
 from foretwin.contracts.futures import PATH_BEHIND_M, PathAhead
+from foretwin.contracts.trace import traced
 from foretwin.contracts.world import World
 from foretwin.orchestrator.routing.arrival import Arrival, DrivingPace, predict_arrivals
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
@@ -67,6 +68,7 @@ class WayAhead:
         """Learn from a state how the car is driven."""
         self._cruise.update(state.stamp_ns, state.speed_mps)
 
+    @traced("locate on the map")
     def locate(self, state: VehicleState) -> tuple[PassedJunction, ...] | None:
         """Find the car on the map; returns the junctions just passed, None off the map."""
         lat, lon = state.position.lat_deg, state.position.lon_deg
@@ -84,6 +86,7 @@ class WayAhead:
         )
         return self._progress.passed
 
+    @traced("road line")
     def road_line(self, state: VehicleState) -> RoadLine | None:
         """Return the line that a state just located drives along, None where it is in doubt."""
         if self._match is None or self._progress is None or not state.yaw_valid:
@@ -133,6 +136,7 @@ class WayAhead:
         """Stretches driven where the map says that cars may not."""
         return self._matcher.off_road_stretches
 
+    @traced("path of a round")
     def path(self, world: World, *, speed_mps: float, horizon_s: float) -> PathAhead | None:
         """Return the way ahead in a World's frame; None where the road ends within a few metres.
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from foretwin.contracts.bus import Bus, Mailbox, Reply
 from foretwin.contracts.runner import Answer, Task
+from foretwin.contracts.trace import sent, traced
 from foretwin.orchestrator.runner.dispatch import Dispatch, GivenUp
 
 NO_ANSWER = "no answer"
@@ -82,6 +83,7 @@ class BusDispatcher:
         self._allowed.clear()
         self.dispatch.close()
 
+    @traced("give jobs out")
     def give_out(self) -> None:
         """Send waiting tasks to free workers; call it often."""
         now_s = time.monotonic()
@@ -90,6 +92,7 @@ class BusDispatcher:
                 del self._silent_since_s[worker_id]
                 self.dispatch.trust(worker_id)
         for worker_id, task in self.dispatch.assignments(now_s=now_s):
+            sent(task.channel, task.key)
             until_s, _ = self._allowed.get(task.key, (now_s + _FOR_EVER_S, 0.0))
             self._bus.request(
                 task.channel,

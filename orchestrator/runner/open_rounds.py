@@ -10,6 +10,7 @@ import numpy as np
 from foretwin.contracts.futures import Future, FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.runner import Answer, Task, job_task
+from foretwin.contracts.trace import traced
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +31,7 @@ class RoundOrder:
     recorded: tuple[JobBytes, ...] = field(init=False)
     """The jobs as they are recorded."""
 
+    @traced("jobs to bytes")
     def __post_init__(self) -> None:
         """Put the jobs into bytes: what is known of them is known by their hash."""
         object.__setattr__(self, "recorded", tuple(job_bytes(job) for job in self.jobs))

@@ -15,6 +15,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import TuningSetup
+from foretwin.contracts.trace import item_name, span
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
 from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
 
@@ -187,7 +188,8 @@ def _take(
         item = mailbox.take(0.0 if taken else timeout_s)
         if item is None:
             return
-        worker.handle(item)
+        with span(item_name(item)):
+            worker.handle(item)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from foretwin.contracts.futures import (
     RoadUserTracks,
     Trajectory,
 )
+from foretwin.contracts.trace import span
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.accident import (
@@ -125,18 +126,22 @@ def _play(
     ticks: int,
     every: int,
 ) -> _Played:
-    scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s, staged=staged)
-    with np.errstate(over="ignore", invalid="ignore"):
+    with span("cast"):
+        scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s, staged=staged)
+    with span("step", ticks=ticks), np.errstate(over="ignore", invalid="ignore"):
         record = drive(scene, stage, ticks=ticks)
         states = record.states[:, ::every].astype(np.float32)
     sizes = _sizes(scene)
-    hits = find_collisions(stage.vehicle, record, sizes, tick_s=stage.control_dt_s)
+    with span("collisions"):
+        hits = find_collisions(stage.vehicle, record, sizes, tick_s=stage.control_dt_s)
     last = hits.last_instants(states.shape[1], step_s=job.step_s, after_steps=OVERLAP_STEPS)
-    measured = measure(
-        job, scene, record, sizes, last, vehicle=stage.vehicle, every=every, scenes=maker
-    )
+    with span("metrics"):
+        measured = measure(
+            job, scene, record, sizes, last, vehicle=stage.vehicle, every=every, scenes=maker
+        )
     outcome = judge(record, hits, measured)
-    ran_on = _accidents(job, scene, stage, hits) if job.accidents else None
+    with span("accidents"):
+        ran_on = _accidents(job, scene, stage, hits) if job.accidents else None
     motion = ran_on if job.accident_motion else None
     states = with_collisions(states, hits, motion, step_s=job.step_s)
     accidents = () if ran_on is None else _accident_messages(ran_on)

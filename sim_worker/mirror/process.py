@@ -16,6 +16,7 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.roles import OtherVehicles, UseRoles
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import ActiveWorld
+from foretwin.contracts.trace import span
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.sim_worker.mirror.mirror import Mirror
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS
@@ -146,4 +147,5 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
 
 def _take(worker: MirrorWorker, item: object) -> None:
     if isinstance(item, Received | Request):
-        worker.handle(item)
+        with span(item.channel):
+            worker.handle(item)

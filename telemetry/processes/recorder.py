@@ -22,6 +22,7 @@ from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
+from foretwin.contracts.trace import traced
 from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.ros_messages.parts import typestore
 
@@ -133,6 +134,7 @@ class RecorderProcess:
         if item is not None:
             self._write(item)
 
+    @traced("write")
     def _write(self, item: Received) -> None:
         try:
             envelope = item.envelope()

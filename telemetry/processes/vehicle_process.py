@@ -17,6 +17,7 @@ from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.trace import traced
 
 _TICK_S = 0.005
 """Between two looks at the clock: what a sample may be late."""
@@ -132,6 +133,7 @@ class VehicleProcess:
                 self._publish_until(until_ns)
                 item.reply(AdvanceReply(published=self.published, ended=self._end_sent))
 
+    @traced("samples that are due")
     def _publish_until(self, until_stamp_ns: int) -> None:
         for channel, message in self._source.advance(until_stamp_ns):
             self._bus.publish(channel, message, vehicle=self._vehicle_id)

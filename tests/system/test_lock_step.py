@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -28,7 +29,7 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> Drives:
     one, two = (
         foretwin(
             folder / f"runs{workers}", *SMALL, "--end", "9", "--workers", str(workers),
-            "--tuning", "report",
+            "--tuning", "report", *(["--trace"] if workers == 2 else []),
         )
         for workers in (1, 2)
     )  # fmt: skip
@@ -45,6 +46,31 @@ def test_one_worker_and_two_give_the_same_results(drives: Drives) -> None:
         assert drives[0].rows(table) == drives[1].rows(table)
     assert one["tuning"] == two["tuning"]
     assert one["tuning"]["gap"]["samples"] >= 6
+
+
+def test_a_trace_has_all_processes_and_each_step_of_a_round(drives: Drives) -> None:
+    plain, traced = (run.run for run in drives)
+    assert plain is not None
+    assert traced is not None
+    events = json.loads((traced / "trace.json").read_bytes())["traceEvents"]
+    names = {e["pid"]: e["args"]["name"] for e in events if e["name"] == "process_name"}
+    assert sorted(names.values()) == [
+        "builder", "mirror", "orchestrator", "recorder", "tuning", "vehicle", "viewer", "w0", "w1",
+    ]  # fmt: skip
+    spans = {(names[e["pid"]].rstrip("01"), e["name"]) for e in events if e["ph"] == "X"}
+    assert spans >= {
+        ("vehicle", "samples that are due"), ("orchestrator", "take a sample"),
+        ("orchestrator", "path of a round"), ("orchestrator", "plan jobs"),
+        ("orchestrator", "give jobs out"), ("w", "decode a job"), ("w", "cast"), ("w", "step"),
+        ("w", "metrics"), ("w", "encode an answer"), ("orchestrator", "decode an answer"),
+        ("orchestrator", "rows of a round"), ("orchestrator", "publish round"),
+        ("orchestrator", "compare a round"), ("orchestrator", "write tables"),
+        ("viewer", "round"), ("recorder", "write"), ("mirror", "state"), ("tuning", "tune"),
+    }  # fmt: skip
+    rounds = [e for e in events if e["ph"] == "b" and e["name"] == "round"]
+    assert len(rounds) == drives[1].record()["futures"]["rounds"]
+    assert not (plain / "trace.json").exists()
+    assert not (traced / "trace").exists()
 
 
 def test_a_shifted_plan_is_reported_by_its_shift(drives: Drives, tmp_path: Path) -> None:

@@ -147,6 +147,18 @@ def test_a_record_that_is_torn_is_written_anew(tmp_path: Path) -> None:
     assert record["futures"]["rounds"] == 3
 
 
+def test_what_the_trace_has_is_joined(tmp_path: Path) -> None:
+    run = killed_run(tmp_path / "run")
+    (run / "trace").mkdir()
+    (run / "trace" / "w0-7.trace").write_bytes(b'{"ph":"X","name":"job"}\n{"ph":"X","na')
+    recover(run)
+
+    assert json.loads((run / "trace.json").read_bytes())["traceEvents"] == [
+        {"ph": "X", "name": "job"}
+    ]
+    assert not (run / "trace").exists()
+
+
 def test_a_run_that_goes_on_is_left_alone(tmp_path: Path) -> None:
     run = killed_run(tmp_path / "run")
     with run_lock(run), pytest.raises(UserError, match="the drive still runs"):
