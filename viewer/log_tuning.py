@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import get_args
 
 import rerun as rr
@@ -20,6 +21,8 @@ from foretwin.viewer.log_roles import REAL, TWIN
 from foretwin.viewer.meshes import Colour
 from foretwin.viewer.rows import Row, document, plain_text, static, table_cell
 
+_SHOWN_VERDICTS = 20
+"""The newest; all are in the run's table."""
 GAPS = {"across_m": 1.0, "along_m": 1.0, "yaw_deg": math.degrees(1.0)}
 _FIELDS = {"across_m": "across_m", "along_m": "along_m", "yaw_deg": "yaw_rad"}
 MANOEUVRE_COLOURS: dict[Manoeuvre, Colour] = {
@@ -67,7 +70,7 @@ class TuningLog:
     """Turns findings into rows; keeps the verdicts of the drive for their text."""
 
     def __init__(self) -> None:
-        self._verdicts: list[str] = []
+        self._verdicts: deque[str] = deque(maxlen=_SHOWN_VERDICTS)
         self._estimates: dict[str, ParameterEstimate] = {}
 
     def opening(self) -> list[Row]:
@@ -107,7 +110,7 @@ class TuningLog:
             f"{one.expected:.4g}. {plain_text(one.text)}"
             for one in verdict.evidence
         ]
-        self._verdicts.insert(0, "\n".join(lines))
+        self._verdicts.appendleft("\n".join(lines))
         return [Row("reality/verdict", drive_ns, document("\n\n".join(self._verdicts)))]
 
     def identification(self, told: Identification, drive_ns: int) -> list[Row]:

@@ -27,6 +27,9 @@ from foretwin.orchestrator.record.bookkeeping import TelemetryCount
 from foretwin.telemetry.estimator.estimator import StateEstimator, estimator_of
 from foretwin.telemetry.estimator.map_aid import RoadLine
 
+MOST_SIGNALS = 1000
+"""Signal groups whose state is kept."""
+
 
 class Intake:
     """Takes samples one by one; the estimator behind it is pure."""
@@ -96,7 +99,7 @@ class Intake:
         elif isinstance(message, RoadUsers):
             self.road_users = message
         elif isinstance(message, SignalState):
-            self.signals[message.group_id] = message
+            self._take_signal(message)
         if self._estimator is None:
             return None
         received_ns = self._drive_ns(item.received_mono_ns)
@@ -106,6 +109,12 @@ class Intake:
             self.latest = LatestState(state, item.received_mono_ns)
             self.states += 1
         return state
+
+    def _take_signal(self, signal: SignalState) -> None:
+        """Keep the newest of its group; of too many groups the one silent for longest goes."""
+        self.signals[signal.group_id] = signal
+        if len(self.signals) > MOST_SIGNALS:
+            del self.signals[min(self.signals, key=lambda name: self.signals[name].stamp_ns)]
 
     def take_line(self, line: RoadLine) -> None:
         """Take the line of the map along which the latest state drives."""

@@ -38,10 +38,12 @@ class MirrorHandler:
         if sample.touches:
             touches = [at | {"one": one, "other": other} for one, other in sample.touches]
             self.tables.add("touches", touches)
+        lately = sample.stamp_ns - _APART_NS
+        self._touched_ns = {pair: ns for pair, ns in self._touched_ns.items() if ns >= lately}
         for pair in sample.touches:
-            last_ns = self._touched_ns.get(pair)
+            apart = pair not in self._touched_ns
             self._touched_ns[pair] = sample.stamp_ns
-            if last_ns is None or sample.stamp_ns - last_ns > _APART_NS:
+            if apart:
                 self.touches += 1
                 one, other = ("what stands" if name == "world" else name for name in pair)
                 self.tell(Notice("warning", f"in the mirror, {one} and {other} touch"))

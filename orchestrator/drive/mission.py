@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.running import FirstOf
 from foretwin.contracts.world import World
-from foretwin.orchestrator.drive.visits import Moment, VisitBook
+from foretwin.orchestrator.drive.visits import Moment, Visit, VisitBook
 from foretwin.orchestrator.instructions import (
     BuildWorld,
     Instruction,
@@ -119,13 +120,11 @@ class Mission:
 
     def on_world_failed(self, junction_id: str) -> None:
         """A junction's World cannot be built; the drive goes on without it."""
-        self._visits.latest(junction_id).failed = True
+        self._visits.fail(junction_id)
 
     def on_round(self, junction_id: str, *, futures: int) -> None:
         """A round for a junction is complete."""
-        visit = self._visits.latest(junction_id)
-        visit.rounds += 1
-        visit.futures += futures
+        self._visits.count_round(junction_id, futures=futures)
 
     # What goes out.
 
@@ -192,9 +191,10 @@ class Mission:
             off_lanes_m=self._way.off_lanes_m,
         )
 
-    def records(self, *, mono_s: float) -> list[dict[str, Any]]:
-        """Return the `intersections` of run.json: those that the car reached, in order."""
-        return [visit.record(mono_s=mono_s) for visit in self._visits.arrived]
+    @property
+    def arrived(self) -> FirstOf[Visit]:
+        """The intersections that the car reached, in order."""
+        return self._visits.arrived
 
     @property
     def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:

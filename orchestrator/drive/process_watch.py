@@ -42,11 +42,11 @@ class ProcessWatch:
                 after = f" in {death.pause_s:g} s" if death.pause_s else ""
                 conductor.tell(Notice("warning", f"{text}; started again{after}"))
                 if death.process_id == VIEWER:
-                    self.troubles.append(f"{text}: what it did not show is missing in monitor.rrd")
+                    self._missing(f"{text}: what it did not show is missing in monitor.rrd")
                 continue
             self.given_up.add(death.process_id)
             conductor.rounds.never_again(death.process_id)
-            self.troubles.append(f"{text} and was not started again")
+            self._missing(f"{text} and was not started again")
             if death.row.when_dead == "end_drive":
                 conductor.tell(Notice("error", text))
                 self.vehicle_lost = True
@@ -55,6 +55,10 @@ class ProcessWatch:
         for text in conductor.tables.take_news():
             conductor.tell(Notice("warning", text))
         self._end_the_hung(conductor, now_s)
+
+    def _missing(self, text: str) -> None:
+        if text not in self.troubles:
+            self.troubles.append(text)
 
     def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
         """Kill processes that were alive, run still, and have not answered for a while."""

@@ -44,7 +44,7 @@ def run_record(
         independent = plan.commands_recorded
     return {
         **_known_at_start(plan, exit_word),
-        "intersections": mission.records(mono_s=mono_s),
+        "intersections": [visit.record(mono_s=mono_s) for visit in mission.arrived],
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
         "tuning": conductor.tuning.record(),
@@ -91,6 +91,13 @@ def run_record(
             }
             for stretch in mission.off_road_stretches
         ],
+        "left_out": {
+            "intersections": mission.arrived.left_out,
+            "changes": conductor.changes.made.left_out,
+            "parameter_changes": conductor.tuning.parameters.made.left_out,
+            "verdicts": conductor.tuning.findings.left_out,
+            **conductor.ads.left_out,
+        },
         "drive_time_s": round(mission.drive_time_s, 3),
         "wall_s": round(wall_s, 3),
     }

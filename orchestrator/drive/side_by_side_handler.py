@@ -9,6 +9,7 @@ import msgspec
 
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState, VehicleStatus
 from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.side_by_side import Disagreement, DisagreementKind, DrivenSegment
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.intake import Intake
@@ -26,8 +27,6 @@ WORDS: dict[DisagreementKind, str] = {
     "ads_faster": "the ADS would have been faster",
     "ads_slower": "the ADS would have been slower",
 }
-MOST_LISTED = 1000
-"""Disagreements in run.json; all are in the table."""
 
 
 class SideBySideHandler:
@@ -41,7 +40,8 @@ class SideBySideHandler:
         )
         self._plan: PlannedTrajectory | None = None
         self._status: VehicleStatus | None = None
-        self._found: list[Disagreement] = []
+        self._found: FirstOf[Disagreement] = FirstOf(MOST_LISTED)
+        self._ended: FirstOf[DrivenSegment] = FirstOf(MOST_LISTED)
 
     def take(self, state: VehicleState | None) -> None:
         """Take what the intake newly holds, and the state where there is a new one."""
@@ -56,33 +56,31 @@ class SideBySideHandler:
             self._keep(self._watch.take_state(state))
 
     def finish(self) -> None:
-        """End what lasts at the drive's end, and write the segments."""
+        """End what lasts at the drive's end."""
         self._keep(self._watch.finish())
-        self._context.tables.add(
-            "driven_segments", [msgspec.to_builtins(s) for s in self._segments]
-        )
 
     def record(self) -> dict[str, Any] | None:
         """Return the `side_by_side` part of run.json, None where the car sent no plans."""
-        segments = self._segments
+        segments = [*self._ended, *self._watch.open_segments]
         if not any(segment.plans or segment.too_short for segment in segments):
             return None
         return {
             "segments": [msgspec.to_builtins(segment) for segment in segments],
             "disagreements": [
                 {"drive_time_s": self._drive_s(one.stamp_ns), **disagreement_row(one)}
-                for one in self._found[:MOST_LISTED]
+                for one in self._found
             ],
         }
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """How many are in the tables and not in the record."""
+        return {"segments": self._ended.left_out, "disagreements": self._found.left_out}
 
     def _place(self) -> DrivePlace:
         latest = self._intake.latest
         position = GeoPoint(math.nan, math.nan) if latest is None else latest.state.position
         return DrivePlace(position, self._mission.junction_id, self._mission.route_m)
-
-    @property
-    def _segments(self) -> list[DrivenSegment]:
-        return self._watch.segments
 
     def _drive_s(self, stamp_ns: int) -> float:
         return round((stamp_ns - self._intake.start_stamp_ns) / 1e9, 2)
@@ -95,6 +93,9 @@ class SideBySideHandler:
                 continue
             self._found.append(one)
             self._context.tables.add("disagreements", [disagreement_row(one)])
+        if ended := self._watch.take_ended():
+            self._ended.extend(ended)
+            self._context.tables.add("driven_segments", [msgspec.to_builtins(s) for s in ended])
 
 
 def disagreement_text(one: Disagreement) -> str:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.columns import row_of
 from foretwin.world_gen.junctions.intersections import Junction
+
+MOST_JUNCTIONS, SEEN_LATELY_S = 64, 120.0
+"""So many junctions, and all that were seen so lately, keep their Worlds."""
 
 
 class Moment(NamedTuple):
@@ -31,6 +36,8 @@ class Visit:
     arrived: Moment | None = None
     rounds: int = 0
     futures: int = 0
+    seen_s: float = 0.0
+    """Drive time when the junction was last ahead."""
 
     def record(self, *, mono_s: float) -> dict[str, Any]:
         """Return the entry of run.json; a World that never came is late by all the time since."""
@@ -52,8 +59,9 @@ class VisitBook:
     """All visits of a drive; a junction passed twice has two, the later one counts."""
 
     def __init__(self) -> None:
-        self._latest: dict[str, Visit] = {}
-        self.arrived: list[Visit] = []
+        self._latest: OrderedDict[str, Visit] = OrderedDict()
+        """By junction, the one seen last at the end."""
+        self.arrived: FirstOf[Visit] = FirstOf(MOST_LISTED)
 
     def get(self, junction_id: str) -> Visit | None:
         """Return the latest visit of a junction, None where it was never seen."""
@@ -76,13 +84,17 @@ class VisitBook:
         that there will be none.
         """
         before = self._latest.get(junction.summary.id)
+        if before is not None:
+            before.seen_s = at.drive_time_s
+            self._latest.move_to_end(junction.summary.id)
         if before is not None and before.arrived is None:
             more = load and not before.load
             before.load = before.load or load
             return more
-        visit = Visit(junction, load)
+        visit = Visit(junction, load, seen_s=at.drive_time_s)
         self._latest[junction.summary.id] = visit
         if before is None:
+            self._forget(before_s=at.drive_time_s - SEEN_LATELY_S)
             return True
         if before.failed:
             visit.failed = True
@@ -90,14 +102,38 @@ class VisitBook:
         if before.world is None:
             return load and not before.load  # asked for, and still on its way
         visit.world, visit.ready = before.world, at
+        before.world = None
         return load
+
+    def _forget(self, *, before_s: float) -> None:
+        """Forget the junctions not seen for longest: they are as new where they are seen again."""
+        while len(self._latest) > MOST_JUNCTIONS:
+            junction_id, oldest = next(iter(self._latest.items()))
+            if oldest.seen_s > before_s:
+                return
+            oldest.world = None
+            del self._latest[junction_id]
 
     def take_world(self, junction_id: str, world: World, at: Moment) -> None:
         """A junction's World is ready, for every visit that has waited for it."""
         late = [visit for visit in self.arrived if visit.junction.summary.id == junction_id]
-        for visit in [*late, self._latest[junction_id]]:
-            if visit.world is None:
-                visit.world, visit.ready = world, at
+        latest = self._latest.get(junction_id)
+        for visit in [*late, *([latest] if latest else [])]:
+            if visit.ready is None:
+                visit.ready = at
+        if latest is not None:
+            latest.world = latest.world or world
+
+    def fail(self, junction_id: str) -> None:
+        """A junction's World cannot be built."""
+        if (visit := self._latest.get(junction_id)) is not None:
+            visit.failed = True
+
+    def count_round(self, junction_id: str, *, futures: int) -> None:
+        """A round for a junction is complete."""
+        if (visit := self._latest.get(junction_id)) is not None:
+            visit.rounds += 1
+            visit.futures += futures
 
     def arrive(self, junction_id: str, at: Moment) -> None:
         """The car is at the junction's centre."""

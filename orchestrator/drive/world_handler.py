@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -18,6 +19,7 @@ from foretwin.orchestrator.instructions import Notice
 log = logging.getLogger("orchestrator")
 
 BUILD_TIMEOUT_S = 60.0
+KEPT_WORLDS = 16
 
 
 @dataclass(slots=True)
@@ -25,7 +27,7 @@ class _Order:
     """One junction's World: whether workers load it, and those that have not done so yet."""
 
     load: bool
-    world: World | None = None
+    world_id: str | None = None
     pending: set[str] | None = None
     """None until loading begins."""
     ready: bool = False
@@ -44,6 +46,8 @@ class WorldHandler:
     on_failed: Callable[[str, str], None]
     _orders: dict[str, _Order] = field(default_factory=dict)
     _junction_of: dict[str, str] = field(default_factory=dict)
+    _worlds: OrderedDict[str, World] = field(default_factory=OrderedDict)
+    """Those used last; the others are read again."""
 
     @property
     def building(self) -> list[str]:
@@ -51,9 +55,14 @@ class WorldHandler:
         return [junction_id for junction_id, order in self._orders.items() if not order.ready]
 
     def world(self, world_id: str) -> World:
-        """Return a World that has been built in this run."""
-        world = self._orders[self._junction_of[world_id]].world
-        assert world is not None
+        """Return a World that has been built in this run; OSError where its file is gone."""
+        world = self._worlds.get(world_id)
+        if world is None:
+            file = self.context.plan.worlds_dir / f"{world_id}.world"
+            world = self._worlds[world_id] = read_message(file, World)
+        self._worlds.move_to_end(world_id)
+        while len(self._worlds) > KEPT_WORLDS:
+            self._worlds.popitem(last=False)
         return world
 
     def want(self, junction_id: str, *, load: bool, workers: tuple[str, ...]) -> None:
@@ -64,8 +73,17 @@ class WorldHandler:
             self._ask_build(junction_id)
             return
         order.load = order.load or load
-        if order.world is not None and load:
-            self._load(order, order.world, workers)
+        if order.world_id is None:
+            return
+        try:
+            world = self.world(order.world_id)
+        except (OSError, SchemaMismatch) as error:
+            self._build_failed(junction_id, order, str(error))
+            return
+        if load:
+            self._load(order, world, workers)
+        if order.ready:  # whoever asks may have forgotten that it is
+            self.on_ready(junction_id, world)
 
     def _ask_build(self, junction_id: str) -> None:
         radius_m = self.context.plan.config.radius_m
@@ -75,7 +93,7 @@ class WorldHandler:
     def builder_up(self) -> None:
         """The builder is back: ask again for what it owes."""
         for junction_id, order in self._orders.items():
-            if order.world is None and not order.ready:
+            if order.world_id is None and not order.ready:
                 self._ask_build(junction_id)
 
     def build_reply(self, reply: Reply, *, workers: tuple[str, ...], builder_up: bool) -> None:
@@ -86,16 +104,15 @@ class WorldHandler:
             if builder_up:
                 self._build_failed(junction_id, order, reply.error or "no reason given")
             return
-        if order.world is not None:
+        if order.world_id is not None:
             return
         answer = reply.message
-        file = self.context.plan.worlds_dir / f"{answer.world_id}.world"
         try:
-            world = read_message(file, World)
+            world = self.world(answer.world_id)
         except (OSError, SchemaMismatch) as error:
             self._build_failed(junction_id, order, str(error))
             return
-        order.world = world
+        order.world_id = world.id
         self._junction_of[world.id] = junction_id
         how = "from the cache" if answer.cached else "built"
         log.info("world %s of %s %s in %.2f s", world.id, junction_id, how, answer.seconds)
@@ -157,6 +174,6 @@ class WorldHandler:
             self._settle(junction_id, order)
 
     def _settle(self, junction_id: str, order: _Order) -> None:
-        if order.world is not None and not order.pending and not order.ready:
+        if order.world_id is not None and not order.pending and not order.ready:
             order.ready = True
-            self.on_ready(junction_id, order.world)
+            self.on_ready(junction_id, self.world(order.world_id))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import msgspec
 
 from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.telemetry.estimator.estimator import StateEstimator
 
+MOST_HEARD = 1000
+"""States that wait for one of the car, and commands for one of their vehicle: the newest."""
 PERIOD_NS = 18_000_000
 """Between two states of a vehicle that are passed on: 50 Hz at most."""
 FRESH_NS = 500_000_000
@@ -17,11 +21,12 @@ class OtherVehicleSource:
     """Where a vehicle's states come from: here from what is heard as it comes."""
 
     def __init__(self) -> None:
-        self._heard: list[OtherVehicle] = []
+        self._heard: deque[OtherVehicle] = deque(maxlen=MOST_HEARD)
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
         """Return what is new of it as the car comes to its own new state."""
-        heard, self._heard = self._heard, []
+        heard = list(self._heard)
+        self._heard.clear()
         return heard
 
     def close(self) -> None:
@@ -33,7 +38,7 @@ class OtherVehicleStates:
 
     def __init__(self, vehicle_id: str, estimator: StateEstimator) -> None:
         self._id, self._estimator = vehicle_id, estimator
-        self._commands: list[ControlCommand] = []
+        self._commands: deque[ControlCommand] = deque(maxlen=MOST_HEARD)
         self._last_ns: int | None = None
 
     def begin_anew(self, estimator: StateEstimator) -> None:
@@ -61,7 +66,8 @@ class OtherVehicleStates:
         stamp_ns = state.stamp_ns + later_ns
         if self._last_ns is not None and stamp_ns - self._last_ns < PERIOD_NS:
             return None
-        commands, self._commands = tuple(self._commands), []
+        commands = tuple(self._commands)
+        self._commands.clear()
         self._last_ns = stamp_ns
         moved = msgspec.structs.replace(state, stamp_ns=stamp_ns, vehicle_id=self._id)
         return OtherVehicle(state=moved, commands=commands)

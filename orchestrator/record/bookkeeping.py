@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.numbering import Numberings
+from foretwin.contracts.running import RunningMeans, RunningQuantiles
 from foretwin.contracts.simulation import Comparison, PlanComparison
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
 
-def percentile(values: list[float], q: float) -> float | None:
-    """Return the q-th percentile, None of nothing."""
-    return round(float(np.percentile(values, q)), 3) if values else None
+def percentile(values: RunningQuantiles, q: float) -> float | None:
+    """Return the q-th percentile as records have it, None of nothing."""
+    found = values.percentile(q)
+    return None if found is None else round(found, 3)
 
 
 @dataclass(slots=True)
@@ -29,7 +31,7 @@ class TelemetryCount:
     """Beyond the gaps: what the vehicle says it sent, before the first sample or after the last."""
     by_channel: dict[str, int] = field(default_factory=lambda: defaultdict(int))
     """Samples that came, each once, those that were refused included."""
-    ages_ms: list[float] = field(default_factory=list)
+    ages_ms: RunningQuantiles = field(default_factory=RunningQuantiles)
     numbers: Numberings = field(default_factory=Numberings)
 
     @property
@@ -41,7 +43,7 @@ class TelemetryCount:
         """Count one sample that was sent and came at these instants of both UTC clocks."""
         self.came(channel, sender=sender, seq=seq, sent_ns=sent_ns)
         self.received += 1
-        self.ages_ms.append(max(0.0, (now_ns - sent_ns) / 1e6))
+        self.ages_ms.take(max(0.0, (now_ns - sent_ns) / 1e6))
 
     def came(self, channel: str, *, sender: int, seq: int, sent_ns: int) -> None:
         """Count a sample as not lost, whatever is made of it."""
@@ -74,7 +76,7 @@ class FuturesCount:
     distinct_min: int | None = None
     sim_seconds: float = 0.0
     cpu_seconds: float = 0.0
-    latencies_ms: list[float] = field(default_factory=list)
+    latencies_ms: RunningQuantiles = field(default_factory=RunningQuantiles)
     rounds_of: Counter[int] = field(default_factory=Counter)
     """Complete rounds by the number of their futures."""
     late_rounds: int = 0
@@ -113,7 +115,7 @@ class FuturesCount:
         self.distinct_min = (
             distinct if self.distinct_min is None else min(self.distinct_min, distinct)
         )
-        self.latencies_ms.append(latency_ms)
+        self.latencies_ms.take(latency_ms)
 
     def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
         """Return the `futures` part of run.json; `rounds` counts the complete ones.
@@ -146,13 +148,11 @@ class FuturesCount:
 class ComparisonCount:
     """Mean displacement errors by horizon: nominal future and two baselines on the same data."""
 
-    errors: dict[float, list[tuple[float, float, float]]] = field(
-        default_factory=lambda: defaultdict(list)
-    )
+    errors: dict[float, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
 
     def take(self, comparison: Comparison) -> None:
         """Count one comparison."""
-        self.errors[comparison.horizon_s].append(
+        self.errors[comparison.horizon_s].take(
             (
                 comparison.nominal.ade_m,
                 comparison.constant_velocity.ade_m,
@@ -162,12 +162,12 @@ class ComparisonCount:
 
     def record(self, *, independent: bool) -> dict[str, Any]:
         """Return the `comparison` part of run.json."""
-        means = {f"{h:g}": np.mean(rows, axis=0) for h, rows in sorted(self.errors.items())}
+        means = {f"{h:g}": rows.means for h, rows in sorted(self.errors.items())}
         return {
-            "ade_m": {h: round(float(m[0]), 4) for h, m in means.items()},
-            "constant_velocity_ade_m": {h: round(float(m[1]), 4) for h, m in means.items()},
-            "constant_turn_rate_ade_m": {h: round(float(m[2]), 4) for h, m in means.items()},
-            "count": {f"{h:g}": len(rows) for h, rows in sorted(self.errors.items())},
+            "ade_m": {h: round(m[0], 4) for h, m in means.items()},
+            "constant_velocity_ade_m": {h: round(m[1], 4) for h, m in means.items()},
+            "constant_turn_rate_ade_m": {h: round(m[2], 4) for h, m in means.items()},
+            "count": {f"{h:g}": rows.count for h, rows in sorted(self.errors.items())},
             "independent": independent,
         }
 
@@ -176,19 +176,19 @@ class ComparisonCount:
 class PlanCount:
     """How far the car's own plans lie from the nominal futures and from the route's lane centre."""
 
-    rows: list[tuple[float, float, float]] = field(default_factory=list)
+    rows: RunningMeans = field(default_factory=RunningMeans)
 
     def take(self, comparison: PlanComparison) -> None:
         """Count one comparison of plans."""
         difference = comparison.difference
-        self.rows.append((difference.ade_m, difference.fde_m, comparison.path_offset_m))
+        self.rows.take((difference.ade_m, difference.fde_m, comparison.path_offset_m))
 
     def record(self) -> dict[str, Any] | None:
         """Return the `plan_comparison` part of run.json, None where the car sent no plans.
 
         `path_offset_m` is the mean signed distance from the lane centre, positive to the left.
         """
-        if not self.rows:
+        if not self.rows.count:
             return None
-        ade, fde, offset = (round(float(v), 4) for v in np.mean(self.rows, axis=0))
-        return {"count": len(self.rows), "ade_m": ade, "fde_m": fde, "path_offset_m": offset}
+        ade, fde, offset = (round(v, 4) for v in self.rows.means)
+        return {"count": self.rows.count, "ade_m": ade, "fde_m": fde, "path_offset_m": offset}

@@ -8,6 +8,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from foretwin.contracts.running import RunningMeans
 from foretwin.orchestrator.record.bookkeeping import (
     ComparisonCount,
     FuturesCount,
@@ -34,12 +35,12 @@ def told_by_tables(results: Path) -> dict[str, Any]:
         futures.take_row(row)
     for row in _rows(results, "comparisons"):
         errors = (row[f"{name}_ade_m"] for name in _BASELINES)
-        comparisons.errors[row["horizon_s"]].append((next(errors), next(errors), next(errors)))
+        comparisons.errors[row["horizon_s"]].take((next(errors), next(errors), next(errors)))
     plans = PlanCount(
-        [
+        RunningMeans(
             (row["ade_m"], row["fde_m"], row["path_offset_m"])
             for row in _rows(results, "plan_comparisons")
-        ]
+        )
     )
     counted = futures.record(wanted=0, missed=0, spared=0, unseeded=0)
     told = {

@@ -9,6 +9,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.orchestrator.routing.road_hypotheses import (
     BEGIN_RADIUS_M,
     SEARCH_RADIUS_M,
@@ -61,7 +62,7 @@ class MapMatcher:
         self._road_xy: Array | None = None
         self._away_m = 0.0
         self._direction_known = False
-        self._stretches: list[OffRoadStretch] = []
+        self._stretches: FirstOf[OffRoadStretch] = FirstOf(MOST_LISTED)
         self._stretch: OffRoadStretch | None = None
 
     @property

@@ -20,7 +20,8 @@ AGAINST_ONE_WAY_FACTOR = 4.0
 U_TURN_M = 60.0
 LOOSE_END_M = 12.0
 REACH_M = 80.0
-"""What can be reached within this is remembered."""
+"""What can be reached within this is remembered, of so many edges."""
+_MOST_KNOWN = 2000
 
 
 def key_of(directed: DirectedEdge) -> EdgeKey:
@@ -139,6 +140,8 @@ class RoadIndex:
             return reach(self.graph, start, limit_m=limit_m)
         key = key_of(start)
         if key not in self._reached:
+            while len(self._reached) >= _MOST_KNOWN:
+                del self._reached[next(iter(self._reached))]
             self._reached[key] = reach(self.graph, start, limit_m=REACH_M)
         return self._reached[key]
 

@@ -36,6 +36,7 @@ _HALF_WINDOW_M = 12.0
 _MOST_BEND_RAD = math.radians(12.0)
 _MOST_OFF_RAD, _MOST_OFF_EVER_RAD = math.radians(6.0), math.radians(15.0)
 _LIKE_RAD = math.radians(30.0)
+_MOST_KNOWN = 2000
 _SURE = 3.0
 """Standard deviations by which the car must be away from any other road that runs alike."""
 
@@ -105,6 +106,8 @@ class RoadLines:
     def _side(self, directed: DirectedEdge) -> _LateralPosition:
         key = key_of(directed)
         if key not in self._sides:
+            while len(self._sides) >= _MOST_KNOWN:
+                del self._sides[next(iter(self._sides))]
             self._sides[key] = _side_of(self._graph, directed)
         return self._sides[key]
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Request
+from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.tuning import SetReply, SetRequest
 
 
@@ -71,8 +72,8 @@ class RuntimeConfiguration:
     def __init__(self, handlers: Mapping[str, ChangeHandler]) -> None:
         self._handlers = dict(handlers)
         self._waiting: list[_Waiting] = []
-        self.made: list[Change] = []
-        """Every change of the drive, in order."""
+        self.made: FirstOf[Change] = FirstOf(MOST_LISTED)
+        """The changes of the drive, in order."""
 
     @property
     def waiting(self) -> bool:
@@ -113,7 +114,7 @@ class RuntimeConfiguration:
             at_s = (stamp_ns - start_stamp_ns) / 1e9
             text = f"{change.text}, from {at_s:.2f} s of the drive on"
             request.reply(SetReply(done=True, text=text))
-        self.made += changes
+        self.made.extend(changes)
         return changes
 
     def refuse_all(self, reason: str) -> None:

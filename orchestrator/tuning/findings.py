@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.running import MOST_LISTED, FirstOf, RunningMeans
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Notice
@@ -36,9 +37,9 @@ class Findings:
     on_identification: Callable[[Identification], None]
     _latest: dict[str, ParameterEstimate] = field(default_factory=dict)
     _reported: dict[str, float] = field(default_factory=dict)
-    _gaps: dict[str, list[tuple[float, ...]]] = field(default_factory=lambda: defaultdict(list))
+    _gaps: dict[str, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
     _alarms: int = 0
-    _verdicts: list[Verdict] = field(default_factory=list)
+    _verdicts: FirstOf[Verdict] = field(default_factory=lambda: FirstOf(MOST_LISTED))
     _independent: bool = True
 
     def take(self, found: Identification | GapSample | GapAlarm | Verdict) -> None:
@@ -50,7 +51,7 @@ class Findings:
                 self.tables.add("gaps", [row_of(found, GAP)])
                 self._independent = self._independent and found.independent
                 if abs(found.horizon_s - HORIZON_S) < 1e-9:
-                    self._gaps[found.manoeuvre].append(
+                    self._gaps[found.manoeuvre].take(
                         tuple(getattr(found, name) ** 2 for name in _SQUARES)
                     )
             case GapAlarm():
@@ -92,10 +93,10 @@ class Findings:
             "gap": {
                 "horizon_s": HORIZON_S,
                 "independent": self._independent,
-                "samples": sum(map(len, self._gaps.values())),
+                "samples": sum(rows.count for rows in self._gaps.values()),
                 "alarms": self._alarms,
                 "rms": {
-                    "all": _rms([row for rows in self._gaps.values() for row in rows]),
+                    "all": _rms(sum(self._gaps.values(), RunningMeans())),
                     **{name: _rms(rows) for name, rows in sorted(self._gaps.items())},
                 },
             },
@@ -108,6 +109,11 @@ class Findings:
             ],
             "parameters": [self._parameter(one) for one in self._latest.values()],
         }
+
+    @property
+    def left_out(self) -> int:
+        """How many verdicts are in the table and not in the record."""
+        return self._verdicts.left_out
 
     def _parameter(self, one: ParameterEstimate) -> dict[str, Any]:
         vehicle = self.vehicle()
@@ -123,10 +129,8 @@ class Findings:
         }
 
 
-def _rms(rows: list[tuple[float, ...]]) -> dict[str, float] | None:
-    if not rows:
+def _rms(squares: RunningMeans) -> dict[str, float] | None:
+    if not squares.count:
         return None
-    return {
-        name: round(math.sqrt(sum(row[index] for row in rows) / len(rows)), 4)
-        for index, name in enumerate(_SQUARES)
-    }
+    named = zip(_SQUARES, squares.means, strict=True)
+    return {name: round(math.sqrt(mean), 4) for name, mean in named}

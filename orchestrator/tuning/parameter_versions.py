@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.tuning import (
     Identification,
     ParameterChange,
@@ -40,8 +41,9 @@ class ParameterVersions:
     ) -> None:
         self.in_force = ParametersInForce(vehicle=vehicle, vehicle_id=vehicle_id)
         self.version = 0
-        self.made: list[ParameterChange] = []
-        """Every change of the drive, in order."""
+        self.made: FirstOf[ParameterChange] = FirstOf(MOST_LISTED)
+        """The changes of the drive, in order."""
+        self._last: dict[str, ParameterChange] = {}
         self._ask = ask
         self._waiting: list[ParameterChange] = []
         self._pinned: frozenset[str] = frozenset()
@@ -89,7 +91,8 @@ class ParameterVersions:
         if changes:
             self.version += 1
             self._stamp_ns = stamp_ns
-            self.made += changes
+            self.made.extend(changes)
+            self._last |= {one.name: one for one in changes}
         for process_id in processes:
             if changes or process_id == watcher:
                 self._tell(process_id, changes)
@@ -99,8 +102,8 @@ class ParameterVersions:
         """Tell a process that has come up; returns whether it has something to learn."""
         if not self.version and not self._pinned:
             return False
-        last = {one.name: one for one in self.made}
-        self._tell(process_id, tuple(one for one in last.values() if one.origin in _BY_HAND))
+        by_hand = tuple(one for one in self._last.values() if one.origin in _BY_HAND)
+        self._tell(process_id, by_hand)
         return True
 
     def _tell(self, process_id: str, changes: tuple[ParameterChange, ...]) -> None:

@@ -8,7 +8,7 @@ and its coefficient of restitution are those given, whatever collides.
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import mujoco
@@ -48,7 +48,7 @@ class Crush(NamedTuple):
     timestep_s: float
 
 
-@cache
+@lru_cache(maxsize=256)
 def contact_damping(restitution: float, crush: Crush) -> float:
     """Return the damping in 1/s that gives a contact its `restitution` at the step of `crush`.
 

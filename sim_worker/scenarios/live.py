@@ -30,6 +30,7 @@ from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.staged import player_on
 from foretwin.sim_worker.scenarios.ways import Way
 
+_MOST_CASTS = 5000
 _LATE = ".arrives_after_s"
 
 
@@ -95,6 +96,9 @@ class KnownScenarios:
             return tuple(Unplaced(own, reason, True) for _ in cases)
         if ego_way is not None:
             found = found._replace(ego=ego_way)
+        if len(self._casts) > _MOST_CASTS:
+            self._casts.clear()
+            self._ways.clear()
         common = (scenario, vehicle, found.name, id(ego_way), ego_arc_m)
         keys = [(*common, *values.items()) for values in cases]
         new = {key: dict(c) for key, c in zip(keys, cases, strict=True) if key not in self._casts}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.measured import CLOCK_LEAP_NS
 
@@ -63,7 +64,7 @@ class ClockSteps:
         self._clock = clock
         self._channels: dict[str, _ChannelTime] = {}
         self._first_received_ns: int | None = None
-        self.steps: list[ClockStep] = []
+        self.steps: FirstOf[ClockStep] = FirstOf(MOST_LISTED)
 
     def shift_ns(self, channel: str) -> int:
         """Return what is added to this channel's stamps."""

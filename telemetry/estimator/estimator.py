@@ -85,7 +85,7 @@ class StateEstimator:
     @property
     def clock_steps(self) -> int:
         """How often the vehicle's clock has stepped."""
-        return len(self._steps.steps)
+        return len(self._steps.steps) + self._steps.steps.left_out
 
     @property
     def late(self) -> Counter[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
+
 import msgspec
 
 from foretwin.contracts.errors import UserError
@@ -23,6 +25,9 @@ from foretwin.sim_worker.analysis.identify.acceptance import (
 )
 from foretwin.sim_worker.vehicle.parameters import check_vehicle
 
+_ROLLBACKS = 100
+"""So many changes of one parameter can be taken back."""
+
 
 class ParametersInForce:
     """One vehicle's parameters, how they came to be, and which of them stay as they are."""
@@ -35,7 +40,7 @@ class ParametersInForce:
         self.pinned: set[str] = set()
         self._vehicle_id = vehicle_id
         self._taken: dict[str, ParameterEstimate] = {}
-        self._before: dict[str, list[Parameter]] = {}
+        self._before: dict[str, deque[Parameter]] = defaultdict(lambda: deque(maxlen=_ROLLBACKS))
 
     def _is_pinned(self, name: str) -> bool:
         return name in self.pinned or (name == UNDERSTEER_GRADIENT and STIFFNESS in self.pinned)
@@ -55,7 +60,7 @@ class ParametersInForce:
             if found.name in names or (found.name == UNDERSTEER_GRADIENT and STIFFNESS in names):
                 self._taken[found.name] = found
         for name in names:
-            self._before.setdefault(name, []).append(getattr(previous, name))
+            self._before[name].append(getattr(previous, name))
         return changes
 
     def _is_news(self, found: ParameterEstimate) -> bool:
@@ -92,7 +97,7 @@ class ParametersInForce:
         self.check_rollback(name)
         earlier = self._before[name][-1]
         change = self._replace(name, earlier, "rolled_back", stamp_ns)
-        del self._before[name][-2:]
+        del self._before[name][-1], self._before[name][-1]
         return change
 
     def check_rollback(self, name: str) -> None:
@@ -109,7 +114,7 @@ class ParametersInForce:
             self.vehicle = check_vehicle(msgspec.structs.replace(self.vehicle, **{name: parameter}))
         except ValueError as error:
             raise UserError(str(error)) from error
-        self._before.setdefault(name, []).append(before)
+        self._before[name].append(before)
         self.pinned.add(name)
         self._given = msgspec.structs.replace(self._given, **{name: parameter})
         self._taken.pop(UNDERSTEER_GRADIENT if name == STIFFNESS else name, None)

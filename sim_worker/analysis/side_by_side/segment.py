@@ -6,12 +6,12 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple, get_args
 
-import numpy as np
 from msgspec.structs import replace
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlMode
 from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.running import RunningQuantiles
 from foretwin.contracts.side_by_side import Aspect, Disagreement, DisagreementKind, DrivenSegment
 from foretwin.sim_worker.analysis.side_by_side.departure import Departure
 
@@ -115,28 +115,31 @@ class Segment:
     until_ns: int | None = None
     """The takeover that ended it."""
     waiting: deque[Waiting] = field(default_factory=deque)
+    plans: int = 0
+    """Compared with what was driven."""
     cut: int = 0
     too_short: int = 0
     disagreements: int = 0
     last_ns: int = 0
-    _peaks: list[list[float]] = field(default_factory=list)
+    _peaks: dict[str, RunningQuantiles] = field(
+        default_factory=lambda: {name: RunningQuantiles() for name in _FIGURES}
+    )
 
     def count(self, found: Departure) -> None:
         """Count one compared plan."""
-        self._peaks.append([abs(getattr(found, name)) for name in _FIGURES])
+        self.plans += 1
+        for name, peaks in self._peaks.items():
+            peaks.take(abs(getattr(found, name)))
 
     def record(self) -> DrivenSegment:
         """Return what is known of it so far."""
-        figures: dict[str, float | None] = dict.fromkeys(_FIGURES)
-        if self._peaks:
-            greatest = np.percentile(self._peaks, 95.0, axis=0)
-            figures = dict(zip(_FIGURES, greatest.tolist(), strict=True))
+        figures = {name: peaks.percentile(95.0) for name, peaks in self._peaks.items()}
         return DrivenSegment(
             number=self.number,
             control_mode=self.mode,
             from_stamp_ns=self.from_ns,
             to_stamp_ns=self.last_ns if self.until_ns is None else self.until_ns,
-            plans=len(self._peaks),
+            plans=self.plans,
             cut=self.cut,
             too_short=self.too_short,
             disagreements=self.disagreements,

@@ -63,12 +63,21 @@ class SideBySide:
         self._driven: deque[tuple[int, Array]] = deque()
         self._last_plan_ns: int | None = None
         self._open: deque[Segment] = deque()
-        self._done: list[Segment] = []
+        self._ended: list[DrivenSegment] = []
+        self._begun = 0
 
     @property
-    def segments(self) -> list[DrivenSegment]:
-        """All segments in which a plan came in or the control mode was told."""
-        return [segment.record() for segment in (*self._done, *self._open)]
+    def open_segments(self) -> list[DrivenSegment]:
+        """The segments that are not over, as far as they are known."""
+        return [segment.record() for segment in self._open]
+
+    def take_ended(self) -> list[DrivenSegment]:
+        """Return the segments that have ended since the last call, in their order.
+
+        In each of them a plan came in or the control mode was told.
+        """
+        ended, self._ended = self._ended, []
+        return ended
 
     def take_status(self, status: VehicleStatus) -> None:
         """Take the control mode; another than before is a takeover."""
@@ -141,7 +150,7 @@ class SideBySide:
         return found + self._close_all()
 
     def _begin(self, mode: ControlMode, stamp_ns: int) -> None:
-        number = len(self._done) + len(self._open)
+        number, self._begun = self._begun, self._begun + 1
         way = AspectWatch(self._vehicle_id, number, "way")
         pace = AspectWatch(self._vehicle_id, number, "pace")
         self._open.append(Segment(number, mode, stamp_ns, (way, pace), last_ns=stamp_ns))
@@ -161,8 +170,7 @@ class SideBySide:
                 break
             if len(self._open) == 1:
                 break  # the drive's end, not a takeover
-            found += _ended(segment)
-            self._done.append(self._open.popleft())
+            found += self._end(self._open.popleft())
         return found
 
     def _compare(self, segment: Segment, plan: Waiting) -> list[Disagreement]:
@@ -211,15 +219,14 @@ class SideBySide:
             segment = self._open.popleft()
             segment.too_short += len(segment.waiting)
             segment.waiting.clear()
-            found += _ended(segment)
-            self._done.append(segment)
+            found += self._end(segment)
         return found
 
-
-def _ended(segment: Segment) -> list[Disagreement]:
-    found = [one for aspect in segment.aspects for one in aspect.finish()]
-    segment.disagreements += len(found)
-    return found
+    def _end(self, segment: Segment) -> list[Disagreement]:
+        found = [one for aspect in segment.aspects for one in aspect.finish()]
+        segment.disagreements += len(found)
+        self._ended.append(segment.record())
+        return found
 
 
 def _at(at: Array, known: Array, rows: Array) -> Array:

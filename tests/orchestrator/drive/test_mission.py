@@ -48,7 +48,7 @@ def through_town() -> Trip:
 
 
 def test_every_world_of_a_given_route_is_there_before_the_car(through_town: Trip) -> None:
-    records = through_town.mission.records(mono_s=2000.0)
+    records = [visit.record(mono_s=2000.0) for visit in through_town.mission.arrived]
 
     assert [(r["kind"], r["control"]) for r in records] == [
         ("t_junction", "stop"),
@@ -67,7 +67,7 @@ def test_a_given_route_asks_for_no_other_turns(through_town: Trip) -> None:
 
 
 def test_worlds_count_one_after_the_other(through_town: Trip) -> None:
-    records = through_town.mission.records(mono_s=2000.0)
+    records = [visit.record(mono_s=2000.0) for visit in through_town.mission.arrived]
 
     assert [world for _, world in through_town.used] == [
         *(town_world(r["id"]).id for r in records), None,
@@ -77,7 +77,7 @@ def test_worlds_count_one_after_the_other(through_town: Trip) -> None:
 def test_the_next_world_counts_from_20_m_past_a_centre() -> None:
     trip = grid_trip().go(on_grid((110, 100), (290, 100)))
 
-    (record,) = trip.mission.records(mono_s=1100.0)
+    (record,) = [visit.record(mono_s=1100.0) for visit in trip.mission.arrived]
     (_, first), (switched_s, second) = trip.used
     assert (first, second) == ("world-n103", "world-n104")
     assert 10.0 * (switched_s - record["arrived_at_s"]) == pytest.approx(20.0, abs=1.1)
@@ -174,7 +174,11 @@ def test_a_world_that_cannot_be_built_is_passed_over() -> None:
 
     assert trip.used[0][1] == "world-n104"
     assert isinstance(trip.rounds[3][1], RoundIntent)
-    (record,) = (r for r in trip.mission.records(mono_s=1100.0) if r["id"] == "n103")
+    (record,) = (
+        r
+        for r in [visit.record(mono_s=1100.0) for visit in trip.mission.arrived]
+        if r["id"] == "n103"
+    )
     assert record["built_at_s"] is None
     assert record["world_ready_before_s"] < -80.0
 
@@ -185,14 +189,20 @@ def test_a_world_that_cannot_be_built_is_passed_over_the_second_time_too() -> No
 
     trip = grid_trip(world_of=broken).go(on_grid(*ROUND_THE_BLOCK))
 
-    assert [r["id"] for r in trip.mission.records(mono_s=1100.0)].count("n103") == 2
+    assert [r["id"] for r in [visit.record(mono_s=1100.0) for visit in trip.mission.arrived]].count(
+        "n103"
+    ) == 2
     late = [r for _, r in trip.rounds if isinstance(r, NotReady) and r.world_late]
     assert late == []
 
 
 def test_the_second_passage_of_a_junction_begins_with_its_world() -> None:
     trip = grid_trip().go(on_grid(*ROUND_THE_BLOCK))
-    first, second = (r for r in trip.mission.records(mono_s=1100.0) if r["id"] == "n103")
+    first, second = (
+        r
+        for r in [visit.record(mono_s=1100.0) for visit in trip.mission.arrived]
+        if r["id"] == "n103"
+    )
 
     assert [round(r["arrived_at_s"]) for r in (first, second)] == [9, 49]
     assert first["arrived_at_s"] <= second["built_at_s"] < second["arrived_at_s"]
@@ -204,7 +214,11 @@ def test_a_world_that_comes_after_two_passages_was_late_for_both() -> None:
     trip = grid_trip(world_of=lambda name: None if name == "n103" else grid_world(name))
     trip.go(on_grid(*ROUND_THE_BLOCK))
     trip.mission.on_world("n103", grid_world("n103"), mono_s=1060.0)
-    first, second = (r for r in trip.mission.records(mono_s=1100.0) if r["id"] == "n103")
+    first, second = (
+        r
+        for r in [visit.record(mono_s=1100.0) for visit in trip.mission.arrived]
+        if r["id"] == "n103"
+    )
 
     assert [round(r["arrived_at_s"]) for r in (first, second)] == [9, 49]
     assert first["world_ready_before_s"] < second["world_ready_before_s"] < 0.0
@@ -216,7 +230,7 @@ def test_rounds_count_for_the_junction_they_ran_for() -> None:
     trip.mission.on_round("n103", futures=32)
     trip.go(on_grid((150, 100), (250, 100), start_s=4.0))
 
-    (record,) = trip.mission.records(mono_s=1100.0)
+    (record,) = [visit.record(mono_s=1100.0) for visit in trip.mission.arrived]
     assert (record["id"], record["rounds"], record["futures"]) == ("n103", 2, 96)
 
 
@@ -263,7 +277,7 @@ def test_on_the_berlin_drive_worlds_are_asked_for_long_before(data_dir) -> None:
                 )
             ]
         )
-    records = trip.mission.records(mono_s=2000.0)
+    records = [visit.record(mono_s=2000.0) for visit in trip.mission.arrived]
 
     assert [round(r["arrived_at_s"]) for r in records][:2] == [39, 65]
     assert all(r["world_ready_before_s"] >= 10.0 for r in records[1:])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from foretwin.contracts.running import MOST_LISTED
+from foretwin.orchestrator.drive import visits
 from foretwin.orchestrator.drive.visits import Moment, VisitBook
 from tests.orchestrator.grid_map import FRAME, grid, junctions
 from tests.orchestrator.trip import world_named
@@ -82,7 +84,7 @@ def test_a_junction_never_seen_has_no_visit() -> None:
     with pytest.raises(KeyError):
         book.latest(NAME)
     book.enter(NAME, Moment(0.0, 0.0))
-    assert book.arrived == []
+    assert not book.arrived
 
 
 def test_a_world_without_hope_stays_so_on_the_next_passage() -> None:
@@ -91,5 +93,35 @@ def test_a_world_without_hope_stays_so_on_the_next_passage() -> None:
     book.arrive(NAME, Moment(110.0, 10.0))
 
     assert not book.see(JUNCTION, Moment(111.0, 11.0), load=True)
-    assert book.latest(NAME) is not book.arrived[0]
+    assert book.latest(NAME) not in book.arrived
     assert book.latest(NAME).failed
+
+
+def test_a_day_of_junctions_keeps_the_worlds_of_those_seen_lately(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(visits, "MOST_JUNCTIONS", 2)
+    book, places = VisitBook(), junctions(grid(4, 4))
+    first, second, third, *_ = places
+    for at_s, junction in ((0.0, first), (10.0, second), (20.0, third)):
+        assert book.see(junction, Moment(at_s, at_s), load=True)
+        book.take_world(junction.summary.id, WORLD, Moment(at_s, at_s))
+    assert book.get(first.summary.id) is not None, "seen lately"
+    late = Moment(500.0, 500.0)
+    book.arrive(first.summary.id, late)
+    assert not book.see(second, late, load=True), "known still"
+    assert book.see(places[3], late, load=True)
+    assert book.get(first.summary.id) is None
+    (visit,) = book.arrived
+    assert visit.world is None
+    assert visit.record(mono_s=600.0)["built_at_s"] == 0.0
+    assert book.see(first, late, load=True), "as new"
+    book.take_world("never seen", WORLD, late)
+
+
+def test_more_passages_than_are_listed_are_counted() -> None:
+    book = seen()
+    for at_s in range(MOST_LISTED + 5):
+        book.arrive(NAME, Moment(at_s, at_s))
+        book.see(JUNCTION, Moment(at_s, at_s), load=True)
+    assert (len(book.arrived), book.arrived.left_out) == (MOST_LISTED, 5)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.contracts.running import RunningQuantiles
 from foretwin.contracts.simulation import Comparison, HorizonError
 from foretwin.orchestrator.record.bookkeeping import (
     ComparisonCount,
@@ -85,7 +86,7 @@ def test_ages_are_given_as_percentiles() -> None:
     record = count.record(skipped_invalid=4)
     assert (record["age_ms_p50"], record["age_ms_p95"]) == (50.0, 95.0)
     assert record["skipped_invalid"] == 4
-    assert percentile([], 50) is None
+    assert percentile(RunningQuantiles(), 50) is None
 
 
 def test_futures_are_counted_and_hashed_in_order() -> None:

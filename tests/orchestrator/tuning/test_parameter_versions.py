@@ -142,4 +142,7 @@ def test_a_change_reads_as_the_engineer_would_say_it() -> None:
     it = Told()
     it.handler.apply(told(found("steering_ratio", 15.3)))
     it.hand_over()
-    assert change_text(it.handler.made[0]) == "steering_ratio 16 -> 15.3 ± 0.2, as the driving says"
+    assert (
+        change_text(next(iter(it.handler.made)))
+        == "steering_ratio 16 -> 15.3 ± 0.2, as the driving says"
+    )

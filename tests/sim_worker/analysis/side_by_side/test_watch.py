@@ -91,7 +91,7 @@ def side_by_side(
         here = DrivePlace(state.position, "junction", 100.0 + at_s)
         watch.take_plan(plan_at(at_s, planned(at_s, ahead), ahead))
         found += watch.take_state(state)
-    return [one for one in found + watch.finish() if one.over], watch.segments
+    return [one for one in found + watch.finish() if one.over], watch.take_ended()
 
 
 def as_driven(driven: Course) -> Callable[[float, Array], Array]:

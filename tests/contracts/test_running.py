@@ -1,0 +1,75 @@
+"""Figures of many values, held against those of all of them."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.contracts.running import (
+    ACCURACY,
+    EXACT,
+    FirstOf,
+    RunningMeans,
+    RunningQuantiles,
+)
+
+VALUES = st.floats(0.0, 1e11)
+
+
+def quantiles(values: list[float]) -> RunningQuantiles:
+    found = RunningQuantiles()
+    for value in values:
+        found.take(value)
+    return found
+
+
+@given(st.lists(VALUES, min_size=1, max_size=50), st.sampled_from([0, 5, 50, 95, 100]))
+def test_quantiles_of_a_few_are_exact(values: list[float], q: float) -> None:
+    assert quantiles(values).percentile(q) == np.percentile(values, q)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 50.0, 95.0, 99.9, 100.0]))
+def test_quantiles_of_many_are_nearly_so_and_know_no_order(seed: int, q: float) -> None:
+    random = np.random.default_rng(seed)
+    values = np.concatenate([random.lognormal(2.0, 2.0, EXACT), np.zeros(3), [1e-9, 1e11]])
+    nearest = np.percentile(values, q, method="lower")
+    found = quantiles(values.tolist()).percentile(q)
+
+    assert found == pytest.approx(nearest, rel=1.01 * ACCURACY, abs=1e-9)
+    assert found == quantiles(random.permutation(values).tolist()).percentile(q)
+
+
+def test_quantiles_of_a_day_take_little_memory() -> None:
+    random = np.random.default_rng(1)
+    found = quantiles(random.lognormal(0.0, 8.0, 200_000).tolist())
+    assert len(found._bins) < 3000
+    assert found._values is None
+    assert sys.getsizeof(found._bins) < 200_000
+
+
+@pytest.mark.parametrize("odd", [-1.0, float("nan")])
+def test_what_is_no_age_counts_as_none(odd: float) -> None:
+    assert quantiles([odd]).percentile(50) == 0.0
+    assert quantiles([float("inf")] * (EXACT + 1)).percentile(50) == pytest.approx(1e12, rel=0.02)
+    assert RunningQuantiles().percentile(50) is None
+
+
+@given(st.lists(st.tuples(VALUES, VALUES), min_size=1), st.integers(0, 100))
+def test_means_are_those_of_all_rows(rows: list[tuple[float, float]], cut: int) -> None:
+    running = RunningMeans(rows)
+    assert running.count == len(rows)
+    assert running.means == pytest.approx(np.mean(rows, axis=0))
+    both = RunningMeans(rows[:cut]) + RunningMeans(rows[cut:])
+    assert (both.count, both.means) == (len(rows), pytest.approx(running.means))
+    assert RunningMeans().means == ()
+
+
+def test_the_first_are_kept_and_the_rest_counted() -> None:
+    kept: FirstOf[int] = FirstOf(3)
+    kept.append(0)
+    kept.extend(range(1, 10))
+    assert (kept, kept.left_out) == ([0, 1, 2], 7)
