@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup drive test check format bench judge clean
+.PHONY: setup drive test check format bench judge chaos clean
 
 setup: $(VENV)/.installed
 
@@ -33,6 +33,10 @@ bench: setup
 
 judge: setup
 	$(BIN)/pytest -m judge
+
+# Drives that faults happen to: make chaos COUNT=1000 SEED=7
+chaos: setup
+	$(BIN)/python -m tests.chaos --count $(or $(COUNT),100) --seed $(or $(SEED),0)
 
 clean:
 	rm -rf $(VENV) build dist

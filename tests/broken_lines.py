@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import argparse
 import ast
-import os
 import random
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.test_layout import ROOT
-from tests.test_mirrored import covered, mirror_of, mirrored, modules
+from tests.mutation.noticing import checkout
+from tests.test_mirrored import modules
 
 UNNOTICED = 3
 _TURNED: dict[type[ast.AST], Any] = {
@@ -49,19 +45,14 @@ def main(arguments: Sequence[str]) -> int:
     draws = random.Random(asked.seed)
     named = [name for name in sorted(modules()) if name.startswith(f"foretwin.{asked.room}")]
     noticed = 0
-    with tempfile.TemporaryDirectory(prefix="broken-lines-") as folder:
-        tree = Path(folder) / "tree"
-        subprocess.run(["git", "worktree", "add", "-q", "--detach", tree], cwd=ROOT, check=True)
-        try:
-            for number in range(asked.count):
-                broken = break_a_line(named, draws)
-                seen = is_noticed(broken, tree)
-                noticed += seen
-                word = "noticed" if seen else "UNNOTICED"
-                print(f"{number + 1:3d} {word:9s} {broken.module}:{broken.line}")
-                print(f"      - {broken.before}\n      + {broken.after}", flush=True)
-        finally:
-            subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=True)
+    with checkout() as tree:
+        for number in range(asked.count):
+            broken = break_a_line(named, draws)
+            seen = tree.fate(broken.module, broken.text, system=True) in ("killed", "timed out")
+            noticed += seen
+            word = "noticed" if seen else "UNNOTICED"
+            print(f"{number + 1:3d} {word:9s} {broken.module}:{broken.line}")
+            print(f"      - {broken.before}\n      + {broken.after}", flush=True)
     print(f"{noticed} of {asked.count} noticed")
     return 0 if noticed == asked.count else UNNOTICED
 
@@ -117,25 +108,6 @@ def _place(text: str, line: int, utf8_offset: int) -> int:
     lines = text.splitlines(keepends=True)
     before = sum(len(one) for one in lines[: line - 1])
     return before + len(lines[line - 1].encode()[:utf8_offset].decode())
-
-
-def is_noticed(broken: Broken, tree: Path) -> bool:
-    """Return whether a test of the module fails where the line is broken."""
-    path = modules()[broken.module]
-    tests = covered().get(broken.module, [])[:]
-    if broken.module in mirrored():
-        tests.append(mirror_of(path).relative_to(ROOT))
-    if not tests:
-        return False
-    target = tree / path.relative_to(ROOT)
-    target.write_text(broken.text, encoding="utf-8")
-    try:
-        command = [sys.executable, "-m", "pytest", "-x", "-q", *map(str, tests)]
-        environment = os.environ | {"PYTHONPATH": str(tree)}
-        ended = subprocess.run(command, cwd=tree, env=environment, capture_output=True, check=False)
-        return ended.returncode != 0
-    finally:
-        subprocess.run(["git", "checkout", "-q", "--", "."], cwd=tree, check=True)
 
 
 if __name__ == "__main__":

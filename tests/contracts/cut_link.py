@@ -1,4 +1,4 @@
-"""A link that can be cut: a TCP proxy on the loopback interface before a bus's endpoint."""
+"""A link that can be cut or slowed down: a TCP proxy on the loopback interface, for an endpoint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ class CutLink:
         self._listener = socket.create_server((LOOPBACK, self._port))
         self._ends: list[socket.socket] = []
         self._whole = True
-        self._lock = threading.Lock()
+        self.delay_s = 0.0
+        """How long what is on its way waits, both ways."""
+        self._lock, self._pause = threading.Lock(), threading.Event()
         self._threads = [threading.Thread(target=self._accept, daemon=True)]
 
     @property
@@ -64,7 +66,7 @@ class CutLink:
                 far = socket.create_connection((LOOPBACK, self._target))
                 self._ends += [near, far]
             both = [
-                threading.Thread(target=_pass_on, args=pair, daemon=True)
+                threading.Thread(target=self._pass_on, args=pair, daemon=True)
                 for pair in ((near, far), (far, near))
             ]
             closing = threading.Thread(target=_close_after, args=(both, near, far), daemon=True)
@@ -72,14 +74,15 @@ class CutLink:
             for thread in (*both, closing):
                 thread.start()
 
-
-def _pass_on(source: socket.socket, target: socket.socket) -> None:
-    with contextlib.suppress(OSError):
-        while data := source.recv(65536):
-            target.sendall(data)
-    for end in (source, target):
+    def _pass_on(self, source: socket.socket, target: socket.socket) -> None:
         with contextlib.suppress(OSError):
-            end.shutdown(socket.SHUT_RDWR)
+            while data := source.recv(65536):
+                if self.delay_s:
+                    self._pause.wait(self.delay_s)
+                target.sendall(data)
+        for end in (source, target):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
 
 
 def _close_after(threads: list[threading.Thread], *ends: socket.socket) -> None:

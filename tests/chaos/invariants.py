@@ -1,0 +1,195 @@
+"""What holds of every drive, whatever befell it: looked at from outside, once it has ended."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow.parquet as pq
+
+from foretwin.contracts.segments import segments_of
+from foretwin.telemetry.standin.sensors import PERIOD_MS
+from foretwin.telemetry.standin.source import START_STAMP_NS
+from tests.chaos.faults import Case
+from tests.chaos.injection import Done
+from tests.chaos.power_cut import read_syncs, unsynced, wrong_after
+from tests.telemetry.own_recordings import read_drive
+
+KILLED = ("kill", "segv")
+MOST_LOST_S = 1.0
+"""Of the telemetry, to one kill."""
+UNIQUE = {
+    "rounds": ("round_id",), "futures": ("round_id", "index"), "jobs": ("job_sha256",),
+    "comparisons": ("stamp_ns", "horizon_s"), "mirror": ("stamp_ns",),
+}  # fmt: skip
+"""What no two rows of a table have in common."""
+_TEMPORARY = ("*.writing", "*.arrows", "*.stderr", "*.tmp", "*.partial")
+_MOST_PUBLISHED = 1_000_000
+"""A car sends 300 a second, bursts and strangers some thousands."""
+_LAST_WORDS = ("lost: ", "error: ")
+_STILL = frozenset({"recorder", "mirror", "vehicle", "orchestrator", "router", "disk", "link"})
+"""Where none of these was disturbed, what they write comes to the disk in time."""
+
+
+class Left(NamedTuple):
+    """What a drive left, and what had befallen it."""
+
+    case: Case
+    run: Path
+    code: int
+    done: list[Done]
+    screen: str
+    temporary: tuple[Path, ...]
+    """Folders where nothing may stay."""
+    syncs: Path
+    scratch: Path
+    recovered: tuple[int, str] | None
+    """Exit code and screen of `foretwin recover`, where the drive's record could not be written."""
+    begun_ns: int
+
+    def befell(self, *kinds: str, what: tuple[str, ...] = ()) -> list[Done]:
+        """Return the faults of these kinds of processes, and of these faults."""
+        return [
+            one
+            for one in self.done
+            if (not kinds or one.kind in kinds) and (not what or one.fault.what in what)
+        ]
+
+
+def wrong_with(left: Left) -> list[str]:
+    """Return what is wrong, in words."""
+    found = [*_wrong_codes(left), *_wrong_files(left)]
+    try:
+        record = json.loads((left.run / "run.json").read_text(encoding="utf-8"))
+        found += [*_wrong_ledger(left, record), *_wrong_words(left, record)]
+        found += [*_wrong_tables(left.run / "results"), *_lost_telemetry(left)]
+    except Exception as error:
+        found.append(f"cannot be looked at: {type(error).__name__}: {error}")
+    return [*found, *_wrong_power(left)]
+
+
+def fitting_codes(left: Left) -> set[int]:
+    """Return the exit codes that fit what befell a drive."""
+    codes = {0, 3}
+    asked = left.befell("orchestrator", "command", what=("term", "hup"))
+    if asked:
+        codes = {130}
+    if left.befell("vehicle", what=("kill", "segv", "term", "hup")):
+        codes = codes | {1, 130} if asked else {1}
+    for one in left.befell("orchestrator", "command", what=KILLED):
+        codes = codes | {-9 if one.fault.what == "kill" else -11}
+    return codes
+
+
+def _wrong_codes(left: Left) -> Iterator[str]:
+    codes = fitting_codes(left)
+    if left.code not in codes:
+        last = left.screen.strip().splitlines()[-1:]
+        yield f"exit code {left.code}, where {sorted(codes)} would fit: {last}"
+    if "Traceback" in left.screen:
+        yield f"a traceback on the screen: {left.screen[-800:]}"
+    if left.recovered is not None and left.recovered[0] not in (0, 3):
+        yield f"recover ended with {left.recovered[0]}: {left.recovered[1][-400:]}"
+
+
+def _wrong_words(left: Left, record: dict[str, Any]) -> Iterator[str]:
+    """Whether a run that lost anything says so last, and one that did not ends as done."""
+    if left.recovered is not None:
+        return
+    last = next(iter(left.screen.strip().splitlines()[-1:]), "")
+    told = last.startswith(_LAST_WORDS)
+    if left.code == 0 and (told or record["troubles"] or record["ledger"]["telemetry"]["lost"]):
+        yield f"exit code 0, and something is lost: {last}"
+    if left.code == 3 and not told:
+        yield f"exit code 3, and the last line does not say of what: {last}"
+    words = {0: "completed", 3: "completed", 130: "interrupted", 1: "failed"}
+    if record["exit"] != words.get(left.code, record["exit"]):
+        yield f"exit code {left.code}, and run.json says {record['exit']!r}"
+
+
+def _wrong_ledger(left: Left, record: dict[str, Any]) -> Iterator[str]:
+    if left.recovered is not None and "ledger" not in record:
+        return
+    ledger = record["ledger"]
+    telemetry, rounds, jobs = ledger["telemetry"], ledger["rounds"], ledger["jobs"]
+    if telemetry["published"] != telemetry["recorded"] + telemetry["lost"]:
+        yield f"the ledger of telemetry does not balance: {telemetry}"
+    if rounds["due"] != sum(count for name, count in rounds.items() if name != "due"):
+        yield f"the ledger of rounds does not balance: {rounds}"
+    if jobs["given"] != sum(count for name, count in jobs.items() if name != "given"):
+        yield f"the ledger of jobs does not balance: {jobs}"
+    if telemetry["published"] > _MOST_PUBLISHED:
+        yield f"{telemetry['published']} samples are said to be published in half a minute"
+    held = sum(1 for part in segments_of(left.run / "drive.mcap") for _ in read_drive(part))
+    if held < telemetry["recorded"]:
+        yield f"{telemetry['recorded']} samples are said to be recorded, {held} messages are there"
+
+
+def _wrong_tables(results: Path) -> Iterator[str]:
+    tables = {
+        name: pq.read_table(results / f"{name}.parquet", columns=list(columns)).to_pylist()
+        for name, columns in UNIQUE.items()
+        if (results / f"{name}.parquet").exists()
+    }
+    for name, rows in tables.items():
+        counts = Counter(tuple(row.values()) for row in rows)
+        if twice := [key for key, count in counts.items() if count > 1]:
+            yield f"twice in {name}: {twice[:3]} of {len(twice)}"
+    if {"rounds", "futures", "jobs"} <= tables.keys():
+        rounds = {row["round_id"] for row in tables["rounds"]}
+        with_futures = {row["round_id"] for row in tables["futures"]}
+        if rounds - with_futures:
+            yield f"rounds without futures: {sorted(rounds - with_futures)[:5]}"
+
+
+def _lost_telemetry(left: Left) -> Iterator[str]:
+    """Whether any samples of the stand-in's regular ones are missing that no kill explains."""
+    if left.case.linked:
+        return
+    kinds = ("recorder", "vehicle", "router", "orchestrator", "command", "other")
+    # A limit on its memory may end a process as well.
+    kills = left.befell(*kinds, what=(*KILLED, "memory", "term", "hup"))
+    held: dict[str, set[int]] = {name: set() for name in PERIOD_MS}
+    for part in segments_of(left.run / "drive.mcap"):
+        for channel, message in read_drive(part):
+            if channel in held:
+                held[channel].add(message.stamp_ns)  # type: ignore[attr-defined]
+    newest_ns = max((max(stamps) for stamps in held.values() if stamps), default=0)
+    for channel, period_ms in PERIOD_MS.items():
+        period_ns = period_ms * 1_000_000
+        due = range(START_STAMP_NS, newest_ns - 200_000_000, period_ns)
+        missing = sum(stamp_ns not in held[channel] for stamp_ns in due)
+        lost_s = missing * period_ns * 1e-9
+        # On a busy machine whatever happens each second happens some tenths later.
+        if lost_s > 1.3 * MOST_LOST_S * len(kills):
+            yield f"{lost_s:.2f} s of {channel} are lost, of {len(kills)} kills"
+
+
+def _wrong_files(left: Left) -> Iterator[str]:
+    temporary = [path.name for name in _TEMPORARY for path in left.run.rglob(name)]
+    if temporary and not (left.code == 3 and left.befell("disk")):
+        yield f"temporary files in the run's folder: {sorted(temporary)}"
+    for folder in left.temporary:
+        if stays := sorted(str(path.relative_to(folder)) for path in folder.rglob("*")):
+            yield f"stays in {folder.name}: {stays[:5]}"
+    if not left.befell("viewer", "disk", "other", "orchestrator", "command"):
+        shown = left.run / "monitor.rrd"
+        if not shown.exists() or not shown.stat().st_size:
+            yield "monitor.rrd is missing or empty"
+
+
+def _wrong_power(left: Left) -> Iterator[str]:
+    syncs = read_syncs(left.syncs)
+    for number, one in enumerate(left.befell(what=("power",))):
+        chance = random.Random(f"{left.case.seed}/{left.case.number}/{number}")
+        cut_ns = one.at_ns + chance.randrange(1_000_000_000)
+        before = {other.kind for other in left.done if other.at_ns <= cut_ns}
+        if not before & _STILL and not left.case.linked:
+            yield from unsynced(syncs, left.run, left.begun_ns, cut_ns)
+        target = left.scratch / f"power-cut-{number}"
+        seed = f"{left.case.seed}/{left.case.number}/{number}"
+        yield from wrong_after(left.run, left.syncs, cut_ns, target, seed)

@@ -1,0 +1,88 @@
+"""The processes of one run, by what the run itself tells: who holds which of its files."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.system.foretwin_command import is_running
+
+MARK = "FORETWIN_CHAOS_DRIVE"
+"""In the environment of everything that a drive starts."""
+
+
+class Member(NamedTuple):
+    """A process of a run: its name there, and its id."""
+
+    name: str
+    pid: int
+
+    @property
+    def kind(self) -> str:
+        """What it is called without its number: `w` of `w0`."""
+        return self.name.rstrip("0123456789")
+
+
+def members(run: Path, mark: str, command_pid: int) -> list[Member]:
+    """Return the processes of a run that live, sorted by name.
+
+    Who was started with a setup is named by it. The orchestrator is who holds the run's log; the
+    command, where that is another process, is `command`. What else carries the mark is `other`.
+    """
+    found = []
+    holder = _lock_holder(run / "log.jsonl")
+    for pid in marked(mark):
+        if (name := _setup_name(pid, run)) is None:
+            name = "other"
+            if pid == command_pid:
+                name = "command"
+            if pid == holder or (pid == command_pid and holder is None):
+                name = "orchestrator"
+        found.append(Member(name, pid))
+    return sorted(found)
+
+
+def marked(mark: str) -> list[int]:
+    """Return the processes that carry a mark and are no zombies."""
+    sought = f"{MARK}={mark}".encode()
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if sought in (folder / "environ").read_bytes().split(b"\0"):
+                found.append(int(folder.name))
+    return sorted(pid for pid in found if is_running(pid))
+
+
+def end_all(mark: str) -> list[str]:
+    """Kill what still carries a mark; returns what that was, in words."""
+    left = []
+    for pid in marked(mark):
+        with contextlib.suppress(OSError):
+            words = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ")
+            left.append(f"{pid}: {words.decode(errors='replace')[:160]}")
+            os.kill(pid, signal.SIGKILL)
+    return left
+
+
+def _setup_name(pid: int, run: Path) -> str | None:
+    """Return the name of the setup below `run` that a process was started with."""
+    with contextlib.suppress(OSError, ValueError):
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
+        setup = Path(words[words.index("--setup") + 1])
+        if setup.parent.parent == run:
+            return setup.stem
+    return None
+
+
+def _lock_holder(file: Path) -> int | None:
+    """Return who holds the exclusive lock of a file."""
+    with contextlib.suppress(OSError):
+        inode = str(file.stat().st_ino)
+        for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
+            words = line.split()
+            if words[1:4:2] == ["FLOCK", "WRITE"] and words[5].split(":")[2] == inode:
+                return int(words[4])
+    return None

@@ -1,0 +1,101 @@
+"""Draws mutants by the operators of cosmic-ray, in whose own environment it runs.
+
+A JSON object {"root", "files", "seed", "count"} comes in, one {"places", "mutants"} goes out, each
+mutant with its file, line, operator and text. Each place in the files is as likely as any other,
+then each operator that can change it: of one `+` cosmic-ray makes a dozen mutants. Left out is what
+changes no result of any program that is right: annotations, protocols, that a type is frozen.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import random
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cosmic_ray import plugins
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+
+_LEFT_OUT = ("core/NoOp",)
+_DECLARED = ("frozen", "slots", "kw_only")
+
+
+class Place(NamedTuple):
+    """Where a mutant differs: file, and line and column where that begins."""
+
+    file: str
+    line: int
+    column: int
+
+
+class Change(NamedTuple):
+    """What an operator does there: its name, and which of its changes in the file it is."""
+
+    operator: str
+    occurrence: int
+
+
+def main() -> None:
+    """Read what is asked for and print the mutants."""
+    asked = json.load(sys.stdin)
+    root, chance = Path(asked["root"]), random.Random(asked["seed"])
+    places: dict[Place, list[Change]] = {}
+    for file in asked["files"]:
+        places.update(_places(root, file))
+    drawn = chance.sample(sorted(places), min(asked["count"], len(places)))
+    mutants = []
+    for place in drawn:
+        change = chance.choice(places[place])
+        text = mutate_code(_read(root, place.file), _operator(change.operator), change.occurrence)
+        mutants.append(
+            {"file": place.file, "line": place.line, "operator": change.operator, "text": text}
+        )
+    json.dump({"places": len(places), "mutants": mutants}, sys.stdout)
+
+
+def _places(root: Path, file: str) -> dict[Place, list[Change]]:
+    text = _read(root, file)
+    tree, unrun = get_ast(text), _unrun(ast.parse(text))
+    found = defaultdict(list)
+    for name in plugins.operator_names():
+        if name in _LEFT_OUT or plugins.get_operator(name).arguments():
+            continue
+        operator = _operator(name)
+        occurrences = (
+            start for node in ast_nodes(tree) for start, _ in operator.mutation_positions(node)
+        )
+        for occurrence, (line, column) in enumerate(occurrences):
+            if not any(first <= (line, column) < last for first, last in unrun):
+                found[Place(file, line, column)].append(Change(name, occurrence))
+    return found
+
+
+def _unrun(tree: ast.Module) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Return where what is left out begins and ends."""
+    nodes: list[Any] = []
+    for node in ast.walk(tree):
+        nodes += [getattr(node, name, None) for name in ("annotation", "returns")]
+        declares = isinstance(node, ast.keyword) and node.arg in _DECLARED
+        protocol = isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases)
+        nodes += [node] if declares or protocol else []
+    return [
+        ((node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset))
+        for node in nodes
+        if isinstance(node, ast.expr | ast.keyword | ast.ClassDef)
+    ]
+
+
+def _operator(name: str) -> Any:
+    return plugins.get_operator(name)()
+
+
+def _read(root: Path, file: str) -> str:
+    return (root / file).read_text(encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
