@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import collections
 import itertools
-import json
 import secrets
 import threading
 import time
@@ -24,8 +23,9 @@ from foretwin.contracts.kept import keeping_publisher, most_kept, recovering_sub
 from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
-from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.trace import span
+from foretwin.contracts.zenoh_config import zenoh_config
 
 __all__ = [
     "Alive",
@@ -43,54 +43,8 @@ __all__ = [
 ]
 
 
-CONNECT_S = 5.0
-"""How long a client looks for its router."""
-LEASE_MS = 3000
-"""A process that is silent for so long counts as lost."""
-LOSSLESS_LEASE_MS = 60_000
-LOSSLESS_WAIT_US = 600_000_000
-"""How long a writer waits for a reader that stands still where nothing may be lost."""
-
-
-_QUEUE_SIZES = {
-    **dict.fromkeys(("real_time", "interactive_high", "data_high", "data"), 16),
-    "interactive_low": 4,
-    **dict.fromkeys(("control", "data_low", "background"), 2),
-}
-"""Batches that may wait to be sent, by priority; docs/bus.md."""
-
-
 class BusUnreachable(ConnectionError):  # noqa: N818
     """No router answers at the endpoint."""
-
-
-def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
-    """Return the Zenoh configuration; docs/bus.md gives the reason for each setting."""
-    import zenoh
-
-    config = zenoh.Config()
-    settings: dict[str, Any] = {
-        "mode": "router" if router else "client",
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "scouting/delay": 0,
-        "timestamping/enabled": True,
-        "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": LOSSLESS_LEASE_MS if setup.lossless else LEASE_MS,
-        "transport/link/tx/queue/size": _QUEUE_SIZES,
-        "listen/endpoints": [setup.endpoint] if router else [],
-    }
-    if setup.lossless:
-        queue = "transport/link/tx/queue/congestion_control/block"
-        settings[f"{queue}/wait_before_close"] = LOSSLESS_WAIT_US
-    if not router:
-        settings["connect/endpoints"] = [setup.endpoint]
-        settings["connect/timeout_ms"] = round(1e3 * CONNECT_S)
-        retry = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
-        settings["connect/retry"] = retry
-    for name, value in settings.items():
-        config.insert_json5(name, json.dumps(value))
-    return config
 
 
 class ZenohSession:
@@ -156,6 +110,12 @@ class ZenohSession:
                 else self._session.declare_publisher(key, **qos)
             )
         return self._publishers[key]
+
+    @property
+    def connected(self) -> bool:
+        """Whether a router or peer is there now; see Bus."""
+        info = self._session.info
+        return bool(info.routers_zid() or info.peers_zid())
 
     def close(self) -> None:
         """Close the session; idempotent."""

@@ -46,6 +46,10 @@ class Bus(Protocol):
     def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
         """Let every appearance, past ones included, and every loss land in `mailbox` as Alive."""
 
+    @property
+    def connected(self) -> bool:
+        """Whether the router is there now; an unplugged cable shows after the lease, 3 s."""
+
     def close(self) -> None:
         """Undeclare everything."""
 

@@ -62,12 +62,6 @@ class ZenohForeignBus(ZenohSession):
         """The session's Zenoh id."""
         return str(self._session.info.zid())
 
-    @property
-    def connected(self) -> bool:
-        """Whether a router or peer is there now; an unplugged cable shows after the lease, 3 s."""
-        info = self._session.info
-        return bool(info.routers_zid() or info.peers_zid())
-
     def subscribe(self, key: str, mailbox: Mailbox, *, history: bool = False) -> None:
         """Receive into `mailbox`; see ForeignBus."""
 

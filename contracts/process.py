@@ -35,8 +35,9 @@ from foretwin.contracts.terminal import say
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
 
-ORCHESTRATOR_GRACE_S = 5.0
-"""A lost link comes back within this time, or the orchestrator is taken for gone."""
+ORCHESTRATOR_GRACE_S = 30.0
+"""A lost link comes back within this time, and an orchestrator that stood still goes on, or it is
+taken for gone. One that has died is seen at once by those that it started."""
 
 
 class JsonLines(logging.Formatter):

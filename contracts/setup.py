@@ -2,36 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TypeVar
-
-import msgspec
-
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.process_setup import BusSetup as BusSetup
+from foretwin.contracts.process_setup import ProcessSetup as ProcessSetup
+from foretwin.contracts.process_setup import read_setup as read_setup
+from foretwin.contracts.process_setup import write_setup as write_setup
 from foretwin.contracts.roles import MirrorCast
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION
-
-_Setup = TypeVar("_Setup", bound="ProcessSetup")
-
-
-class BusSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How to reach the bus; `lossless` makes every publisher wait rather than drop (lock step)."""
-
-    endpoint: str
-    lossless: bool = False
-
-
-class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every process knows: the run, its own id, the bus, and where its log goes."""
-
-    run_id: str
-    process_id: str
-    vehicle_id: str
-    bus: BusSetup
-    log_file: str
-    trace_dir: str | None = None
-    """Where it leaves what it did when; None: nowhere. See foretwin.contracts.trace."""
 
 
 class ReplaySetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -134,13 +112,3 @@ class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     title: str = "foretwin"
     attribution: str = ATTRIBUTION
     start_stamp_ns: int = 0
-
-
-def write_setup(setup: ProcessSetup, path: Path) -> None:
-    """Write a setup as JSON."""
-    path.write_bytes(msgspec.json.format(msgspec.json.encode(setup), indent=2))
-
-
-def read_setup(path: Path, kind: type[_Setup]) -> _Setup:
-    """Read a setup of type `kind`; raises msgspec.ValidationError naming the field at fault."""
-    return msgspec.json.decode(path.read_bytes(), type=kind)

@@ -94,6 +94,11 @@ class DrivePlan(DriveInputs):
         return self.folder / TRACE_PARTS if self.config.trace else None
 
     @property
+    def router_word_file(self) -> Path:
+        """Where the router says that it listens, or why it cannot."""
+        return self.processes_dir / "router.word"
+
+    @property
     def recording(self) -> Path:
         """What the vehicle sent; where it has several parts, the first of them."""
         return self.folder / "drive.mcap"

@@ -24,10 +24,18 @@ from foretwin.orchestrator.drive.intake import unannounced
 from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.lock_step import LockStepLoop
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
-from foretwin.orchestrator.drive.plan import make_plan, open_bus, read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
-from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
+from foretwin.orchestrator.drive.processes import (
+    BUILDER,
+    ORCHESTRATOR,
+    PROCESSES,
+    ROUTER,
+    process_ids,
+    row_of,
+)
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
+from foretwin.orchestrator.drive.router_start import join_bus
 from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
@@ -123,7 +131,7 @@ class _Drive:
         plan = self._plan
         started_s = time.monotonic()
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
-        with open_bus(plan) as bus:
+        with join_bus(plan, self._supervisor) as bus:
             tables = ResultTables(
                 plan.folder / RESULTS,
                 {
@@ -179,19 +187,21 @@ class _Drive:
                 conductor, housekeeping=housekeeping, stop=self._stop, each_turn=in_charge
             )
         ended = loop.run()
-        if self._watch.vehicle_lost and not self._interrupt.asked:
-            raise DriveError("the vehicle's process died; see log.jsonl")
+        if self._watch.ended_by is not None and not self._interrupt.asked:
+            raise DriveError(f"{self._watch.ended_by}; see log.jsonl")
         if not ended:
             return "interrupted", EXIT_INTERRUPTED
         conductor.finish()
         return "completed", EXIT_DONE
 
     def _stop(self) -> bool:
-        return self._interrupt.asked or self._watch.vehicle_lost
+        return self._interrupt.asked or self._watch.ended_by is not None
 
     def _start_processes(self) -> None:
         for row in PROCESSES:
             for process_id in process_ids(row, self._plan):
+                if process_id == ROUTER:
+                    continue  # it runs already: we are on its bus
                 setup = row.setup(self._plan, process_id)
                 self._supervisor.start(row_of(row, self._plan), setup)
 
@@ -238,6 +248,8 @@ class _Drive:
 
     def _look_after(self, conductor: Conductor, now_s: float) -> None:
         self._watch.look_after(conductor, now_s)
+        if BUILDER in conductor.alive:
+            conductor.worlds.ask_again(now_s)
 
     def _end(
         self,
@@ -253,7 +265,8 @@ class _Drive:
         bus.publish("run_end", end, run=plan.run_id)
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
         quick = exit_word != "completed"
-        if killed := self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s):
+        grace_s = INTERRUPT_GRACE_S if quick else to_write_s
+        if killed := self._supervisor.stop(grace_s=grace_s, but={ROUTER}):
             log.warning("had to kill %s", ", ".join(killed))
         try:
             while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
@@ -263,6 +276,7 @@ class _Drive:
             log.exception("the last messages could not be taken")
             exit_word = "failed"
             self._failed_at_end = True
+        self._supervisor.stop(grace_s=0.0)  # the router: nobody has anything to say any more
         conductor.rounds.close()
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()

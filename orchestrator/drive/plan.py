@@ -5,13 +5,11 @@ from __future__ import annotations
 import datetime
 import json
 import secrets
-import shutil
 from pathlib import Path
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.bus import BusUnreachable, ZenohBus
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
@@ -204,15 +202,3 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
     if plan.standin is not None:
         plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
     return plan
-
-
-def open_bus(plan: DrivePlan) -> ZenohBus:
-    """Return the bus of a run, its router; UserError, with no folder left, if it cannot listen."""
-    try:
-        return ZenohBus(plan.bus, router=True)
-    except BusUnreachable as error:
-        shutil.rmtree(plan.folder, ignore_errors=True)
-        raise UserError(
-            f"endpoint {plan.bus.endpoint}: cannot be listened on here; it must be an address of "
-            "this machine with a free port"
-        ) from error

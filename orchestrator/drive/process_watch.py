@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass, field
 
 from foretwin.orchestrator.drive.conductor import Conductor
-from foretwin.orchestrator.drive.processes import ORCHESTRATOR, VIEWER
+from foretwin.orchestrator.drive.processes import ORCHESTRATOR, ROUTER, VIEWER
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.runner.supervisor import Supervisor
 
@@ -15,6 +16,10 @@ log = logging.getLogger(ORCHESTRATOR)
 HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
 """A process whose token is gone for so long while it runs (a stopped one, say) is killed; one that
 gives way may have to wait for a processor that long."""
+RECONNECT_S = 2.0
+"""So long after our own link came back another process may still be without its own."""
+ROUTER_START_S = 15.0
+"""What a router that was started again has until it must be there."""
 
 
 @dataclass(slots=True)
@@ -22,7 +27,8 @@ class ProcessWatch:
     """Tells of each death once, and ends those that hang; call `look_after` ten times a second."""
 
     supervisor: Supervisor
-    vehicle_lost: bool = False
+    ended_by: str | None = None
+    """Whose death ends the drive, in words."""
     given_up: set[str] = field(default_factory=set)
     """Processes that are not started any more."""
     troubles: list[str] = field(default_factory=list)
@@ -30,6 +36,10 @@ class ProcessWatch:
     telemetry tells what."""
     _seen_alive: set[str] = field(default_factory=set)
     _silent_since_s: dict[str, float] = field(default_factory=dict)
+    _linked: bool = False
+    _link_changed_s: float = -math.inf
+    _router_was_there: bool = True
+    """Whether there has been a link to the router since it was started last."""
 
     def look_after(self, conductor: Conductor, now_s: float) -> None:
         """Take notice of deaths and of who hangs."""
@@ -37,6 +47,8 @@ class ProcessWatch:
             # One that is started again is not silent before it was heard.
             self._seen_alive.discard(death.process_id)
             self._silent_since_s.pop(death.process_id, None)
+            if death.process_id == ROUTER:
+                self._router_was_there, self._link_changed_s = False, now_s
             text = f"{death.process_id} ended with code {death.exit_code}"
             if death.restarted:
                 after = f" in {death.pause_s:g} s" if death.pause_s else ""
@@ -47,26 +59,46 @@ class ProcessWatch:
             self.given_up.add(death.process_id)
             conductor.rounds.never_again(death.process_id)
             self._missing(f"{text} and was not started again")
-            if death.row.when_dead == "end_drive":
+            if death.row.when_dead == "end_drive" or death.process_id == ROUTER:
                 conductor.tell(Notice("error", text))
-                self.vehicle_lost = True
+                self.ended_by = _ended_by(
+                    death.process_id, lock_step=conductor.plan.config.lock_step
+                )
             else:
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
         for text in conductor.tables.take_news():
             conductor.tell(Notice("warning", text))
+        self._watch_router(now_s, linked=conductor.bus.connected)
         self._end_the_hung(conductor, now_s)
 
     def _missing(self, text: str) -> None:
         if text not in self.troubles:
             self.troubles.append(text)
 
+    def _watch_router(self, now_s: float, *, linked: bool) -> None:
+        """Kill a router that runs and that we have no link to; clients find the next one."""
+        if linked != self._linked:
+            self._linked, self._link_changed_s = linked, now_s
+        if linked:
+            self._router_was_there = True
+            return
+        patience_s = HUNG_AFTER_S if self._router_was_there else ROUTER_START_S
+        if now_s - self._link_changed_s > patience_s and ROUTER in self.supervisor.running():
+            log.warning("%s hangs: killed", ROUTER)
+            self.supervisor.kill(ROUTER)
+            self._router_was_there, self._link_changed_s = False, now_s
+
     def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
-        """Kill processes that were alive, run still, and have not answered for a while."""
+        """Kill processes that were alive, run still, and have not answered for a while.
+
+        Without a link to the router nobody is heard, and after it not everybody at once.
+        """
+        heard_from_s = self._link_changed_s + RECONNECT_S if self._linked else math.inf
         for process_id in self.supervisor.running():
             if process_id in conductor.alive:
                 self._silent_since_s.pop(process_id, None)
                 self._seen_alive.add(process_id)
-            elif process_id in self._seen_alive:
+            elif process_id in self._seen_alive and now_s >= heard_from_s:
                 since_s = self._silent_since_s.setdefault(process_id, now_s)
                 row = self.supervisor.row(process_id)
                 patience_s = GIVES_WAY_HUNG_AFTER_S if row.nice else HUNG_AFTER_S
@@ -74,3 +106,11 @@ class ProcessWatch:
                     log.warning("%s hangs: killed", process_id)
                     self.supervisor.kill(process_id)
                     self._seen_alive.discard(process_id)
+
+
+def _ended_by(process_id: str, *, lock_step: bool) -> str:
+    if process_id != ROUTER:
+        return "the vehicle's process died"
+    if lock_step:
+        return "the router died, and with it what was on its way: in lock step nothing may be lost"
+    return "the router died again and again"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from foretwin.contracts.process_setup import RouterSetup
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
     BuilderSetup,
@@ -22,6 +23,7 @@ from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR = "orchestrator"
+ROUTER = "router"
 BUILDER = "builder"
 MIRROR = "mirror"
 RECORDER, VIEWER = "recorder", "viewer"
@@ -54,6 +56,10 @@ def _base(plan: DrivePlan, process_id: str) -> dict[str, Any]:
         "log_file": str(plan.folder / "log.jsonl"),
         "trace_dir": None if plan.trace_dir is None else str(plan.trace_dir),
     }
+
+
+def _router(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return RouterSetup(**_base(plan, process_id), word_file=str(plan.router_word_file))
 
 
 def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
@@ -182,6 +188,7 @@ def _source_is(source: str) -> Callable[[DrivePlan], bool]:
 
 _REPLAY, _STANDIN = "telemetry.processes.replay", "telemetry.standin"
 PROCESSES = (
+    ProcessRow(ROUTER, "contracts.router", "restart", _router),
     ProcessRow(BUILDER, "orchestrator.worlds.builder_process", "restart", _builder, nice=10),
     ProcessRow("w", "sim_worker", "restart", _worker, how_many=lambda plan: plan.config.workers),
     ProcessRow(MIRROR, "sim_worker", "restart", _worker),
@@ -202,22 +209,27 @@ PROCESSES = (
         how_many=lambda plan: len(_ros2_of_others(plan)),
     ),
 )
-"""In the order in which they are started; the vehicle waits for the orchestrator's token."""
+"""In the order in which they are started: the router before the orchestrator is on the bus, and it
+ends after all others; the vehicle waits for the orchestrator's token."""
 
 
 def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     """Return a row as it counts in one drive.
 
-    In lock step nobody may begin in the middle who answers for all samples from the first one on.
+    In lock step nothing may be lost, and what was in a router that died is; nor may anybody begin
+    in the middle who answers for all samples from the first one on.
     """
+    if row.name == ROUTER and plan.config.lock_step:
+        return row._replace(when_dead="end_drive")
     if row.name in (TUNING, RECORDER, VIEWER) and plan.config.lock_step:
         return row._replace(when_dead="report")
     return row
 
 
 def expected_ids(plan: DrivePlan) -> frozenset[str]:
-    """Return the ids of all processes that a drive starts."""
-    return frozenset(one for row in PROCESSES for one in process_ids(row, plan))
+    """Return the ids of all processes of a drive that say on the bus that they are alive."""
+    rows = (row for row in PROCESSES if row.name != ROUTER)
+    return frozenset(one for row in rows for one in process_ids(row, plan))
 
 
 def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:

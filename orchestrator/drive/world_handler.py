@@ -15,11 +15,15 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.processes import BUILDER
 from foretwin.orchestrator.instructions import Notice
+from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER
 
 log = logging.getLogger("orchestrator")
 
 BUILD_TIMEOUT_S = 60.0
 KEPT_WORLDS = 16
+ASKS_AGAIN_AFTER_S = 0.5
+MOST_UNANSWERED = 5
+"""So often a question for a World may find nobody; one that goes out without a link does too."""
 
 
 @dataclass(slots=True)
@@ -31,7 +35,9 @@ class _Order:
     pending: set[str] | None = None
     """None until loading begins."""
     ready: bool = False
-    asked_again: bool = False
+    unanswered: int = 0
+    ask_at_s: float | None = None
+    """When to ask again, on the monotonic clock, if the builder is there."""
 
 
 @dataclass(slots=True)
@@ -94,6 +100,14 @@ class WorldHandler:
         """The builder is back: ask again for what it owes."""
         for junction_id, order in self._orders.items():
             if order.world_id is None and not order.ready:
+                order.ask_at_s = None
+                self._ask_build(junction_id)
+
+    def ask_again(self, now_s: float) -> None:
+        """Ask the builder, which is up, for what it was asked for in vain; call it often."""
+        for junction_id, order in self._orders.items():
+            if order.ask_at_s is not None and now_s >= order.ask_at_s:
+                order.ask_at_s = None
                 self._ask_build(junction_id)
 
     def build_reply(self, reply: Reply, *, workers: tuple[str, ...], builder_up: bool) -> None:
@@ -101,7 +115,10 @@ class WorldHandler:
         junction_id = reply.tag
         order = self._orders[junction_id]
         if reply.message is None:
-            if builder_up:
+            order.unanswered += reply.error == NO_ANSWER
+            if reply.error == NO_ANSWER and order.unanswered <= MOST_UNANSWERED:
+                order.ask_at_s = time.monotonic() + ASKS_AGAIN_AFTER_S
+            elif builder_up:
                 self._build_failed(junction_id, order, reply.error or "no reason given")
             return
         if order.world_id is not None:
@@ -122,11 +139,6 @@ class WorldHandler:
             self._settle(junction_id, order)
 
     def _build_failed(self, junction_id: str, order: _Order, reason: str) -> None:
-        """Ask once more where the builder only took too long; else give the World up."""
-        if reason == "no answer" and not order.asked_again:
-            order.asked_again = True
-            self._ask_build(junction_id)
-            return
         order.ready = True  # nothing more will come of it
         self.on_failed(junction_id, reason)
 
@@ -151,7 +163,7 @@ class WorldHandler:
     def prepare_reply(self, reply: Reply) -> None:
         """Take a worker's answer."""
         worker_id, world_id, asked_s = reply.tag
-        if reply.error == "no answer":
+        if reply.error == NO_ANSWER:
             # Just started or just gone; a job loads the World too.
             log.info("world %s not loaded by %s beforehand", world_id, worker_id)
         elif reply.message is None:

@@ -233,36 +233,41 @@ class Supervisor:
         """Return the operating system's id of a process."""
         return self._managed[process_id].child.pid
 
-    def stop(self, *, grace_s: float, term_s: float = TERM_S) -> list[str]:
-        """Wait `grace_s` for all to end by themselves, then terminate, then kill.
+    def stop(
+        self, *, grace_s: float, term_s: float = TERM_S, but: Collection[str] = ()
+    ) -> list[str]:
+        """Wait `grace_s` for all `but` these to end by themselves, then terminate, then kill.
 
         Returns the ids that had to be killed. Those who gave way are waited for now.
         """
-        for managed in self._alive():
+        ending = [managed for name, managed in self._managed.items() if name not in but]
+        for managed in _alive(ending):
             if managed.row.nice:
                 gives_way(managed.child.pid, 0)
-        self._wait(grace_s)
-        for managed in self._alive():
+        _wait(ending, grace_s)
+        for managed in _alive(ending):
             _signal(managed.child, signal.SIGTERM)
             _signal(managed.child, signal.SIGCONT)
-        self._wait(term_s)
-        killed = self._alive()
+        _wait(ending, term_s)
+        killed = _alive(ending)
         for managed in killed:
             _signal(managed.child, signal.SIGKILL)
-        for managed in self._managed.values():
+        for managed in ending:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 managed.child.wait(timeout=_REAP_S)
             managed.gone = True
         return [managed.setup.process_id for managed in killed]
 
-    def _alive(self) -> list[_Managed]:
-        return [m for m in self._managed.values() if not m.gone and m.child.poll() is None]
 
-    def _wait(self, seconds: float) -> None:
-        deadline = time.monotonic() + seconds
-        for managed in self._alive():
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                managed.child.wait(timeout=max(0.0, deadline - time.monotonic()))
+def _alive(ending: Collection[_Managed]) -> list[_Managed]:
+    return [one for one in ending if not one.gone and one.child.poll() is None]
+
+
+def _wait(ending: Collection[_Managed], seconds: float) -> None:
+    deadline = time.monotonic() + seconds
+    for managed in _alive(ending):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            managed.child.wait(timeout=max(0.0, deadline - time.monotonic()))
 
 
 def _signal(child: Child, sig: int) -> None:

@@ -113,6 +113,10 @@ class MemoryBus:
         for mailbox in watchers:
             mailbox.put(Alive(alive_key, up, time.monotonic_ns()))
 
+    @property
+    def connected(self) -> bool:
+        return True
+
     def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
         """Watch liveliness tokens; see Bus."""
         with self._lock:

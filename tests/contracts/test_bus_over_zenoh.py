@@ -131,7 +131,7 @@ def test_a_question_that_is_never_answered_times_out() -> None:
 
 
 def test_no_router_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("foretwin.contracts.bus.CONNECT_S", 0.5)
+    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.5)
     endpoint = free_endpoint()
 
     with pytest.raises(BusUnreachable, match=f"no Zenoh router at {endpoint}"):

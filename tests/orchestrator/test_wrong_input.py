@@ -158,6 +158,7 @@ def test_an_endpoint_that_is_taken_is_told_and_leaves_no_run(tmp_path: Path) -> 
             cwd=tmp_path, capture_output=True, text=True, check=False,
         )  # fmt: skip
     assert ended.returncode == 2
-    assert ended.stderr.startswith(f"foretwin: endpoint {endpoint}: cannot be listened on here")
+    port = endpoint.rsplit(":", 1)[1]
+    assert ended.stderr.startswith(f"foretwin: endpoint {endpoint}: port {port} is taken; ")
     assert ended.stderr.count("\n") == 1
     assert list((tmp_path / "runs").iterdir()) == []

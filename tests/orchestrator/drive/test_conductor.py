@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,8 +15,10 @@ import pytest
 from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import GnssFix, SpeedSample
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from foretwin.contracts.mailbox import Received
+from foretwin.contracts.mailbox import Received, Reply
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.world_handler import ASKS_AGAIN_AFTER_S, MOST_UNANSWERED
+from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER
 from tests.orchestrator.house import INFO, Builder, House, Worker
 
 COVERS = (
@@ -108,6 +111,27 @@ def test_a_builder_that_dies_is_asked_again_when_it_is_back(house: House) -> Non
     house.work()
     assert "n4" in house.builder.asked
     assert ready(house.conductor)
+
+
+def test_a_question_for_a_world_that_found_nobody_is_asked_again(house: House) -> None:
+    """As while the link to the router is away: the builder is up, and nothing reaches it."""
+    house.drive(1, working=False)
+    house.builder.answer()
+    house.settle()
+    worlds = house.conductor.worlds
+    worlds.want("n10", load=False, workers=())
+    lost = Reply("build", "n10", None, NO_ANSWER, 0)
+    for _ in range(MOST_UNANSWERED):
+        house.builder.take()
+        house.conductor.handle(lost)
+        worlds.ask_again(time.monotonic())
+        assert house.builder.take() == []
+        worlds.ask_again(time.monotonic() + 2.0 * ASKS_AGAIN_AFTER_S)
+        worlds.ask_again(time.monotonic() + 4.0 * ASKS_AGAIN_AFTER_S)
+        assert len(house.builder.take()) == 1
+        assert "n10" in worlds.building
+    house.conductor.handle(lost)
+    assert "n10" not in worlds.building, "given up in the end"
 
 
 def test_a_world_that_was_built_is_not_built_again(house: House) -> None:

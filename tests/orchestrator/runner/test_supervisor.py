@@ -100,7 +100,9 @@ def test_who_watches_and_records_is_started_again_but_not_in_lock_step() -> None
     watching = [row(name) for name in ("tuning", "recorder", "viewer")]
     assert {row_of(one, live).when_dead for one in watching} == {"restart"}  # type: ignore[arg-type]
     assert {row_of(one, stepped).when_dead for one in watching} == {"report"}  # type: ignore[arg-type]
-    others = [one for one in PROCESSES if one not in watching]
+    assert row_of(row("router"), live).when_dead == "restart"  # type: ignore[arg-type]
+    assert row_of(row("router"), stepped).when_dead == "end_drive"  # type: ignore[arg-type]
+    others = [one for one in PROCESSES if one not in (*watching, row("router"))]
     assert [row_of(one, stepped) for one in others] == others  # type: ignore[arg-type]
 
 

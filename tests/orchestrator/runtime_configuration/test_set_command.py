@@ -58,7 +58,7 @@ def test_what_cannot_be_asked_ends_in_one_line(
 def test_a_drive_that_was_killed_is_told_apart(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("foretwin.contracts.bus.CONNECT_S", 0.3)
+    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
     folder = _run(tmp_path, "killed", "running", endpoint := free_endpoint())
     assert run(["set", "role.ego=twin", "--run", str(folder)]) == EXIT_USER
     (line,) = capsys.readouterr().err.splitlines()

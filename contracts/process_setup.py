@@ -1,0 +1,48 @@
+"""What every process is started with, and the router, which needs no more.
+
+The router must start at once and stay small: nothing here knows frames, vehicles or Worlds.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+_Setup = TypeVar("_Setup", bound="ProcessSetup")
+
+
+class BusSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How to reach the bus; `lossless` makes every publisher wait rather than drop (lock step)."""
+
+    endpoint: str
+    lossless: bool = False
+
+
+class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every process knows: the run, its own id, the bus, and where its log goes."""
+
+    run_id: str
+    process_id: str
+    vehicle_id: str
+    bus: BusSetup
+    log_file: str
+    trace_dir: str | None = None
+    """Where it leaves what it did when; None: nowhere. See foretwin.contracts.trace."""
+
+
+class RouterSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The router; it says in `word_file` that it listens, or in one line why it cannot."""
+
+    word_file: str
+
+
+def write_setup(setup: ProcessSetup, path: Path) -> None:
+    """Write a setup as JSON."""
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(setup), indent=2))
+
+
+def read_setup(path: Path, kind: type[_Setup]) -> _Setup:
+    """Read a setup of type `kind`; raises msgspec.ValidationError naming the field at fault."""
+    return msgspec.json.decode(path.read_bytes(), type=kind)

@@ -1,0 +1,64 @@
+"""The router of a run's bus: `python -m foretwin.contracts.router --setup FILE`.
+
+It passes on what the others say and decodes none of it: no message can end it, and an orchestrator
+that stands still or dies takes nobody's bus along. It ends when it is told to, or with the process
+that started it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+import msgspec
+import zenoh
+
+from foretwin.contracts.end_signals import on_end_signals
+from foretwin.contracts.process_setup import RouterSetup, read_setup
+from foretwin.contracts.zenoh_config import zenoh_config
+
+LISTENS = "listens"
+"""The router's word once clients can connect; any other tells why they never will."""
+_LOOK_S = 0.5
+
+
+def run_router(argv: list[str] | None = None) -> None:
+    """Be the router until told to end. Exit codes: 0 done, 2 it cannot listen, in one line."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = os.getppid()
+    ended = threading.Event()
+    on_end_signals(ended.set)
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--setup", type=Path, required=True, help="JSON file written by foretwin")
+    file = parser.parse_args(argv).setup
+    try:
+        setup = read_setup(file, RouterSetup)
+    except (msgspec.DecodeError, OSError) as problem:
+        parser.exit(2, f"{file}: {problem}\n")
+    word_file = Path(setup.word_file)
+    try:
+        session = zenoh.open(zenoh_config(setup.bus, router=True))
+    except zenoh.ZError as error:
+        _say(word_file, " ".join(str(error).split()))
+        parser.exit(2, f"router: {error}\n")
+    with session:
+        _say(word_file, LISTENS)
+        while not ended.wait(_LOOK_S) and os.getppid() == parent:
+            pass
+    sys.stderr.flush()
+    os._exit(0)
+
+
+def _say(word_file: Path, word: str) -> None:
+    """Let who waits for the router read all of its word or nothing."""
+    partial = word_file.with_suffix(".partial")
+    partial.write_text(word, encoding="utf-8")
+    partial.replace(word_file)
+
+
+if __name__ == "__main__":
+    run_router()

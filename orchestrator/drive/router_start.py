@@ -1,0 +1,64 @@
+"""Starts a run's router before anything else, and joins its bus."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+
+from foretwin.contracts.bus import BusUnreachable, ZenohBus
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.router import LISTENS
+from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, row_of
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.runner.supervisor import Supervisor
+
+LISTENS_WITHIN_S = 30.0
+"""Long: a busy machine is no fault of the router's."""
+_LOOK_S = 0.005
+
+
+def join_bus(plan: DrivePlan, supervisor: Supervisor) -> ZenohBus:
+    """Start the router and return the orchestrator's session.
+
+    UserError, with no folder left, where it cannot listen. Nobody connects before it listens:
+    where the port is another's, that would be a stranger's bus.
+    """
+    row = next(row for row in PROCESSES if row.name == ROUTER)
+    plan.router_word_file.unlink(missing_ok=True)
+    supervisor.start(row_of(row, plan), row.setup(plan, ROUTER))
+    try:
+        word = _word(plan, supervisor)
+        if word != LISTENS:
+            raise UserError(cannot_listen_text(plan.bus.endpoint, word))
+        return ZenohBus(plan.bus)
+    except (BusUnreachable, UserError):
+        supervisor.stop(grace_s=0.0)
+        shutil.rmtree(plan.folder, ignore_errors=True)
+        raise
+
+
+def _word(plan: DrivePlan, supervisor: Supervisor) -> str:
+    """Return what the router says; empty where it ends or hangs without a word."""
+    deadline_s = time.monotonic() + LISTENS_WITHIN_S
+    while True:
+        running = ROUTER in supervisor.running()
+        if plan.router_word_file.exists():
+            return plan.router_word_file.read_text(encoding="utf-8")
+        if not running or time.monotonic() > deadline_s:
+            return ""
+        time.sleep(_LOOK_S)
+
+
+def cannot_listen_text(endpoint: str, word: str) -> str:
+    """Say why a router cannot listen at an endpoint; `word` is Zenoh's own."""
+    port = re.search(r":(\d+)(?=[?#]|$)", endpoint)
+    if "in use" in word and port is not None:
+        return (
+            f"endpoint {endpoint}: port {port[1]} is taken; end what listens on it, or give "
+            "another one"
+        )
+    return (
+        f"endpoint {endpoint}: cannot be listened on here; it must be an address of this machine "
+        "with a free port"
+    )

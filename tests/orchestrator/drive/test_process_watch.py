@@ -1,0 +1,126 @@
+"""Who hangs and is killed, and that nobody is while the link to the router is away."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foretwin.orchestrator.drive.process_watch import (
+    HUNG_AFTER_S,
+    RECONNECT_S,
+    ROUTER_START_S,
+    ProcessWatch,
+)
+from foretwin.orchestrator.drive.processes import PROCESSES
+from foretwin.orchestrator.runner.supervisor import MAX_RESTARTS, Supervisor
+from tests.orchestrator.house import House
+from tests.orchestrator.runner.test_supervisor import FakeChild, setup
+
+EVERY_S = 0.1
+
+
+class LinkedBus:
+    """A bus whose link to the router comes and goes."""
+
+    def __init__(self, bus: Any) -> None:
+        self._bus, self.connected = bus, True
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)
+
+
+class Watched:
+    """A router and a worker under watch, ten times a second."""
+
+    def __init__(self, folder: Path, **settings: Any) -> None:
+        self.house = House(folder, **settings)
+        self.bus = LinkedBus(self.house.bus)
+        self.house.conductor.bus = self.bus
+        self.children: dict[str, list[FakeChild]] = {}
+        self.watch = ProcessWatch(Supervisor(self._launch))
+        for name, process_id in (("router", "router"), ("w", "w0")):
+            row = next(row for row in PROCESSES if row.name == name)
+            self.watch.supervisor.start(row, setup(process_id))
+        self.now_s = 0.0
+        self.look(1.0)
+
+    def _launch(self, *, module: str, setup: Any) -> FakeChild:
+        self.children.setdefault(setup.process_id, []).append(FakeChild())
+        return self.children[setup.process_id][-1]
+
+    def look(self, seconds: float) -> None:
+        until_s = self.now_s + seconds
+        while self.now_s < until_s:
+            self.now_s += EVERY_S
+            self.watch.look_after(self.house.conductor, self.now_s)
+
+    def alive(self, *process_ids: str) -> None:
+        self.house.conductor.alive = set(process_ids)
+
+    def started(self, process_id: str) -> int:
+        return len(self.children[process_id])
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Watched:
+    return Watched(tmp_path)
+
+
+def test_who_falls_silent_is_killed_and_started_again(watched: Watched) -> None:
+    watched.alive("w0")
+    watched.look(RECONNECT_S + 0.5)
+    watched.alive()
+    watched.look(0.9 * HUNG_AFTER_S)
+    assert watched.started("w0") == 1
+    watched.look(0.5 * HUNG_AFTER_S)
+    assert watched.started("w0") == 2
+
+
+def test_nobody_is_silent_while_the_link_is_away_and_a_little_longer(watched: Watched) -> None:
+    watched.alive("w0")
+    watched.look(RECONNECT_S + 0.5)
+    watched.alive()
+    watched.bus.connected = False
+    watched.look(0.8 * HUNG_AFTER_S)
+    watched.bus.connected = True
+    watched.look(0.9 * (RECONNECT_S + HUNG_AFTER_S))
+    watched.alive("w0")
+    watched.look(30.0)
+    assert (watched.started("w0"), watched.started("router")) == (1, 1)
+
+    watched.alive()
+    watched.look(2.0 * HUNG_AFTER_S)
+    assert watched.started("w0") == 2, "it is watched again"
+
+
+def test_a_router_without_a_link_is_killed_and_the_next_one_has_time_to_start(
+    watched: Watched,
+) -> None:
+    watched.bus.connected = False
+    watched.look(0.8 * HUNG_AFTER_S)
+    assert watched.started("router") == 1
+    watched.look(0.5 * HUNG_AFTER_S)
+    assert watched.children["router"][0].signals == [signal.SIGKILL]
+    assert watched.started("router") == 2
+    watched.look(0.9 * ROUTER_START_S)
+    assert watched.started("router") == 2
+    watched.bus.connected = True
+    watched.look(60.0)
+    assert watched.started("router") == 2
+    assert watched.watch.ended_by is None
+    assert watched.watch.troubles == []
+
+
+def test_a_router_that_dies_again_and_again_ends_the_drive(watched: Watched) -> None:
+    for _ in range(MAX_RESTARTS + 1):
+        assert watched.watch.ended_by is None
+        watched.children["router"][-1].exit_code = -9
+        watched.bus.connected = False
+        before = watched.started("router")
+        while watched.started("router") == before and watched.watch.ended_by is None:
+            watched.look(EVERY_S)
+    assert watched.watch.ended_by == "the router died again and again"
+    assert watched.watch.troubles == ["router ended with code -9 and was not started again"]
