@@ -28,7 +28,6 @@ from tests.system.test_faults import (
 )
 from tests.viewer.readback import Recorded
 
-COVERS = ("foretwin.orchestrator.drive.process_watch",)
 
 
 def recorded_for_a_while(out: Path) -> Path:

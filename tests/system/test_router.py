@@ -23,7 +23,6 @@ from tests.system.foretwin_command import (
 )
 from tests.system.test_faults import ENDS_WITHIN_S, LIVE, assert_nothing_left, says, under_way, when
 
-COVERS = ("foretwin.orchestrator.drive.router_start",)
 FROZEN_S = 8.0
 
 

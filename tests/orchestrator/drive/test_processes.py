@@ -9,7 +9,13 @@ import msgspec
 
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.orchestrator.config import OtherVehicleConfig
-from foretwin.orchestrator.drive.processes import PROCESSES, TUNING, process_ids, row_of
+from foretwin.orchestrator.drive.processes import (
+    PROCESSES,
+    TUNING,
+    expected_ids,
+    process_ids,
+    row_of,
+)
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
 from tests.orchestrator.trip import town_plan
@@ -29,7 +35,10 @@ def autoware() -> MappingFile:
 
 def test_a_drive_has_its_workers_one_source_and_what_it_is_asked_for(tmp_path: Path) -> None:
     plan = configured(town_plan(tmp_path), workers=3, tuning="off", source="standin")
-    assert ids(plan) == ["builder", "w0", "w1", "w2", "mirror", "recorder", "viewer", "vehicle"]
+    workers = ["w0", "w1", "w2"]
+    others = ["mirror", "recorder", "viewer", "vehicle"]
+    assert ids(plan) == ["router", "builder", *workers, *others]
+    assert expected_ids(plan) == {"builder", *workers, *others}, "who says that it is alive"
     assert TUNING in ids(configured(plan, tuning="report"))
     live = configured(plan, source="live")
     assert "vehicle" not in ids(live)
