@@ -29,7 +29,6 @@ from tests.system.test_faults import (
 from tests.viewer.readback import Recorded
 
 
-
 def recorded_for_a_while(out: Path) -> Path:
     """Wait until a part of a drive is on the disk; return the drive's folder."""
     run = under_way(out)
