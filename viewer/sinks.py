@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import logging
 import threading
 from collections.abc import Callable, Iterable
@@ -19,6 +20,8 @@ LIVE_ROWS = 256
 LASTING_ROWS = 4096
 MOST_WAITING = 1000
 FLUSH_S = 3.0
+MOST_FAILURES = 3
+"""Flushes that fail one after the other: a busy machine may be too slow for one of them."""
 FILE_BATCH_S, LIVE_BATCH_S = 2.0, 0.05
 
 _log = logging.getLogger(__name__)
@@ -67,6 +70,7 @@ class FileStream:
         self._stream.send_recording_name(plain_text(title))
         self._waiting: dict[str, list[Row]] = collections.defaultdict(list)
         self._count = 0
+        self._failures = 0
 
     def write(self, rows: Iterable[Row]) -> None:
         """Append rows."""
@@ -87,17 +91,31 @@ class FileStream:
         self._count = 0
 
     def flush(self) -> None:
-        """Bring what was written to the file, in bounded time."""
+        """Bring what was written to the file, in bounded time.
+
+        Raises OSError where that fails again and again: after an error of the disk (one that is
+        full for a moment) Rerun writes no more into a file, and only another one can go on.
+        """
         self._send_waiting()
         try:
             self._stream.flush(timeout_sec=FLUSH_S)
         except RuntimeError as problem:
+            self._failures += 1
             _log.warning("the recording could not be flushed: %s", problem)
+            if self._failures >= MOST_FAILURES:
+                raise OSError(f"the recording takes nothing any more: {problem}") from problem
+        else:
+            self._failures = 0
 
     def close(self) -> None:
-        """Flush and write the footer."""
-        self.flush()
-        self._stream.disconnect()
+        """Flush and write the footer, in bounded time: a file that takes nothing takes for ever."""
+        with contextlib.suppress(OSError):
+            self.flush()
+        leaving = threading.Thread(target=self._stream.disconnect, name="footer", daemon=True)
+        leaving.start()
+        leaving.join(FLUSH_S)
+        if leaving.is_alive():
+            _log.warning("the recording could not be ended in %g s", FLUSH_S)
 
 
 class LiveStream:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 import rerun as rr
 
 from foretwin.contracts.ports import free_port
+from foretwin.viewer import sinks
 from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.live_viewer import address, start_program, wait_until_it_answers
 from foretwin.viewer.rows import Row
@@ -71,3 +74,33 @@ def test_an_absent_window_is_told_and_the_file_goes_on(tmp_path: Path) -> None:
     assert live.close(DEADLINE_S)
     assert len(Recorded(tmp_path / "a.rrd").times_s("/gap/pos_m/twin")) == 1000
     assert live.dropped == 1000 - LIVE_ROWS
+
+
+class StuckStream:
+    """As Rerun's after the disk was full: flushes fail, and ending it may take for ever."""
+
+    def __init__(self) -> None:
+        self.well = False
+
+    def flush(self, *, timeout_sec: float) -> None:
+        if not self.well:
+            raise RuntimeError("File-writer thread shut down prematurely")
+
+    def disconnect(self) -> None:
+        threading.Event().wait()
+
+
+def test_a_file_that_takes_nothing_any_more_is_told_of_and_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sinks, "FLUSH_S", 0.1)
+    file = FileStream(tmp_path / "a.rrd", recording_id="r", title="t", blueprint=drive_blueprint())
+    stuck = StuckStream()
+    file._stream, whole = stuck, file._stream  # type: ignore[assignment]
+    whole.disconnect()
+    for well in (False, False, True, False, False):  # a machine that is busy now and then
+        stuck.well = well
+        file.flush()
+    with pytest.raises(OSError, match="takes nothing any more"):
+        file.flush()
+    file.close()
