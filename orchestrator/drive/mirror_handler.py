@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -12,6 +13,8 @@ from foretwin.orchestrator.record.results import MIRROR, MIRRORED, ResultTables
 
 _APART_NS = 2_000_000_000
 """Who touches again sooner is not told of again."""
+_KNOWN = 600
+"""Stamps of the last minute."""
 
 
 @dataclass(slots=True)
@@ -26,9 +29,16 @@ class MirrorHandler:
     touches: int = 0
     """Times that two began to touch."""
     _touched_ns: dict[tuple[str, str], int] = field(default_factory=dict)
+    _stamps_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_KNOWN))
 
     def take(self, sample: MirrorSample) -> None:
-        """Keep a sample, and tell of touches that begin."""
+        """Keep a sample, and tell of touches that begin.
+
+        A mirror that was started again begins with a state that the one before it has answered.
+        """
+        if sample.stamp_ns in self._stamps_ns:
+            return
+        self._stamps_ns.append(sample.stamp_ns)
         self.stamp_ns = sample.stamp_ns
         self.independent = sample.independent
         at = {"stamp_ns": sample.stamp_ns}

@@ -38,3 +38,12 @@ def test_a_touch_is_told_as_it_begins_and_again_only_after_a_while() -> None:
     assert handler.touches == 3
     assert tables.rows == {"mirror": 6, "touches": 7}
     assert (handler.stamp_ns, handler.independent) == (5_100_000_000, True)
+
+
+def test_what_a_mirror_that_was_started_again_says_once_more_counts_once() -> None:
+    tables = Tables()
+    handler = MirrorHandler(tables, lambda _: None)  # type: ignore[arg-type]
+    for at_s in (1.0, 1.1, 1.2, 1.2, 1.25, 1.1, 1.3):
+        handler.take(sample(at_s, ("ego", "van")))
+    assert tables.rows == {"mirror": 5, "touches": 5}
+    assert handler.stamp_ns == 1_300_000_000
