@@ -174,7 +174,9 @@ def _wrong_files(left: Left) -> Iterator[str]:
     if temporary and not (left.code == 3 and left.befell("disk")):
         yield f"temporary files in the run's folder: {sorted(temporary)}"
     for folder in left.temporary:
-        if stays := sorted(str(path.relative_to(folder)) for path in folder.rglob("*")):
+        found = [path for path in folder.rglob("*") if str(path) not in left.screen]
+        # The log of an internal error is named on the screen, for who reports it.
+        if stays := sorted(str(path.relative_to(folder)) for path in found):
             yield f"stays in {folder.name}: {stays[:5]}"
     if not left.befell("viewer", "disk", "other", "orchestrator", "command"):
         shown = left.run / "monitor.rrd"
