@@ -8,6 +8,7 @@ from foretwin.contracts.process_setup import ProcessSetup as ProcessSetup
 from foretwin.contracts.process_setup import read_setup as read_setup
 from foretwin.contracts.process_setup import write_setup as write_setup
 from foretwin.contracts.roles import MirrorCast
+from foretwin.contracts.segments import Roll
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION
 
@@ -34,9 +35,11 @@ class StandinSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class RecorderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Writes the vehicle's channels to one MCAP file."""
+    """Writes the vehicle's channels to MCAP files."""
 
     file: str
+    """The first of them; see foretwin.contracts.segments."""
+    roll: Roll = Roll()
 
 
 class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -108,6 +111,7 @@ class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     file: str
     worlds_dir: str
     drive_frame: LocalFrame
+    roll: Roll = Roll()
     live: str = "none"
     title: str = "foretwin"
     attribution: str = ATTRIBUTION

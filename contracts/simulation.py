@@ -208,6 +208,7 @@ class WorkerStatus(msgspec.Struct, frozen=True, kw_only=True):
     state: Literal["starting", "idle", "busy", "sick", "dead"]
     """A `sick` one refuses jobs; it is tried again after a pause."""
     rtf: float | None = None
+    memory_mb: float | None = None
 
 
 class Progress(msgspec.Struct, frozen=True, kw_only=True):
@@ -222,6 +223,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     dropped: int
     too_slow: str = ""
     """What is run of what was asked for where the machine is too slow for all; empty where not."""
+    memory_mb: float | None = None
+    """Of all processes of the run together."""
 
 
 class RunEnd(msgspec.Struct, frozen=True, kw_only=True):

@@ -13,6 +13,7 @@ from foretwin.checks import path_of
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.record.job_tables import table_at
 from foretwin.orchestrator.record.run_state import check_finished
+from foretwin.orchestrator.record.table_parts import read_parts
 
 _RUN, _SWEEP = "run.json", "sweep.json"
 
@@ -34,7 +35,8 @@ class Recording:
         Raises UserError where there is none.
         """
         try:
-            return pq.read_table(table_at(self.folder, name))
+            table = table_at(self.folder, name)
+            return pq.read_table(table) if table.is_dir() else read_parts(table)
         except (OSError, pa.ArrowException) as error:
             raise UserError(f"{self.folder}: no table {name!r} to be read: {error}") from error
 

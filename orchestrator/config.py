@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import msgspec
 
@@ -16,8 +15,9 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED
 from foretwin.contracts.ports import trouble_with_endpoint
 from foretwin.contracts.roles import Correction, FollowLimits, Role
+from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.processors import processors, trouble_with_workers
-from foretwin.orchestrator.settings import read_toml, settings_from
+from foretwin.orchestrator.settings import read_toml, setting_of, settings_from
 from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning
 
 View = Literal["auto", "native", "web", "none"]
@@ -112,6 +112,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Others in the mirror besides the car, each with a role of its own."""
     view: View = "auto"
     out: str = "runs"
+    keep: str | None = None
+    """How much of the run stays while it goes on: the newest hours (12h) or bytes (20GB)."""
     trace: bool = False
     """Whether all processes leave what they did when, as `trace.json`; docs/trace.md."""
     radius_m: float = 150.0
@@ -181,6 +183,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             "--map needs --log FILE (a recorded drive), --route FILE (the stand-in car drives "
             "it) or --source live",
         )
+        parse_keep(self.keep)
         for other in self.vehicles:
             trouble = other.trouble()
             yield trouble is None, f"vehicles, {other.id}: {trouble}"
@@ -256,30 +259,10 @@ def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
         config = settings_from(written | flags, DriveConfig, "flags:", error=ConfigError)
         return config.validate()
     except ConfigError as wrong:
-        at_fault = _setting_of(str(wrong))
+        at_fault = setting_of(str(wrong))
         if at_fault is None or at_fault.name not in written or at_fault.name in flags:
             raise
         raise ConfigError(f"{path}: {at_fault.name}{at_fault.rest}") from wrong
-
-
-class _AtFault(NamedTuple):
-    """A setting as a file calls it, and what is said of it."""
-
-    name: str
-    rest: str
-
-
-_SHORTER = {"rate": "rate_hz", "horizon": "horizon_s", "start": "start_s", "end": "end_s"}
-"""Settings whose flag leaves out the unit."""
-
-
-def _setting_of(text: str) -> _AtFault | None:
-    """Return the setting that an error begins with, by its flag or by its name."""
-    found = re.match(r"(--)?([a-z0-9_-]+)", text)
-    if found is None:
-        return None
-    name = found[2].replace("-", "_")
-    return _AtFault(_SHORTER.get(name, name) if found[1] else name, text[found.end() :])
 
 
 def parse_speed(value: object) -> float | None:

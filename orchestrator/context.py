@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
@@ -12,6 +12,7 @@ from foretwin.contracts.bus import Bus, Mailbox
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.runner.memory import MemoryWatch
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,7 @@ class DriveContext:
     mailbox: Mailbox
     tables: ResultTables
     tell: Callable[[Notice], None]
+    memory: MemoryWatch = field(default_factory=MemoryWatch)
 
     def publish(self, channel: str, message: msgspec.Struct) -> None:
         """Send a message below the run's key."""

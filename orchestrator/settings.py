@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 import msgspec.inspect
@@ -70,3 +70,23 @@ def _inside(around: msgspec.inspect.Type, field: str | None) -> list[msgspec.ins
             found = []
     unions = (one.types if isinstance(one, msgspec.inspect.UnionType) else (one,) for one in found)
     return [one for types in unions for one in types]
+
+
+class AtFault(NamedTuple):
+    """A setting as a file calls it, and what is said of it."""
+
+    name: str
+    rest: str
+
+
+_SHORTER = {"rate": "rate_hz", "horizon": "horizon_s", "start": "start_s", "end": "end_s"}
+"""Settings whose flag leaves out the unit."""
+
+
+def setting_of(text: str) -> AtFault | None:
+    """Return the setting that an error begins with, by its flag or by its name."""
+    found = re.match(r"(--)?([a-z0-9_-]+)", text)
+    if found is None:
+        return None
+    name = found[2].replace("-", "_")
+    return AtFault(_SHORTER.get(name, name) if found[1] else name, text[found.end() :])

@@ -17,7 +17,13 @@ from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
-from foretwin.contracts.segments import next_number, segment_file, segments_of
+from foretwin.contracts.segments import (
+    first_left,
+    first_name,
+    next_number,
+    segment_file,
+    segments_of,
+)
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
 from foretwin.contracts.trace import span, traced
@@ -74,31 +80,57 @@ class Recorder:
         self._refusals = Refusals()
         self._reported_window = False
         self._flushed_s = time.monotonic()
-        self._monitor = Monitor(
+        self._setup = setup
+        self._blueprint = drive_blueprint()
+        self._monitor = self._new_monitor(find_start)
+        self.channels = self._monitor.channels
+        self._live_viewer = live_viewer(setup.live)
+        self._live = (
+            None
+            if self._live_viewer is None
+            else LiveStream(
+                self._live_viewer.open, recording_id=setup.run_id, blueprint=self._blueprint
+            )
+        )
+        self._active: Received | None = None
+        """The World that was said to count last."""
+        self._open_part()
+        self._write(self._monitor.opening())
+        self._file.flush()
+
+    def _new_monitor(self, find_start: Callable[[int], int]) -> Monitor:
+        setup = self._setup
+        return Monitor(
             drive_frame=setup.drive_frame,
             find_start=find_start,
             title=setup.title,
             attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
         )
-        self.channels = self._monitor.channels
-        blueprint = drive_blueprint()
-        self._live_viewer = live_viewer(setup.live)
-        first = Path(setup.file)
+
+    def _open_part(self) -> None:
         # What one that died has shown is left as it is.
+        first = Path(self._setup.file)
+        self._path, self._begun_s = segment_file(first, next_number(first)), time.monotonic()
         self._file = FileStream(
-            segment_file(first, next_number(first)),
-            recording_id=setup.run_id,
-            title=setup.title,
-            blueprint=blueprint,
+            self._path,
+            recording_id=self._setup.run_id,
+            title=self._setup.title,
+            blueprint=self._blueprint,
         )
-        self._live = (
-            None
-            if self._live_viewer is None
-            else LiveStream(self._live_viewer.open, recording_id=setup.run_id, blueprint=blueprint)
-        )
-        self._write(self._monitor.opening())
-        self._file.flush()
+
+    def _roll(self) -> None:
+        """Begin another file where this one is large; each can be shown without the others."""
+        size, age_s = self._path.stat().st_size, time.monotonic() - self._begun_s
+        start_ns = self._monitor.start_ns
+        if start_ns is None or not self._setup.roll.is_due(size_bytes=size, age_s=age_s):
+            return
+        self._file.close()
+        self._open_part()
+        self._monitor = self._new_monitor(lambda _: start_ns)
+        self._file.write(self._monitor.opening())
+        if self._active is not None:
+            self._file.write(self._monitor.handle("active_world", self._active.message()))
 
     def take_one(self, timeout_s: float) -> bool:
         """Write the rows of one message; False where none came in time."""
@@ -109,6 +141,8 @@ class Recorder:
             try:
                 with span(item.channel):
                     rows = self._monitor.handle(item.channel, item.message())
+                if item.channel == "active_world":
+                    self._active = item
             except Refused as refused:
                 text = self._refusals.take(refused)
                 rows = self._monitor.note("error", text) if text else []
@@ -116,6 +150,7 @@ class Recorder:
         if time.monotonic() - self._flushed_s > FLUSH_PERIOD_S:
             self._report_troubles()
             self._file.flush()
+            self._roll()
             self._flushed_s = time.monotonic()
         return item is not None
 
@@ -195,7 +230,9 @@ def show(recording: Path) -> None:
             f"`python -m foretwin.viewer.picture {recording} OUT.png` renders a picture without one"
         )
     program = str(rerun_program())
-    parts = [_complete(part) for part in segments_of(recording)]
+    first = first_name(recording)
+    parts = segments_of(first) if first_left(first) == recording else [recording]
+    parts = [_complete(part) for part in parts]
     arguments = [program, "--bind", HOST, "--port", "auto", *map(str, parts)]
     os.execve(program, arguments, offline_environment())
 

@@ -94,6 +94,7 @@ def drive_blueprint(
                     rrb.TimeSeriesView(
                         origin="/workers/rtf", name="Real-time factor", time_ranges=last_30_s
                     ),
+                    rrb.TimeSeriesView(origin="/workers/memory_mb", name="Memory, MB"),
                     active_tab="Workers",
                 ),
                 row_shares=[0.32, 6.0, 1.7],

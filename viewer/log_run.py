@@ -54,12 +54,17 @@ class RunLog:
                     ),
                 )
             )
-            rows.append(static(f"workers/rtf/{part}", rr.SeriesLines(names=status.worker_id)))
+            rows += [
+                static(f"workers/{what}/{part}", rr.SeriesLines(names=status.worker_id))
+                for what in ("rtf", "memory_mb")
+            ]
         if self._states.get(status.worker_id) != status.state:
             self._states[status.worker_id] = status.state
             rows.append(Row(f"workers/state/{part}", drive_ns, rr.StateChange(state=status.state)))
         if status.rtf is not None:
             rows.append(Row(f"workers/rtf/{part}", drive_ns, rr.Scalars(status.rtf)))
+        if status.memory_mb is not None:
+            rows.append(Row(f"workers/memory_mb/{part}", drive_ns, rr.Scalars(status.memory_mb)))
         return rows
 
     def progress(self, progress: Progress, drive_ns: int) -> list[Row]:
@@ -69,12 +74,13 @@ class RunLog:
             ahead = f"next **{plain_text(progress.next_intersection)}**"
             if progress.arrival_in_s is not None:
                 ahead += f" in {progress.arrival_in_s:.0f} s"
+        memory = f" · {progress.memory_mb:.0f} MB" if progress.memory_mb is not None else ""
         short = f"**{progress.too_slow}** (too slow for all) · " if progress.too_slow else ""
         text = (
             # The map's source early on: where the line is too long, its end is cut off.
             f"**{progress.drive_time_s:.1f} s** · {self._source} · "
             f"{plain_text(progress.mission_state)} · {ahead} · "
-            f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped"
+            f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped{memory}"
         )
         return [Row("status", drive_ns, document(text))]
 

@@ -50,7 +50,8 @@ class Monitor:
     ) -> None:
         self._frame = drive_frame
         self._find_start = find_start
-        self._start_ns: int | None = None
+        self.start_ns: int | None = None
+        """The stamp of the drive's start, once it is known."""
         self._load_world = load_world
         self._drive = DriveLog(drive_frame)
         self._run = RunLog(title, attribution)
@@ -111,11 +112,11 @@ class Monitor:
             return self._say("error", f"{channel} at {drive_ns / 1e9:.2f} s: {problem}", drive_ns)
 
     def _drive_ns(self, stamp_ns: int) -> int:
-        if self._start_ns is None:
+        if self.start_ns is None:
             if stamp_ns == 0:
                 return 0
-            self._start_ns = self._find_start(stamp_ns)
-        return max(0, stamp_ns - self._start_ns)
+            self.start_ns = self._find_start(stamp_ns)
+        return max(0, stamp_ns - self.start_ns)
 
     def note(self, level: str, text: str) -> list[Row]:
         """Return an event of the viewer itself at the latest drive time."""

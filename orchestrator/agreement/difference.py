@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyarrow.parquet as pq
+
+from foretwin.orchestrator.record.table_parts import read_parts
 
 SAME_NS = 1_000_000_000
 """Disagreements of one kind that begin so near to each other are the same."""
@@ -26,8 +27,8 @@ class JudgedRun(NamedTuple):
 def read_judged(folder: Path) -> JudgedRun:
     """Read a run's folder; raises FileNotFoundError for one without its tables."""
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    rows: list[dict[str, Any]] = pq.read_table(folder / "results/agreement.parquet").to_pylist()
-    gaps = pq.read_table(folder / "results/mirror.parquet", columns=["gap_m"])
+    rows: list[dict[str, Any]] = read_parts(folder / "results/agreement.parquet").to_pylist()
+    gaps = read_parts(folder / "results/mirror.parquet", columns=["gap_m"])
     return JudgedRun(folder, record, rows, gaps["gap_m"].to_pylist())
 
 

@@ -98,6 +98,9 @@ def drive(
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
+    keep: Annotated[
+        str | None, typer.Option(help="the newest of a run that stay, such as 12h or 20GB")
+    ] = None,
     trace: Annotated[
         bool, typer.Option("--trace", help="what each process does when, as RUN/trace.json")
     ] = False,

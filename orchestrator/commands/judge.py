@@ -12,6 +12,7 @@ import msgspec
 
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.segments import first_left
 from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
@@ -92,9 +93,9 @@ def _drive(config: DriveConfig) -> tuple[int, Path]:
 
 def _record(run: Path) -> dict[str, Any]:
     check_finished(run)
-    for part in (RECORD, DRIVE):
-        if not (run / part).is_file():
-            raise FileNotFoundError(f"run {run}: no {part} in it")
+    for part in (run / RECORD, first_left(run / DRIVE)):
+        if not part.is_file():
+            raise FileNotFoundError(f"run {run}: no {part.name} in it")
     try:
         record: dict[str, Any] = json.loads((run / RECORD).read_text(encoding="utf-8"))
     except ValueError as error:
@@ -124,7 +125,7 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
     if len(kept) < len(was.vehicles):
         gone = ", ".join(one.id for one in was.vehicles if one.live)
         _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
-    inputs = {"log": str(run / DRIVE), "source": "log", "map": map_file, "route": route}
+    inputs = {"log": str(first_left(run / DRIVE)), "source": "log", "map": map_file, "route": route}
     alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
     workers = {"workers": min(was.workers, most_workers())}  # it may come from a larger machine
     no_car = {"endpoint": None, "ros2": None, "towards_vehicle": False}

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.segments import first_left
 from foretwin.contracts.terminal import say
 
 
@@ -36,7 +37,7 @@ def convert_log(
 
 def open_view(run_folder: Path) -> int:
     """Open a run's recording in the native viewer; returns the viewer's exit code."""
-    recording = run_folder / "monitor.rrd" if run_folder.is_dir() else run_folder
+    recording = first_left(run_folder / "monitor.rrd") if run_folder.is_dir() else run_folder
     if not recording.is_file():
         raise FileNotFoundError(f"{run_folder}: holds no monitor.rrd")
     return subprocess.run(

@@ -39,6 +39,7 @@ from foretwin.orchestrator.drive.router_start import join_bus
 from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, run_lock, write_record
@@ -140,6 +141,7 @@ class _Drive:
                     "map": plan.osm.sha256,
                 },
                 lossless=plan.config.lock_step,
+                keep=parse_keep(plan.config.keep),
             )
             conductor = Conductor(plan, bus, self._mission, tables)
             exit_word, code = "failed", EXIT_FAILED

@@ -12,6 +12,7 @@ from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.contracts.terminal import console, plain, say, visible, words
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission
+from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 
 PERIOD_S = 0.25
@@ -55,6 +56,7 @@ class ProgressLine:
         if now_s - self._last_s < PERIOD_S:
             return
         self._last_s = now_s
+        self._watch_memory(now_s)
         progress = self._progress(now_s)
         conductor = self._conductor
         conductor.context.publish("progress", progress)
@@ -66,6 +68,11 @@ class ProgressLine:
         elif now_s - self._last_plain_s >= PLAIN_PERIOD_S:
             self._last_plain_s = now_s
             say(text, error=True)
+
+    def _watch_memory(self, now_s: float) -> None:
+        context = self._conductor.context
+        for text in context.memory.look(context.plan.processes_dir, now_s):
+            context.tell(Notice("warning", text))
 
     def _progress(self, now_s: float) -> Progress:
         conductor, mission = self._conductor, self._mission
@@ -87,6 +94,7 @@ class ProgressLine:
             futures_per_s=rate,
             dropped=conductor.mailbox.dropped + conductor.tables.dropped,
             too_slow=conductor.rounds.short_of,
+            memory_mb=sum(conductor.context.memory.now_mb.values()) or None,
         )
 
     def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
@@ -106,6 +114,7 @@ class ProgressLine:
                     worker_id=worker_id,
                     state=state,
                     rtf=self._conductor.rounds.rtf.get(worker_id),
+                    memory_mb=self._conductor.context.memory.now_mb.get(worker_id),
                 )
             )
         return statuses

@@ -14,6 +14,7 @@ from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.durable import sync_folder, whole_file
+from foretwin.orchestrator.record.kept_parts import kept_record
 from foretwin.orchestrator.record.ledger import Ledger, jobs_ledger, lost_rounds_line
 from foretwin.orchestrator.record.run_state import RUNNING
 from foretwin.orchestrator.record.telemetry_ledger import lost_telemetry_line, telemetry_ledger
@@ -91,6 +92,8 @@ def run_record(
             }
             for stretch in mission.off_road_stretches
         ],
+        "kept": kept_record(plan.folder, plan.config.keep),
+        "memory": conductor.context.memory.record(),
         "left_out": {
             "intersections": mission.arrived.left_out,
             "changes": conductor.changes.made.left_out,

@@ -14,6 +14,7 @@ from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.record.columns import columns, row_of, schema
+from foretwin.orchestrator.record.table_parts import table_of
 from foretwin.orchestrator.record.versions import versions
 from foretwin.sim_worker.futures.future_rows import FUTURE_COLUMNS, Row
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
@@ -32,12 +33,13 @@ METRICS_FILE = "metrics.parquet"
 
 
 def table_at(folder: Path, table: str) -> Path:
-    """Return the file of a run's or sweep's table, or the folder of a sweep's.
+    """Return the last file of a run's or sweep's table, or the folder of a sweep's.
 
     Raises FileNotFoundError, naming those that are there, where there is none.
     """
     swept = {name: folder / at for name, at in (("metrics", METRICS_FILE), *SWEPT_TABLES.items())}
-    there = {file.stem: file for file in (folder / "results").glob("*.parquet")}
+    of_run = {table_of(file) or file.stem for file in (folder / "results").glob("*.parquet")}
+    there = {name: folder / "results" / f"{name}.parquet" for name in of_run}
     there = {name: path for name, path in swept.items() if path.exists()} | there
     if table not in there:
         known = f"holds {', '.join(sorted(there))}" if there else "neither of a run nor a sweep"

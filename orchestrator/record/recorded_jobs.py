@@ -25,6 +25,7 @@ from foretwin.orchestrator.record.job_tables import (
     table_at,
 )
 from foretwin.orchestrator.record.run_state import check_finished
+from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.record.versions import versions
 from foretwin.sim_worker.world_file import load_world
 from foretwin.world_gen.build import with_id
@@ -78,7 +79,7 @@ def recorded_future(folder: Path, wanted: str) -> RecordedFuture:
     file = _file_of(table_at(folder, "futures"), "future_id", wanted)
     row = _row(file, "future_id", wanted, FutureRow)
     jobs = table_at(folder, "jobs")
-    part = jobs / file.name if jobs.is_dir() else jobs
+    part = jobs / file.name if jobs.is_dir() else _file_of(jobs, "job_sha256", row.job_sha256)
     asked = _row(part, "job_sha256", row.job_sha256, _JobRow)
     if hashlib.sha256(asked.job).hexdigest() != row.job_sha256:
         raise UserError(f"{part}: the job of {wanted} is damaged: its hash is another one")
@@ -129,7 +130,7 @@ def opened(path: Path) -> Iterator[pq.ParquetFile]:
 
 def _file_of(table: Path, column: str, value: str) -> Path:
     """Return which file of a table holds a value; what cannot be read is passed by."""
-    files = sorted(table.glob("*.parquet")) if table.is_dir() else [table]
+    files = sorted(table.glob("*.parquet")) if table.is_dir() else parts_of_table(table)
     unread = None if files else UserError(f"{table}: holds no rows")
     for path in files:
         try:

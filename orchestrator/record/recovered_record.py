@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.contracts.running import RunningMeans
 from foretwin.orchestrator.record.bookkeeping import (
@@ -15,6 +14,7 @@ from foretwin.orchestrator.record.bookkeeping import (
     PlanCount,
     percentile,
 )
+from foretwin.orchestrator.record.table_parts import read_parts
 
 _BASELINES = "nominal", "constant_velocity", "constant_turn_rate"
 _UNKNOWN = (
@@ -57,7 +57,7 @@ def told_by_tables(results: Path) -> dict[str, Any]:
 
 def _rows(results: Path, table: str, *columns: str) -> list[dict[str, Any]]:
     try:
-        read = pq.read_table(results / f"{table}.parquet", columns=list(columns) or None)
+        read = read_parts(results / f"{table}.parquet", columns=columns or None)
     except (OSError, pa.ArrowException):
         return []
     rows: list[dict[str, Any]] = read.to_pylist()

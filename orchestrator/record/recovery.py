@@ -4,7 +4,7 @@ and run.json."""
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,8 +14,10 @@ import pyarrow.parquet as pq
 from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.process import is_held
+from foretwin.contracts.segments import segments_of
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import WRITING, sync_folder
+from foretwin.orchestrator.record.kept_parts import kept_record, read_removed
 from foretwin.orchestrator.record.recovered_record import told_by_tables
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_state import (
@@ -29,6 +31,7 @@ from foretwin.orchestrator.record.run_state import (
     run_lock,
     write_record,
 )
+from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.runner.supervisor import fold_stderr
 from foretwin.telemetry.logs.mend_mcap import look_through, mend
 
@@ -38,7 +41,7 @@ LEAVE_S = 20.0
 """How long the other processes of a drive may take to leave once its orchestrator is gone: their
 grace, and what they then still write."""
 _LOOK_S = 0.1
-_RECORDINGS = "drive*.mcap"
+_RECORDING = "drive.mcap"
 
 
 class Part(NamedTuple):
@@ -74,16 +77,16 @@ def recover(run: Path) -> Recovery:
     with run_lock(run):
         record = read_record(run)
         _let_leave(run)
-        torn = [file for file in sorted(run.glob(_RECORDINGS)) if not look_through(file).ended]
+        torn = [file for file in segments_of(run / _RECORDING) if not look_through(file).ended]
         if record and not is_unfinished(run) and not torn:
-            parts = tuple(_in_parquet(results, TABLES))
+            parts = tuple(_in_parquet(results))
             healthy = not any(part.lost for part in parts)
             return Recovery(str(record.get("exit")), parts, healthy=healthy)
         try:
             streams = streams_in(results)
-            others = [name for name in TABLES if name not in {stream.stem for stream in streams}]
-            recordings = map(_mended, sorted(run.glob(_RECORDINGS)))
-            parts = (*_in_parquet(results, others), *_derived(results), *recordings)
+            recordings = map(_mended, segments_of(run / _RECORDING))
+            there = _in_parquet(results, but={stream.stem for stream in streams})
+            parts = (*there, *_derived(results), *recordings)
             record = _completed(run, record, parts)
             write_record(record, run / RECORD)
             for stream in streams:
@@ -121,16 +124,14 @@ def _derived(results: Path) -> Iterator[Part]:
     sync_folder(results)
 
 
-def _in_parquet(results: Path, names: Iterable[str]) -> Iterator[Part]:
+def _in_parquet(results: Path, *, but: Container[str] = ()) -> Iterator[Part]:
     """Tell of the tables that are in Parquet already; older runs do not have all of today's."""
-    for name in names:
-        file = results / f"{name}.parquet"
-        if not file.exists():
-            continue
+    parts = [part for name in TABLES for part in parts_of_table(results / f"{name}.parquet")]
+    for file in (part for part in parts if part.stem not in but):
         try:
-            yield Part(f"{name}: {pq.read_metadata(file).num_rows} rows, as they were")
+            yield Part(f"{file.stem}: {pq.read_metadata(file).num_rows} rows, as they were")
         except (OSError, pa.ArrowException) as error:
-            yield Part(f"{name}: lost: {one_line(error)}", lost=True)
+            yield Part(f"{file.stem}: lost: {one_line(error)}", lost=True)
 
 
 def _mended(file: Path) -> Part:
@@ -150,9 +151,11 @@ def _completed(run: Path, record: dict[str, Any], parts: tuple[Part, ...]) -> di
     if record.get("exit", RUNNING) != RUNNING:
         return record | {RECOVERED: {"lost": lost}}
     known = {name: value for name, value in record.items() if name != "endpoint"}
+    gone = read_removed(run)
     return {
         **({"run_id": run.resolve().name} | known),
         "exit": RECOVERED,
         **told_by_tables(run / RESULTS),
+        **({"kept": kept_record(run, (record.get("config") or {}).get("keep"))} if gone else {}),
         RECOVERED: {"lost": lost},
     }

@@ -25,10 +25,12 @@ from foretwin.contracts.simulation import (
 )
 from foretwin.contracts.trace import span, traced
 from foretwin.contracts.tuning import ParameterChange, ParameterEstimate
+from foretwin.orchestrator.keep import Keep
 from foretwin.orchestrator.record.columns import columns, columns_of, schema
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import sync_folder
 from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, played_with
+from foretwin.orchestrator.record.kept_parts import KeptParts
 from foretwin.orchestrator.record.run_streams import Rows, RunStreams
 
 log = logging.getLogger("results")
@@ -97,6 +99,8 @@ TABLES: dict[str, pa.Schema] = {
 
 WRITE_S, SYNC_S = 0.5, 1.0
 """How often rows are appended, which outlives a kill, and synced, which outlives a power cut."""
+LOOK_EVERY_S = 5.0
+"""How often a table may be put away, and parts of the run removed."""
 QUEUE_DEPTH = 4096
 CLOSE_S, LOCK_STEP_CLOSE_S = 10.0, 120.0
 """How long the disk may take nothing at the end, live and where nothing may be missing."""
@@ -109,7 +113,12 @@ class ResultTables:
     """
 
     def __init__(
-        self, folder: Path, metadata: Mapping[str, str], *, lossless: bool = False
+        self,
+        folder: Path,
+        metadata: Mapping[str, str],
+        *,
+        lossless: bool = False,
+        keep: Keep | None = None,
     ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
@@ -118,12 +127,14 @@ class ResultTables:
             folder, {name: schema.with_metadata(told) for name, schema in TABLES.items()}
         )
         self._queue: queue.Queue[tuple[str, Rows] | None] = queue.Queue(QUEUE_DEPTH)
-        self._lossless = lossless
+        self._lossless, self._roll = lossless, (keep or Keep()).tables
+        self._kept = KeptParts(folder.parent, keep or Keep())
         self._dropped = 0
         self.troubles: list[str] = []
         """What is lost or not in Parquet, and why; complete once closed."""
         self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._moved_s = time.monotonic()
+        self._look_s = 0.0
         self._thread = threading.Thread(target=self._run, name="results", daemon=True)
         self._thread.start()
         self.add("metrics", metric_rows())
@@ -199,10 +210,28 @@ class ResultTables:
                 with span("write tables", sync=sync):
                     streams.write(sync=sync)
                 self._tell(before, streams.failing)
+                if sync:
+                    self._keep_small(streams)
                 write_s = _now_s() + WRITE_S
                 sync_s = _now_s() + SYNC_S - WRITE_S if sync else sync_s
         streams.close()
         self.troubles += [f"{rows} rows are lost: {why}" for why, rows in streams.lost.items()]
+
+    def _keep_small(self, streams: RunStreams) -> None:
+        """Make Parquet of what is large enough, and remove what is more than is kept."""
+        if _now_s() < self._look_s:
+            return
+        self._look_s = _now_s() + LOOK_EVERY_S
+        try:
+            for ended in streams.put_away(self._roll):
+                if derive(ended).rows is not None:
+                    ended.unlink()
+            begun = not self._kept.gone
+            self._kept.look()
+            if begun and self._kept.gone:
+                self._news.put("the oldest parts of the run go from here on, as --keep says")
+        except (OSError, pa.ArrowException) as error:  # what is there stays
+            log.warning("the run's folder cannot be kept small now: %s", one_line(error))
 
     def _tell(self, before: str | None, now: str | None) -> None:
         if now is not None and before is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +12,9 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 
 from foretwin.contracts.errors import one_line
+from foretwin.contracts.segments import Roll
 from foretwin.orchestrator.record.durable import sync_folder
+from foretwin.orchestrator.record.table_parts import next_part
 from foretwin.orchestrator.record.table_stream import SUFFIX, TableStream, record_bytes
 
 log = logging.getLogger("results")
@@ -65,6 +68,24 @@ class RunStreams:
                     self._streams[table].sync()
             except OSError as error:
                 self.failing = self.failing or one_line(error)
+
+    def put_away(self, roll: Roll) -> list[Path]:
+        """Put away what is large or old enough, and begin those tables anew; raises OSError.
+
+        A kill at any moment leaves streams that can be read.
+        """
+        ended = []
+        for table, stream in list(self._streams.items()):
+            age_s = time.monotonic() - stream.begun_s
+            if stream.size_bytes == stream.empty_bytes:
+                continue
+            if roll.is_due(size_bytes=stream.size_bytes, age_s=age_s):
+                path = self._folder / f"{table}{SUFFIX}"
+                stream.sync()
+                stream.close()
+                del self._streams[table]
+                ended.append(path.rename(next_part(path)))
+        return ended
 
     def close(self) -> None:
         """Close the files; rows that still wait are lost."""

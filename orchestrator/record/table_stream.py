@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,6 +33,8 @@ class TableStream:
     def __init__(self, path: Path, schema: pa.Schema) -> None:
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         self._unsynced = False
+        self.begun_s = time.monotonic()
+        self.empty_bytes = len(schema.serialize())
         try:
             self._whole_bytes = _whole_bytes(path, schema)
             os.ftruncate(self._descriptor, self._whole_bytes)
@@ -54,6 +57,11 @@ class TableStream:
             raise
         self._whole_bytes += written
         self._unsynced = True
+
+    @property
+    def size_bytes(self) -> int:
+        """How long the file is; `empty_bytes` where it holds no row."""
+        return self._whole_bytes
 
     def sync(self) -> None:
         """Bring to the disk what was appended; then a power cut leaves it in the file, too."""

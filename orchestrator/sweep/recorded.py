@@ -16,6 +16,7 @@ from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.placement import RecordedStart
+from foretwin.contracts.segments import first_left
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
@@ -66,10 +67,11 @@ def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedStarts
     """
     run = Path(recorded.run)
     check_finished(run)
-    for part in (_ROUNDS, Path(_DRIVE), Path(WORLDS)):
-        if not (run / part).exists():
-            raise FileNotFoundError(f"recorded.run {run}: no {part} in it")
-    states, said = _states(run / _DRIVE, vehicle, longest_gap_s=recorded.longest_gap_s)
+    drive = first_left(run / _DRIVE)
+    for part in (run / _ROUNDS, drive, run / WORLDS):
+        if not part.exists():
+            raise FileNotFoundError(f"recorded.run {run}: no {part.relative_to(run)} in it")
+    states, said = _states(drive, vehicle, longest_gap_s=recorded.longest_gap_s)
     starts = _starts(run, states, every_s=recorded.every_s)
     if recorded.road_users == "none":
         return RecordedStarts(starts, None)

@@ -17,7 +17,7 @@ from foretwin.contracts import drive
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import Refused, admit
-from foretwin.contracts.segments import number_of, segments_of
+from foretwin.contracts.segments import first_left, first_name, number_of, segments_of
 from foretwin.telemetry.logs.foreign_ros import Decode, open_foreign, time_base_of
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
@@ -54,11 +54,13 @@ _Kind = TypeVar("_Kind")
 def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     """Open an MCAP file; raises LogError where it is none or holds no positions.
 
-    The first part of a recording of ours (foretwin.contracts.segments) is read with all others,
-    as one drive. `declaration` is that of foretwin.telemetry.logs.map_origin, for files of other
-    programs.
+    The first part of a recording of ours (foretwin.contracts.segments), or the oldest that is left,
+    is read with all others, as one drive. `declaration` is that of
+    foretwin.telemetry.logs.map_origin, for files of other programs.
     """
-    parts = [path, *(part for part in segments_of(path)[1:] if _is_part(path, part))]
+    first = first_name(path)
+    later = segments_of(first)[1:] if first_left(first) == path else []
+    parts = [path, *(part for part in later if _is_part(first, part))]
     if len(parts) > 1:
         check_undeclared(path, declaration, "foretwin's own recording")
         return _open_parts(parts)

@@ -188,7 +188,7 @@ def serve(setup: RecorderSetup, bus: Bus, life: ProcessLife) -> None:
     """Record until the run is over."""
     typestore()  # Costs a third of a second: before the first message, not at it.
     process = RecorderProcess(
-        DriveRecording(Path(setup.file)),
+        DriveRecording(Path(setup.file), roll=setup.roll),
         bus=bus,
         life=life,
         run_id=setup.run_id,

@@ -13,15 +13,12 @@ from typing import Literal, NamedTuple, Protocol
 import msgspec
 
 from foretwin.contracts.drive import DriveEnd, VehicleInfo
-from foretwin.contracts.segments import next_number, segment_file
+from foretwin.contracts.segments import Roll, next_number, segment_file
 from foretwin.contracts.simulation import Event
 from foretwin.contracts.tally import Tally, read_tally, tally_file, write_tally
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 
 SOURCE = "recorder"
-ROLL_BYTES = 64 * 2**20
-"""A file that is so large is ended and the next one begun: an hour of a car, some seconds to read
-where it was cut short."""
 MOST_WAITING = 20_000
 """Messages that are kept for a disk that has no room: more than a minute of a car."""
 RETRY_S = 1.0
@@ -59,10 +56,11 @@ class DriveRecording:
         *,
         open_part: OpenPart = create,
         mono_s: Callable[[], float] = time.monotonic,
-        roll_bytes: int = ROLL_BYTES,
+        roll: Roll | None = None,
     ) -> None:
         self._path, self._open_part = path, open_part
-        self._mono_s, self._roll_bytes = mono_s, roll_bytes
+        self._mono_s, self._roll = mono_s, roll or Roll()
+        self._begun_s = mono_s()
         self._part = next_number(path)
         begun = self._part > 1
         self.tally = (read_tally(tally_file(path)) if begun else None) or Tally()
@@ -125,7 +123,9 @@ class DriveRecording:
         # Before the disk is waited for: whoever is killed meanwhile has it in the file.
         self._write_tally()
         events += self._attempt(DriveWriter.sync)
-        if self._writer is not None and self._writer.size_bytes >= self._roll_bytes:
+        if self._writer is not None and self._roll.is_due(
+            size_bytes=self._writer.size_bytes, age_s=self._mono_s() - self._begun_s
+        ):
             self._end_part()
             events += self._open()
         return events
@@ -157,6 +157,7 @@ class DriveRecording:
         try:
             path = segment_file(self._path, self._part)
             self._writer = self._open_part(path, part=self._part)
+            self._begun_s = self._mono_s()
         except OSError as error:
             self._discard()
             return self._stopped(error)

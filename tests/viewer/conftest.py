@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +15,7 @@ from foretwin.contracts.bus import Mailbox, ZenohBus
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.segments import Roll
 from foretwin.contracts.setup import BusSetup, ViewerSetup, write_setup
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
@@ -34,7 +36,12 @@ class ViewerRun:
     """A router that plays the orchestrator, and one viewer process."""
 
     def __init__(
-        self, folder: Path, *, live: str = "none", start_stamp_ns: int = scene.START_NS
+        self,
+        folder: Path,
+        *,
+        live: str = "none",
+        start_stamp_ns: int = scene.START_NS,
+        roll: Roll | None = None,
     ) -> None:
         self.recording = folder / "monitor.rrd"
         self.log = folder / "log.jsonl"
@@ -53,6 +60,7 @@ class ViewerRun:
             worlds_dir=str(worlds),
             drive_frame=scene.DRIVE_FRAME,
             live=live,
+            roll=roll or Roll(),
             title="hand-made drive",
             start_stamp_ns=start_stamp_ns,
         )
@@ -84,8 +92,8 @@ def start_viewer(tmp_path: Path) -> Iterator[Callable[..., ViewerRun]]:
     """Start a viewer process that ends with the test."""
     runs: list[ViewerRun] = []
 
-    def start(*, live: str = "none", start_stamp_ns: int = scene.START_NS) -> ViewerRun:
-        runs.append(ViewerRun(tmp_path, live=live, start_stamp_ns=start_stamp_ns))
+    def start(**how: Any) -> ViewerRun:
+        runs.append(ViewerRun(tmp_path, **how))
         return runs[-1]
 
     yield start

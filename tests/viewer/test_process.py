@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.ports import free_port
+from foretwin.contracts.segments import Roll, segments_of
 from foretwin.contracts.simulation import RunEnd
 from foretwin.viewer.live_viewer import address, start_program, wait_until_it_answers
 from tests.contracts.bus_sides import DEADLINE_S
@@ -194,3 +196,29 @@ def test_a_frozen_window_holds_up_nothing(start_viewer: StartViewer) -> None:
         os.kill(window.pid, signal.SIGCONT)
         window.kill()
         window.wait()
+
+
+def test_a_large_recording_goes_on_in_a_file_that_can_be_shown_alone(
+    start_viewer: StartViewer,
+) -> None:
+    run = start_viewer(roll=Roll(most_s=1.0))
+    messages = list(scene.drive(duration_s=20.0))
+    second = run.recording.with_name("monitor-002.rrd")
+    sent = 0
+    while not second.exists():
+        run.send(iter(messages[sent : sent + 20]))
+        sent += 20
+        assert sent < len(messages)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            run.process.wait(0.1)
+    run.send(iter(messages[sent:]))
+    _end_run(run)
+    assert run.process.wait(DEADLINE_S) == 0
+    parts = [Recorded(part) for part in segments_of(run.recording)]
+    apart_s = np.diff(np.concatenate([part.times_s("/world/ego/real") for part in parts]))
+    assert 0.0 < apart_s.min() < apart_s.max() < 0.15, "nothing missing, nothing twice"
+    assert parts[-1].times_s("/world/ego/real")[-1] > 19.8
+    for part in parts[1:]:
+        assert {"/about", "/status"} <= part.paths
+    for path in segments_of(run.recording):
+        assert RrdReader(path).blueprints(), "the layout is missing"

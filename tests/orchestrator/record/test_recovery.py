@@ -7,6 +7,7 @@ import json
 import os
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from mcap.reader import make_reader
@@ -17,6 +18,7 @@ from foretwin.orchestrator.record import recovery
 from foretwin.orchestrator.record.recovery import recover
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_state import run_lock
+from foretwin.orchestrator.record.table_parts import read_parts
 from foretwin.telemetry.logs.mend_mcap import look_through
 from tests.orchestrator.record.ended_badly import ROUNDS, event, killed_run
 
@@ -194,3 +196,30 @@ def test_a_table_whose_parquet_is_damaged_is_said(tmp_path: Path) -> None:
 def test_what_is_no_run_is_told(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no folder of a run"):
         recover(tmp_path)
+
+
+def test_a_run_in_parts_is_recovered_with_all_of_them(tmp_path: Path) -> None:
+    run = killed_run(tmp_path / "run")
+    results, recording = run / "results", run / "drive.mcap"
+    # Killed as it put a table away for the second time; the oldest part of the recording is gone.
+    (results / "events.arrows").rename(results / "events-002.arrows")
+    pq.write_table(pq_of(event(-1)), results / "events-001.parquet")
+    recording.rename(run / "drive-002.mcap")
+    (run / "removed.json").write_bytes(b'{"drive.mcap": {"parts": 1, "size_bytes": 5}}')
+    os.truncate(run / "drive-002.mcap", look_through(run / "drive-002.mcap").data_bytes)
+    done = recover(run)
+
+    assert done.lost == []
+    told = [part.text.split(",")[0] for part in done.parts]
+    assert "events-001: 1 rows" in told
+    assert "events-002: 3 rows" in told
+    assert "drive-002.mcap: 5 messages" in told
+    assert look_through(run / "drive-002.mcap").ended
+    read = read_parts(results / "events.parquet")["stamp_ns"].to_pylist()
+    assert read == [event(number)["stamp_ns"] for number in (-1, *range(ROUNDS))]
+    assert json.loads((run / "run.json").read_text())["kept"]["removed"]["drive.mcap"]["parts"] == 1
+    assert recover(run).healthy
+
+
+def pq_of(row: dict[str, object]) -> pa.Table:
+    return pa.Table.from_pylist([row], schema=TABLES["events"])

@@ -8,7 +8,10 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.orchestrator.keep import Keep
+from foretwin.orchestrator.record import results as module
 from foretwin.orchestrator.record.results import QUEUE_DEPTH, TABLES, ResultTables
+from foretwin.orchestrator.record.table_parts import parts_of_table, read_parts
 from foretwin.orchestrator.record.table_stream import StreamReader
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import wait_for
@@ -124,3 +127,55 @@ def test_where_parquet_has_no_room_the_streams_stay(
         "events.arrows", "metrics.arrows",
     }  # fmt: skip
     assert not list((tmp_path / "results").glob("*.writing"))
+
+
+def test_a_day_of_rows_is_put_away_in_parts_and_read_as_one_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LOOK_EVERY_S", 0.0)
+    monkeypatch.setattr(module, "SYNC_S", 0.0)
+    monkeypatch.setattr(module, "WRITE_S", 0.01)
+    keep = Keep(total_bytes=1e6)
+    tables, last = (
+        ResultTables(tmp_path / "results", {}, keep=keep),
+        tmp_path / "results/events.parquet",
+    )
+    number = 0
+
+    def three_parts() -> bool:
+        nonlocal number
+        for _ in range(100):
+            tables.add("events", [event(number)])
+            number += 1
+        return len(parts_of_table(last)) > 3
+
+    wait_for(three_parts, "three parts")
+    assert not list((tmp_path / "results").glob("*.writing"))
+    tables.close()
+    assert tables.troubles == []
+    assert tables.dropped == 0
+    assert read_parts(last)["stamp_ns"].to_pylist() == list(range(number))
+    assert len(parts_of_table(tmp_path / "results/rounds.parquet")) == 1, "no part without a row"
+
+
+def test_parts_that_are_more_than_is_kept_go_while_the_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LOOK_EVERY_S", 0.0)
+    monkeypatch.setattr(module, "SYNC_S", 0.0)
+    monkeypatch.setattr(module, "WRITE_S", 0.01)
+    tables = ResultTables(tmp_path / "results", {}, keep=Keep(hours=1e-4))  # 0.36 s
+    number = 0
+
+    def gone() -> bool:
+        nonlocal number
+        tables.add("events", [event(number)])
+        number += 1
+        return (tmp_path / "removed.json").exists()
+
+    wait_for(gone, "a part that goes")
+    tables.close()
+    assert tables.take_news() == ["the oldest parts of the run go from here on, as --keep says"]
+    left = read_parts(tmp_path / "results/events.parquet")["stamp_ns"].to_pylist()
+    assert 0 < len(left) < number
+    assert left == list(range(number - len(left), number))

@@ -1,0 +1,134 @@
+"""The memory of a drive's processes: watched while it goes on, told where one grows, recorded.
+
+What counts is a process's own memory: resident, and not shared with others or with a file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+LOOK_EVERY_S = 5.0
+SETTLED_AFTER_S = 300.0
+"""What a process grows by later it may grow by for ever."""
+GROWN_MB, MOST_MB = 256.0, 4096.0
+"""Who has grown by so much since it settled, or is so large, is told of; again at each doubling."""
+_LEAST_SPAN_S = 600.0
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(slots=True)
+class _Watched:
+    pid: int
+    since_s: float
+    now_mb: float = 0.0
+    most_mb: float = 0.0
+    settled: tuple[float, float] | None = None
+    """When it had run for long enough, and its memory then."""
+    last_s: float = 0.0
+    tell_at_mb: float = MOST_MB
+
+    def take(self, now_s: float, now_mb: float) -> bool:
+        """Take what it holds now; returns whether that is to be told."""
+        self.last_s, self.now_mb = now_s, now_mb
+        self.most_mb = max(self.most_mb, now_mb)
+        if self.settled is None and now_s - self.since_s >= SETTLED_AFTER_S:
+            self.settled = now_s, now_mb
+            self.tell_at_mb = min(self.tell_at_mb, now_mb + GROWN_MB)
+        if now_mb < self.tell_at_mb:
+            return False
+        self.tell_at_mb = 2.0 * now_mb
+        return True
+
+    @property
+    def mb_per_h(self) -> float | None:
+        """How fast it has grown since it settled, None before that can be told."""
+        if self.settled is None or self.last_s - self.settled[0] < _LEAST_SPAN_S:
+            return None
+        return 3600.0 * (self.now_mb - self.settled[1]) / (self.last_s - self.settled[0])
+
+
+@dataclass(slots=True)
+class MemoryWatch:
+    """Looks into /proc; where there is none, nothing is known. Times are monotonic, in s."""
+
+    proc: Path = Path("/proc")
+    _watched: dict[str, _Watched] = field(default_factory=dict)
+    _looked_s: float | None = None
+
+    def look(self, setups: Path, now_s: float, *, own: str = "orchestrator") -> list[str]:
+        """Look again, at most every few seconds; returns what is to be told.
+
+        `setups` is the folder of the setups that processes were started with; `own` is this one.
+        """
+        if self._looked_s is not None and now_s - self._looked_s < LOOK_EVERY_S:
+            return []
+        self._looked_s = now_s
+        self._find(setups, own, now_s)
+        told = []
+        for name, one in self._watched.items():
+            now_mb = self._own_mb(one.pid)
+            if now_mb is not None and one.take(now_s, now_mb):
+                told.append(f"{name} holds {now_mb:.0f} MB of memory{_since(one)}")
+        return told
+
+    @property
+    def now_mb(self) -> dict[str, float]:
+        """What each process holds."""
+        return {name: one.now_mb for name, one in self._watched.items()}
+
+    def record(self) -> dict[str, Any]:
+        """Return the `memory` of run.json, in MB."""
+        return {
+            name: {
+                "at_end": round(one.now_mb, 1),
+                "most": round(one.most_mb, 1),
+                "settled": None if one.settled is None else round(one.settled[1], 1),
+                "per_hour": None if one.mb_per_h is None else round(one.mb_per_h, 1),
+            }
+            for name, one in sorted(self._watched.items())
+        }
+
+    def _find(self, setups: Path, own: str, now_s: float) -> None:
+        """Find processes that are not known yet, or were started again."""
+        here = {own: os.getpid()}
+        missing = {
+            path.stem
+            for path in setups.glob("*.json")
+            if (known := self._watched.get(path.stem)) is None or self._own_mb(known.pid) is None
+        }
+        if missing:
+            here |= self._pids(setups, missing)
+        for name, pid in here.items():
+            known = self._watched.get(name)
+            if known is None or known.pid != pid:
+                most = 0.0 if known is None else known.most_mb
+                self._watched[name] = _Watched(pid, now_s, most_mb=most)
+
+    def _pids(self, setups: Path, names: set[str]) -> dict[str, int]:
+        wanted = {os.fsencode(setups / f"{name}.json"): name for name in names}
+        found = {}
+        for entry in self.proc.glob("[0-9]*/cmdline"):
+            with contextlib.suppress(OSError):
+                arguments = entry.read_bytes().split(b"\0")
+                if b"--setup" in arguments:
+                    name = wanted.get(arguments[arguments.index(b"--setup") + 1])
+                    if name is not None:
+                        found[name] = int(entry.parent.name)
+        return found
+
+    def _own_mb(self, pid: int) -> float | None:
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            pages = (self.proc / str(pid) / "statm").read_text().split()
+            return (int(pages[1]) - int(pages[2])) * _PAGE_BYTES / 1e6
+        return None
+
+
+def _since(one: _Watched) -> str:
+    if one.settled is None:
+        return ""
+    grown_mb, minutes = one.now_mb - one.settled[1], SETTLED_AFTER_S / 60.0
+    return f", {grown_mb:.0f} MB more than {minutes:g} min after its start"
