@@ -28,7 +28,7 @@ REMOVED = "removed.json"
 """What went so far: outlives an orchestrator."""
 
 
-class _Part(NamedTuple):
+class _EndedPart(NamedTuple):
     path: Path
     ended_s: float
     """By UTC."""
@@ -66,7 +66,7 @@ class KeptParts:
             total -= part.size_bytes
             self._count(part)
 
-    def _parts(self) -> list[_Part]:
+    def _parts(self) -> list[_EndedPart]:
         """Return the parts that may go: of each recording and table all that are ended."""
         found = [
             (path, name) for name in RECORDINGS for path in segments_of(self._folder / name)[:-1]
@@ -77,9 +77,9 @@ class KeptParts:
             if (table := table_of(path)) is not None
         ]
         stats = [(path, path.stat(), of) for path, of in found]
-        return [_Part(path, stat.st_mtime, stat.st_size, of) for path, stat, of in stats]
+        return [_EndedPart(path, stat.st_mtime, stat.st_size, of) for path, stat, of in stats]
 
-    def _count(self, part: _Part) -> None:
+    def _count(self, part: _EndedPart) -> None:
         gone = self.gone.setdefault(part.of, Gone())
         gone.parts += 1
         gone.size_bytes += part.size_bytes
