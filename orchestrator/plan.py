@@ -12,6 +12,7 @@ from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.trace import TRACE_PARTS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
+from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import StandinPath
@@ -102,6 +103,17 @@ class DrivePlan(DriveInputs):
     def recording(self) -> Path:
         """What the vehicle sent; where it has several parts, the first of them."""
         return self.folder / "drive.mcap"
+
+    @property
+    def origin(self) -> dict[str, str]:
+        """What every table of results says of its run."""
+        osm = self.osm
+        return {"run_id": self.run_id, "attribution": osm.attribution, "map": osm.sha256}
+
+    @property
+    def keep(self) -> Keep:
+        """How much of the run stays while it goes on."""
+        return parse_keep(self.config.keep)
 
     @property
     def standin_path_file(self) -> Path:

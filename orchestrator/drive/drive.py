@@ -39,7 +39,6 @@ from foretwin.orchestrator.drive.router_start import join_bus
 from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
-from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, run_lock, write_record
@@ -134,14 +133,7 @@ class _Drive:
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with join_bus(plan, self._supervisor) as bus:
             tables = ResultTables(
-                plan.folder / RESULTS,
-                {
-                    "run_id": plan.run_id,
-                    "attribution": plan.osm.attribution,
-                    "map": plan.osm.sha256,
-                },
-                lossless=plan.config.lock_step,
-                keep=parse_keep(plan.config.keep),
+                plan.folder / RESULTS, plan.origin, lossless=plan.config.lock_step, keep=plan.keep
             )
             conductor = Conductor(plan, bus, self._mission, tables)
             exit_word, code = "failed", EXIT_FAILED

@@ -18,7 +18,6 @@ from foretwin.contracts.setup import (
     ViewerSetup,
     WorkerSetup,
 )
-from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
@@ -117,7 +116,7 @@ def _recorder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return RecorderSetup(
         **_base(plan, process_id),
         file=str(plan.recording),
-        roll=parse_keep(plan.config.keep).recordings,
+        roll=plan.keep.recordings,
     )
 
 
@@ -125,7 +124,7 @@ def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return ViewerSetup(
         **_base(plan, process_id),
         file=str(plan.folder / "monitor.rrd"),
-        roll=parse_keep(plan.config.keep).recordings,
+        roll=plan.keep.recordings,
         worlds_dir=str(plan.worlds_dir),
         drive_frame=plan.drive_frame,
         live=plan.live_view,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mcap.reader import NonSeekingReader
 
 from foretwin.contracts.drive import DriveEnd, ImuSample, SpeedSample
-from foretwin.contracts.segments import Roll, first_left, segments_of
+from foretwin.contracts.segments import segments_of
 from foretwin.contracts.tally import read_tally, tally_file
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.write_mcap import create
@@ -197,23 +197,6 @@ def test_what_the_guard_does_not_let_in_is_counted_once(tmp_path: Path) -> None:
     assert balances(recording)
 
 
-def test_large_files_are_ended_and_read_as_one_drive(tmp_path: Path) -> None:
-    path = tmp_path / "drive.mcap"
-    recording = DriveRecording(path, roll=Roll(most_bytes=2000))
-    recording.set_info(INFO)
-    for number in range(300):
-        assert recording.add("imu", imu(number)) == []
-        if number % 20 == 0:
-            assert recording.flush() == []
-    recording.finish()
-    assert len(segments_of(path)) > 3
-    log = open_log(path)
-    assert [message for _, message in log.samples()] == [imu(number) for number in range(300)]
-    assert log.info.body_from_antenna_m == INFO.body_from_antenna_m
-    assert log.info.end_stamp_ns == START_NS + 299
-    assert log.skipped == {}
-
-
 def test_a_part_that_was_cut_short_and_one_with_nothing_in_it_do_not_hide_the_others(
     tmp_path: Path,
 ) -> None:
@@ -281,40 +264,3 @@ def test_the_chunk_in_progress_is_all_that_a_kill_can_take(tmp_path: Path) -> No
     writer.flush()
     assert (writer.held, in_file()) == (0, 3000)
     writer.finish()
-
-
-def test_what_is_left_of_a_recording_whose_oldest_parts_are_gone_is_one_drive(
-    tmp_path: Path,
-) -> None:
-    path = tmp_path / "drive.mcap"
-    recording = DriveRecording(path, roll=Roll(most_bytes=2000))
-    recording.set_info(INFO)
-    for number in range(300):
-        recording.add("imu", imu(number))
-        if number % 20 == 0:
-            recording.flush()
-    recording.finish()
-    first, second, *_ = segments_of(path)
-    gone = sum(1 for part in (first, second) for _ in read_drive(part))
-    first.unlink()
-    second.unlink()
-    oldest = first_left(path)
-    assert oldest.name == "drive-003.mcap"
-    messages = [message for _, message in open_log(oldest).samples()]
-    assert messages == [imu(number) for number in range(gone, 300)]
-    alone = list(open_log(segments_of(path)[1]).samples())
-    assert 0 < len(alone) < len(messages), "a later part is that part"
-
-
-def test_an_old_part_is_ended_however_small_it_is(tmp_path: Path) -> None:
-    disk = Disk(10**9)
-    path = tmp_path / "drive.mcap"
-    recording = DriveRecording(
-        path, open_part=disk.open_part, mono_s=disk.clock, roll=Roll(most_s=10.0)
-    )
-    for number in range(25):
-        disk.now_s = float(number)
-        recording.add("imu", imu(number))
-        recording.flush()
-    recording.finish()
-    assert len(segments_of(path)) == 3
