@@ -182,8 +182,11 @@ def test_wrapped_angles_point_the_same_way(angle_rad: float) -> None:
 
 @pytest.mark.parametrize(
     ("lat_deg", "lon_deg", "text"),
-    [(math.nan, 0.0, "not finite"), (0.0, math.inf, "not finite"), (91.0, 0.0, "outside")],
-)
+    [
+        (math.nan, 0.0, "not finite"), (0.0, math.inf, "not finite"), (90.1, 0.0, "outside"),
+        (-90.1, 0.0, "outside"), (0.0, 180.1, "outside"), (0.0, -180.1, "outside"),
+    ],
+)  # fmt: skip
 def test_points_off_the_earth_are_refused(lat_deg: float, lon_deg: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         GeoPoint(lat_deg, lon_deg).validate()

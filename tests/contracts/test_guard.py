@@ -19,6 +19,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused, admit, is_identifier, kept, opened, reason_in
 from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.simulation import WorldNotice
+from foretwin.contracts.tuning import ParameterEstimate
 from tests.contracts.hostile_messages import hostile_bytes
 
 COVERS = ("foretwin.contracts.bounds",)
@@ -72,6 +73,31 @@ def test_numbers_are_within_bounds() -> None:
     assert why(GnssFix(stamp_ns=2**62 + 1, position=HERE)) == "GnssFix: stamp_ns out of bounds"
     assert why(SpeedSample(stamp_ns=1, speed_mps=1e5)) == "SpeedSample: speed_mps out of bounds"
     assert admit(GnssFix(stamp_ns=1, position=GeoPoint(90.0, -180.0)), where=KEY)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("speed_mps", "mps"), ("accel_mps2", "mps2"), ("tire_angle_rad", "rad"),
+        ("yaw_rate_radps", "radps"), ("alt_m", "m"), ("lat_deg", "lat_deg"),
+        ("lon_deg", "lon_deg"),
+    ],
+)  # fmt: skip
+def test_a_number_may_be_as_great_as_its_unit_says(name: str, unit: str) -> None:
+    most = {"mps": 1e4, "mps2": 1e5, "rad": 1e5, "radps": 1e4, "m": 1e9, "lat_deg": 90.0,
+            "lon_deg": 180.0}[unit]  # fmt: skip
+    one = msgspec.defstruct("One", [(name, float)])
+    for value in (most, -most):
+        assert admit(one(value), where=KEY).message == one(value)
+        assert why(one(1.001 * value)) == f"One: {name} out of bounds"
+
+
+def test_of_what_belongs_together_none_is_missing_alone() -> None:
+    estimate = ParameterEstimate(name="mass_kg", value=None, low=None, high=None)
+    assert admit(estimate, where=KEY)
+    for lone in ("value", "low", "high"):
+        changed = msgspec.structs.replace(estimate, **{lone: 1.0})
+        assert why(changed) == "ParameterEstimate: value incomplete"
 
 
 def test_an_array_holds_floats() -> None:

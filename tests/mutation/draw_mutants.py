@@ -2,13 +2,16 @@
 
 A JSON object {"root", "files", "seed", "count"} comes in, one {"places", "mutants"} goes out, each
 mutant with its file, line, operator and text. Each place in the files is as likely as any other,
-then each operator that can change it: of one `+` cosmic-ray makes a dozen mutants. Left out is what
-changes no result of any program that is right: annotations, protocols, that a type is frozen.
+then each operator that can change it: of one `+` cosmic-ray makes a dozen mutants. A number that
+has a name is trebled: nobody promised 120 m rather than 121. Left out is what changes no result of
+any program that is right: annotations, protocols, that a type is frozen, what only a type checker
+reads.
 """
 
 from __future__ import annotations
 
 import ast
+import contextlib
 import json
 import random
 import sys
@@ -21,6 +24,7 @@ from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 
 _LEFT_OUT = ("core/NoOp",)
+_NUMBERS, _TREBLED = "core/NumberReplacer", "trebled"
 _DECLARED = ("frozen", "slots", "kw_only")
 
 
@@ -46,21 +50,42 @@ def main() -> None:
     places: dict[Place, list[Change]] = {}
     for file in asked["files"]:
         places.update(_places(root, file))
-    drawn = chance.sample(sorted(places), min(asked["count"], len(places)))
-    mutants = []
-    for place in drawn:
+    mutants: list[dict[str, Any]] = []
+    for place in chance.sample(sorted(places), len(places)):
+        if len(mutants) == asked["count"]:
+            break
         change = chance.choice(places[place])
-        text = mutate_code(_read(root, place.file), _operator(change.operator), change.occurrence)
-        mutants.append(
-            {"file": place.file, "line": place.line, "operator": change.operator, "text": text}
-        )
+        # Dotted names of exceptions in a tuple are too much for cosmic-ray 8.7, and of `**` before
+        # a dict it makes what is no Python: these would be killed by every test.
+        with contextlib.suppress(AttributeError, SyntaxError):
+            text = _mutated(_read(root, place.file), place, change)
+            ast.parse(text)
+            mutants.append(
+                {"file": place.file, "line": place.line, "operator": change.operator, "text": text}
+            )
     json.dump({"places": len(places), "mutants": mutants}, sys.stdout)
+
+
+def _mutated(text: str, place: Place, change: Change) -> str:
+    if change.operator != _TREBLED:
+        return mutate_code(text, _operator(change.operator), change.occurrence)
+    lines = text.splitlines(keepends=True)
+    line = lines[place.line - 1]
+    number = line[place.column : change.occurrence]
+    trebled = f"(3 * {number})" if ast.literal_eval(number) else "1"
+    lines[place.line - 1] = line[: place.column] + trebled + line[change.occurrence :]
+    return "".join(lines)
 
 
 def _places(root: Path, file: str) -> dict[Place, list[Change]]:
     text = _read(root, file)
     tree, unrun = get_ast(text), _unrun(ast.parse(text))
+    named = _named_numbers(ast.parse(text))
     found = defaultdict(list)
+    for node in named.values():
+        found[Place(file, node.lineno, node.col_offset)].append(
+            Change(_TREBLED, node.end_col_offset)
+        )
     for name in plugins.operator_names():
         if name in _LEFT_OUT or plugins.get_operator(name).arguments():
             continue
@@ -69,8 +94,22 @@ def _places(root: Path, file: str) -> dict[Place, list[Change]]:
             start for node in ast_nodes(tree) for start, _ in operator.mutation_positions(node)
         )
         for occurrence, (line, column) in enumerate(occurrences):
+            if name == _NUMBERS and (line, column) in named:
+                continue
             if not any(first <= (line, column) < last for first, last in unrun):
                 found[Place(file, line, column)].append(Change(name, occurrence))
+    return found
+
+
+def _named_numbers(tree: ast.Module) -> dict[tuple[int, int], Any]:
+    """Return the numbers that stand in constants of the module, by where they begin."""
+    found = {}
+    for node in tree.body:
+        targets = [node.target] if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [])
+        if targets and all(isinstance(one, ast.Name) and one.id.isupper() for one in targets):
+            for one in ast.walk(node):
+                if isinstance(one, ast.Constant) and type(one.value) in (int, float):
+                    found[(one.lineno, one.col_offset)] = one
     return found
 
 
@@ -82,11 +121,17 @@ def _unrun(tree: ast.Module) -> list[tuple[tuple[int, int], tuple[int, int]]]:
         declares = isinstance(node, ast.keyword) and node.arg in _DECLARED
         protocol = isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases)
         nodes += [node] if declares or protocol else []
+        if isinstance(node, ast.If) and {"TYPE_CHECKING", "__name__"} & set(_names(node.test)):
+            nodes.append(node.test)
     return [
         ((node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset))
         for node in nodes
         if isinstance(node, ast.expr | ast.keyword | ast.ClassDef)
     ]
+
+
+def _names(node: ast.expr) -> list[str]:
+    return [one.id for one in ast.walk(node) if isinstance(one, ast.Name)]
 
 
 def _operator(name: str) -> Any:

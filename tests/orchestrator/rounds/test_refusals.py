@@ -110,3 +110,27 @@ def test_what_a_slow_round_still_sends_after_it_was_given_up_is_late(
     dispatch = rounds.dispatcher.dispatch
     assert (rounds.tally.run, rounds.tally.failed, dispatch.late) == (0, 1, 2)
     assert (dispatch.count.given, dispatch.count.lost, dispatch.count.results) == (2, 2, 0)
+
+
+@pytest.mark.parametrize(("seconds", "smaller"), [(0.0, False), (1.1 * GIVEN_UP_AFTER_S, True)])
+def test_only_rounds_that_were_slow_when_given_up_make_the_next_ones_smaller(
+    seconds: float, smaller: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = [10**9]
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns[0])
+    house = House(tmp_path, futures=64, futures_per_job=32, least_futures=16, rate_hz=2.0)
+    house.drive(20)
+    rounds = house.conductor.rounds
+    for _ in range(6):
+        assert house.conductor.start_round()
+        now_ns[0] += round(1e9 * seconds)
+        if smaller:
+            rounds.next_is_due()
+            house.work()
+        else:
+            refuse_all(house, *house.workers, reason="no disk")
+        assert not rounds.open
+    house.tables.close()
+
+    assert rounds.tally.failed == 6
+    assert (rounds.pace.now.futures < 64) is smaller

@@ -9,9 +9,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.drive import SignalState, VehicleState
+from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.simulation import Event
-from foretwin.orchestrator.rounds.jobs import planners_of
+from foretwin.orchestrator.rounds.jobs import _signals, planners_of
 from foretwin.orchestrator.rounds.pace import Pace
+from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 from tests.orchestrator.house import House
 
 COVERS = ("foretwin.orchestrator.rounds.jobs",)
@@ -165,3 +168,28 @@ def test_who_acts_for_a_planner_is_said_once_for_each(tmp_path: Path) -> None:
         ("warning", "a future driven by remote: fallback 'pur"),
         ("warning", "a future driven by constant_speed: fallb"),
     ]
+
+
+def light(stamp_ns: int) -> SignalState:
+    return SignalState(stamp_ns=stamp_ns, group_id="g", colour="red")
+
+
+@pytest.mark.parametrize(("age_s", "fresh"), [(0.0, True), (-0.1, True), (0.1, False)])
+def test_signals_count_as_long_as_they_are_fresh(age_s: float, fresh: bool) -> None:
+    now_ns = round(1e9 * (100.0 + LIVE_FOR_S + age_s))
+    state = VehicleState(
+        vehicle_id="ego", stamp_ns=now_ns, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
+        speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0,
+    )  # fmt: skip
+    of_now = light(now_ns)
+    old = light(round(100e9) if age_s else now_ns)
+    assert _signals((of_now, old), state) == ((of_now, old) if fresh else (of_now,))
+
+
+def test_a_way_on_the_lanes_is_not_counted_as_off_them(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.work()
+    house.end()
+    assert house.conductor.rounds.futures.off_lanes_rounds == 0

@@ -36,7 +36,8 @@ def names(users: RoadUsers | None) -> list[str]:
 def test_those_near_the_car_at_about_its_time_are_met() -> None:
     near, far = user("near", 30.0), user("far", WITHIN_M + 1.0)
 
-    assert names(seen(near, far)) == ["near"]
+    assert WITHIN_M == 120.0
+    assert names(seen(near, user("edge", WITHIN_M - 1.0), far)) == ["near", "edge"]
     assert names(seen()) == names(None) == []
     assert names(seen(near, stamp_ns=1_000 + 600_000_000)) == []
 

@@ -8,7 +8,7 @@ import pytest
 
 from foretwin.contracts.futures import RoadUserTracks
 from foretwin.orchestrator.record.result_rows import round_futures
-from foretwin.orchestrator.rounds.views import round_view
+from foretwin.orchestrator.rounds.views import SAFE_CLEARANCE_M, VIEW_POINTS, round_view
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 from tests.orchestrator.futures_rounds import TIME_S, round_done, straight
 from tests.orchestrator.trip import town_world
@@ -58,3 +58,22 @@ def test_without_road_users_there_is_nobody_to_show() -> None:
     view = round_view(done, round_futures(done).futures, FRAME, FRAME)
     assert view.user_xy_m.shape == (0, 25, 2)
     assert view.touch_xy_m.shape == (0, 2)
+
+
+def test_criticality_grows_as_the_clearance_shrinks_and_is_one_where_cars_touch() -> None:
+    done = meeting((40.0, 2.0))
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    safe, near, touching = view.criticality.tolist()
+    assert safe == 0.0
+    assert near == pytest.approx(1.0 - 3.0 / SAFE_CLEARANCE_M)
+    assert touching == 1.0
+    assert (view.collided, view.min_clearance_m, view.nominal_index) == (1, 0.0, 0)
+    assert view.xy_m.shape == (3, VIEW_POINTS, 2)
+
+
+def test_who_meets_nobody_has_no_clearance() -> None:
+    states = straight((0.0, 0.0))
+    done = round_done(states, outcome={"min_clearance_m": np.array([np.inf])})
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert view.min_clearance_m is None
+    assert view.criticality.tolist() == [0.0]

@@ -1,0 +1,55 @@
+"""What the gateway makes of a vehicle's units, signs and axes, and that it counts each sample."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from foretwin.contracts.drive import ImuSample, SpeedSample, SteeringSample
+from foretwin.telemetry.ros2.inwards import _in_our_units
+from foretwin.telemetry.ros2.mapping import InRow
+from tests.telemetry.ros2.gateway_ground import FIX_KEY, fix
+from tests.telemetry.ros2.test_gateway import Ground
+
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+S = 10**9
+
+
+def row(channel: str, **said: object) -> InRow:
+    return InRow(topic="/a", type="a/msg/B", channel=channel, **said)  # type: ignore[arg-type]
+
+
+def test_axes_that_point_forward_right_and_down_are_turned_about_the_first() -> None:
+    sample = ImuSample(stamp_ns=1, accel_mps2=(1.0, 2.0, 3.0), rate_radps=(0.1, 0.2, 0.3))
+    assert _in_our_units(sample, row("imu")) == sample
+    turned = _in_our_units(sample, row("imu", axes="forward_right_down"))
+    assert turned == ImuSample(
+        stamp_ns=1, accel_mps2=(1.0, -2.0, -3.0), rate_radps=(0.1, -0.2, -0.3)
+    )
+
+
+@pytest.mark.parametrize(
+    ("said", "angle_rad"),
+    [
+        ({}, 0.2), ({"left_positive": False}, -0.2), ({"angle_unit": "deg"}, math.radians(0.2)),
+        ({"angle_unit": "deg", "left_positive": False}, -math.radians(0.2)),
+    ],
+)  # fmt: skip
+def test_angles_become_radians_to_the_left(said: dict[str, object], angle_rad: float) -> None:
+    sample = SteeringSample(stamp_ns=1, tire_angle_rad=0.2)
+    found = _in_our_units(sample, row("steering", **said))
+    assert found.tire_angle_rad == pytest.approx(angle_rad)  # type: ignore[attr-defined]
+
+
+def test_speeds_become_metres_a_second() -> None:
+    sample = SpeedSample(stamp_ns=1, speed_mps=36.0)
+    assert _in_our_units(sample, row("speed", speed_unit="km/h")).speed_mps == pytest.approx(10.0)  # type: ignore[attr-defined]
+
+
+def test_each_sample_counts_once() -> None:
+    ground = Ground(enabled=False, flag=False)
+    for number in range(3):
+        ground.arrive(FIX_KEY, fix(5 * S + number, 52.6, 13.5), number)
+    assert ground.gateway.inwards.counts == {"gnss": 3}
+    assert ground.gateway.inwards.first_stamp_ns == 5 * S
