@@ -3,14 +3,25 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup drive test check format bench judge chaos clean
+.PHONY: setup drive test check format bench judge chaos clean lock
 
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r constraints.txt
+	# What is here has no hash: it is installed apart, and built by what is installed already.
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
+
+lock:
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/pip install --quiet --disable-pip-version-check uv
+	grep '^[^# ]' constraints.txt | cut -d' ' -f1 > build/lock/pins.txt
+	echo '# Made by `make lock`: every package that `make setup` installs, with the hashes of its files.' > build/lock/constraints.txt
+	build/lock/bin/uv pip compile pyproject.toml --quiet --extra dev --constraint build/lock/pins.txt \
+		--python-version 3.11 --generate-hashes --no-header --no-annotate $(LOCK) >> build/lock/constraints.txt
+	mv build/lock/constraints.txt constraints.txt
 
 drive: setup
 	$(BIN)/foretwin drive

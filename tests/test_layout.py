@@ -96,14 +96,6 @@ def test_no_file_holds_a_machine_path_or_an_index_address() -> None:
     assert found == []
 
 
-def test_pins_are_exact() -> None:
-    lines = (ROOT / "constraints.txt").read_text().splitlines()
-    pins = [line for line in lines if line and not line.startswith("#")]
-
-    assert pins
-    assert [line for line in pins if not re.fullmatch(r"[A-Za-z0-9._-]+==[^\s;,*]+", line)] == []
-
-
 def test_the_command_line_starts_without_heavy_libraries() -> None:
     code = "import sys, foretwin.__main__; print(*sys.modules)"
     run = subprocess.run(
