@@ -25,6 +25,7 @@ import msgspec
 
 from foretwin.contracts import trace
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
+from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused
@@ -76,9 +77,15 @@ class ProcessLife:
     """Tells a process when its run begins and when it is over; both are cheap to ask."""
 
     def __init__(
-        self, setup: ProcessSetup, bus: Bus, *, mono_s: Callable[[], float] = time.monotonic
+        self,
+        setup: ProcessSetup,
+        bus: Bus,
+        *,
+        mono_s: Callable[[], float] = time.monotonic,
+        meter: CpuMeter | None = None,
     ) -> None:
         self._setup = setup
+        self._meter = meter
         self._bus = bus
         self._mono_s = mono_s
         self._parent = os.getppid()
@@ -94,6 +101,8 @@ class ProcessLife:
 
     def ready(self) -> None:
         """Declare the process alive: it can take work from now on."""
+        if self._meter is not None:
+            self._meter.ready()
         self._bus.declare_alive(alive_key(run=self._setup.run_id, process=self._setup.process_id))
 
     @property
@@ -114,6 +123,8 @@ class ProcessLife:
         return self.terminated.is_set()
 
     def _look(self) -> None:
+        if self._meter is not None:
+            self._meter.look()
         while (item := self._mailbox.take()) is not None:
             if isinstance(item, Received):
                 self._take_end(item)
@@ -182,10 +193,10 @@ def run_process(
     log_to_file(setup)
     if setup.trace_dir is not None:
         trace.begin(Path(setup.trace_dir), setup.process_id)
-    code = 0
+    meter, code = CpuMeter(file.parent, setup.process_id), 0
     try:
         with ZenohBus(setup.bus) as bus:
-            life = ProcessLife(setup, bus)
+            life = ProcessLife(setup, bus, meter=meter)
             on_end_signals(life.terminated.set)
             serve(setup, bus, life)
     except (UserError, OSError) as problem:
@@ -196,6 +207,7 @@ def run_process(
         logging.getLogger(setup.process_id).exception("ended by an error")
         code = 1
     trace.end()
+    meter.write()
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 from foretwin.contracts import trace
 from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
+from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.keys import alive_key
@@ -116,6 +117,7 @@ class _Drive:
         self._interrupt = _Interrupt()
         self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
         self._watch = ProcessWatch(self._supervisor)
+        self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
         self._failed_at_end = False
         self._mission = Mission(
             WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
@@ -164,6 +166,7 @@ class _Drive:
             return "interrupted", EXIT_INTERRUPTED
         prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)
         bus.declare_alive(alive_key(run=self._plan.run_id, process=ORCHESTRATOR))
+        self._meter.ready()
 
         def housekeeping(now_s: float) -> None:
             self._look_after(conductor, now_s)
@@ -257,6 +260,7 @@ class _Drive:
         plan = self._plan
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
+        self._meter.write()  # what follows is no part of the drive
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
         quick = exit_word != "completed"
         grace_s = INTERRUPT_GRACE_S if quick else to_write_s

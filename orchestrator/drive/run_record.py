@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from foretwin.contracts.cpu_use import cpu_uses
 from foretwin.contracts.tally import read_tally, tally_file
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
@@ -62,6 +63,7 @@ def run_record(
         "plan_comparison": conductor.rounds.plans.record(),
         "side_by_side": conductor.ads.record(),
         "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),
+        "processor": msgspec.to_builtins(cpu_uses(plan.processes_dir)),
         "workers": {
             "started": plan.config.workers,
             "restarted": restarted,
