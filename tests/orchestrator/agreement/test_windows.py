@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.drive import RoadUser, RoadUsers, SignalState
-from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.frames import GeoPoint, local_from_geo
 from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.agreement import windows
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines, judged_row
-from foretwin.orchestrator.agreement.windows import OpenWindows, judge_in
+from foretwin.orchestrator.agreement.windows import MOST_KEPT, OpenWindows, judge_in
 from foretwin.orchestrator.instructions import LatestReports
 from foretwin.sim_worker.analysis.agreement.tally import Judged
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -111,3 +112,44 @@ def test_a_desk_that_saw_nothing_says_nothing() -> None:
     handler = OpenWindows(VEHICLE, horizon_s=8.0)
     assert handler.finish() == []
     assert handler.record(0) is None
+
+
+def test_of_a_crowd_the_nearest_are_kept_in_their_order() -> None:
+    state = states_along(WORLD.frame, np.array([[0.0, Y], [20.0, Y]]), speed_mps=5.0)[0]
+    near, far = 1e-5, 1e-3
+    crowd = tuple(
+        RoadUser(
+            user_id=f"u{number}", kind="car", yaw_rad=0.0, speed_mps=0.0, length_m=4.0, width_m=2.0,
+            position=GeoPoint(
+                state.position.lat_deg + (far if number % 2 else near) * (1 + number / 1000),
+                state.position.lon_deg,
+            ),
+        )
+        for number in range(100)
+    )  # fmt: skip
+    seen = RoadUsers(stamp_ns=state.stamp_ns, users=crowd)
+    kept = windows._nearest(seen, state)
+
+    assert [user.user_id for user in kept.users] == [f"u{2 * k}" for k in range(MOST_KEPT)]
+    few = msgspec.structs.replace(seen, users=crowd[:MOST_KEPT])
+    assert windows._nearest(few, state) is few
+
+
+def test_east_and_north_count_alike_for_who_is_nearest() -> None:
+    state = states_along(WORLD.frame, np.array([[0.0, Y], [20.0, Y]]), speed_mps=5.0)[0]
+    lat, lon = state.position.lat_deg, state.position.lon_deg
+    east = [GeoPoint(lat, lon + 1.2e-5 * (1 + n)) for n in range(MOST_KEPT)]
+    north = [GeoPoint(lat + 1e-5 * (1 + n), lon) for n in range(MOST_KEPT)]
+    crowd = tuple(
+        RoadUser(
+            user_id=str(n), kind="car", yaw_rad=0.0, speed_mps=0.0, length_m=4.0, width_m=2.0,
+            position=place,
+        )
+        for n, place in enumerate(east + north)
+    )  # fmt: skip
+    kept = windows._nearest(RoadUsers(stamp_ns=state.stamp_ns, users=crowd), state).users
+    xy_m = [local_from_geo(WORLD.frame, u.position.lat_deg, u.position.lon_deg) for u in crowd]
+    here_m = local_from_geo(WORLD.frame, lat, lon)
+    away_m = np.hypot(*(np.array(xy_m) - here_m).T)
+
+    assert {int(user.user_id) for user in kept} == set(np.argsort(away_m)[:MOST_KEPT].tolist())
