@@ -13,7 +13,7 @@ import functools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Protocol, TypeVar, cast
@@ -207,6 +207,21 @@ def came(name: str, key: str) -> None:
     if _recorder is not None:
         more = {"cat": "bus", "id": f"{name} {key}", "bp": "e"}
         _recorder.add("f", name, time.monotonic_ns(), 0, more)
+
+
+@contextlib.contextmanager
+def whole_run(folder: Path | None, process_id: str) -> Iterator[None]:
+    """Record what this process does, and at the end join what all have left in `folder` to the
+    trace beside it; nothing where there is no folder."""
+    if folder is None:
+        yield
+        return
+    begin(folder, process_id)
+    try:
+        yield
+    finally:
+        end()
+        joined(folder, folder.with_name(TRACE))
 
 
 def joined(folder: Path, file: Path) -> int:

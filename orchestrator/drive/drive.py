@@ -7,7 +7,6 @@ import datetime
 import logging
 import signal
 import time
-from collections.abc import Iterator
 
 from foretwin.contracts import trace
 from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
@@ -91,22 +90,8 @@ def carry_out(plan: DrivePlan) -> int:
             log_file=str(plan.folder / LOG),
         )
     )
-    with run_lock(plan.folder), traced_run(plan):
+    with run_lock(plan.folder), trace.whole_run(plan.trace_dir, ORCHESTRATOR):
         return _Drive(plan).run()
-
-
-@contextlib.contextmanager
-def traced_run(plan: DrivePlan) -> Iterator[None]:
-    """Record what all processes do when, where that was asked for, and join it at the end."""
-    if plan.trace_dir is None:
-        yield
-        return
-    trace.begin(plan.trace_dir, ORCHESTRATOR)
-    try:
-        yield
-    finally:
-        trace.end()
-        trace.joined(plan.trace_dir, plan.folder / trace.TRACE)
 
 
 class _Drive:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array32
 from foretwin.contracts.drive import PlannedTrajectory, SignalState, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
@@ -39,6 +41,8 @@ HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
 """An older plan of the car is not compared with a new future, nor followed in one."""
 _KEPT_WORLDS = 8
+CRITICAL = 0.3
+"""From this criticality on (see `views.round_view`) a future is one to look at again."""
 LEAST_IN_JOB = 16
 """A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
 
@@ -74,11 +78,18 @@ class RoundPlanner:
         self._scenarios = scenarios_of(config)
         self._known: dict[str, KnownScenarios] = {}
         self._futures: dict[tuple[str, ...], tuple[Future, ...]] = {}
+        self._worst: tuple[Future, ...] = ()
 
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
         """Plan for these parameters from now on."""
         self._vehicle, self._vehicle_version = vehicle, version
         self._vehicle_digest = vehicle_digest(vehicle)
+
+    def take_worst(self, futures: Sequence[Future], criticality: Array32) -> None:
+        """Keep of a round's futures the critical ones, the worst first: where the next round runs
+        fewer, these come first."""
+        worst = np.argsort(-criticality, kind="stable")
+        self._worst = tuple(futures[i] for i in worst if criticality[i] >= CRITICAL)
 
     def draw_cases(self) -> None:
         """Draw the cases of all scenarios: before the drive, not in its first round."""
@@ -100,7 +111,8 @@ class RoundPlanner:
         """Return the jobs of a round of `count` futures."""
         config = self._config
         scenarios = self._fitting(world, intent.path)
-        futures = some_of(self._futures_with(scenarios), count, turn=round_id)
+        planned = self._futures_with(scenarios)
+        futures = some_of(planned, count, turn=round_id, first=self._worst)
         users = near_car(reports.road_users, state, world.frame)
         signals = _signals(reports.signals, state)
         car_plan = _car_plan(reports.plan, state, world.frame)

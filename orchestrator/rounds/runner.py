@@ -31,7 +31,7 @@ from foretwin.orchestrator.record.result_rows import (
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.news import RoundNews
-from foretwin.orchestrator.rounds.pace import Pace, RoundPace
+from foretwin.orchestrator.rounds.pace import Pace, Played, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
 from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
@@ -233,7 +233,7 @@ class RoundRunner:
         seed = self._seeds.pop(order.round_id)
         for expired in [r for r in self._seeds if r < order.round_id]:
             del self._seeds[expired]
-        self._take_time(seed.pace, done.seconds)
+        self._take_time(seed.pace, done.seconds, done.played_by)
         self.tally.run += 1
         world = self._world_of(order.world_id)
         futures, rows, distinct = round_futures(done, vehicle=self._plan.vehicle.name)
@@ -253,15 +253,16 @@ class RoundRunner:
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame)
         self._context.publish("round", view)
+        self._planner.take_worst(order.futures, view.criticality)
         self._news.planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
 
-    def _take_time(self, pace: Pace, seconds: float) -> None:
+    def _take_time(self, pace: Pace, seconds: float, by: tuple[Played, ...] = ()) -> None:
         """Count how long a round took, and tell where the next ones have another pace."""
-        if not self.pace.take(pace, seconds):
+        if not self.pace.take(pace, seconds, by):
             return
         if not self.pace.slowed:
             self._tell(Notice("info", "the machine keeps up: all futures in every round again"))

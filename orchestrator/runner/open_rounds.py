@@ -63,6 +63,11 @@ class RoundDone:
     seconds: float
     late: bool = False
 
+    @property
+    def played_by(self) -> tuple[tuple[str, str], ...]:
+        """The workers that played it, each with the World in which it did."""
+        return tuple((result.worker_id, result.world_id) for result in self.results)
+
 
 class RoundGivenUp(NamedTuple):
     """A round one of whose jobs is given up."""

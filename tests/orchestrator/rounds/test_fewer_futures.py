@@ -70,3 +70,32 @@ def test_as_many_as_there_are_is_all_of_them() -> None:
     assert some_of(ALL, 65, turn=3) == ALL
     with pytest.raises(ValueError, match="0 futures: at least 1"):
         some_of(ALL, 0, turn=0)
+
+
+@given(
+    count=st.integers(2, 63),
+    turn=st.integers(0, 100),
+    worst=st.lists(st.sampled_from(ALL[1:]), unique_by=lambda future: future.index, max_size=40),
+)
+def test_those_found_worst_come_first_and_leave_room_for_others(
+    count: int, turn: int, worst: list[Future]
+) -> None:
+    some = some_of(ALL, count, turn=turn, first=worst)
+    indices = [future.index for future in some]
+
+    assert some[0] is ALL[0]
+    assert len(some) == count
+    assert indices == sorted(set(indices))
+    assert {future.index for future in worst[: (count - 1) // 2]} <= set(indices)
+    assert some == some_of(ALL, count, turn=turn, first=worst)
+
+
+def test_all_still_come_within_some_rounds_where_the_same_are_always_worst() -> None:
+    worst = ALL[40:50]
+    seen = {f.index for turn in range(16) for f in some_of(ALL, 16, turn=turn, first=worst)}
+    assert seen == {future.index for future in ALL}
+
+
+def test_a_future_of_another_junction_is_not_taken_for_one_of_this() -> None:
+    other = plan_futures(count=64, seed=1, planners=["pure_pursuit_idm"])
+    assert some_of(ALL, 16, turn=3, first=other[1:]) == some_of(ALL, 16, turn=3)

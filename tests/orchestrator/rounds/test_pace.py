@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from foretwin.orchestrator.rounds.pace import (
     CALM_PERIODS,
-    COLD_ROUNDS,
     LATE_ROUNDS,
+    MEASURED_ROUNDS,
     Pace,
     RoundPace,
     RoundTime,
+    future_s,
     next_pace,
     paces_between,
 )
@@ -29,13 +30,16 @@ Load = Callable[[int, int], float]
 """Seconds of round k with n futures."""
 
 
-def drive(load: Load, rounds: int, *, least: int = 16, cold_rounds: int = 0) -> list[Pace]:
-    """Paces of the rounds of a drive, by default of one that has begun before them."""
-    pace = RoundPace(most=64, least=least, period_s=PERIOD_S, cold_rounds=cold_rounds)
+def drive(
+    load: Load, rounds: int, *, least: int = 16, cold: frozenset[int] = frozenset()
+) -> list[Pace]:
+    """Paces of the rounds of a drive; those of some numbers are cold."""
+    pace = RoundPace(most=64, least=least, period_s=PERIOD_S)
     paces = []
     for number in range(rounds):
         paces.append(pace.now)
-        pace.take(pace.now, load(number, pace.now.futures))
+        by = [("w0", f"world {number}")] if number in cold else []
+        pace.take(pace.now, load(number, pace.now.futures), by)
     return paces
 
 
@@ -74,14 +78,53 @@ def test_where_the_least_futures_are_too_many_rounds_become_rare() -> None:
     assert paces == [ALL] * 2 + [QUARTER] * 2 + [SECOND] * 96
 
 
-def test_the_first_rounds_do_not_say_how_fast_the_machine_is() -> None:
-    def cold(number: int, n: int) -> float:
-        return 9.0 if number < COLD_ROUNDS else 0.004 * n
+def test_rounds_in_which_somebody_does_what_is_done_once_say_nothing_of_the_machine() -> None:
+    cold = frozenset({0, 1, 40, 41})
 
-    assert drive(cold, 100, cold_rounds=COLD_ROUNDS) == [ALL] * 100
-    assert drive(cold, 3) == [ALL] * 2 + [FOURTH]
-    slow = drive(lambda _, n: 0.0125 * n, 100, cold_rounds=COLD_ROUNDS)
-    assert slow == [ALL] * (COLD_ROUNDS + 2) + [HALF] * (98 - COLD_ROUNDS)
+    def load(number: int, n: int) -> float:
+        return 9.0 if number in cold else 0.004 * n
+
+    assert drive(load, 100, cold=cold) == [ALL] * 100
+    assert drive(load, 3) == [ALL] * 2 + [FOURTH]
+    slow = drive(lambda _, n: 0.0125 * n, 100, cold=cold)
+    assert slow == [ALL] * 4 + [HALF] * 96
+
+
+def test_a_worker_meets_each_world_once() -> None:
+    pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
+    w0, w1 = ("w0", "here"), ("w1", "here")
+
+    assert not pace.take(ALL, math.inf, [w0])
+    assert not pace.take(ALL, math.inf, [w0, w1])
+    assert not pace.take(ALL, 0.6, [w0, w1])
+    assert pace.take(ALL, 0.6, [w1])
+    assert pace.now == HALF
+
+
+def test_what_a_future_costs_is_measured_where_the_pace_has_changed() -> None:
+    def took(pace: Pace, *seconds: float) -> list[RoundTime]:
+        return [RoundTime(pace, second) for second in seconds]
+
+    assert future_s(took(ALL, 0.3, 0.4)) == math.inf
+    assert future_s(took(ALL, 0.5, 0.6) + took(HALF, 0.45, 0.44)) == pytest.approx(0.16 / 32)
+    assert future_s(took(HALF, 0.3) + took(ALL, 0.4, 0.46)) == pytest.approx(0.16 / 32)
+    old = took(ALL, 9.0) + took(ALL, *[0.6] * MEASURED_ROUNDS)
+    later = took(HALF, *[0.5] * MEASURED_ROUNDS) + took(HALF, 0.1)
+    assert future_s(old + later) == pytest.approx(0.1 / 32)
+    # Rarer rounds of as many futures are rounds of those.
+    rare = took(QUARTER, 0.6, 0.6) + took(SECOND, 0.5)
+    assert future_s(took(HALF, 0.7) + rare) == pytest.approx(0.2 / 16)
+    assert future_s(took(ALL, 0.3) + took(HALF, 0.5)) == 0.0
+
+
+def test_where_futures_cost_little_it_rises_as_far_as_that_allows() -> None:
+    """64 take 0.49 s and 16 take 0.266 s; in proportion, 64 would seem to take 1.06 s."""
+
+    def load(number: int, n: int) -> float:
+        return 0.19 + 0.0032 * n if number >= 12 else 0.6 + 0.0047 * n
+
+    assert QUARTER in drive(load, 12)
+    assert drive(load, 300)[-1] in (ALL, THREE_QUARTERS)
 
 
 def test_one_late_round_alone_changes_nothing() -> None:
@@ -106,7 +149,7 @@ def test_with_room_to_spare_all_are_run_again_and_every_fall_makes_it_wait_longe
 
 
 def test_a_round_that_was_given_up_counts_as_endless() -> None:
-    pace = RoundPace(most=64, least=16, period_s=PERIOD_S, cold_rounds=0)
+    pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
 
     assert not pace.take(ALL, math.inf)
     assert pace.take(ALL, math.inf)
