@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -34,7 +35,13 @@ class Picture(NamedTuple):
 
 
 def has_vulkan() -> bool:
-    """Return whether a Vulkan driver is installed, which the headless viewer needs."""
+    """Return whether there is a Vulkan driver, which the headless viewer needs.
+
+    Where the environment names drivers, Vulkan's loader looks for no others.
+    """
+    named = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
+    if named:
+        return any(Path(one).exists() for one in named.split(os.pathsep))
     folders = [Path(root) / "vulkan/icd.d" for root in ("/usr/share", "/usr/local/share", "/etc")]
     return any(any(folder.glob("*.json")) for folder in folders if folder.is_dir())
 

@@ -123,3 +123,14 @@ def test_what_is_no_recording_is_told_in_one_line(
     assert len(told) == 2
     assert "none.rrd" in told[0]
     assert "text.rrd" in told[1]
+
+
+def test_drivers_that_the_environment_names_count_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("VK_ICD_FILENAMES", raising=False)
+    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "none.json"))
+    assert not has_vulkan()
+    (tmp_path / "there.json").touch()
+    monkeypatch.setenv("VK_DRIVER_FILES", f"{tmp_path / 'none.json'}:{tmp_path / 'there.json'}")
+    assert has_vulkan()
