@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 ENDERS = ("kill", "segv", "term", "hup")
 """Signals that end who gets them."""
-SERVANTS = ("w", "w", "mirror", "builder", "tuning", "recorder", "recorder", "viewer", "other")
+SERVANTS = (
+    "w", "w", "mirror", "builder", "tuning", "recorder", "recorder", "viewer", "router", "other",
+)  # fmt: skip
 """Kinds of processes that are started again; `other` is any that stands in no table here."""
-ALL = (*SERVANTS, "vehicle", "orchestrator", "router")
+ALL = (*SERVANTS, "vehicle", "orchestrator")
 LAST = ("orchestrator", "orchestrator", "vehicle", "command")
 """Of whom a signal is, or may be, the end of the drive: the last of its faults."""
 

@@ -79,7 +79,7 @@ def _mutated(text: str, place: Place, change: Change) -> str:
 
 def _places(root: Path, file: str) -> dict[Place, list[Change]]:
     text = _read(root, file)
-    tree, unrun = get_ast(text), _unrun(ast.parse(text))
+    tree, unrun, lines = get_ast(text), _unrun(ast.parse(text)), text.splitlines()
     named = _named_numbers(ast.parse(text))
     found = defaultdict(list)
     for node in named.values():
@@ -96,6 +96,8 @@ def _places(root: Path, file: str) -> dict[Place, list[Change]]:
         for occurrence, (line, column) in enumerate(occurrences):
             if name == _NUMBERS and (line, column) in named:
                 continue
+            if lines[line - 1][column : column + 2] == "*,":
+                continue  # before arguments by name alone, no product
             if not any(first <= (line, column) < last for first, last in unrun):
                 found[Place(file, line, column)].append(Change(name, occurrence))
     return found
