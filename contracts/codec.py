@@ -127,10 +127,14 @@ def content_bytes(message: msgspec.Struct) -> bytes:
 
 
 def write_message(message: msgspec.Struct, path: Path) -> None:
-    """Write one message to a file, complete or not at all."""
+    """Write one message to a file, complete or not at all; raises OSError, and leaves nothing."""
     partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(encode(message))
-    partial.replace(path)
+    try:
+        partial.write_bytes(encode(message))
+        partial.replace(path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
 
 
 def read_message(path: Path, kind: type[Message]) -> Message:

@@ -25,6 +25,8 @@ MOST_FAILURES = 3
 FILE_BATCH_S, LIVE_BATCH_S = 2.0, 0.05
 
 _log = logging.getLogger(__name__)
+_NEVER_DROPPED: list[rr.RecordingStream] = []
+"""Streams whose file takes nothing any more: who lets go of one waits for it, for ever."""
 
 
 def recording_stream(
@@ -103,6 +105,7 @@ class FileStream:
             self._failures += 1
             _log.warning("the recording could not be flushed: %s", problem)
             if self._failures >= MOST_FAILURES:
+                _NEVER_DROPPED.append(self._stream)
                 raise OSError(f"the recording takes nothing any more: {problem}") from problem
         else:
             self._failures = 0
@@ -115,6 +118,7 @@ class FileStream:
         leaving.start()
         leaving.join(FLUSH_S)
         if leaving.is_alive():
+            _NEVER_DROPPED.append(self._stream)
             _log.warning("the recording could not be ended in %g s", FLUSH_S)
 
 

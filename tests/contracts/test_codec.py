@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import struct
 from pathlib import Path
 
@@ -168,3 +169,19 @@ def test_files_hold_one_whole_message(tmp_path: Path) -> None:
 def test_only_structs_and_arrays_can_be_sent() -> None:
     with pytest.raises(TypeError, match="type object cannot be sent"):
         encode(SpeedSample(stamp_ns=1, speed_mps=object()))  # type: ignore[arg-type]
+
+
+def test_a_disk_without_room_is_left_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_message(PLAN, tmp_path / "plan")
+
+    def no_room(self: Path, data: bytes) -> int:
+        self.touch()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", no_room)
+    with pytest.raises(OSError, match="No space left"):
+        write_message(PLAN, tmp_path / "plan")
+    assert [path.name for path in tmp_path.iterdir()] == ["plan"]
+    assert same(read_message(tmp_path / "plan", type(PLAN)), PLAN)

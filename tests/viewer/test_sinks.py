@@ -104,3 +104,4 @@ def test_a_file_that_takes_nothing_any_more_is_told_of_and_left(
     with pytest.raises(OSError, match="takes nothing any more"):
         file.flush()
     file.close()
+    assert stuck in sinks._NEVER_DROPPED
