@@ -63,7 +63,11 @@ class CutLink:
                 if not self._whole:
                     near.close()
                     continue
-                far = socket.create_connection((LOOPBACK, self._target))
+                try:
+                    far = socket.create_connection((LOOPBACK, self._target))
+                except OSError:  # the router is being started again
+                    near.close()
+                    continue
                 self._ends += [near, far]
             both = [
                 threading.Thread(target=self._pass_on, args=pair, daemon=True)

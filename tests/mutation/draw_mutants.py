@@ -5,7 +5,7 @@ mutant with its file, line, operator and text. Each place in the files is as lik
 then each operator that can change it: of one `+` cosmic-ray makes a dozen mutants. A number that
 has a name is trebled: nobody promised 120 m rather than 121. Left out is what changes no result of
 any program that is right: annotations, protocols, that a type is frozen, what only a type checker
-reads.
+reads or a trace tells.
 """
 
 from __future__ import annotations
@@ -98,7 +98,12 @@ def _places(root: Path, file: str) -> dict[Place, list[Change]]:
                 continue
             if lines[line - 1][column : column + 2] == "*,":
                 continue  # before arguments by name alone, no product
-            if not any(first <= (line, column) < last for first, last in unrun):
+            # Of a decorator the place is that of its `@`.
+            if not any(
+                first <= place < last
+                for first, last in unrun
+                for place in ((line, column), (line, column + 1))
+            ):
                 found[Place(file, line, column)].append(Change(name, occurrence))
     return found
 
@@ -123,6 +128,8 @@ def _unrun(tree: ast.Module) -> list[tuple[tuple[int, int], tuple[int, int]]]:
         declares = isinstance(node, ast.keyword) and node.arg in _DECLARED
         protocol = isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases)
         nodes += [node] if declares or protocol else []
+        for decorator in getattr(node, "decorator_list", []):
+            nodes += [decorator] if ast.unparse(decorator).startswith("traced(") else []
         if isinstance(node, ast.If) and {"TYPE_CHECKING", "__name__"} & set(_names(node.test)):
             nodes.append(node.test)
     return [

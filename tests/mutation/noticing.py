@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -21,15 +23,34 @@ _PATIENCE, _LEAST_S = 5.0, 30.0
 
 
 def files_of(module: str, *, system: bool = False) -> list[str]:
-    """Return the test files that mirror a module or name it, the mirror first.
+    """Return the test files that mirror a module, name it, or lie beside its mirror and import it.
 
-    Those of several processes, which take minutes, with `system` alone.
+    The mirror first; those of several processes, which take minutes, with `system` alone.
     """
-    named = [str(path) for path in covered().get(module, ())]
-    found = [name for name in named if system or not name.startswith("tests/system/")]
-    if module in mirrored():
-        found.insert(0, str(mirror_of(modules()[module]).relative_to(ROOT)))
-    return found
+    mirror = mirror_of(modules()[module])
+    found = [mirror] if module in mirrored() else []
+    found += [ROOT / path for path in covered().get(module, ())]
+    found += [path for path in sorted(mirror.parent.glob("test_*.py")) if _imports(path, module)]
+    names = dict.fromkeys(str(path.relative_to(ROOT)) for path in found)
+    return [name for name in names if system or not _takes_long(name)]
+
+
+def _takes_long(name: str) -> bool:
+    return name.startswith("tests/system/") or name.endswith("_system.py")
+
+
+@cache
+def _imports(test: Path, module: str) -> bool:
+    package, _, last = module.rpartition(".")
+    for node in ast.walk(ast.parse(test.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (
+            node.module == module
+            or (node.module == package and any(one.name == last for one in node.names))
+        ):
+            return True
+        if isinstance(node, ast.Import) and any(one.name == module for one in node.names):
+            return True
+    return False
 
 
 class Checkout:
