@@ -7,7 +7,7 @@ import rerun as rr
 
 from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.contracts.world import ATTRIBUTION
-from foretwin.viewer.rows import Row, document, path_part, plain_text, static
+from foretwin.viewer.rows import Row, document, in_markdown, path_part, plain_text, static
 
 WORKER_COLOURS = {
     "starting": 0x607D8BFF,
@@ -27,8 +27,8 @@ class RunLog:
     """Turns the run's messages into rows; a worker's colours come with its first status."""
 
     def __init__(self, title: str, attribution: str = ATTRIBUTION) -> None:
-        self._title = plain_text(title)
-        self._source = f"map: {attribution}"
+        self._title = in_markdown(title)
+        self._source = f"map: {in_markdown(attribution)}"
         self._states: dict[str, str] = {}
 
     def static_rows(self) -> list[Row]:
@@ -71,15 +71,19 @@ class RunLog:
         """Return the status line."""
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
-            ahead = f"next **{plain_text(progress.next_intersection)}**"
+            ahead = f"next **{in_markdown(progress.next_intersection)}**"
             if progress.arrival_in_s is not None:
                 ahead += f" in {progress.arrival_in_s:.0f} s"
         memory = f" · {progress.memory_mb:.0f} MB" if progress.memory_mb is not None else ""
-        short = f"**{progress.too_slow}** (too slow for all) · " if progress.too_slow else ""
+        short = (
+            f"**{in_markdown(progress.too_slow)}** (too slow for all) · "
+            if progress.too_slow
+            else ""
+        )
         text = (
             # The map's source early on: where the line is too long, its end is cut off.
             f"**{progress.drive_time_s:.1f} s** · {self._source} · "
-            f"{plain_text(progress.mission_state)} · {ahead} · "
+            f"{in_markdown(progress.mission_state)} · {ahead} · "
             f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped{memory}"
         )
         return [Row("status", drive_ns, document(text))]

@@ -13,7 +13,7 @@ from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.viewer.log_drive import PLAN
 from foretwin.viewer.log_roles import TWIN
 from foretwin.viewer.meshes import Colour
-from foretwin.viewer.rows import Row, document, point_at, raised, static, table_cell
+from foretwin.viewer.rows import Row, document, in_markdown, point_at, raised, static
 
 SAFE, WATCH, CRITICAL = (56, 176, 92), (255, 184, 28), (234, 62, 56)
 NOMINAL: Colour = (250, 250, 255)
@@ -132,7 +132,7 @@ def scenario_table(view: RoundView) -> str:
         else f"least clearance {view.min_clearance_m:.1f} m"
     )
     lines = [
-        f"**{len(view.names)} futures** from {table_cell(view.intersection_id)} · "
+        f"**{len(view.names)} futures** from {in_markdown(view.intersection_id)} · "
         f"{view.collided} collide · {clearance} · {view.latency_ms:.0f} ms",
         "",
         "| # | future | criticality | |",
@@ -144,7 +144,7 @@ def scenario_table(view: RoundView) -> str:
         value = float(criticality[index])
         verdict = "collides" if value >= 1.0 else "close" if value >= 0.5 else "clear"
         name = view.names[index] if index < len(view.names) else str(index)
-        lines.append(f"| {index} | {table_cell(name)} | {value:.2f} | {verdict} |")
+        lines.append(f"| {index} | {in_markdown(name)} | {value:.2f} | {verdict} |")
     return "\n".join(lines)
 
 

@@ -19,7 +19,7 @@ from foretwin.contracts.tuning import Identification, ParameterChange, Parameter
 from foretwin.viewer.log_drive import LIMIT, PLAN
 from foretwin.viewer.log_roles import REAL, TWIN
 from foretwin.viewer.meshes import Colour
-from foretwin.viewer.rows import Row, document, plain_text, static, table_cell
+from foretwin.viewer.rows import Row, document, in_markdown, static
 
 _SHOWN_VERDICTS = 20
 """The newest; all are in the run's table."""
@@ -101,13 +101,13 @@ class TuningLog:
         """Return all verdicts so far, the newest first, as one text."""
         who = _CULPRITS.get(verdict.culprit, verdict.culprit)
         lines = [
-            f"### {drive_ns / 1e9:.1f} s: {plain_text(who)}, {plain_text(verdict.cause)}",
-            f"{plain_text(verdict.text)} (confidence {verdict.confidence:.2f})",
+            f"### {drive_ns / 1e9:.1f} s: {in_markdown(who)}, {in_markdown(verdict.cause)}",
+            f"{in_markdown(verdict.text)} (confidence {verdict.confidence:.2f})",
             "",
         ]
         lines += [
-            f"* {plain_text(one.name)}: {one.value:.4g} ± {one.std:.2g}, expected "
-            f"{one.expected:.4g}. {plain_text(one.text)}"
+            f"* {in_markdown(one.name)}: {one.value:.4g} ± {one.std:.2g}, expected "
+            f"{one.expected:.4g}. {in_markdown(one.text)}"
             for one in verdict.evidence
         ]
         self._verdicts.appendleft("\n".join(lines))
@@ -149,7 +149,7 @@ class TuningLog:
         for found in self._estimates.values():
             interval = "" if found.low is None else f"{_number(found.low)} to {_number(found.high)}"
             cells = (found.name, _number(found.prior), _number(found.value), interval, found.reason)
-            lines.append("| " + " | ".join(table_cell(cell) for cell in cells) + " |")
+            lines.append("| " + " | ".join(in_markdown(cell) for cell in cells) + " |")
         return "\n".join(lines)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from foretwin.contracts.arrays import Array, Array32
 APPLICATION_ID = "foretwin"
 TIMELINE = "drive_time"
 
+_MARKUP = re.compile(r"[\\`*\[\]<>|!&~]")
 _SAFE_BEYOND_LATIN = frozenset("–—‘’“”„•…→←↑↓≤≥≈−")  # noqa: RUF001
 """Signs of our own texts; every font of the viewer has them."""
 _LAST_LATIN = 0x24F
@@ -73,9 +75,10 @@ def plain_text(text: str) -> str:
     return "".join(out)
 
 
-def table_cell(text: str) -> str:
-    """Return `plain_text` fit for one cell of a Markdown table."""
-    return plain_text(text).replace("\n", " ").replace("|", "/")
+def in_markdown(text: str) -> str:
+    """Return `plain_text` as a line of Markdown that shows it: no link, picture, HTML or cell."""
+    line = " ".join(plain_text(text).split("\n"))
+    return _MARKUP.sub(r"\\\g<0>", line)
 
 
 def path_part(text: str) -> str:

@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.terminal import plain, visible
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import offset
 from foretwin.geometry.rectangles import Rectangles, corners
@@ -145,9 +146,16 @@ def write_case_picture(
     figure, axes = upright_figure(0.1, 0.77)
     draw_case(axes, played, world, heedless, planned, aspect=0.96 * 9.0 / 7.7)
     where = world.intersection.name or played.place.junction_id
-    figure.text(0.02, 0.965, f"{scenario.title}: {where}", fontsize=13, weight="bold")
+    figure.text(
+        0.02,
+        0.965,
+        f"{scenario.title}: {plain(where)}",
+        fontsize=13,
+        weight="bold",
+        parse_math=False,
+    )
     words = caption(played, heedless, planned, planner)
-    figure.text(0.02, 0.88, f"{scenario.shows}\n{words}", fontsize=9.5)
+    figure.text(0.02, 0.88, f"{scenario.shows}\n{visible(words)}", fontsize=9.5, parse_math=False)
     draw_case_legend(figure, planner if planned is not None else "", ncols=3)
     write_upright(figure, path, world)
 
@@ -160,7 +168,15 @@ def upright_figure(bottom: float, height: float) -> tuple[Figure, Axes]:
 
 def write_upright(figure: Figure, path: Path, world: World) -> None:
     """Write a figure as PNG with the attribution of the World's map."""
-    figure.text(0.98, 0.012, world.attribution, fontsize=9, ha="right", weight="bold")
+    figure.text(
+        0.98,
+        0.012,
+        plain(world.attribution),
+        fontsize=9,
+        ha="right",
+        weight="bold",
+        parse_math=False,
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     metadata = {"Copyright": world.attribution, "Software": "foretwin"}
     FigureCanvasAgg(figure).print_figure(str(path), format="png", metadata=metadata)

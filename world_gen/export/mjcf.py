@@ -20,7 +20,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Building, World
 from foretwin.world_gen.buildings.convex_parts import convex_cover, sound_polygons
 from foretwin.world_gen.export import solids
-from foretwin.world_gen.export.xml_tree import in_comment
+from foretwin.world_gen.export.xml_tree import in_comment, in_section
 from foretwin.world_gen.polygon_areas import polygons_from
 
 STATIC = 1
@@ -46,7 +46,7 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = f"world {world.id}"
     _set_options(spec)
-    spec.add_text(name="attribution", data=world.attribution)
+    spec.add_text(name="attribution", data=in_section(world.attribution))
     spec.add_text(name="world", data=world.id)
     spec.worldbody.add_geom(
         name="ground",

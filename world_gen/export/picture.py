@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.terminal import plain
 from foretwin.contracts.world import World
 from foretwin.world_gen.export import picture_marks as marks
 from foretwin.world_gen.export.picture_ground import draw_ground
@@ -41,15 +42,15 @@ def write_picture(world: World, path: Path) -> None:
     form = path.suffix.lower().lstrip(".")
     if form not in ("png", "svg"):
         raise UserError(f"{path}: a picture is written as .png or .svg, not .{form}")
-    report = report_of(world)
+    report, rights = report_of(world), plain(world.attribution)
     settings = {"svg.hashsalt": "foretwin", "svg.fonttype": "none", "hatch.linewidth": 0.5}
     with matplotlib.rc_context(settings):  # type: ignore[arg-type]
         figure = _figure(world, report)
         if form == "svg":
-            metadata = {"Date": None, "Rights": world.attribution, "Title": _title(world, report)}
+            metadata = {"Date": None, "Rights": rights, "Title": plain(_title(world, report))}
             FigureCanvasSVG(figure).print_figure(str(path), format=form, metadata=metadata)
         else:
-            metadata = {"Copyright": world.attribution, "Software": "foretwin"}
+            metadata = {"Copyright": rights, "Software": "foretwin"}
             FigureCanvasAgg(figure).print_figure(str(path), format=form, metadata=metadata)
 
 
@@ -66,11 +67,27 @@ def _figure(world: World, report: WorldReport) -> Figure:
         view = view_around(np.zeros(2), world.radius_m, _aspect(_WHOLE_BOX), close=False)
         _draw(figure.add_axes(_WHOLE_BOX), world, view)
         top = 0.57
-    title = _title(world, report)
+    title = plain(_title(world, report))
     size = min(18.0, 1550.0 / len(title))
-    figure.text(0.01, 0.972, title, fontsize=size, weight="bold", va="center")
-    figure.text(0.01, 0.945, _subtitle(world), fontsize=10.5, va="center", color="#444444")
-    figure.text(0.99, 0.012, world.attribution, fontsize=12, ha="right", weight="bold")
+    figure.text(0.01, 0.972, title, fontsize=size, weight="bold", va="center", parse_math=False)
+    figure.text(
+        0.01,
+        0.945,
+        plain(_subtitle(world)),
+        fontsize=10.5,
+        va="center",
+        color="#444444",
+        parse_math=False,
+    )
+    figure.text(
+        0.99,
+        0.012,
+        plain(world.attribution),
+        fontsize=12,
+        ha="right",
+        weight="bold",
+        parse_math=False,
+    )
     marks.draw_legend(figure)
     marks.draw_height_scale(figure, (0.84, 0.135, 0.15, 0.011))
     marks.draw_panel(figure, world, report, top=top)

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.terminal import visible
 from foretwin.contracts.world import World, WorldJunction
 from foretwin.world_gen.export import picture_style as style
 from foretwin.world_gen.export.picture_style import Look, View
@@ -155,7 +156,7 @@ def draw_panel(figure: Figure, world: World, report: WorldReport, *, top: float)
     room = _PANEL_LINES if world.bounds_m is None else 2 * _PANEL_LINES - 8
     look = Look(fontsize=9.2, color="#222222", family="monospace")
     text = "\n".join(_at_most(room, lines))
-    figure.text(0.612, top, text, va="top", linespacing=1.25, **look)
+    figure.text(0.612, top, visible(text), va="top", linespacing=1.25, parse_math=False, **look)
 
 
 def _wrapped(text: str, indent: int) -> list[str]:

@@ -22,7 +22,15 @@ from foretwin.world_gen.export.sdformat_plugins import HEADING_DEG, world_plugin
 from foretwin.world_gen.export.sdformat_shapes import StaticLink, extrusions, numbers, shaped
 from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
 from foretwin.world_gen.export.solids import Rgba
-from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment, leaves
+from foretwin.world_gen.export.xml_tree import (
+    Element,
+    child,
+    document,
+    element,
+    in_comment,
+    leaves,
+    legal,
+)
 
 SDF_VERSION = "1.7"
 NAMESPACE = "urn:foretwin:sdformat"
@@ -70,7 +78,9 @@ def write_sdf(
     root.append(etree.Comment(in_comment(about)))
     made = child(root, "world", name=f"world_{world.id or 'unnamed'}")
     attribution = f"{{{NAMESPACE}}}attribution"
-    etree.SubElement(made, attribution, nsmap={"foretwin": NAMESPACE}).text = world.attribution
+    etree.SubElement(made, attribution, nsmap={"foretwin": NAMESPACE}).text = legal(
+        world.attribution
+    )
     _surroundings(made, world, simulator)
     _road(made, world)
     _markings(made, world)

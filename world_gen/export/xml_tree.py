@@ -63,6 +63,11 @@ def legal(words: str, *, instead: str = "") -> str:
     return _NOT_IN_XML.sub(instead, words)
 
 
+def in_section(words: str) -> str:
+    """Return words fit for a CDATA section, which others write."""
+    return legal(words).replace("]]>", "]] >")
+
+
 def in_comment(words: str) -> str:
     """Return words fit for an XML comment that has a space on both sides of them."""
     return legal(words).replace("--", "- ")
