@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
 
 import msgspec
@@ -61,6 +62,18 @@ class Answer(NamedTuple):
     received_mono_ns: int = 0
 
 
+@dataclass(slots=True)
+class TaskCount:
+    """What became of the tasks taken: `given` is what ended in one of three ways, and the open."""
+
+    given: int = 0
+    results: int = 0
+    refused: int = 0
+    """Ended since every worker refused them."""
+    lost: int = 0
+    """Ended in no answer: their workers died, they came too late, or were wanted no more."""
+
+
 class Runner(Protocol):
     """Answers every task that is submitted and not cancelled exactly once, in any order."""
 
@@ -71,6 +84,10 @@ class Runner(Protocol):
     @property
     def workers(self) -> tuple[str, ...]:
         """Ids of the workers that can take work now."""
+
+    @property
+    def count(self) -> TaskCount:
+        """What became of the tasks submitted so far."""
 
     def submit(self, task: Task) -> None:
         """Take a task; never waits."""

@@ -22,6 +22,7 @@ from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.processors import trouble_with_workers
 from foretwin.orchestrator.record.job_tables import keep_vehicles
+from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
     FoundPlaces,
@@ -97,10 +98,11 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         maker = JobMaker(loaded, plan.worlds)
         parts.keep_first(len(plan.jobs))
         left = [one for one in plan.jobs if not parts.hold(maker.job(one))]
-        started_s = time.monotonic()
+        started_s, before = time.monotonic(), jobs_ledger(runner.count)
         _play(left, maker, parts, runner)
         playing_s = round(time.monotonic() - started_s, 3)
-        now = {"jobs_played": len(left), "playing_s": playing_s}
+        ledger = {"jobs": jobs_ledger(runner.count).since(before)}
+        now = {"jobs_played": len(left), "playing_s": playing_s, "ledger": ledger}
         return folder.summarise(_summary(loaded, plan, places, parts) | now)
 
 

@@ -7,6 +7,7 @@ import datetime
 import logging
 import signal
 import time
+from pathlib import Path
 
 from foretwin.contracts import trace
 from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
@@ -14,6 +15,7 @@ from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.new_folder import new_folder
 from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.contracts.simulation import RunEnd
@@ -76,7 +78,9 @@ class _Interrupt:
 
 def drive(config: DriveConfig) -> int:
     """Run one drive; returns its exit code. Raises UserError before anything is written."""
-    return carry_out(make_plan(read_inputs(config), datetime.datetime.now()))
+    inputs = read_inputs(config)
+    with new_folder(Path(config.out)):
+        return carry_out(make_plan(inputs, datetime.datetime.now()))
 
 
 def carry_out(plan: DrivePlan) -> int:

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.errors import one_line
-from foretwin.orchestrator.runner.dispatch import TaskCount
+from foretwin.contracts.runner import TaskCount
 
 
 class RoundsLedger(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,6 +44,11 @@ class JobsLedger(msgspec.Struct, frozen=True, kw_only=True):
     def balanced(self) -> bool:
         """Whether every job that was given ended in exactly one way."""
         return self.given == self.results + self.refused + self.lost
+
+    def since(self, before: JobsLedger) -> JobsLedger:
+        """Return what was counted since an earlier count."""
+        names = self.__struct_fields__
+        return JobsLedger(**{n: getattr(self, n) - getattr(before, n) for n in names})
 
 
 class Ledger(msgspec.Struct, frozen=True, kw_only=True):

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from foretwin.contracts.runner import Task
+from foretwin.contracts.runner import Task, TaskCount
 from foretwin.orchestrator.runner.sickness import Sickness
 
 ATTEMPTS = 3
@@ -50,18 +50,6 @@ class _Open:
     """Workers that are not asked for it again."""
     refusal: str = ""
     """The last of their reasons."""
-
-
-@dataclass(slots=True)
-class TaskCount:
-    """What became of the tasks taken: `given` is what ended in one of three ways, and the open."""
-
-    given: int = 0
-    results: int = 0
-    refused: int = 0
-    """Ended since every worker refused them."""
-    lost: int = 0
-    """Ended in no answer: their workers died, they came too late, or were wanted no more."""
 
 
 @dataclass(slots=True)

@@ -13,7 +13,7 @@ import msgspec
 from foretwin.contracts.bus import Alive, Mailbox, Reply, ZenohBus
 from foretwin.contracts.keys import alive_key, process_of_alive_key
 from foretwin.contracts.ports import free_endpoint
-from foretwin.contracts.runner import Answer, Task
+from foretwin.contracts.runner import Answer, Task, TaskCount
 from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
 from foretwin.orchestrator.runner.supervisor import (
@@ -113,6 +113,11 @@ class WorkerProcesses:
     def workers(self) -> tuple[str, ...]:
         """Ids of the workers that can take work now."""
         return self._dispatcher.workers
+
+    @property
+    def count(self) -> TaskCount:
+        """What became of the tasks submitted so far."""
+        return self._dispatcher.dispatch.count
 
     @property
     def pids(self) -> list[int]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.ports import LOOPBACK
 from tests.system.foretwin_command import environment, foretwin
 
 MODULES = ("telemetry", "contracts", "orchestrator", "viewer", "numpy", "zenoh", "foretwin")
@@ -53,3 +55,21 @@ def test_a_drive_from_a_read_only_folder_writes_where_it_is_told(tmp_path: Path)
 
     assert done.returncode == 0, done.stderr
     assert list(folder.iterdir()) == []
+
+
+def test_a_port_that_is_taken_is_said_in_a_line_and_leaves_nothing(tmp_path: Path) -> None:
+    with socket.create_server((LOOPBACK, 0)) as other:
+        port = other.getsockname()[1]
+        config = tmp_path / "drive.toml"
+        config.write_text(f'endpoint = "tcp/{LOOPBACK}:{port}"\n', encoding="utf-8")
+        arguments = ["drive", "--view", "none", "--out", str(tmp_path / "new" / "runs")]
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", "foretwin", *arguments, "--config", str(config), *SHORT],
+            env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=280,
+            check=False,
+        )  # fmt: skip
+
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"port {port} is taken" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "new").exists()

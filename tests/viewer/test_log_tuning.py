@@ -72,7 +72,7 @@ def test_parameters_have_curves_with_intervals_and_a_table() -> None:
     assert "parameters/brake_gain/value" not in shown.paths
     table = text_of(shown["parameters/table"])
     assert "| steering_ratio | 16 | 15.3 | 15.1 to 15.5 |  |" in table
-    assert "| brake_gain | 1 | - |  | no / grade |" in table
+    assert "| brake_gain | 1 | - |  | no \\| grade |" in table
 
     change = ParameterChange(
         vehicle_id="ego",

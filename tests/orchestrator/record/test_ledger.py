@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from foretwin.contracts.runner import TaskCount
 from foretwin.orchestrator.record.ledger import (
     JobsLedger,
     Ledger,
@@ -11,7 +12,6 @@ from foretwin.orchestrator.record.ledger import (
     RoundTally,
     jobs_ledger,
 )
-from foretwin.orchestrator.runner.dispatch import TaskCount
 
 ROUNDS = RoundsLedger(due=21, run=1, missed=2, spared=3, unseeded=5, given_up=10)
 JOBS = JobsLedger(given=7, results=1, refused=2, lost=4)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from foretwin.contracts.runner import Task
+from foretwin.contracts.runner import Task, TaskCount
 from foretwin.contracts.simulation import PrepareRequest
-from foretwin.orchestrator.runner.dispatch import ATTEMPTS, Dispatch, TaskCount
+from foretwin.orchestrator.runner.dispatch import ATTEMPTS, Dispatch
 from foretwin.orchestrator.runner.sickness import FIRST_PAUSE_S
 
 
