@@ -37,6 +37,8 @@ class Leaving(InProcessRunner):
             return answer
         if self._world_id not in ("", answer.task.world_id):
             return answer
+        self.count.results -= 1
+        self.count.lost += 1
         return Answer(answer.task, None, "no answer in 1 s")
 
 
@@ -126,7 +128,8 @@ def test_what_was_given_up_is_tried_again(
     failed = played(loaded, tmp_path / "out", channel)
     assert failed["placed"] == 0
     assert len(failed["failures"]) == (2 if channel == "place" else 0)
-    assert failed["ledger"]["jobs"].results == 0
+    lost = 0 if channel == "place" else failed["jobs_played"]
+    assert failed["ledger"]["jobs"] == JobsLedger(given=lost, results=0, refused=0, lost=lost)
     again = played(loaded, tmp_path / "out")
     assert (again["failed"], again["failures"]) == (0, {})
     count = again["jobs_played"]
