@@ -11,6 +11,7 @@ from foretwin.contracts.segments import Roll
 
 _UNITS = {"h": 1.0, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 LEAST_HOURS, LEAST_BYTES = 0.1, 50_000_000
+_VIEW_BYTES = 32 * 2**20
 _PARTS = 8
 """What is kept is cut into so many parts at least, since whole parts go."""
 
@@ -34,6 +35,13 @@ class Keep(NamedTuple):
             most_bytes=round(min(usual.most_bytes, self.total_bytes / (4 * _PARTS))),
             most_s=min(usual.most_s, 3600.0 * self.hours / _PARTS),
         )
+
+    @property
+    def view(self) -> Roll:
+        """When a part of what was shown ends: Rerun's index of a file grows as the file does."""
+        of_recordings = self.recordings
+        most_bytes = min(_VIEW_BYTES, of_recordings.most_bytes)
+        return Roll(most_bytes=most_bytes, most_s=of_recordings.most_s)
 
     @property
     def tables(self) -> Roll:

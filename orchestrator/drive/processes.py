@@ -124,7 +124,7 @@ def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return ViewerSetup(
         **_base(plan, process_id),
         file=str(plan.folder / "monitor.rrd"),
-        roll=plan.keep.recordings,
+        roll=plan.keep.view,
         worlds_dir=str(plan.worlds_dir),
         drive_frame=plan.drive_frame,
         live=plan.live_view,

@@ -34,7 +34,9 @@ def test_what_is_too_little_to_be_kept_is_refused(text: str) -> None:
 def test_parts_are_as_small_as_what_is_kept_needs() -> None:
     assert parse_keep(None).recordings == Roll()
     assert parse_keep(None).tables == Roll(most_bytes=4 * Roll().most_bytes, most_s=math.inf)
+    assert parse_keep(None).view.most_bytes < Roll().most_bytes
     small = parse_keep("100MB")
+    assert small.view == small.recordings
     assert small.recordings.most_bytes < 100e6 / 16
     assert small.tables == small.recordings
     assert parse_keep("1h").recordings.most_s == 450.0
