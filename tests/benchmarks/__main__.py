@@ -34,6 +34,8 @@ BENCHMARKS = (
     "world_monaco_vs_netconvert",
     "world_liechtenstein_vs_netconvert",
     "state_to_result",
+    "live_round",
+    "live_total_cpu",
     "metrics_64x80x10",
     "estimator_bad_network",
     "tuning_cost",
