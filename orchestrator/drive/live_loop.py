@@ -16,6 +16,9 @@ HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
 """So long may nothing come before it is asked whether something should have."""
 LAST_ROUND_GRACE_S = 1.0
+GATHER_S = 0.01
+"""Messages are taken in portions: waking up for each of 330 a second costs more than what most of
+them are about. Never where a round is due."""
 STALE_AFTER_S = 1.0
 """No round starts from a state older than this, in seconds of the drive's clock."""
 
@@ -55,9 +58,11 @@ class LiveLoop:
                 with span("housekeeping"):
                     self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
+            if not self._telemetry_waits():
+                time.sleep(max(0.0, min(GATHER_S, self._next_due_s - now_s)))
             seen = conductor.intake.states
             wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
-            item = conductor.mailbox.take(max(0.0, wake_s - now_s))
+            item = conductor.mailbox.take(max(0.0, wake_s - time.monotonic()))
             now_s = time.monotonic()
             if item is not None:
                 with span(item_name(item)):

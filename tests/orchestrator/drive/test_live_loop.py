@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from foretwin.orchestrator.drive import live_loop
-from foretwin.orchestrator.drive.live_loop import LiveLoop
+from foretwin.orchestrator.drive.live_loop import GATHER_S, LiveLoop
 from foretwin.orchestrator.record.ledger import RoundTally
 from foretwin.orchestrator.rounds.pace import Pace
 
@@ -21,9 +21,14 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_s = 100.0
+        self.sleeps_s: list[tuple[float, float]] = []
 
     def monotonic(self) -> float:
         return self.now_s
+
+    def sleep(self, seconds: float) -> None:
+        self.sleeps_s.append((self.now_s - 100.0, seconds))
+        self.now_s += seconds
 
 
 class Mailbox:
@@ -269,6 +274,18 @@ def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(dri
     assert conductor.started_s == pytest.approx([*range(10)], abs=0.03)
     assert conductor.tally.missed == 0
     assert conductor.tally.spared == 10
+
+
+def test_messages_are_gathered_and_no_round_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(live_loop, "time", clock)
+    conductor = Conductor(clock, states_s=every(0.003, 10.0), end_s=10.0)
+    assert LiveLoop(conductor, housekeeping=lambda _: None, stop=lambda: False).run()  # type: ignore[arg-type]
+
+    slept = [(at_s, length_s) for at_s, length_s in clock.sleeps_s if length_s]
+    assert 800 < len(slept) <= 1000  # and not for each of 3333
+    assert max(length_s for _, length_s in slept) <= GATHER_S
+    assert conductor.started_s[:20] == pytest.approx([k / 2 for k in range(20)], abs=0.0031)
 
 
 def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.MonkeyPatch) -> None:
