@@ -190,7 +190,8 @@ def test_wrapped_angles_point_the_same_way(angle_rad: float) -> None:
 def test_points_off_the_earth_are_refused(lat_deg: float, lon_deg: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         GeoPoint(lat_deg, lon_deg).validate()
-    assert GeoPoint(52.0, 13.0).validate() == GeoPoint(52.0, 13.0)
+    for there in (GeoPoint(90.0, 180.0), GeoPoint(-90.0, -180.0), GeoPoint(52.0, 13.0)):
+        assert there.validate() == there
 
 
 @given(

@@ -16,10 +16,18 @@ from foretwin.contracts.bounds import MOST_IDENTIFIER, MOST_USERS, SHAPES
 from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import GnssFix, PlannedTrajectory, RoadUser, RoadUsers, SpeedSample
 from foretwin.contracts.frames import GeoPoint
-from foretwin.contracts.guard import Refused, admit, is_identifier, kept, opened, reason_in
+from foretwin.contracts.guard import (
+    Refused,
+    admit,
+    is_identifier,
+    is_road_user,
+    kept,
+    opened,
+    reason_in,
+)
 from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.simulation import WorldNotice
-from foretwin.contracts.tuning import ParameterEstimate
+from foretwin.contracts.tuning import ParameterEstimate, SteeringMapBin
 from tests.contracts.hostile_messages import hostile_bytes
 
 COVERS = ("foretwin.contracts.bounds",)
@@ -121,6 +129,29 @@ def test_of_road_users_those_that_cannot_be_are_left_out(changed: dict[str, Any]
 
     assert admitted.message == RoadUsers(stamp_ns=1, users=(good,))
     assert admitted.left_out == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [("length_m", 0.05, 100.0), ("width_m", 0.05, 30.0), ("speed_mps", -120.0, 120.0)],
+)
+def test_a_road_user_is_between_a_childs_arm_and_the_longest_tram(
+    name: str, low: float, high: float
+) -> None:
+    assert is_road_user(user(**{name: low}))
+    assert is_road_user(user(**{name: high}))
+    assert not is_road_user(user(**{name: low - 0.01}))
+    assert not is_road_user(user(**{name: high + 0.01}))
+
+
+def test_what_may_be_unknown_may_be_nan_and_nothing_else_may() -> None:
+    bin_ = SteeringMapBin(
+        from_mps=0.0, to_mps=5.0, ratio=math.nan, low=math.nan, high=math.nan, samples=0
+    )
+    assert admit(bin_, where=KEY)
+    around = msgspec.defstruct("Around", [("speed_mps", float), ("bin", SteeringMapBin)])
+    assert admit(around(1.0, bin_), where=KEY)
+    assert why(around(math.nan, bin_)) == "Around: speed_mps not finite"
 
 
 def test_too_many_road_users_are_no_message() -> None:

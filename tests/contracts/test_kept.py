@@ -68,3 +68,8 @@ def test_a_cut_of_the_senders_link_loses_nothing() -> None:
         assert last >= first + COUNT
         found = {seq for _, seq in numbers(mailbox, last + 1)}
     assert found >= set(range(last + 1))
+
+
+def test_the_usual_rate_of_a_channel_says_how_many_samples_20_seconds_are() -> None:
+    known = {name: most_kept(CHANNELS[name]) for name in ("imu", "speed", "state", "gnss", "end")}
+    assert known == {"imu": 2000, "speed": 1000, "state": 1000, "gnss": 200, "end": 64}

@@ -187,3 +187,24 @@ def test_many_lives_of_one_that_tells_no_id_fill_no_memory() -> None:
 def test_numberings_survive_a_file() -> None:
     numbers = heard([*numbered(5, sender=7), Sent(2**64 - 1, 0, 7)])
     assert msgspec.json.decode(msgspec.json.encode(numbers), type=Numberings) == numbers
+
+
+@given(
+    st.lists(st.integers(0, 40), unique=True, max_size=30), st.sets(st.integers(0, 40), max_size=15)
+)
+def test_what_is_given_back_counts_as_if_it_had_not_come(seqs: list[int], back: set[int]) -> None:
+    """A recorder that is killed has not written the last ones: the next one takes them again."""
+    came = sorted(seqs)
+    stream = Numbering("imu", 0, 0)
+    for seq in came:
+        stream.go_on(seq, 0)
+    returned = sorted(back & set(came))
+    stream.give_back(returned)
+
+    missing = set(range(stream.next)) - (set(came) - back)
+    held = [seq for begin, end in stream.holes for seq in range(begin, end)]
+    assert sorted(held) == sorted(missing)
+    assert held == sorted(held)
+    assert stream.missing == len(missing)
+    for seq in returned:
+        assert stream.fill(seq, 0), "it can come again"

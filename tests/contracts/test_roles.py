@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import pytest
 
 from foretwin.contracts.roles import CORRECTIONS, ROLES, FollowLimits
@@ -32,3 +33,8 @@ def test_a_jerk_is_bounded_by_its_acceleration(jerk: str, accel: str) -> None:
     assert FollowLimits(**{accel: 1.0, jerk: 60.0}).trouble() is None
     told = FollowLimits(**{accel: 1.0, jerk: 61.0}).trouble()
     assert told == f"{jerk} 61.0: at most 60 times the acceleration"
+
+
+def test_a_limit_that_there_is_not_is_refused() -> None:
+    with pytest.raises(msgspec.ValidationError, match="unknown field `acel_mps2`"):
+        msgspec.convert({"acel_mps2": 1.0}, FollowLimits)

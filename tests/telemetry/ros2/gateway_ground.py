@@ -29,7 +29,7 @@ CONTROL_KEY = "0/control/cmd/autoware_control_msgs::msg::dds_::Control_/*"
 ODOMETRY_KEY = "0/foretwin/twin/nav_msgs::msg::dds_::Odometry_/*"
 
 MAPPING = """
-dialect = "rmw_zenoh"
+dialect = "{dialect}"
 {head}
 [map]
 lat_deg = 52.5
@@ -74,15 +74,19 @@ source = "virtual_objects"
 topic = "/clock"
 type = "rosgraph_msgs/msg/Clock"
 source = "clock"
-
+{more}
 [towards_vehicle]
 enabled = {enabled}
 """
 
 
-def mapping_text(*, enabled: bool, endpoint: str | None = None) -> str:
+def mapping_text(
+    *, enabled: bool, endpoint: str | None = None, dialect: str = "rmw_zenoh", more: str = ""
+) -> str:
+    """Return a mapping of some topics, and of `more` after them."""
     head = "" if endpoint is None else f'endpoint = "{endpoint}"'
-    return MAPPING.format(head=head, enabled="true" if enabled else "false")
+    on = "true" if enabled else "false"
+    return MAPPING.format(head=head, enabled=on, dialect=dialect, more=more)
 
 
 def attached(seq: int) -> bytes:

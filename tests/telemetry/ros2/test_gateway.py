@@ -44,14 +44,14 @@ TOWARDS = ("/control/cmd", "/perception/objects", "/clock")
 class Ground:
     """A gateway with a clock in the test's hand."""
 
-    def __init__(self, *, enabled: bool, flag: bool) -> None:
+    def __init__(self, *, enabled: bool, flag: bool, **mapped: str) -> None:
         self.now_ns = S
         self.bus, self.foreign = MemoryBus(), RecordingForeign()
         self.inbox = Mailbox(100)
         for channel in ("gnss", "steering"):
             self.bus.subscribe(channel, self.inbox, vehicle="ego")
         self.gateway = Gateway(
-            parse_mapping(mapping_text(enabled=enabled), name="m.toml"),
+            parse_mapping(mapping_text(enabled=enabled, **mapped), name="m.toml"),
             bus=self.bus,
             foreign=self.foreign,
             run_id="r",

@@ -14,6 +14,12 @@ from tests.telemetry.ros2.test_gateway import Ground
 
 COVERS = ("foretwin.telemetry.ros2.inwards",)
 S = 10**9
+CLOCK_OF_OTHERS = """
+[[out]]
+topic = "/foretwin/clock"
+type = "rosgraph_msgs/msg/Clock"
+source = "clock"
+"""
 
 
 def row(channel: str, **said: object) -> InRow:
@@ -53,3 +59,23 @@ def test_each_sample_counts_once() -> None:
         ground.arrive(FIX_KEY, fix(5 * S + number, 52.6, 13.5), number)
     assert ground.gateway.inwards.counts == {"gnss": 3}
     assert ground.gateway.inwards.first_stamp_ns == 5 * S
+
+
+def test_where_nothing_may_go_to_the_vehicle_others_hear_of_it_all_the_same() -> None:
+    """Two topics of one source, the first towards the vehicle."""
+    ground = Ground(enabled=False, flag=False, more=CLOCK_OF_OTHERS)
+    for _ in range(3):
+        ground.say_everything()
+        ground.step(100.0)
+    assert ground.towards()["/clock"] == 0
+    assert ground.foreign.on("/foretwin/clock")
+
+
+@pytest.mark.parametrize(("dialect", "attached"), [("rmw_zenoh", True), ("ros2dds", False)])
+def test_a_bridge_needs_neither_tokens_nor_attachments(dialect: str, attached: bool) -> None:
+    ground = Ground(enabled=True, flag=True, dialect=dialect)
+    ground.say_everything()
+    ground.step(1100.0)
+    assert bool(ground.foreign.tokens) is attached
+    assert ground.foreign.attachments
+    assert all((one is not None) is attached for one in ground.foreign.attachments)
