@@ -52,10 +52,10 @@ class ForeignBus(Protocol):
 
 
 class ZenohForeignBus(ZenohSession):
-    """A client session to the router at `endpoint`; raises BusUnreachable where there is none."""
+    """A client session to a router; raises BusUnreachable where there is none."""
 
-    def __init__(self, endpoint: str) -> None:
-        super().__init__(BusSetup(endpoint=endpoint))
+    def __init__(self, setup: BusSetup) -> None:
+        super().__init__(setup)
 
     @property
     def session_id(self) -> str:

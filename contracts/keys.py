@@ -51,11 +51,23 @@ WATCH = Qos("data", block=False, express=False)
 REQUEST = Qos("interactive_high", block=True, express=True)
 
 
+BusRole = Literal["car", "orchestrator", "worker", "viewer", "recorder", "planner", "operator"]
+"""Who somebody is on the bus. Workers are also mirror, tuning and builder; the car is who speaks
+for a vehicle, the planner a driving stack under test, the operator who steers a running drive."""
+
+
+class Writer(NamedTuple):
+    """Who may publish, or ask: a role, or of it the one process of that name alone."""
+
+    role: BusRole
+    process: str | None = None
+
+
 class Channel(NamedTuple):
     """What a channel says, how often and what for; `reply` is the answer to a question.
 
-    `rate_hz` is the usual rate, None where it is on demand. Key and quality of service are those
-    of the group in which it stands.
+    `rate_hz` is the usual rate, None where it is on demand. Key, quality of service and who may say
+    it are those of the group in which it stands; who answers a question is whom its key names.
     """
 
     kind: type[msgspec.Struct]
@@ -64,6 +76,16 @@ class Channel(NamedTuple):
     reply: type[msgspec.Struct] | None = None
     key: str = ""
     qos: Qos = LIVE
+    writers: tuple[Writer, ...] = ()
+
+    @property
+    def server(self) -> BusRole | None:
+        """Who answers, where it is a question."""
+        if self.reply is None:
+            return None
+        if "/vehicle/" in self.key:
+            return "car"
+        return "worker" if "{process}" in self.key else "orchestrator"
 
     @property
     def most_bytes(self) -> int:
@@ -74,9 +96,14 @@ class Channel(NamedTuple):
 _VEHICLE, _RUN = "vehicle/{vehicle}", "run/{run}"
 _WORKER = f"{_RUN}/worker/{{process}}"
 
-_TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
+_CAR, _OPERATOR, _PLANNER = (Writer("car"),), (Writer("operator"),), (Writer("planner"),)
+_ORCHESTRATOR, _ANY_WORKER = (Writer("orchestrator"),), (Writer("worker"),)
+
+_WHO_RECKONS_TIME = Writer("viewer"), Writer("recorder"), Writer("worker", "tuning")
+
+_TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     # What the vehicle sends.
-    (f"{_VEHICLE}/telemetry", RECORDED): {
+    (f"{_VEHICLE}/telemetry", RECORDED, _CAR): {
         "gnss": Channel(drive.GnssFix, 10, "antenna position"),
         "imu": Channel(drive.ImuSample, 100, "specific force and rates"),
         "speed": Channel(drive.SpeedSample, 50, "wheel speed"),
@@ -90,21 +117,23 @@ _TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
         "end": Channel(drive.DriveEnd, None, "the drive is over"),
     },
     # What is derived from it.
-    (_VEHICLE, RECORDED): {
+    (_VEHICLE, RECORDED, _ORCHESTRATOR): {
         "state": Channel(drive.VehicleState, 50, "estimated state"),
     },
-    (_VEHICLE, LIVE): {
+    (_VEHICLE, LIVE, _CAR): {
         "route": Channel(drive.RouteToGoal, 1, "where the ADS goes"),
     },
     # Questions to the vehicle's process.
-    (_VEHICLE, REQUEST): {
+    (_VEHICLE, REQUEST, (*_ORCHESTRATOR, *_WHO_RECKONS_TIME)): {
         "info": Channel(drive.InfoRequest, None, "what the vehicle is", drive.VehicleInfo),
+    },
+    (_VEHICLE, REQUEST, _ORCHESTRATOR): {
         "advance": Channel(
             drive.AdvanceRequest, None, "lock step: go on until", drive.AdvanceReply
         ),
     },
     # Work.
-    (_WORKER, REQUEST): {
+    (_WORKER, REQUEST, _ORCHESTRATOR): {
         "job": Channel(runner.JobRequest, 2, "simulate futures", runner.JobAnswer),
         "place": Channel(
             placement.PlaceRequest, None, "find places for scenarios", placement.WorldPlaces
@@ -123,56 +152,66 @@ _TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
         ),
         "use_roles": Channel(roles.UseRoles, None, "the mirror's roles", roles.UseRoles),
     },
-    (f"{_RUN}/builder/{{process}}", REQUEST): {
+    (f"{_RUN}/builder/{{process}}", REQUEST, _ORCHESTRATOR): {
         "build": Channel(simulation.BuildRequest, None, "build a World", simulation.BuildReply),
     },
-    (_RUN, REQUEST): {
+    (_RUN, REQUEST, _OPERATOR): {
         "set": Channel(tuning.SetRequest, None, "change a running drive", tuning.SetReply),
     },
     # What those who watch receive.
-    (_RUN, RESULT): {
+    (_RUN, RESULT, _ORCHESTRATOR): {
         "round": Channel(simulation.RoundView, 2, "one round of futures"),
         "comparison": Channel(simulation.Comparison, 8, "nominal future against reality"),
         "plan_comparison": Channel(simulation.PlanComparison, 2, "the car's plan against ours"),
         "disagreement": Channel(side_by_side.Disagreement, None, "human and ADS disagree"),
+        "parameter": Channel(tuning.ParameterChange, None, "a parameter that counts from now on"),
+        "active_world": Channel(simulation.ActiveWorld, None, "which World counts"),
+        "world": Channel(simulation.WorldNotice, None, "a World is ready"),
+        "run_end": Channel(simulation.RunEnd, None, "write and leave"),
+    },
+    (_RUN, RESULT, (*_ORCHESTRATOR, Writer("recorder"))): {
+        "event": Channel(simulation.Event, None, "worth telling"),
+    },
+    (_RUN, RESULT, (Writer("worker", "mirror"),)): {
         "mirror": Channel(simulation.MirrorSample, 10, "twin, shadow, ghost and their gap"),
+    },
+    (_RUN, RESULT, (Writer("worker", "tuning"),)): {
         "gap": Channel(gap.GapSample, 4, "model against reality"),
         "gap_alarm": Channel(gap.GapAlarm, None, "a gap beyond limits"),
         "verdict": Channel(gap.Verdict, None, "which of the two is wrong"),
         "identification": Channel(
             tuning.Identification, 0.2, "what the driving says of the vehicle"
         ),
-        "parameter": Channel(tuning.ParameterChange, None, "a parameter that counts from now on"),
-        "active_world": Channel(simulation.ActiveWorld, None, "which World counts"),
-        "world": Channel(simulation.WorldNotice, None, "a World is ready"),
-        "event": Channel(simulation.Event, None, "worth telling"),
-        "run_end": Channel(simulation.RunEnd, None, "write and leave"),
     },
-    (_RUN, WATCH): {
+    (_RUN, WATCH, _ORCHESTRATOR): {
         "worker_status": Channel(simulation.WorkerStatus, 2, "health of the workers"),
         "progress": Channel(simulation.Progress, 5, "one line"),
     },
     # The vehicles beside the car, and what goes towards a real vehicle: through a gateway that
     # bounds it, off unless switched on twice.
-    (_RUN, LIVE): {
+    (_RUN, LIVE, _ORCHESTRATOR): {
         "other_vehicles": Channel(roles.OtherVehicles, 50, "states of the vehicles beside the car"),
         "authority": Channel(towards_vehicle.Authority, 20, "the orchestrator is in charge"),
         "vehicle_command": Channel(towards_vehicle.VehicleCommand, 50, "what the vehicle shall do"),
+    },
+    (_RUN, LIVE, _OPERATOR): {
         "virtual_objects": Channel(drive.RoadUsers, 10, "road users that are simulated"),
     },
     # A driving stack in another process as planner under test.
-    (_WORKER, LIVE): {
+    (_WORKER, LIVE, _ANY_WORKER): {
         "planner_scene": Channel(
             planner_link.PlannerScene, None, "futures at one instant: what to do?"
         ),
+    },
+    (_WORKER, LIVE, _PLANNER): {
         "planned_motions": Channel(
             planner_link.PlannedMotions, None, "what a driving stack would do"
         ),
     },
 }
 CHANNELS: dict[str, Channel] = {
-    name: channel._replace(key=f"{PREFIX}/{place}/{name}", qos=qos)
-    for (place, qos), channels in _TABLE.items()
+    name: channel._replace(key=f"{PREFIX}/{place}/{name}", qos=qos, writers=writers)
+    for (place, qos, writers), channels in _TABLE.items()
     for name, channel in channels.items()
 }
 """All channels by name."""

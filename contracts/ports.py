@@ -53,3 +53,16 @@ def trouble_with_endpoint(endpoint: str) -> str | None:
     if place is None or not 0 < int(place["port"]) < 2**16:
         return f"{found['protocol']}/HOST:PORT with a port of 1 to 65535"
     return None
+
+
+def trouble_with_bus(endpoint: str | None, *, insecure: bool) -> str | None:
+    """Return what is wrong with where a drive's bus shall be, None where nothing is."""
+    if endpoint is None:
+        own = "without one the bus is a socket of this user's alone"
+        return f"--insecure: needs an endpoint; {own}" if insecure else None
+    if trouble := trouble_with_endpoint(endpoint):
+        return f"endpoint {endpoint!r}: {trouble}"
+    if not insecure:
+        open_to_all = "whoever reaches it may speak as the car and end the drive"
+        return f"endpoint {endpoint}: {open_to_all}; if that shall be so, add --insecure"
+    return None

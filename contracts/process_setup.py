@@ -13,11 +13,23 @@ import msgspec
 _Setup = TypeVar("_Setup", bound="ProcessSetup")
 
 
+class Admission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Whom a router lets in: users with passwords, where it knows them by these, and what each may
+    say, as Zenoh's `access_control` in JSON."""
+
+    access: str
+    users_file: str | None = None
+
+
 class BusSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How to reach the bus; `lossless` makes every publisher wait rather than drop (lock step)."""
 
     endpoint: str
     lossless: bool = False
+    credentials: str | None = None
+    """The file with this process's name and password; see foretwin.contracts.credentials."""
+    admits: Admission | None = None
+    """Of the router alone; None: whoever comes may say anything."""
 
 
 class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -36,6 +48,8 @@ class RouterSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     """The router; it says in `word_file` that it listens, or in one line why it cannot."""
 
     word_file: str
+    folder: str | None = None
+    """Where socket and passwords lie: gone with a router whose drive has died."""
 
 
 def write_setup(setup: ProcessSetup, path: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -29,6 +30,7 @@ _LOOK_S = 0.5
 def run_router(argv: list[str] | None = None) -> None:
     """Be the router until told to end. Exit codes: 0 done, 2 it cannot listen, in one line."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.umask(0o077)  # a socket is then its user's alone
     parent = os.getppid()
     ended = threading.Event()
     on_end_signals(ended.set)
@@ -49,6 +51,8 @@ def run_router(argv: list[str] | None = None) -> None:
         _say(word_file, LISTENS)
         while not ended.wait(_LOOK_S) and os.getppid() == parent:
             pass
+    if os.getppid() != parent and setup.folder is not None:
+        shutil.rmtree(setup.folder, ignore_errors=True)
     sys.stderr.flush()
     os._exit(0)
 

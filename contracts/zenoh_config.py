@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.credentials import read_credentials
 from foretwin.contracts.process_setup import BusSetup
 
 CONNECT_S = 5.0
@@ -47,6 +49,13 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
         settings["connect/timeout_ms"] = round(1e3 * CONNECT_S)
         retry = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 2}
         settings["connect/retry"] = retry
+    if setup.credentials is not None:
+        shown = read_credentials(Path(setup.credentials))
+        settings["transport/auth/usrpwd"] = {"user": shown.user, "password": shown.password}
+    if router and setup.admits is not None:
+        settings["access_control"] = json.loads(setup.admits.access)
+        if setup.admits.users_file is not None:
+            settings["transport/auth/usrpwd"] = {"dictionary_file": setup.admits.users_file}
     for name, value in settings.items():
         config.insert_json5(name, json.dumps(value))
     return config

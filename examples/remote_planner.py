@@ -1,8 +1,7 @@
 """A driving stack in a process of its own, as planner under test: copy it and put yours in.
 
-    echo 'endpoint = "tcp/127.0.0.1:7447"' > remote.toml
-    foretwin drive --config remote.toml --planner remote
-    python examples/remote_planner.py --endpoint tcp/127.0.0.1:7447     # in a second terminal
+    foretwin drive --planner remote
+    python examples/remote_planner.py     # in a second terminal, same folder
 
 It follows the path at the target speed, brakes for red lights and for who is ahead.
 """
@@ -13,11 +12,13 @@ import argparse
 import math
 import sys
 import time
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from foretwin import UserError
 from foretwin.bus import (
     Bus,
     BusSetup,
@@ -27,6 +28,7 @@ from foretwin.bus import (
     PlannerScene,
     Received,
     ZenohBus,
+    newest_running,
 )
 
 Array = npt.NDArray[np.float64]
@@ -112,17 +114,23 @@ def serve(bus: Bus) -> None:
 def main() -> int:
     """Join the bus, waiting for a run to begin, and serve until Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="where the run listens")
-    endpoint = parser.parse_args().endpoint
+    parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs")
+    parser.add_argument("--endpoint", help="where a run listens that asks nobody who it is")
+    given = parser.parse_args()
     end = time.monotonic() + JOIN_S
     while True:
         try:
-            with ZenohBus(BusSetup(endpoint=endpoint)) as bus:
+            if given.endpoint is None:
+                setup = newest_running(given.out).bus("planner")
+            else:
+                setup = BusSetup(endpoint=given.endpoint)
+            with ZenohBus(setup) as bus:
                 serve(bus)
-        except BusUnreachable as error:
+        except (BusUnreachable, UserError) as error:
             if time.monotonic() > end:
                 print(error, file=sys.stderr)
                 return 2
+            time.sleep(0.2)
         except KeyboardInterrupt:
             return 0
 

@@ -1,7 +1,7 @@
 """A road user that does not exist, for the car's own driving stack: copy it and put yours in.
 
     foretwin drive --map town.osm --source live --ros2 my.toml --config fixed.toml --towards-vehicle
-    python examples/virtual_road_user.py --endpoint tcp/127.0.0.1:7447 --lat 52.51 --lon 13.39
+    python examples/virtual_road_user.py --lat 52.51 --lon 13.39
 
 A pedestrian walks to and fro at that place, 10 times a second, until Ctrl-C; docs/ros2.md says what
 my.toml needs so that it goes out.
@@ -13,6 +13,7 @@ import argparse
 import contextlib
 import math
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from foretwin.bus import (
     ZenohBus,
     alive_key,
     geo_from_local,
+    newest_running,
     run_of_alive_key,
 )
 
@@ -78,11 +80,16 @@ def serve(bus: Bus, place: GeoPoint) -> None:
 def main() -> int:
     """Join the bus of a drive and serve until Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="where the run listens")
+    parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs")
+    parser.add_argument("--endpoint", help="where a run listens that asks nobody who it is")
     parser.add_argument("--lat", type=float, required=True, help="degrees")
     parser.add_argument("--lon", type=float, required=True, help="degrees")
     given = parser.parse_args()
-    with contextlib.suppress(KeyboardInterrupt), ZenohBus(BusSetup(endpoint=given.endpoint)) as bus:
+    if given.endpoint is None:
+        setup = newest_running(given.out).bus("operator")
+    else:
+        setup = BusSetup(endpoint=given.endpoint)
+    with contextlib.suppress(KeyboardInterrupt), ZenohBus(setup) as bus:
         serve(bus, GeoPoint(given.lat, given.lon))
     return 0
 

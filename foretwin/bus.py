@@ -9,6 +9,7 @@ from __future__ import annotations
 from foretwin.contracts.bus import Alive, Bus, BusUnreachable, Mailbox, Received, ZenohBus
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.joining import RunningDrive, newest_running, running_drive
 from foretwin.contracts.keys import alive_key, run_of_alive_key
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
 from foretwin.contracts.setup import BusSetup
@@ -26,8 +27,11 @@ __all__ = [
     "Received",
     "RoadUser",
     "RoadUsers",
+    "RunningDrive",
     "ZenohBus",
     "alive_key",
     "geo_from_local",
+    "newest_running",
     "run_of_alive_key",
+    "running_drive",
 ]

@@ -13,7 +13,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED
-from foretwin.contracts.ports import trouble_with_endpoint
+from foretwin.contracts.ports import trouble_with_bus
 from foretwin.contracts.roles import Correction, FollowLimits, Role
 from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.processors import processors, trouble_with_workers
@@ -124,7 +124,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     worlds: str | None = None
     """A folder of Worlds that are used as they are, instead of being built."""
     endpoint: str | None = None
-    """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
+    """Where the router listens, such as tcp/127.0.0.1:7447; None takes a socket of this user's."""
+    insecure: bool = False
+    """Whether whoever reaches `endpoint` may say anything."""
     standin_plan_shift_m: float = 0.0
     standin_parameters: str | None = None
     """What the stand-in car really is, hidden from the twin: a TOML file, or the bundled one."""
@@ -189,8 +191,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             yield trouble is None, f"vehicles, {other.id}: {trouble}"
         shift_m = self.standin_plan_shift_m
         yield math.isfinite(shift_m), f"standin_plan_shift_m {shift_m}: a finite number of metres"
-        place = None if self.endpoint is None else trouble_with_endpoint(self.endpoint)
-        yield place is None, f"endpoint {self.endpoint!r}: {place}"
+        place = trouble_with_bus(self.endpoint, insecure=self.insecure)
+        yield place is None, f"{place}"
         yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
         yield len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from foretwin.contracts.access import BusMember
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
@@ -16,6 +17,7 @@ from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import StandinPath
+from foretwin.orchestrator.runner.local_bus import LocalBus
 from foretwin.orchestrator.worlds.opening import Clip
 from foretwin.telemetry.ros2.mapping import MappingFile
 from foretwin.world_gen.junctions.intersections import Junction
@@ -77,7 +79,19 @@ class DrivePlan(DriveInputs):
     run_id: str
     folder: Path
     bus: BusSetup
+    """How the orchestrator joins; without an endpoint until the bus of this host is made."""
     live_view: str
+    local: LocalBus | None = None
+    """The bus of this host; None where anybody may join at `endpoint`."""
+
+    @property
+    def router_bus(self) -> BusSetup:
+        """How the router is set."""
+        return self.bus if self.local is None else self.local.router
+
+    def bus_of(self, member: BusMember) -> BusSetup:
+        """Return how one of the drive's processes joins the bus."""
+        return self.bus if self.local is None else self.local.setup_of(member.name)
 
     @property
     def worlds_dir(self) -> Path:

@@ -20,7 +20,15 @@ from foretwin.orchestrator.commands.cli_logs import (
     recover,
     repeat,
 )
-from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption, ServiceRoadsOption
+from foretwin.orchestrator.commands.cli_options import (
+    EndpointOption,
+    InsecureOption,
+    LeastFuturesOption,
+    MapArgument,
+    OutOption,
+    ServiceRoadsOption,
+    TuningOption,
+)
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_set import set_value
 from foretwin.orchestrator.commands.error_lines import (
@@ -68,13 +76,7 @@ def drive(
     ] = None,
     workers: Annotated[int | None, typer.Option(help="worker processes [default: 2]")] = None,
     futures: Annotated[int | None, typer.Option(help="futures per round [default: 64]")] = None,
-    least_futures: Annotated[
-        int | None,
-        typer.Option(
-            help="futures per round where the machine is too slow for all; "
-            "as many as --futures holds them fixed [default: a quarter]"
-        ),
-    ] = None,
+    least_futures: LeastFuturesOption = None,
     rate_hz: Annotated[
         float | None, typer.Option("--rate", help="rounds per wall second [default: 2]")
     ] = None,
@@ -84,13 +86,7 @@ def drive(
     planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the futures [default: 0]")] = None,
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
-    tuning: Annotated[
-        str | None,
-        typer.Option(
-            help="parameters from the driving: off, report, apply [default: report; off where "
-            "there are fewer processors than workers]"
-        ),
-    ] = None,
+    tuning: TuningOption = None,
     map_aiding: Annotated[
         str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
     ] = None,
@@ -101,6 +97,8 @@ def drive(
     keep: Annotated[
         str | None, typer.Option(help="the newest of a run that stay, such as 12h or 20GB")
     ] = None,
+    endpoint: EndpointOption = None,
+    insecure: InsecureOption = False,
     trace: Annotated[
         bool, typer.Option("--trace", help="what each process does when, as RUN/trace.json")
     ] = False,
@@ -118,7 +116,7 @@ def drive(
     settings = locals()  # named as the fields of DriveConfig, but for two
     settings["map"] = settings.pop("map_file")
     settings["towards_vehicle"] = towards_vehicle or None
-    settings["trace"] = trace or None
+    settings |= {"trace": trace or None, "insecure": insecure or None}
     from foretwin.orchestrator.config import load_config
     from foretwin.orchestrator.drive.drive import drive as run_drive
 

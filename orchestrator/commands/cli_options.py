@@ -1,4 +1,4 @@
-"""Options that several commands have in common."""
+"""Options of commands: those that several have, and long ones."""
 
 from __future__ import annotations
 
@@ -11,5 +11,26 @@ MapArgument = Annotated[Path, typer.Argument(help="map: .osm, .osm.gz, .osm.bz2 
 ServiceRoadsOption = Annotated[
     bool,
     typer.Option("--service-roads", help="driveways and parking aisles count as roads everywhere"),
+]
+LeastFuturesOption = Annotated[
+    int | None,
+    typer.Option(
+        help="futures per round where the machine is too slow for all; "
+        "as many as --futures holds them fixed [default: a quarter]"
+    ),
+]
+TuningOption = Annotated[
+    str | None,
+    typer.Option(
+        help="parameters from the driving: off, report, apply [default: report; off where "
+        "there are fewer processors than workers]"
+    ),
+]
+EndpointOption = Annotated[
+    str | None,
+    typer.Option(help="where the bus listens, such as tcp/127.0.0.1:7447 with --insecure"),
+]
+InsecureOption = Annotated[
+    bool, typer.Option("--insecure", help="whoever reaches the endpoint may say anything")
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]

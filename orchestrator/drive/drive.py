@@ -37,7 +37,7 @@ from foretwin.orchestrator.drive.processes import (
     row_of,
 )
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
-from foretwin.orchestrator.drive.router_start import join_bus
+from foretwin.orchestrator.drive.router_start import join_bus, on_local_bus
 from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record, run_record
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
@@ -95,7 +95,7 @@ def carry_out(plan: DrivePlan) -> int:
         )
     )
     with run_lock(plan.folder), trace.whole_run(plan.trace_dir, ORCHESTRATOR):
-        return _Drive(plan).run()
+        return _Drive(on_local_bus(plan)).run()
 
 
 class _Drive:

@@ -14,7 +14,6 @@ from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.new_folder import trouble_with_folder
-from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
@@ -196,7 +195,7 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
         **{name: getattr(inputs, name) for name in DriveInputs.__dataclass_fields__},
         run_id=run_id,
         folder=folder.resolve(),
-        bus=BusSetup(endpoint=config.endpoint or free_endpoint(), lossless=config.lock_step),
+        bus=BusSetup(endpoint=config.endpoint or "", lossless=config.lock_step),
         live_view=live,
     )
     if plan.standin is not None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from foretwin.contracts.access import BusMember
+from foretwin.contracts.keys import BusRole
 from foretwin.contracts.process_setup import RouterSetup
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
@@ -20,6 +22,7 @@ from foretwin.contracts.setup import (
 )
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
+from foretwin.orchestrator.runner.local_bus import OUTSIDERS, member_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR = "orchestrator"
@@ -30,6 +33,17 @@ RECORDER, VIEWER = "recorder", "viewer"
 TUNING = "tuning"
 VEHICLE = "vehicle"
 ROS2_BESIDE = "ros2-beside"
+
+
+_ROLES: dict[str, BusRole] = {
+    ORCHESTRATOR: "orchestrator",
+    RECORDER: "recorder",
+    VIEWER: "viewer",
+    VEHICLE: "car",
+    "ros2": "car",
+    ROS2_BESIDE: "car",
+}
+"""Roles of processes by name, where it is none of a worker; a gateway speaks for its vehicle."""
 
 
 class ProcessRow(NamedTuple):
@@ -47,19 +61,45 @@ class ProcessRow(NamedTuple):
     """So many there are, each named with a number; None for the one process of this name."""
 
 
+def member(plan: DrivePlan, process_id: str) -> BusMember:
+    """Return as whom a process speaks on the bus."""
+    role = _ROLES.get(process_id.rstrip("0123456789"), _ROLES.get(process_id, "worker"))
+    vehicle_id = plan.config.vehicle_id
+    if process_id.startswith(ROS2_BESIDE):
+        vehicle_id = _beside(plan, process_id).config.id
+    return member_of(role, process_id, vehicle_id=vehicle_id)
+
+
+def members(plan: DrivePlan) -> tuple[BusMember, ...]:
+    """Return everybody who may join the bus of a drive."""
+    config = plan.config
+    outside = [other.id for other in config.vehicles if other.live and other.ros2 is None]
+    if config.resolved_source == "live" and plan.ros2 is None:
+        outside.append(config.vehicle_id)
+    return (
+        *(member(plan, one) for one in (ORCHESTRATOR, *sorted(expected_ids(plan)))),
+        *(BusMember(f"car-of-{one}", "car", vehicle_id=one) for one in outside),
+        *OUTSIDERS,
+    )
+
+
 def _base(plan: DrivePlan, process_id: str) -> dict[str, Any]:
     return {
         "run_id": plan.run_id,
         "process_id": process_id,
         "vehicle_id": plan.config.vehicle_id,
-        "bus": plan.bus,
+        "bus": plan.bus_of(member(plan, process_id)),
         "log_file": str(plan.folder / "log.jsonl"),
         "trace_dir": None if plan.trace_dir is None else str(plan.trace_dir),
     }
 
 
 def _router(plan: DrivePlan, process_id: str) -> ProcessSetup:
-    return RouterSetup(**_base(plan, process_id), word_file=str(plan.router_word_file))
+    return RouterSetup(
+        **_base(plan, process_id) | {"bus": plan.router_bus},
+        word_file=str(plan.router_word_file),
+        folder=None if plan.local is None else str(plan.local.folder),
+    )
 
 
 def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
@@ -172,8 +212,12 @@ def _ros2_of_others(plan: DrivePlan) -> list[OtherVehiclePlan]:
     return [one for one in plan.beside if one.ros2 is not None]
 
 
+def _beside(plan: DrivePlan, process_id: str) -> OtherVehiclePlan:
+    return _ros2_of_others(plan)[int(process_id.removeprefix(ROS2_BESIDE))]
+
+
 def _ros2_beside(plan: DrivePlan, process_id: str) -> ProcessSetup:
-    one = _ros2_of_others(plan)[int(process_id.removeprefix(ROS2_BESIDE))]
+    one = _beside(plan, process_id)
     assert one.ros2 is not None
     return Ros2Setup(
         **_base(plan, process_id) | {"vehicle_id": one.config.id},

@@ -119,6 +119,12 @@ class ProgressLine:
             )
         return statuses
 
+    @property
+    def _open_to_all(self) -> str:
+        """Said on every line where nobody has to show who it is."""
+        config = self._conductor.plan.config
+        return f"INSECURE {config.endpoint}  " if config.insecure else ""
+
     def _text(self, progress: Progress) -> str:
         conductor = self._conductor
         dispatch = conductor.rounds.dispatcher.dispatch
@@ -128,7 +134,8 @@ class ProgressLine:
             ahead = f"{progress.next_intersection} in {progress.arrival_in_s:.0f} s"
         short = f"{progress.too_slow} (machine too slow for all)  " if progress.too_slow else ""
         return (
-            f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  {short}"
+            f"{self._open_to_all}{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}"
+            f"  {short}"
             f"{progress.futures_per_s:.0f} futures/s  "
             f"workers {len(dispatch.workers)}/{conductor.plan.config.workers}"
             f"{f' ({sick} sick)' if sick else ''}  "

@@ -2,23 +2,62 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import re
 import shutil
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 
 from foretwin.contracts.bus import BusUnreachable, ZenohBus
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.router import LISTENS
-from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, row_of
+from foretwin.contracts.terminal import say
+from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, ROUTER, members, row_of
 from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.runner.local_bus import make_local_bus
 from foretwin.orchestrator.runner.supervisor import Supervisor
+
+log = logging.getLogger(ORCHESTRATOR)
 
 LISTENS_WITHIN_S = 30.0
 """Long: a busy machine is no fault of the router's."""
 _LOOK_S = 0.005
 
 
-def join_bus(plan: DrivePlan, supervisor: Supervisor) -> ZenohBus:
+def on_local_bus(plan: DrivePlan) -> DrivePlan:
+    """Return a drive with its bus: as it is where an endpoint is given, else one of this host."""
+    if plan.bus.endpoint:
+        return plan
+    everybody = members(plan)
+    local = make_local_bus(
+        plan.run_id,
+        everybody,
+        run_id=plan.run_id,
+        lossless=plan.bus.lossless,
+        instead=plan.processes_dir,
+    )
+    if local.trouble:
+        text = f"no socket for the bus ({local.trouble}): it is on the loopback, with passwords"
+        log.warning("%s", text)
+        say(f"warning: {text}", error=True)
+    return replace(plan, local=local, bus=local.setup_of(ORCHESTRATOR))
+
+
+@contextlib.contextmanager
+def join_bus(plan: DrivePlan, supervisor: Supervisor) -> Iterator[ZenohBus]:
+    """Start the router and join; afterwards both are gone, and so are the passwords."""
+    try:
+        with _joined(plan, supervisor) as bus:
+            yield bus
+    finally:
+        supervisor.stop(grace_s=0.0)
+        if plan.local is not None:
+            plan.local.remove()
+
+
+def _joined(plan: DrivePlan, supervisor: Supervisor) -> ZenohBus:
     """Start the router and return the orchestrator's session.
 
     UserError, with no folder left, where it cannot listen. Nobody connects before it listens:

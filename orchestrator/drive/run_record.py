@@ -151,7 +151,9 @@ def reserve_record(plan: DrivePlan, file: Path) -> None:
 
     Whoever lists runs meanwhile sees the whole of it or nothing.
     """
-    begun = _known_at_start(plan, RUNNING) | {"endpoint": plan.bus.endpoint}
+    folder = None if plan.local is None else str(plan.local.folder)
+    joining = {"endpoint": plan.bus.endpoint, "credentials": folder}
+    begun = _known_at_start(plan, RUNNING) | joining
     text = json.dumps(begun, ensure_ascii=False)
     with whole_file(file) as partial:
         partial.write_bytes(text.encode().ljust(RESERVED_BYTES) + b"\n")

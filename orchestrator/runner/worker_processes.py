@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import secrets
 import time
 from collections import deque
 from pathlib import Path
@@ -12,10 +13,15 @@ import msgspec
 
 from foretwin.contracts.bus import Alive, Mailbox, Reply, ZenohBus
 from foretwin.contracts.keys import alive_key, process_of_alive_key
-from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.runner import Answer, Task, TaskCount
-from foretwin.contracts.setup import BusSetup, WorkerSetup
+from foretwin.contracts.setup import WorkerSetup
 from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
+from foretwin.orchestrator.runner.local_bus import (
+    LocalBus,
+    make_local_bus,
+    member_of,
+    private_files,
+)
 from foretwin.orchestrator.runner.supervisor import (
     Death,
     FreshInterpreter,
@@ -69,10 +75,9 @@ class WorkerProcesses:
     ) -> None:
         self._count, self._timeout_s, self._folder = count, task_timeout_s, folder
         self._names = tuple(f"w{number}" for number in range(count))
-        self._setup = msgspec.structs.replace(
-            setup, bus=BusSetup(endpoint=free_endpoint(), lossless=True)
-        )
+        self._setup = setup
         self._bus: ZenohBus | None = None
+        self._local: LocalBus | None = None
         self._mailbox = Mailbox(_MAILBOX_DEPTH)
         self._supervisor = Supervisor(FreshInterpreter(folder) if launch is None else launch)
         self._answers: deque[Answer] = deque()
@@ -85,8 +90,16 @@ class WorkerProcesses:
 
     def __enter__(self) -> Self:
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._bus = ZenohBus(self._setup.bus, router=True)
         run_id = self._setup.run_id
+        self._local = make_local_bus(
+            f"{run_id}-{secrets.token_hex(4)}",
+            [member_of("worker", name) for name in self._names],
+            run_id=run_id,
+            lossless=True,
+            instead=self._folder,
+        )
+        with private_files():
+            self._bus = ZenohBus(self._local.router, router=True)
         self._dispatcher = BusDispatcher(
             self._bus,
             self._mailbox,
@@ -101,6 +114,8 @@ class WorkerProcesses:
         self._supervisor.stop(grace_s=0.0, term_s=_END_S)
         assert self._bus is not None
         self._bus.close()
+        assert self._local is not None
+        self._local.remove()
         if self._supervisor.started:
             fold_stderr(self._folder, Path(self._setup.log_file))
 
@@ -194,6 +209,7 @@ class WorkerProcesses:
 
     def _start_missing(self) -> None:
         """Start as many workers as there is work for, one of them for what all others refused."""
+        assert self._local is not None
         running = set(self._supervisor.running())
         able = [
             name for name in self._names if self._failed_starts.get(name, 0) < MAX_FAILED_STARTS
@@ -204,9 +220,9 @@ class WorkerProcesses:
         dispatch = self._dispatcher.dispatch
         wanted = min(self._count, max(dispatch.open, dispatch.most_refusals + 1))
         for name in [name for name in able if name not in running][: max(wanted - len(running), 0)]:
-            self._supervisor.start(
-                _WorkerRow(), msgspec.structs.replace(self._setup, process_id=name)
-            )
+            bus = self._local.setup_of(member_of("worker", name).name)
+            setup = msgspec.structs.replace(self._setup, process_id=name, bus=bus)
+            self._supervisor.start(_WorkerRow(), setup)
 
 
 def _how(death: Death) -> str:

@@ -7,7 +7,7 @@ import logging
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.foreign_bus import ZenohForeignBus
 from foretwin.contracts.process import ProcessLife, run_process
-from foretwin.contracts.setup import Ros2Setup
+from foretwin.contracts.setup import BusSetup, Ros2Setup
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import listening_only, parse_mapping
 from foretwin.telemetry.ros_messages.parts import typestore
@@ -22,7 +22,9 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
         mapping = listening_only(mapping)
         log.info("listens to %s and sends it nothing", setup.vehicle_id)
     typestore()  # 0.15 s that no sample shall wait for
-    with ZenohForeignBus(mapping.endpoint or setup.bus.endpoint) as foreign:
+    # The run's own router knows us by the run's own certificates, the car's does not.
+    theirs = setup.bus if mapping.endpoint is None else BusSetup(endpoint=mapping.endpoint)
+    with ZenohForeignBus(theirs) as foreign:
         gateway = Gateway(
             mapping,
             bus=bus,

@@ -197,7 +197,7 @@ class _ChaosDrive:
         if self._link is None:
             return ("--source", "standin", "--end", f"{DRIVING_S + 4.0:g}")
         config = self._base / "live.toml"
-        config.write_text(f'endpoint = "{self._link.router}"\n', encoding="utf-8")
+        config.write_text(f'endpoint = "{self._link.router}"\ninsecure = true\n', encoding="utf-8")
         return ("--source", "live", "--config", str(config))
 
     def _environment(self) -> dict[str, str]:

@@ -50,6 +50,8 @@ def test_no_file_and_no_flags_is_the_embedded_drive() -> None:
         ({"start_s": 5.0}, "--start 5.0: needs --log FILE"),
         ({"standin_plan_shift_m": float("nan")}, "standin_plan_shift_m nan: a finite number"),
         ({"endpoint": "foo"}, "endpoint 'foo': PROTOCOL/ADDRESS"),
+        ({"endpoint": "tcp/127.0.0.1:7447"}, "whoever reaches it may speak as the car"),
+        ({"insecure": True}, "--insecure: needs an endpoint"),
         ({"tuning": "maybe"}, "flags: tuning 'maybe': one of apply, off, report"),
         ({"towards_vehicle": True, "source": "live"}, "--towards-vehicle needs --ros2"),
     ],

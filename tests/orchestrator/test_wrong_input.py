@@ -151,7 +151,7 @@ def test_folders_that_are_files_are_told_before_anything_begins(
 def test_an_endpoint_that_is_taken_is_told_and_leaves_no_run(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         endpoint = f"tcp/127.0.0.1:{other.getsockname()[1]}"
-        (tmp_path / "drive.toml").write_text(f'endpoint = "{endpoint}"\n')
+        (tmp_path / "drive.toml").write_text(f'endpoint = "{endpoint}"\ninsecure = true\n')
         ended = subprocess.run(
             [sys.executable, "-P", "-m", "foretwin", "drive", "--view", "none",
              "--config", "drive.toml"],

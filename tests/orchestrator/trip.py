@@ -83,7 +83,11 @@ def town_world(junction_id: str) -> World:
 def town_plan(folder: Path, **settings: Any) -> DrivePlan:
     """A drive through the town; its files lie below `folder`, nothing listens at its endpoint."""
     config = DriveConfig(
-        view="none", out=str(folder / "runs"), endpoint="tcp/127.0.0.1:7447", **settings
+        view="none",
+        out=str(folder / "runs"),
+        endpoint="tcp/127.0.0.1:7447",
+        insecure=True,
+        **settings,
     )
     return make_plan(replace(town(), config=config.validate()), NOW)
 

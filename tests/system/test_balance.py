@@ -17,6 +17,7 @@ import pytest
 
 from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.orchestrator.record.ledger import Ledger
 from tests.system.foretwin_command import child_pids, foretwin, started, wait_for
@@ -107,9 +108,9 @@ def test_a_run_whose_workers_all_refuse_goes_on_and_says_so_last(tmp_path: Path)
 
 def test_the_ledger_balances_after_freezes_kills_and_strangers(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE) as process:
+    endpoint = free_endpoint()
+    with started(out, *LIVE, "--endpoint", endpoint, "--insecure") as process:
         run = under_way(out)
-        endpoint = record_of(run)["endpoint"]
         with ZenohBus(BusSetup(endpoint=endpoint)) as stranger:
             for name in ("w7", "w8"):
                 stranger.declare_alive(alive_key(run=run.name, process=name))

@@ -70,7 +70,10 @@ def test_two_live_vehicles_are_mirrored_where_they_drive(tmp_path: Path) -> None
     config = tmp_path / "drive.toml"
     config.write_text(CONFIG.format(run=run, second=second))
     out = tmp_path / "runs"
-    with ZenohBus(BusSetup(endpoint=car_side), router=True), ZenohForeignBus(car_side) as peer:
+    with (
+        ZenohBus(BusSetup(endpoint=car_side), router=True),
+        ZenohForeignBus(BusSetup(endpoint=car_side)) as peer,
+    ):
         heard: set[str] = set()
         with started(out, *FLAGS, "--ros2", str(own), "--config", str(config)) as process:
             wait_for(lambda: bool(list(out.glob("*/run.json"))), "the run's record")

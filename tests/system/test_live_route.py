@@ -59,7 +59,7 @@ def test_the_route_of_the_driving_stack_is_taken_and_followed(tmp_path: Path) ->
     out = tmp_path / "runs"
     with (
         ZenohBus(BusSetup(endpoint=endpoint), router=True),
-        ZenohForeignBus(endpoint) as peer,
+        ZenohForeignBus(BusSetup(endpoint=endpoint)) as peer,
         started(out, *FLAGS, "--ros2", str(file)) as process,
     ):
         wait_for(lambda: bool(list(out.glob("*/run.json"))), "the run's record")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import signal
@@ -19,7 +18,7 @@ from mcap.reader import make_reader
 import foretwin
 from foretwin.contracts.bus import Mailbox, Received, ZenohBus
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.joining import running_drive
 from foretwin.orchestrator.commands.cli import run as command
 from foretwin.orchestrator.record.results import TABLES
 from tests.starvation import kept_waiting
@@ -52,9 +51,8 @@ def killed(out: Path, arguments: tuple[str, ...], after_s: float) -> Killed:
         wait_for(partial(there, out, "*/run.json"), "the run's record")
         run = run_folder(out)
         assert run is not None
-        endpoint = json.loads((run / "run.json").read_text())["endpoint"]
         messages = Mailbox(100_000)
-        with ZenohBus(BusSetup(endpoint=endpoint)) as bus:
+        with ZenohBus(running_drive(run).bus("viewer")) as bus:
             for channel in HEARD:
                 bus.subscribe(channel, messages, run=run.name)
             wait_for(lambda: len(messages) > 0, "the first round")

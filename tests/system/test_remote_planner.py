@@ -27,8 +27,8 @@ EXAMPLE = REPOSITORY / "examples" / "remote_planner.py"
 VEHICLE = load_vehicle()
 
 
-def example(endpoint: str) -> AbstractContextManager[subprocess.Popen[str]]:
-    return python(str(EXAMPLE), "--endpoint", endpoint)
+def example(*arguments: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    return python(str(EXAMPLE), *arguments)
 
 
 @contextmanager
@@ -45,7 +45,7 @@ def test_the_example_drives_and_after_its_death_the_fallback() -> None:
     with run_bus() as (bus, endpoint):
         planner = RemotePlanner(first_answer_s=DEADLINE_S, answer_s=DEADLINE_S)
         planner.connect(bus, run="r1", process="w0")
-        with example(endpoint) as process:
+        with example("--endpoint", endpoint) as process:
             told: list[dict[int, str]] = []
 
             class Kept:
@@ -80,7 +80,7 @@ def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
     )
     planner = load_planner("remote")
     assert isinstance(planner, RemotePlanner)
-    with run_bus() as (bus, endpoint), example(endpoint):
+    with run_bus() as (bus, endpoint), example("--endpoint", endpoint):
         planner.connect(bus, run="r1", process="w0")
         shown = Mailbox(64)
         bus.subscribe("planned_motions", shown, run="r1", process="w0")
@@ -94,14 +94,13 @@ def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
 
 
 def test_a_whole_drive_is_driven_by_it(tmp_path: Path) -> None:
-    endpoint = free_endpoint()
     config = tmp_path / "remote.toml"
-    config.write_text(f'endpoint = "{endpoint}"\nscenarios = []\n')
+    config.write_text("scenarios = []\n")
     out = tmp_path / "runs"
     with started(
         out, "--config", str(config), "--planner", "remote", "--speed", "max", "--end", "3",
         "--rate", "1", "--futures", "4", "--horizon", "2", "--workers", "1",
-    ) as drive, example(endpoint):  # fmt: skip
+    ) as drive, example("--out", str(out)):  # fmt: skip
         screen, _ = drive.communicate(timeout=240.0)
     run = Finished(drive.returncode, screen, run_folder(out))
     assert run.code == 0, run.screen

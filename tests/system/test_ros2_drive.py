@@ -38,7 +38,10 @@ def test_a_killed_orchestrator_sends_nothing_towards_the_vehicle_after_200_ms(
 ) -> None:
     endpoint = free_endpoint()
     file = mapping(tmp_path, endpoint=endpoint, enabled=True)
-    with ZenohBus(BusSetup(endpoint=endpoint), router=True), ZenohForeignBus(endpoint) as peer:
+    with (
+        ZenohBus(BusSetup(endpoint=endpoint), router=True),
+        ZenohForeignBus(BusSetup(endpoint=endpoint)) as peer,
+    ):
         car = Ros2Car(peer, listens_to=("clock",))
         flags = (*FLAGS, "--ros2", str(file), "--towards-vehicle")
         with started(tmp_path / "runs", *flags) as process:
@@ -63,7 +66,10 @@ def test_one_switch_sends_the_twin_and_nothing_towards_the_vehicle(
 ) -> None:
     endpoint = free_endpoint()
     file = mapping(tmp_path, endpoint=endpoint, enabled=enabled)
-    with ZenohBus(BusSetup(endpoint=endpoint), router=True), ZenohForeignBus(endpoint) as peer:
+    with (
+        ZenohBus(BusSetup(endpoint=endpoint), router=True),
+        ZenohForeignBus(BusSetup(endpoint=endpoint)) as peer,
+    ):
         car = Ros2Car(peer, listens_to=("foretwin/**", "clock", "control/**", "perception/**"))
         keys: list[str] = []
         with started(tmp_path / "runs", *FLAGS, "--ros2", str(file), *flag):

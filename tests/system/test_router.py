@@ -10,6 +10,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.ports import free_endpoint
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
     Pause,
@@ -129,12 +130,12 @@ def test_the_router_ends_with_an_orchestrator_that_is_killed(tmp_path: Path) -> 
 
 
 def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
-    with started(tmp_path / "first", *LIVE) as process:
+    flags = ("--endpoint", free_endpoint(), "--insecure")
+    with started(tmp_path / "first", *LIVE, *flags) as process:
         assert process.poll() is None
         run = under_way(tmp_path / "first")
         endpoint = json.loads((run / "run.json").read_text(encoding="utf-8"))["endpoint"]
-        (tmp_path / "drive.toml").write_text(f'endpoint = "{endpoint}"\n', encoding="utf-8")
-        second = foretwin(tmp_path / "second", "--config", str(tmp_path / "drive.toml"))
+        second = foretwin(tmp_path / "second", *flags)
     assert second.code == 2
     port = endpoint.rsplit(":", 1)[1]
     assert second.screen.splitlines() == [

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.joining import newest_running
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
-from foretwin.orchestrator.commands.set import newest_running
 from tests.system.foretwin_command import Finished, run_folder, started, wait_for
 
 HELD_AT_JOIN = """

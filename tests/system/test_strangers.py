@@ -16,6 +16,7 @@ from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import GnssFix, PlannedTrajectory, RoadUser, RoadUsers
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.keys import CHANNELS, alive_key, key
+from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from tests.contracts.hostile_messages import hostile_bytes
 from tests.system.foretwin_command import Finished, log_lines, run_folder, started, wait_for
@@ -72,7 +73,8 @@ def speak(endpoint: str, run: str) -> None:
 
 def test_a_drive_survives_a_stranger_and_counts_what_it_said(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE) as process:
+    open_to_all = ("--endpoint", free_endpoint(), "--insecure")
+    with started(out, *LIVE, *open_to_all) as process:
 
         def begun() -> bool:
             folder = run_folder(out)

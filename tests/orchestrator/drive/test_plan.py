@@ -7,13 +7,17 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
+from foretwin.contracts.credentials import read_credentials
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_from_local, local_from_geo
 from foretwin.orchestrator.config import ConfigError, DriveConfig
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, process_ids
+from foretwin.orchestrator.drive.router_start import on_local_bus
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.junctions.intersections import junctions_on_route
@@ -63,14 +67,24 @@ def test_a_bus_of_lock_step_loses_nothing(tmp_path: Path) -> None:
     assert not town_plan(tmp_path, speed=2.0).bus.lossless
 
 
-def test_without_an_endpoint_a_free_one_is_taken(tmp_path: Path) -> None:
+def test_without_an_endpoint_the_bus_is_a_socket_on_which_each_process_has_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     config = DriveConfig(view="none", out=str(tmp_path))
-    plan = make_plan(replace(town(), config=config), NOW)
+    plan = on_local_bus(make_plan(replace(town(), config=config), NOW))
 
-    host, port = plan.bus.endpoint.rsplit(":", 1)
-    assert host == "tcp/127.0.0.1"
-    assert 1024 <= int(port) <= 65535
-    assert town_plan(tmp_path).bus.endpoint == "tcp/127.0.0.1:7447"
+    folder = tmp_path / "foretwin" / plan.run_id
+    assert plan.bus.endpoint == f"unixsock-stream/{folder / 'bus'}"
+    setups = [row.setup(plan, one) for row in PROCESSES for one in process_ids(row, plan)]
+    shown = [setup.bus.credentials for setup in setups if setup.process_id != ROUTER]
+    assert len({*shown, plan.bus.credentials}) == len(shown) + 1
+    assert all(Path(one).parent == folder for one in shown)
+    passwords = [read_credentials(Path(one)).password for one in shown]
+    texts = [file.read_text() for file in plan.folder.rglob("*") if file.is_file()]
+    texts += [str(msgspec.json.encode(setup)) for setup in setups]
+    assert not any(password in text for password in passwords for text in texts)
+    assert on_local_bus(town_plan(tmp_path)).bus.endpoint == "tcp/127.0.0.1:7447"
 
 
 @pytest.mark.parametrize(("display", "live"), [("", "none"), (":0", "native")])

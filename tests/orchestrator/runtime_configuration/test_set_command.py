@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.joining import newest_running, running_drive
 from foretwin.contracts.ports import free_endpoint
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
-from foretwin.orchestrator.commands.set import newest_running, running_drive
 
 COVERS = (
     "foretwin.orchestrator.commands.cli_set",
     "foretwin.orchestrator.commands.set",
+    "foretwin.contracts.joining",
 )
 
 

@@ -187,7 +187,7 @@ def vehicle(folder: Path) -> Iterator[Vehicle]:
     mapping = mapping_text(enabled=True, endpoint=own)
     with (
         ZenohBus(BusSetup(endpoint=own), router=True),
-        ZenohForeignBus(own) as peer,
+        ZenohForeignBus(BusSetup(endpoint=own)) as peer,
         python("-c", ORCHESTRATOR, run) as orchestrator,
         gateway_process(folder, run_endpoint=run, mapping=mapping, flag=True) as gateway,
     ):

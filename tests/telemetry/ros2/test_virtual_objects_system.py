@@ -101,7 +101,7 @@ def ground(folder: Path, *, enabled: bool, flag: bool) -> Iterator[Ground]:
     objects, diagnostics = Mailbox(1000), Mailbox(1000)
     with (
         ZenohBus(BusSetup(endpoint=own), router=True),
-        ZenohForeignBus(own) as peer,
+        ZenohForeignBus(BusSetup(endpoint=own)) as peer,
         python("-c", ORCHESTRATOR, run) as orchestrator,
         python(str(EXAMPLE), "--endpoint", run, "--lat", "52.5", "--lon", "13.4") as script,
         python("-c", MIRROR, run),

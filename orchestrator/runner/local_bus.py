@@ -1,0 +1,91 @@
+"""The bus of one host: a socket that is this user's alone, on which everybody has a password.
+
+Where there can be no such socket, the same passwords on the loopback interface.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from foretwin.contracts.access import BusMember, access_control
+from foretwin.contracts.credentials import (
+    SOCKET,
+    USERS,
+    bus_folder,
+    credentials_file,
+    make_credentials,
+)
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.keys import BusRole
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.process_setup import Admission, BusSetup
+
+OUTSIDERS = BusMember("operator", "operator"), BusMember("planner", "planner")
+"""Who may join the bus of a drive without having been started by it."""
+
+
+class LocalBus(NamedTuple):
+    """How the router is set, and where the names and passwords of its clients lie."""
+
+    router: BusSetup
+    folder: Path
+    trouble: str = ""
+    """Why it is no socket."""
+
+    def setup_of(self, user: str) -> BusSetup:
+        """Return how somebody joins."""
+        return BusSetup(
+            endpoint=self.router.endpoint,
+            lossless=self.router.lossless,
+            credentials=str(credentials_file(self.folder, user)),
+        )
+
+    def remove(self) -> None:
+        """Leave nothing."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def private_files() -> Iterator[None]:
+    """Let what is made within be this user's alone; the whole process is concerned meanwhile."""
+    before = os.umask(0o077)
+    try:
+        yield
+    finally:
+        os.umask(before)
+
+
+def member_of(
+    role: BusRole, process_id: str, *, vehicle_id: str = "*", name: str | None = None
+) -> BusMember:
+    """Return one of a run's processes as somebody on its bus."""
+    name = name or (process_id if process_id == role else f"{role}-{process_id}")
+    return BusMember(name, role, process_id, vehicle_id)
+
+
+def make_local_bus(
+    name: str, members: Iterable[BusMember], *, run_id: str, lossless: bool, instead: Path
+) -> LocalBus:
+    """Make the folder `name` of a bus with a password for each member.
+
+    Where there can be no socket, they lie below `instead`, and the bus is on the loopback.
+    """
+    members = tuple(members)
+    trouble = ""
+    try:
+        folder = bus_folder(name)
+        endpoint = f"unixsock-stream/{folder / SOCKET}"
+    except UserError as error:
+        trouble, endpoint = str(error), free_endpoint()
+        folder = instead / "bus"
+        folder.mkdir(mode=0o700, parents=True)
+    make_credentials(folder, [one.name for one in members])
+    access = access_control(members, subject="usernames", run_id=run_id)
+    admits = Admission(users_file=str(folder / USERS), access=json.dumps(access))
+    return LocalBus(BusSetup(endpoint=endpoint, lossless=lossless, admits=admits), folder, trouble)

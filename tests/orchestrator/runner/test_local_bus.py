@@ -1,0 +1,47 @@
+"""The bus of one host: a socket of this user's, else the loopback with the same passwords."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.bus import ZenohBus
+from foretwin.orchestrator.runner.local_bus import make_local_bus, member_of, private_files
+
+MEMBERS = (member_of("worker", "w0"), member_of("orchestrator", "orchestrator"))
+
+
+def test_members_meet_on_a_socket_that_nobody_else_can_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    local = make_local_bus("b", MEMBERS, run_id="r1", lossless=True, instead=tmp_path / "run")
+    assert (local.trouble, local.router.lossless) == ("", True)
+    with private_files():
+        router = ZenohBus(local.router, router=True)
+    with router:
+        socket = local.folder / "bus"
+        assert socket.is_socket()
+        assert socket.stat().st_mode & 0o077 == 0
+        for one in MEMBERS:
+            with ZenohBus(local.setup_of(one.name)) as bus:
+                assert bus.connected
+    local.remove()
+    assert not local.folder.exists()
+
+
+def test_where_there_can_be_no_socket_it_says_why_and_is_on_the_loopback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / ("x" * 120)))
+    (tmp_path / ("x" * 120)).mkdir()
+    local = make_local_bus("b", MEMBERS, run_id="r1", lossless=False, instead=tmp_path / "run")
+    assert "longer than the 107 bytes" in local.trouble
+    assert local.router.endpoint.startswith("tcp/127.0.0.1:")
+    with (
+        ZenohBus(local.router, router=True),
+        ZenohBus(local.setup_of("worker-w0")) as bus,
+    ):
+        assert bus.connected
+    assert local.folder.stat().st_mode & 0o777 == 0o700
