@@ -22,7 +22,7 @@ from tests.chaos.faults import DRIVING_S, Case
 from tests.chaos.injection import Done, Injection
 from tests.chaos.invariants import Left, wrong_with
 from tests.chaos.link import Link, link_for
-from tests.chaos.power_cut import SYNCS
+from tests.chaos.power_cut import SYNCS, SYNCS_LOG, log_of
 from tests.chaos.run_processes import MARK, end_all, marked
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.system.foretwin_command import REPOSITORY, Pause, log_lines, run_folder
@@ -204,6 +204,7 @@ class _ChaosDrive:
         paths = os.pathsep.join(map(str, (HERE / "injected", REPOSITORY)))
         return os.environ | {
             MARK: self._mark, SYNCS: str(self._syncs), "PYTHONPATH": paths,
+            SYNCS_LOG: str(log_of(self._syncs)),
             "XDG_CACHE_HOME": str(self._base / "cache"), "TMPDIR": str(self._temporary),
             "XDG_RUNTIME_DIR": str(self._runtime),
         }  # fmt: skip

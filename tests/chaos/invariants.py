@@ -67,9 +67,10 @@ def wrong_with(left: Left) -> list[str]:
         record = json.loads((left.run / "run.json").read_text(encoding="utf-8"))
         found += [*_wrong_ledger(left, record), *_wrong_words(left, record)]
         found += [*_wrong_tables(left.run / "results"), *_lost_telemetry(left)]
+        found += _wrong_power(left)
     except Exception as error:
         found.append(f"cannot be looked at: {type(error).__name__}: {error}")
-    return [*found, *_wrong_power(left)]
+    return found
 
 
 def fitting_codes(left: Left) -> set[int]:

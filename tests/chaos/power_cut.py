@@ -17,7 +17,7 @@ from foretwin.orchestrator.record.recovery import recover
 from foretwin.orchestrator.record.table_stream import SUFFIX, StreamReader
 from foretwin.telemetry.logs.mend_mcap import look_through
 
-SYNCS = "FORETWIN_CHAOS_SYNCS"
+SYNCS, SYNCS_LOG = "FORETWIN_CHAOS_SYNCS", "FORETWIN_CHAOS_SYNCS_LOG"
 _KEPT_AS_IT_IS = ("processes", "worlds")
 MOST_UNSYNCED_S = 3.0
 """Results are synced each second and a recording each second: with a busy machine's delays."""
@@ -32,9 +32,14 @@ class Sync(NamedTuple):
     size: int
 
 
-def read_syncs(folder: Path) -> list[Sync]:
+def log_of(copies: Path) -> Path:
+    """Return where it is told what came to the disk: beside the disk that holds the copies."""
+    return copies.parent.with_name("syncs.jsonl")
+
+
+def read_syncs(copies: Path) -> list[Sync]:
     """Return what the processes of a drive told, in the order of time."""
-    file, found = folder / "syncs.jsonl", []
+    file, found = log_of(copies), []
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
         told = json.loads(line)
         found.append(Sync(told["ns"], Path(told["path"]), told["inode"], told["bytes"]))

@@ -128,9 +128,9 @@ def test_what_is_doubled_lost_untold_or_left_behind_is_noticed(tmp_path: Path) -
 
 def cut_run(tmp_path: Path) -> tuple[Path, Path]:
     """A run under way whose streams and recording are on the disk, and what told of it."""
-    run, copies = killed_run(tmp_path / "run"), tmp_path / "syncs"
-    copies.mkdir()
-    with (copies / "syncs.jsonl").open("w") as log:
+    run, copies = killed_run(tmp_path / "run"), tmp_path / "disk" / "syncs"
+    copies.mkdir(parents=True)
+    with power_cut.log_of(copies).open("w") as log:
         for path in [run / "run.json", *power_cut.parts_of(run)]:
             known = path.stat()
             os.link(path, copies / str(known.st_ino))

@@ -1,9 +1,10 @@
 """Python imports this as it starts, where its folder is on PYTHONPATH: tells what comes to the
 disk, and when.
 
-Each fsync adds a line to `syncs.jsonl` in the folder named by FORETWIN_CHAOS_SYNCS, and the first
-of a file gives it a second name there, by its inode: whatever is renamed or removed later can be
-had as it was, for files here only grow.
+Each fsync adds a line to the file named by FORETWIN_CHAOS_SYNCS_LOG, which lies on another disk:
+the drive's may be full. The first of a file gives it a second name, by its inode, in the folder
+FORETWIN_CHAOS_SYNCS: whatever is renamed or removed later can be had as it was, for files here only
+grow.
 """
 
 import contextlib
@@ -13,6 +14,7 @@ import stat
 import time
 
 _FOLDER = os.environ.get("FORETWIN_CHAOS_SYNCS", "")
+_LOG = os.environ.get("FORETWIN_CHAOS_SYNCS_LOG", "")
 
 
 def _told(sync):
@@ -27,7 +29,7 @@ def _told(sync):
                     os.link(path, f"{_FOLDER}/{known.st_ino}")
                 line = {"ns": time.monotonic_ns(), "path": path, "inode": known.st_ino,
                         "bytes": known.st_size}  # fmt: skip
-                log = os.open(f"{_FOLDER}/syncs.jsonl", os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+                log = os.open(_LOG, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
                 os.write(log, json.dumps(line).encode() + b"\n")
                 os.close(log)
         return done
