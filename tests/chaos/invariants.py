@@ -176,7 +176,8 @@ def _wrong_files(left: Left) -> Iterator[str]:
     if temporary and not (left.code == 3 and left.befell("disk")):
         yield f"temporary files in the run's folder: {sorted(temporary)}"
     for folder in left.temporary:
-        found = [path for path in folder.rglob("*") if str(path) not in left.screen]
+        files = (path for path in folder.rglob("*") if not path.is_dir())
+        found = [path for path in files if str(path) not in left.screen]
         # The log of an internal error is named on the screen, for who reports it.
         if stays := sorted(str(path.relative_to(folder)) for path in found):
             yield f"stays in {folder.name}: {stays[:5]}"
