@@ -17,7 +17,7 @@ def on_end_signals(handle: Callable[[], object]) -> None:
 
     def take(number: int, _: object) -> None:
         if number == signal.SIGHUP:
-            _leave_closed_terminal()
+            leave_closed_terminal()
         handle()
 
     for number in END_SIGNALS:
@@ -31,7 +31,7 @@ def ignore_end_signals() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def _leave_closed_terminal() -> None:
+def leave_closed_terminal() -> None:
     """Let what is still said go nowhere: words to a terminal that is gone are errors, and an error
     in the middle of an orderly end would be the end of the order."""
     for descriptor in _SCREEN:

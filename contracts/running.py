@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -110,6 +110,17 @@ class FirstOf(list[Kept]):
         """Keep those for which there is room."""
         for one in many:
             self.append(one)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Pickle would append before it says how many there may be.
+        return _first_of, (self._most, list(self), self.left_out)
+
+
+def _first_of(most: int, kept: list[Kept], left_out: int) -> FirstOf[Kept]:
+    first = FirstOf[Kept](most)
+    first.extend(kept)
+    first.left_out = left_out
+    return first
 
 
 def _bin(value: float) -> int:

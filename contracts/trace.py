@@ -94,6 +94,7 @@ class _Thread(threading.local):
 
 
 _thread = _Thread()
+os.register_at_fork(after_in_child=_thread.__init__)  # type: ignore[misc]
 
 
 def _ready_ns() -> int:

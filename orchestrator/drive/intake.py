@@ -61,6 +61,15 @@ class Intake:
         self.info = info
         self._estimator = estimator_of(info, self._vehicle)
 
+    @property
+    def estimator(self) -> StateEstimator | None:
+        """What estimates the state, None before the vehicle has said what it is."""
+        return self._estimator
+
+    def go_on(self, estimator: StateEstimator) -> None:
+        """Estimate on from where another orchestrator's estimator was."""
+        self._estimator = estimator
+
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Turn steering wheels into tyres with these parameters from now on."""
         self._vehicle = vehicle

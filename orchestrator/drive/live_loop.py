@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
@@ -19,8 +20,18 @@ LAST_ROUND_GRACE_S = 1.0
 GATHER_S = 0.01
 """Messages are taken in portions: waking up for each of 330 a second costs more than what most of
 them are about. Never where a round is due."""
+UNPLACED_S = 5.0
+"""So long after a restart nothing falls due before it is known where the car is; then it does where
+it did before."""
 STALE_AFTER_S = 1.0
 """No round starts from a state older than this, in seconds of the drive's clock."""
+
+
+class RoundGrid(NamedTuple):
+    """When the next round is due, by the monotonic clock, and whether rounds are wanted."""
+
+    next_due_s: float
+    wanted: bool
 
 
 @dataclass(slots=True)
@@ -40,7 +51,18 @@ class LiveLoop:
     stop: Callable[[], bool]
     each_turn: Callable[[], None] = lambda: None
     """Called at least every 50 ms, unless the loop itself is held up."""
+    before: RoundGrid | None = None
+    """The grid of an orchestrator before this one: what fell due since is missed."""
     _next_due_s: float = 0.0
+    _unplaced_until_s: float = 0.0
+
+    @property
+    def grid(self) -> RoundGrid:
+        """Where the rounds are, for who goes on with them."""
+        wanted = self.conductor.mission.wants_rounds
+        if self._is_unplaced(time.monotonic()) and self.before is not None:
+            wanted = self.before.wanted
+        return RoundGrid(self._next_due_s, wanted)
 
     @property
     def _period_s(self) -> float:
@@ -50,6 +72,9 @@ class LiveLoop:
         """Return True where the drive ended by itself, False where it was stopped."""
         conductor = self.conductor
         next_housekeeping_s = self._next_due_s = time.monotonic()
+        if self.before is not None:
+            self._next_due_s = self.before.next_due_s
+            self._unplaced_until_s = next_housekeeping_s + UNPLACED_S
         while not self.stop():
             self.each_turn()
             conductor.make_changes()
@@ -71,7 +96,8 @@ class LiveLoop:
             else:
                 conductor.watch_telemetry(round(now_s * 1e9))
             fresh = conductor.intake.states > seen
-            if now_s >= self._next_due_s and (fresh or now_s >= self._at_the_latest_s):
+            due = now_s >= self._next_due_s and not self._is_unplaced(now_s)
+            if due and (fresh or now_s >= self._at_the_latest_s):
                 # Where the machine is too slow, one round follows the other without a turn between.
                 conductor.make_changes()
                 # New parameters take workers a few milliseconds; no round may be half of one kind.
@@ -97,13 +123,24 @@ class LiveLoop:
         one_of = self.conductor.rounds.pace.now.one_of
         turns = 1 + int((now_s - self._next_due_s) / (one_of * self._period_s))
         self._next_due_s += turns * one_of * self._period_s
-        if not self.conductor.mission.wants_rounds:
+        before, self.before = self.before, None
+        mission = self.conductor.mission
+        nowhere = before is not None and before.wanted and mission.state == "waiting"
+        if not (mission.wants_rounds or nowhere):
             return False
         tally = self.conductor.rounds.tally
         tally.due += turns * one_of
-        tally.missed += turns - 1
+        tally.missed += turns - (not nowhere)
         tally.spared += turns * (one_of - 1)
-        return True
+        return not nowhere
+
+    def _is_unplaced(self, now_s: float) -> bool:
+        """Whether a restarted orchestrator does not know yet where the car is."""
+        return (
+            self.before is not None
+            and now_s < self._unplaced_until_s
+            and self.conductor.mission.state == "waiting"
+        )
 
     def _start_round(self, now_s: float) -> None:
         """Start the round that is due, or count why it is not."""

@@ -23,7 +23,6 @@ from foretwin.orchestrator.instructions import (
     UseWorld,
 )
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction
-from foretwin.orchestrator.routing.map_matching import OffRoadStretch
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.telemetry.estimator.map_aid import RoadLine
@@ -60,9 +59,9 @@ class Mission:
         self.start_stamp_ns = start_stamp_ns
         self.road_line: RoadLine | None = None
         """The line that the latest state drives along; None in doubt, or between two matches."""
-        self._way = way
+        self.way = way
         self._settings = settings
-        self._visits = VisitBook()
+        self.visits = VisitBook()
         self._current: str | None = None
         self._passed_s_m: float | None = None
         self._car: VehicleState | None = None
@@ -79,28 +78,28 @@ class Mission:
         return [
             BuildWorld(junction.summary.id, load=True)
             for junction in junctions
-            if self._visits.see(junction, at, load=True)
+            if self.visits.see(junction, at, load=True)
         ]
 
     def give_route(self, route: Route) -> None:
         """Follow this route from the next state on."""
-        self._way.give(route)
+        self.way.give(route)
 
     def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
         """Take where the car is."""
         self._car = state
-        self._way.take_speed(state)
+        self.way.take_speed(state)
         self.road_line = None
         if not self._time_to_match(state):
             return []
-        passed = self._way.locate(state)
+        passed = self.way.locate(state)
         if passed is None:
             return self._off_map()
-        self.road_line = self._way.road_line(state)
+        self.road_line = self.way.road_line(state)
         todo: list[Instruction] = []
         if self.state != "following":
             text = "on the map" if self.state == "waiting" else "back on the map"
-            todo.append(Notice("info", f"{text}: {self._way.road_text}"))
+            todo.append(Notice("info", f"{text}: {self.way.road_text}"))
             self.state = "following"
         at = Moment(mono_s, self.drive_time_s)
         for junction in passed:
@@ -115,16 +114,16 @@ class Mission:
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
         """A junction's World is built and loaded by the workers."""
-        self._visits.take_world(junction_id, world, Moment(mono_s, self.drive_time_s))
+        self.visits.take_world(junction_id, world, Moment(mono_s, self.drive_time_s))
         return self._choose_current()
 
     def on_world_failed(self, junction_id: str) -> None:
         """A junction's World cannot be built; the drive goes on without it."""
-        self._visits.fail(junction_id)
+        self.visits.fail(junction_id)
 
     def on_round(self, junction_id: str, *, futures: int) -> None:
         """A round for a junction is complete."""
-        self._visits.count_round(junction_id, futures=futures)
+        self.visits.count_round(junction_id, futures=futures)
 
     # What goes out.
 
@@ -138,7 +137,7 @@ class Mission:
     @property
     def next_junction(self) -> tuple[str, float] | None:
         """Name of the junction ahead and seconds until the car is there."""
-        for ahead in self._way.junctions[:1]:
+        for ahead in self.way.junctions[:1]:
             return ahead.junction.summary.name or ahead.junction.summary.id, ahead.in_s
         return None
 
@@ -147,18 +146,18 @@ class Mission:
         """The junction that the car is at, or has before it."""
         if self._current is not None:
             return self._current
-        return next((a.junction.summary.id for a in self._way.junctions), None)
+        return next((a.junction.summary.id for a in self.way.junctions), None)
 
     @property
     def route_m(self) -> float | None:
         """How far along its route the car is, None off the map."""
-        return self._way.s_m if self.state == "following" else None
+        return self.way.s_m if self.state == "following" else None
 
     def worlds_ahead(self) -> list[str]:
         """Ids of the Worlds that the coming rounds need, the current one first."""
         ids = [self._current] if self._current else []
-        ids += [ahead.junction.summary.id for ahead in self._way.junctions]
-        visits = [self._visits.get(junction_id) for junction_id in dict.fromkeys(ids)]
+        ids += [ahead.junction.summary.id for ahead in self.way.junctions]
+        visits = [self.visits.get(junction_id) for junction_id in dict.fromkeys(ids)]
         return [v.world.id for v in visits if v is not None and v.load and v.world is not None]
 
     @property
@@ -173,12 +172,12 @@ class Mission:
         car = self._car
         if car is None or not self.wants_rounds:
             return None
-        visit = self._visits.latest(self._current) if self._current else None
+        visit = self.visits.latest(self._current) if self._current else None
         if visit is None or visit.world is None:
             return NotReady("the world is not ready", world_late=True)
         if not car.yaw_valid:
             return NotReady("the heading is not known", world_late=False)
-        path = self._way.path(
+        path = self.way.path(
             visit.world, speed_mps=car.speed_mps, horizon_s=self._settings.horizon_s
         )
         if path is None:
@@ -187,19 +186,14 @@ class Mission:
             junction_id=visit.junction.summary.id,
             world_id=visit.world.id,
             path=path,
-            cruise_speed_mps=self._way.cruise_speed_mps,
-            off_lanes_m=self._way.off_lanes_m,
+            cruise_speed_mps=self.way.cruise_speed_mps,
+            off_lanes_m=self.way.off_lanes_m,
         )
 
     @property
     def arrived(self) -> FirstOf[Visit]:
         """The intersections that the car reached, in order."""
-        return self._visits.arrived
-
-    @property
-    def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:
-        """Stretches driven where the map says that cars may not."""
-        return self._way.off_road_stretches
+        return self.visits.arrived
 
     # Inside.
 
@@ -213,7 +207,7 @@ class Mission:
     def _within_look_ahead(self) -> list[str]:
         return [
             ahead.junction.summary.id
-            for ahead in self._way.junctions
+            for ahead in self.way.junctions
             if ahead.in_s <= self._settings.look_ahead_s
         ]
 
@@ -233,9 +227,9 @@ class Mission:
     def _arrive(self, passed: PassedJunction, at: Moment) -> list[Instruction]:
         summary = passed.junction.summary
         todo: list[Instruction] = []
-        if self._visits.see(passed.junction, at, load=True):
+        if self.visits.see(passed.junction, at, load=True):
             todo.append(BuildWorld(summary.id, load=True))
-        self._visits.arrive(summary.id, at)
+        self.visits.arrive(summary.id, at)
         self._passed_s_m = passed.centre_s_m
         text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
         return [*todo, Notice("info", text)]
@@ -244,18 +238,18 @@ class Mission:
         soon = set(self._within_look_ahead())
         wanted = [
             (ahead.junction, True)
-            for ahead in self._way.junctions
+            for ahead in self.way.junctions
             if ahead.junction.summary.id in soon
         ]
-        wanted += [(junction, False) for junction in self._way.other_turns]
+        wanted += [(junction, False) for junction in self.way.other_turns]
         todo: list[Instruction] = [
             BuildWorld(junction.summary.id, load)
             for junction, load in wanted
-            if self._visits.see(junction, at, load=load)
+            if self.visits.see(junction, at, load=load)
         ]
-        for ahead in self._way.junctions:
+        for ahead in self.way.junctions:
             if ahead.distance_m <= self._settings.radius_m:
-                self._visits.enter(ahead.junction.summary.id, at)
+                self.visits.enter(ahead.junction.summary.id, at)
         return todo
 
     def _choose_current(self) -> list[Instruction]:
@@ -263,13 +257,13 @@ class Mission:
         if self.state != "following":
             return []
         if self._passed_s_m is not None:
-            away_m = self._way.s_m - self._passed_s_m
+            away_m = self.way.s_m - self._passed_s_m
             if away_m < KEEP_PAST_CENTRE_M and self._current is not None:
                 return []
             self._passed_s_m = None
         chosen = None
         for junction_id in self._within_look_ahead():
-            visit = self._visits.get(junction_id)
+            visit = self.visits.get(junction_id)
             if visit is None or visit.failed:
                 continue
             chosen = junction_id if visit.world is not None else None
@@ -277,18 +271,18 @@ class Mission:
         if chosen == self._current:
             return []
         self._current = chosen
-        world = self._visits.latest(chosen).world if chosen else None
+        world = self.visits.latest(chosen).world if chosen else None
         return [UseWorld(world.id if world is not None else None)]
 
     def _deviations(self) -> list[Instruction]:
         todo: list[Instruction] = []
-        if self._way.off_route != self._off_route_reported:
-            self._off_route_reported = self._way.off_route
+        if self.way.off_route != self._off_route_reported:
+            self._off_route_reported = self.way.off_route
             if self._off_route_reported:
                 todo.append(Notice("warning", "left the given route; the way ahead is predicted"))
             else:
                 todo.append(Notice("info", "back on the given route"))
-        stretches = self._way.off_road_stretches
+        stretches = self.way.off_road_stretches
         if len(stretches) > self._stretches_reported:
             self._stretches_reported = len(stretches)
             last = stretches[-1]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, ROUTER, VIEWER
 from foretwin.orchestrator.instructions import Notice
-from foretwin.orchestrator.runner.supervisor import Supervisor
+from foretwin.orchestrator.runner.supervisor import Death, SupervisedRow
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -22,11 +23,27 @@ ROUTER_START_S = 15.0
 """What a router that was started again has until it must be there."""
 
 
+class WatchedProcesses(Protocol):
+    """The processes of a drive, whoever started them."""
+
+    def poll(self, now_s: float) -> list[Death]:
+        """Return deaths since the last call."""
+
+    def running(self) -> list[str]:
+        """Return the ids of processes that have not ended."""
+
+    def row(self, process_id: str) -> SupervisedRow:
+        """Return the table's row of a process."""
+
+    def kill(self, process_id: str) -> None:
+        """End a process that hangs."""
+
+
 @dataclass(slots=True)
 class ProcessWatch:
     """Tells of each death once, and ends those that hang; call `look_after` ten times a second."""
 
-    supervisor: Supervisor
+    supervisor: WatchedProcesses
     ended_by: str | None = None
     """Whose death ends the drive, in words."""
     given_up: set[str] = field(default_factory=set)

@@ -25,7 +25,7 @@ from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.runner.local_bus import OUTSIDERS, member_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
 
-ORCHESTRATOR = "orchestrator"
+ORCHESTRATOR, SUPERVISOR = "orchestrator", "supervisor"
 ROUTER = "router"
 BUILDER = "builder"
 MIRROR = "mirror"
@@ -270,6 +270,11 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     if row.name in (TUNING, RECORDER, VIEWER) and plan.config.lock_step:
         return row._replace(when_dead="report")
     return row
+
+
+def rows_by_id(plan: DrivePlan) -> dict[str, ProcessRow]:
+    """Return the row of each process of a drive, in the order in which they are started."""
+    return {one: row_of(row, plan) for row in PROCESSES for one in process_ids(row, plan)}
 
 
 def expected_ids(plan: DrivePlan) -> frozenset[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import Literal
 
@@ -40,11 +41,13 @@ class ProgressLine:
 
     def __exit__(self, *_: object) -> None:
         if self._status is not None:
-            self._status.stop()
+            with contextlib.suppress(OSError):
+                self._status.stop()
 
     def say(self, text: str) -> None:
         """Print a line that stays."""
-        self._console.print(visible(text), soft_wrap=True)
+        with contextlib.suppress(OSError):  # a terminal that is gone ends no drive
+            self._console.print(visible(text), soft_wrap=True)
 
     def tell(self, event: Event) -> None:
         """Print what the engineer should know now: warnings and errors."""
@@ -64,7 +67,8 @@ class ProgressLine:
             conductor.context.publish("worker_status", status)
         text = self._text(progress)
         if self._status is not None:
-            self._status.update(words(text))
+            with contextlib.suppress(OSError):
+                self._status.update(words(text))
         elif now_s - self._last_plain_s >= PLAIN_PERIOD_S:
             self._last_plain_s = now_s
             say(text, error=True)

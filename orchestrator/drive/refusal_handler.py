@@ -15,19 +15,19 @@ class RefusalHandler:
 
     def __init__(self, tell: Callable[[Notice], None]) -> None:
         self._tell = tell
-        self._refusals = Refusals()
+        self.counted = Refusals()
 
     def take(self, refused: Refused) -> None:
         """Count something that was not let in."""
-        self._say("error", self._refusals.take(refused))
+        self._say("error", self.counted.take(refused))
 
     def leave_out(self, key: str, count: int) -> None:
         """Count road users that were left out of a message on `key`."""
-        self._say("warning", self._refusals.note(key, "road users that cannot be", count=count))
+        self._say("warning", self.counted.note(key, "road users that cannot be", count=count))
 
     def record(self) -> dict[str, Any]:
         """Return the `refused` of run.json."""
-        return self._refusals.record()
+        return self.counted.record()
 
     def _say(self, level: Literal["warning", "error"], text: str | None) -> None:
         if text is not None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import re
 import shutil
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 from foretwin.contracts.bus import BusUnreachable, ZenohBus
@@ -45,36 +43,31 @@ def on_local_bus(plan: DrivePlan) -> DrivePlan:
     return replace(plan, local=local, bus=local.setup_of(ORCHESTRATOR))
 
 
-@contextlib.contextmanager
-def join_bus(plan: DrivePlan, supervisor: Supervisor) -> Iterator[ZenohBus]:
-    """Start the router and join; afterwards both are gone, and so are the passwords."""
-    try:
-        with _joined(plan, supervisor) as bus:
-            yield bus
-    finally:
-        supervisor.stop(grace_s=0.0)
-        if plan.local is not None:
-            plan.local.remove()
+def start_router(plan: DrivePlan, supervisor: Supervisor) -> None:
+    """Start the router, and wait until it listens.
 
-
-def _joined(plan: DrivePlan, supervisor: Supervisor) -> ZenohBus:
-    """Start the router and return the orchestrator's session.
-
-    UserError, with no folder left, where it cannot listen. Nobody connects before it listens:
-    where the port is another's, that would be a stranger's bus.
+    UserError, with no folder left, where it cannot. Nobody connects before it listens: where the
+    port is another's, that would be a stranger's bus.
     """
     row = next(row for row in PROCESSES if row.name == ROUTER)
     plan.router_word_file.unlink(missing_ok=True)
     supervisor.start(row_of(row, plan), row.setup(plan, ROUTER))
-    try:
-        word = _word(plan, supervisor)
-        if word != LISTENS:
-            raise UserError(cannot_listen_text(plan.bus.endpoint, word))
-        return ZenohBus(plan.bus)
-    except (BusUnreachable, UserError):
+    word = _word(plan, supervisor)
+    if word != LISTENS:
         supervisor.stop(grace_s=0.0)
         shutil.rmtree(plan.folder, ignore_errors=True)
-        raise
+        raise UserError(cannot_listen_text(plan.bus.endpoint, word))
+
+
+def join_bus(plan: DrivePlan) -> ZenohBus:
+    """Return a session of the run's bus; raises BusUnreachable where its router stays away."""
+    deadline_s = time.monotonic() + LISTENS_WITHIN_S
+    while True:
+        try:
+            return ZenohBus(plan.bus)
+        except BusUnreachable:  # it has died and is started again
+            if time.monotonic() > deadline_s:
+                raise
 
 
 def _word(plan: DrivePlan, supervisor: Supervisor) -> str:

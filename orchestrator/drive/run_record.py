@@ -29,24 +29,27 @@ def run_record(
     restarted: int,
     *,
     exit_word: str,
+    ended_by: Sequence[str] = (),
     wall_s: float,
     mono_s: float,
     troubles: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return everything that run.json says; `restarted` counts processes started again.
 
-    `troubles` are what is missing since processes died.
+    `troubles` are what is missing since processes died, `ended_by` how each orchestrator of this
+    drive before this one ended.
     """
     plan, mission, futures = conductor.plan, conductor.mission, conductor.rounds.futures
     tally, dispatch = conductor.rounds.tally, conductor.rounds.dispatcher.dispatch
     ledger = Ledger(rounds=tally.ledger(), jobs=jobs_ledger(dispatch.count))
+    junctions = mission.visits.records(mono_s=mono_s)
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror.independent
     if independent is None:
         independent = plan.commands_recorded
     return {
         **_known_at_start(plan, exit_word),
-        "intersections": [visit.record(mono_s=mono_s) for visit in mission.arrived],
+        "intersections": junctions,
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
         "tuning": conductor.tuning.record(),
@@ -64,6 +67,7 @@ def run_record(
         "side_by_side": conductor.ads.record(),
         "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),
         "processor": msgspec.to_builtins(cpu_uses(plan.processes_dir)),
+        "orchestrator": {"restarts": len(ended_by), "ended_by": list(ended_by)},
         "workers": {
             "started": plan.config.workers,
             "restarted": restarted,
@@ -92,12 +96,12 @@ def run_record(
                 "way_ids": list(stretch.way_ids),
                 "length_m": round(stretch.length_m, 1),
             }
-            for stretch in mission.off_road_stretches
+            for stretch in mission.way.off_road_stretches
         ],
         "kept": kept_record(plan.folder, plan.config.keep),
         "memory": conductor.context.memory.record(),
         "left_out": {
-            "intersections": mission.arrived.left_out,
+            "intersections": junctions.left_out,
             "changes": conductor.changes.made.left_out,
             "parameter_changes": conductor.tuning.parameters.made.left_out,
             "verdicts": conductor.tuning.findings.left_out,
@@ -134,6 +138,16 @@ def telemetry_of(conductor: Conductor) -> dict[str, Any]:
     if intake.end is not None and plan.config.resolved_source != "live":
         published = intake.end.published
     return telemetry_ledger(read_tally(tally_file(plan.recording)), published)
+
+
+def restart_troubles(plan: DrivePlan, ended_by: Sequence[str]) -> list[str]:
+    """Return what a drive misses since orchestrators died; in lock step all is played again."""
+    if not ended_by or plan.config.lock_step:
+        return []
+    times = "once" if len(ended_by) == 1 else f"{len(ended_by)} times"
+    how = ", ".join(sorted(set(ended_by)))
+    lost = "rounds at work then are lost, and those due before the next one was there are missed"
+    return [f"the orchestrator ended {times} by {how}: {lost}"]
 
 
 def lost_lines(record: dict[str, Any]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.visited import RoundsOf, Visited
 from foretwin.world_gen.junctions.intersections import Junction
 
 MOST_JUNCTIONS, SEEN_LATELY_S = 64, 120.0
@@ -29,6 +30,7 @@ class Visit:
     junction: Junction
     load: bool
     """Whether the workers load its World, rather than its being built for a turn not expected."""
+    seen: Moment
     world: World | None = None
     failed: bool = False
     ready: Moment | None = None
@@ -41,6 +43,13 @@ class Visit:
 
     def record(self, *, mono_s: float) -> dict[str, Any]:
         """Return the entry of run.json; a World that never came is late by all the time since."""
+        return {**self._told(mono_s=mono_s), "rounds": self.rounds, "futures": self.futures}
+
+    def row(self, *, mono_s: float) -> dict[str, Any]:
+        """Return the row of the table `junctions`, as far as is known."""
+        return {**self._told(mono_s=mono_s), "seen_at_s": _drive_s(self.seen)}
+
+    def _told(self, *, mono_s: float) -> dict[str, Any]:
         summary = self.junction.summary
         entered_s = mono_s if self.entered is None else self.entered.mono_s
         ready_s = max(mono_s, entered_s) if self.ready is None else self.ready.mono_s
@@ -50,8 +59,6 @@ class Visit:
             "built_at_s": _drive_s(self.ready),
             "within_radius_at_s": _drive_s(self.entered),
             "world_ready_before_s": round(entered_s - ready_s, 3),
-            "rounds": self.rounds,
-            "futures": self.futures,
         }
 
 
@@ -62,6 +69,25 @@ class VisitBook:
         self._latest: OrderedDict[str, Visit] = OrderedDict()
         """By junction, the one seen last at the end."""
         self.arrived: FirstOf[Visit] = FirstOf(MOST_LISTED)
+        self._news: list[Visit] = []
+        self._earlier = Visited([], {})
+
+    def go_on(self, earlier: Visited) -> None:
+        """Begin with what another book of the same drive held."""
+        self._earlier = earlier
+
+    def records(self, *, mono_s: float) -> FirstOf[dict[str, Any]]:
+        """Return the `intersections` of run.json: those that the car reached, in order."""
+        listed: FirstOf[dict[str, Any]] = FirstOf(MOST_LISTED)
+        listed.extend(self._earlier.records)
+        listed.extend(one.record(mono_s=mono_s) for one in self.arrived)
+        listed.left_out += self.arrived.left_out
+        return listed
+
+    def take_news(self) -> list[Visit]:
+        """Return visits that are there, or have their World, since the last call."""
+        news, self._news = self._news, []
+        return news
 
     def get(self, junction_id: str) -> Visit | None:
         """Return the latest visit of a junction, None where it was never seen."""
@@ -91,7 +117,8 @@ class VisitBook:
             more = load and not before.load
             before.load = before.load or load
             return more
-        visit = Visit(junction, load, seen_s=at.drive_time_s)
+        rounds, futures = self._earlier.ahead.pop(junction.summary.id, RoundsOf())
+        visit = Visit(junction, load, at, rounds=rounds, futures=futures, seen_s=at.drive_time_s)
         self._latest[junction.summary.id] = visit
         if before is None:
             self._forget(before_s=at.drive_time_s - SEEN_LATELY_S)
@@ -121,6 +148,7 @@ class VisitBook:
         for visit in [*late, *([latest] if latest else [])]:
             if visit.ready is None:
                 visit.ready = at
+                self._news += [visit] if visit.arrived is not None else []
         if latest is not None:
             latest.world = latest.world or world
 
@@ -140,6 +168,7 @@ class VisitBook:
         visit = self._latest[junction_id]
         visit.arrived, visit.entered = at, visit.entered or at
         self.arrived.append(visit)
+        self._news.append(visit)
 
 
 def _drive_s(at: Moment | None) -> float | None:

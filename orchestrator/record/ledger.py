@@ -85,6 +85,12 @@ class RoundTally:
     last_failure: str = ""
     """Why a round was given up last."""
 
+    @property
+    def ended(self) -> int:
+        """How many rounds have ended, in whatever way."""
+        given_up = self.failed + self.cut_off
+        return self.run + self.missed + self.spared + self.unseeded + given_up
+
     def not_ready(self, *, world_late: bool) -> None:
         """Count a round that is due and cannot be run now."""
         if world_late:

@@ -31,6 +31,7 @@ from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import sync_folder
 from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, played_with
 from foretwin.orchestrator.record.kept_parts import KeptParts
+from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.run_streams import Rows, RunStreams
 
 log = logging.getLogger("results")
@@ -83,6 +84,10 @@ _COLUMNS = {
         "stamp_ns:int since_stamp_ns:int culprit:str cause:str text:str evidence:str "
         "confidence:float"
     ),
+    "junctions": columns(
+        "id:str kind:str name:str control:str lat:float lon:float seen_at_s:float "
+        "arrived_at_s:float built_at_s:float within_radius_at_s:float world_ready_before_s:float"
+    ),
     "events": columns_of(Event),
 }
 _ROUNDS = columns(
@@ -129,6 +134,7 @@ class ResultTables:
         self._queue: queue.Queue[tuple[str, Rows] | None] = queue.Queue(QUEUE_DEPTH)
         self._lossless, self._roll = lossless, (keep or Keep()).tables
         self._kept = KeptParts(folder.parent, keep or Keep())
+        self._left = False
         self._dropped = 0
         self.troubles: list[str] = []
         """What is lost or not in Parquet, and why; complete once closed."""
@@ -136,8 +142,10 @@ class ResultTables:
         self._moved_s = time.monotonic()
         self._look_s = 0.0
         self._thread = threading.Thread(target=self._run, name="results", daemon=True)
+        begun = bool(kept_rows(folder, "metrics", "name"))  # by an orchestrator before this one
         self._thread.start()
-        self.add("metrics", metric_rows())
+        if not begun:
+            self.add("metrics", metric_rows())
 
     @property
     def dropped(self) -> int:
@@ -177,6 +185,13 @@ class ResultTables:
                 f"{self._dropped} rows are lost: they came faster than they could be written"
             )
 
+    def leave(self, timeout_s: float = CLOSE_S) -> None:
+        """Write everything, and leave the streams to who goes on with them."""
+        self._left = True
+        with contextlib.suppress(queue.Full):
+            self._queue.put(None, timeout=timeout_s)
+            self._thread.join(timeout_s)
+
     @property
     def _how(self) -> str:
         return f"`foretwin recover {self._folder.parent}` makes it of what was written"
@@ -187,7 +202,8 @@ class ResultTables:
     def _run(self) -> None:
         try:
             self._write_streams()
-            self._make_parquet()
+            if not self._left:
+                self._make_parquet()
         except Exception as error:
             log.exception("results cannot be written")
             self.troubles.append(f"results cannot be written: {one_line(error)}")

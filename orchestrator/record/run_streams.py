@@ -33,11 +33,15 @@ class _WaitingRecord(NamedTuple):
 class RunStreams:
     """One stream for each table of `schemas`, in one folder; nothing here raises.
 
-    What the disk does not take now is tried again at the next `write`.
+    What the disk does not take now is tried again at the next `write`. A stream that is there is
+    gone on with; of a table that is in Parquet already nothing more is taken.
     """
 
     def __init__(self, folder: Path, schemas: Mapping[str, pa.Schema]) -> None:
-        self._folder, self._schemas = folder, schemas
+        self._folder = folder
+        done = {name for name in schemas if _is_done(folder, name)}
+        self._schemas = {name: of for name, of in schemas.items() if name not in done}
+        self._done = done
         self._streams: dict[str, TableStream] = {}
         self._rows: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
         self._waiting: dict[str, deque[_WaitingRecord]] = defaultdict(deque)
@@ -51,7 +55,10 @@ class RunStreams:
 
     def take(self, table: str, rows: Rows) -> None:
         """Take rows of a table; `write` writes them."""
-        self._rows[table].extend(rows)
+        if table in self._done:
+            self.lost["they came after their table was complete"] += len(rows)
+        else:
+            self._rows[table].extend(rows)
 
     def write(self, *, sync: bool) -> None:
         """Append what was taken; with `sync` a power cut leaves it, too."""
@@ -141,3 +148,8 @@ class RunStreams:
             self.lost[self._refused[table]] += 1
             return False
         return True
+
+
+def _is_done(folder: Path, table: str) -> bool:
+    stream = folder / f"{table}{SUFFIX}"
+    return stream.with_suffix(".parquet").exists() and not stream.exists()

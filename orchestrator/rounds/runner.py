@@ -88,7 +88,7 @@ class RoundRunner:
             least=plan.config.fewest_futures,
             period_s=1.0 / plan.config.rate_hz,
         )
-        self._next_round_id = 0
+        self.next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
         self._slow_reported = False
         self._news = RoundNews(self._tell)
@@ -112,7 +112,7 @@ class RoundRunner:
     ) -> None:
         """Open a round and give its jobs out."""
         self.futures.off_lanes_rounds += intent.off_lanes_m > 0.0
-        round_id, self._next_round_id = self._next_round_id, self._next_round_id + 1
+        round_id, self.next_round_id = self.next_round_id, self.next_round_id + 1
         pace, lock_step = self.pace.now, self._plan.config.lock_step
         period_ns = round(1e9 / self._plan.config.rate_hz)
         jobs = self._planner.plan(

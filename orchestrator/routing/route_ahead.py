@@ -19,7 +19,7 @@ from foretwin.orchestrator.routing.map_matching import MapMatcher, Match, OffRoa
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
-from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
+from foretwin.orchestrator.routing.route_follower import PlaceOnRoute, RouteFollower, RouteProgress
 from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
@@ -100,6 +100,15 @@ class WayAhead:
         """The car's position along its route."""
         assert self._progress is not None
         return self._progress.s_m
+
+    @property
+    def place(self) -> PlaceOnRoute:
+        """Where on its route the car was last."""
+        return self._follower.place
+
+    def go_on(self, place: PlaceOnRoute) -> None:
+        """Look for the car from a place on its route on; before the first state."""
+        self._follower.go_on(place)
 
     @property
     def off_route(self) -> bool:

@@ -38,6 +38,13 @@ class RouteProgress(NamedTuple):
     passed: tuple[PassedJunction, ...]
 
 
+class PlaceOnRoute(NamedTuple):
+    """How far along its way a car is, and at which edge of the routes given."""
+
+    s_m: float = 0.0
+    given_place: int = 0
+
+
 class RouteFollower:
     """Follows a car along the routes given, or along the most probable path without any."""
 
@@ -62,6 +69,9 @@ class RouteFollower:
         self._direction_known = False
         self._turning = False
         self._given_from = 0
+        self._given_at = 0
+        """Where on the given routes the first edge of the present one lies, while on them."""
+        self._looked_for_from = 0
         self._doubt: Match | None = None
         self._encounters: tuple[PassedJunction, ...] = ()
         self._passed_at: dict[str, float] = {}
@@ -69,6 +79,15 @@ class RouteFollower:
     def give(self, routes: Sequence[Route]) -> None:
         """Follow these from the next match on; what is driven on now is kept until they are met."""
         self._given, self._given_from, self._on_given = GivenRoutes(routes), 0, False
+
+    @property
+    def place(self) -> PlaceOnRoute:
+        """Where the car was last; a route that crosses itself is not begun anew from it."""
+        return PlaceOnRoute(self._s_m, self._given_at + (self._place if self._on_given else 0))
+
+    def go_on(self, place: PlaceOnRoute) -> None:
+        """Look for the car from here on the routes given, and count metres on; before it is met."""
+        self._s_m, self._looked_for_from = place.s_m, place.given_place
 
     @property
     def route(self) -> Route:
@@ -137,13 +156,15 @@ class RouteFollower:
 
     def _begin(self, match: Match) -> None:
         edge = match.directed_edge
-        place = self._given.find(edge, direction_matters=match.direction_known)
+        place = self._given.find(
+            edge, direction_matters=match.direction_known, start=self._looked_for_from
+        )
         s_on_edge = match.s_on_edge_m
         if place is not None:
             edges = self._given.edges_from(place)
             if edges[0].reverse != edge.reverse:
                 s_on_edge = edge.edge.length_m - s_on_edge
-            self._given_from = place
+            self._given_from = self._given_at = place
         else:
             edges = (edge,)
         self._on_given = place is not None
@@ -235,7 +256,7 @@ class RouteFollower:
         assert self._route is not None
         rest = self._given.edges_from(place)[1:]
         self._on_given = True
-        self._given_from = place
+        self._given_from, self._given_at = place, place - self._place
         self._set_route(Route((*self._route.edges[: self._place + 1], *rest), self._route.origin_m))
 
     # --- what lies ahead --------------------------------------------------------------------
@@ -256,6 +277,7 @@ class RouteFollower:
         if drop:
             grown = Route(grown.edges[drop:], float(grown.start_m[drop]))
             self._place -= drop
+            self._given_at += drop
         if grown is not route:
             self._route = grown
             self._encounters = tuple(encounters(grown, self._junction_at))

@@ -167,7 +167,7 @@ class Supervisor:
             if not managed.gone and managed.due_s is None and exit_code is not None:
                 pause_s = None
                 if managed.row.when_dead == "restart":
-                    pause_s = self._pause_s(process_id, now_s)
+                    pause_s = self.pause_s(process_id, now_s)
                 managed.gone = pause_s is None
                 managed.due_s = None if pause_s is None else now_s + pause_s
                 again = not managed.gone
@@ -175,6 +175,10 @@ class Supervisor:
             if managed.due_s is not None and now_s >= managed.due_s:
                 self._start_again(managed, now_s)
         return deaths
+
+    def anew(self) -> Supervisor:
+        """Return a supervisor without processes, which goes on with the counts of this one."""
+        return Supervisor(self.launch, self.started, self.restarted, _deaths=self._deaths)
 
     def _start_again(self, managed: _Managed, now_s: float) -> None:
         process_id, managed.due_s = managed.setup.process_id, None
@@ -196,8 +200,10 @@ class Supervisor:
             if gives_way(managed.child.pid, managed.row.nice):
                 del self._to_give_way[process_id]
 
-    def _pause_s(self, process_id: str, now_s: float) -> float | None:
-        """Return how long to wait before another start, None where there is to be none."""
+    def pause_s(self, process_id: str, now_s: float) -> float | None:
+        """Count a death; return how long to wait before the next start, None where there is to be
+        none: it died too often.
+        """
         recent = self._deaths[process_id]
         recent.append(now_s)
         while recent and now_s - recent[0] > RESTARTS_WITHIN_S:

@@ -6,7 +6,7 @@ Pure but for `ask`: changes wait until no round is open, so that each round has 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -24,6 +24,16 @@ from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_accept
 from foretwin.sim_worker.analysis.identify.parameters_in_force import ParametersInForce
 
 _BY_HAND = ("set", "rolled_back")
+
+
+class ParametersStanding(NamedTuple):
+    """What counts in a drive, for one that goes on with it."""
+
+    in_force: ParametersInForce
+    version: int
+    made: FirstOf[ParameterChange]
+    pinned: frozenset[str]
+    stamp_ns: int
 
 
 class ParameterVersions:
@@ -49,6 +59,17 @@ class ParameterVersions:
         self._pinned: frozenset[str] = frozenset()
         self._awaited: set[str] = set()
         self._stamp_ns = 0
+
+    @property
+    def standing(self) -> ParametersStanding:
+        """What processes have been told; what still waits is not of it."""
+        return ParametersStanding(
+            self.in_force, self.version, self.made, self._pinned, self._stamp_ns
+        )
+
+    def go_on(self, standing: ParametersStanding) -> None:
+        """Begin with what counted before; every process is told as it comes up."""
+        self.in_force, self.version, self.made, self._pinned, self._stamp_ns = standing
 
     @property
     def settled(self) -> bool:

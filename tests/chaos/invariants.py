@@ -81,8 +81,7 @@ def fitting_codes(left: Left) -> set[int]:
         codes = {130}
     if left.befell("vehicle", what=("kill", "segv", "term", "hup")):
         codes = codes | {1, 130} if asked else {1}
-    for one in left.befell("orchestrator", "command", what=KILLED):
-        # Who started the orchestrator may start it again, or end with it.
+    for one in left.befell("command", what=KILLED):
         codes = codes | {-9 if one.fault.what == "kill" else -11}
     return codes
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 from pathlib import Path
 from typing import NamedTuple
@@ -29,17 +30,17 @@ class Member(NamedTuple):
 def members(run: Path, mark: str, command_pid: int) -> list[Member]:
     """Return the processes of a run that live, sorted by name.
 
-    Who was started with a setup is named by it. The orchestrator is who holds the run's log; the
-    command, where that is another process, is `command`. What else carries the mark is `other`.
+    Who was started with a setup is named by it. The command is the supervisor; the orchestrator is
+    who was forked from it last. What else carries the mark is `other`.
     """
     found = []
-    holder = _lock_holder(run / "log.jsonl")
+    orchestrator = _forked_last(run / "log.jsonl")
     for pid in marked(mark):
         if (name := _setup_name(pid, run)) is None:
             name = "other"
             if pid == command_pid:
                 name = "command"
-            if pid == holder or (pid == command_pid and holder is None):
+            if pid == orchestrator:
                 name = "orchestrator"
         found.append(Member(name, pid))
     return sorted(found)
@@ -77,12 +78,9 @@ def _setup_name(pid: int, run: Path) -> str | None:
     return None
 
 
-def _lock_holder(file: Path) -> int | None:
-    """Return who holds the exclusive lock of a file."""
-    with contextlib.suppress(OSError):
-        inode = str(file.stat().st_ino)
-        for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
-            words = line.split()
-            if words[1:4:2] == ["FLOCK", "WRITE"] and words[5].split(":")[2] == inode:
-                return int(words[4])
-    return None
+def _forked_last(log: Path) -> int | None:
+    """Return the newest orchestrator by a run's log."""
+    forked = re.findall(
+        r"forked the orchestrator as process (\d+)", log.read_text(encoding="utf-8")
+    )
+    return int(forked[-1]) if forked else None

@@ -182,20 +182,24 @@ def test_before_anything_came_to_the_disk_nothing_need_be_there(tmp_path: Path) 
 def test_processes_of_a_drive_are_found_by_what_it_tells(tmp_path: Path) -> None:
     mark, folder = f"chaos-test-{os.getpid()}", tmp_path / "run" / "processes"
     folder.mkdir(parents=True)
-    (folder.parent / "log.jsonl").touch()
     sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
     environment = os.environ | {MARK: mark}
     with (
         subprocess.Popen([*sleep, "--setup", str(folder / "w1.json")], env=environment) as worker,
         subprocess.Popen(sleep, env=environment) as command,
+        subprocess.Popen(sleep, env=environment) as fork,
     ):
+        said = f'{{"text": "forked the orchestrator as process {fork.pid}"}}\n'
+        (folder.parent / "log.jsonl").write_text(said)
         try:
-            wait_for(lambda: len(marked(mark)) == 2, "both of them")
+            wait_for(lambda: len(marked(mark)) == 3, "all of them")
             found = members(folder.parent, mark, command.pid)
-            assert found == [("orchestrator", command.pid), ("w1", worker.pid)]
-            assert [one.kind for one in found] == ["orchestrator", "w"]
+            assert found == [
+                ("command", command.pid), ("orchestrator", fork.pid), ("w1", worker.pid),
+            ]  # fmt: skip
+            assert [one.kind for one in found] == ["command", "orchestrator", "w"]
         finally:
-            assert len(end_all(mark)) == 2
+            assert len(end_all(mark)) == 3
         wait_for(lambda: not is_running(worker.pid), "its end")
     assert marked(mark) == []
 

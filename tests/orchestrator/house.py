@@ -184,10 +184,18 @@ class Worker(Process):
 class House:
     """A conductor with its builder, its workers and a car that drives through the town."""
 
-    def __init__(self, folder: Path, *, at_once: bool = False, **settings: Any) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        at_once: bool = False,
+        plan: DrivePlan | None = None,
+        **settings: Any,
+    ) -> None:
+        """`plan` is that of a drive to go on with."""
         given = {"futures": 6, "futures_per_job": 3, **settings}
         # However slow the machine is that tests run on, rounds are of one size.
-        self.plan = town_plan(folder, **{"least_futures": given["futures"], **given})
+        self.plan = plan or town_plan(folder, **{"least_futures": given["futures"], **given})
         self.bus = MemoryBus()
         inputs = town()
         self.mission = Mission(

@@ -105,6 +105,12 @@ def child_pids(run: Path) -> dict[str, int]:
     return pids
 
 
+def orchestrator_pid(run: Path) -> int:
+    """Return the process of the newest orchestrator that the log names."""
+    forked = [one["text"] for one in log_lines(run) if one["text"].startswith("forked the orch")]
+    return int(forked[-1].rsplit(" ", 1)[1])
+
+
 def wait_for(condition: Callable[[], bool], what: str, *, within_s: float = DEADLINE_S) -> float:
     """Wait until a condition holds; returns the seconds that took, fails after `within_s`."""
     begun = time.monotonic()

@@ -22,7 +22,14 @@ from foretwin.contracts.joining import running_drive
 from foretwin.orchestrator.commands.cli import run as command
 from foretwin.orchestrator.record.results import TABLES
 from tests.starvation import kept_waiting
-from tests.system.foretwin_command import child_pids, is_running, run_folder, started, wait_for
+from tests.system.foretwin_command import (
+    child_pids,
+    is_running,
+    orchestrator_pid,
+    run_folder,
+    started,
+    wait_for,
+)
 
 SEED = int(os.environ.get("FORETWIN_KILL_SEED", "0")) or random.SystemRandom().randrange(1, 10**6)
 """Printed, so that a failure can be had again: FORETWIN_KILL_SEED=…"""
@@ -60,7 +67,10 @@ def killed(out: Path, arguments: tuple[str, ...], after_s: float) -> Killed:
             wait_for(lambda: time.monotonic() > kill_s - 2 * WITHIN_S, "a random instant")
             with kept_waiting(process.pid) as kept:
                 wait_for(lambda: time.monotonic() > kill_s, "a random instant")
+            # The supervisor first: it would start another orchestrator.
+            orchestrator = orchestrator_pid(run)
             process.kill()
+            os.kill(orchestrator, signal.SIGKILL)
             kill_s = time.monotonic()
             process.wait()
         pids = child_pids(run)

@@ -15,7 +15,13 @@ from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.telemetry.ros2.mapping import AUTOWARE
 from tests.starvation import kept_waiting
-from tests.system.foretwin_command import started
+from tests.system.foretwin_command import (
+    log_lines,
+    orchestrator_pid,
+    run_folder,
+    started,
+    wait_for,
+)
 from tests.system.ros2_car import Ros2Car
 
 CLOCK_ROW = '\n[[out]]\ntopic = "/clock"\ntype = "rosgraph_msgs/msg/Clock"\nsource = "clock"\n'
@@ -47,12 +53,18 @@ def test_a_killed_orchestrator_sends_nothing_towards_the_vehicle_after_200_ms(
         with started(tmp_path / "runs", *flags) as process:
             for _ in range(20):
                 assert car.drive_until(deadline_s=60.0) is not None, "nothing towards the vehicle"
+            run = run_folder(tmp_path / "runs")
+            assert run is not None
             with kept_waiting(process.pid) as kept:
                 killed_ns = time.monotonic_ns()
-                os.kill(process.pid, signal.SIGKILL)
+                os.kill(orchestrator_pid(run), signal.SIGKILL)
                 last_ns = killed_ns
                 while (heard := car.drive_until(deadline_s=1.0)) is not None:
                     last_ns = heard.received_mono_ns
+                # The next one goes on with the drive, and says nothing towards the vehicle.
+                stays = "nothing goes towards the vehicle any more"
+                wait_for(lambda: any(stays in one["text"] for one in log_lines(run)), stays)
+                assert car.drive_until(deadline_s=2.0) is None
             after_ms = (last_ns - killed_ns) / 1e6
             print(f"last message {after_ms:.1f} ms after SIGKILL")
             assert after_ms < 200.0 + 1e3 * kept.seconds

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections import defaultdict, deque
 
 import msgspec
@@ -40,7 +41,9 @@ class ParametersInForce:
         self.pinned: set[str] = set()
         self._vehicle_id = vehicle_id
         self._taken: dict[str, ParameterEstimate] = {}
-        self._before: dict[str, deque[Parameter]] = defaultdict(lambda: deque(maxlen=_ROLLBACKS))
+        self._before: dict[str, deque[Parameter]] = defaultdict(
+            functools.partial(deque[Parameter], (), _ROLLBACKS)
+        )
 
     def _is_pinned(self, name: str) -> bool:
         return name in self.pinned or (name == UNDERSTEER_GRADIENT and STIFFNESS in self.pinned)

@@ -64,6 +64,7 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
         "state_to_result_ms_p50": 101.0,
         "state_to_result_ms_p95": 101.9,
         "plan_comparison": None,
+        "intersections": [],
         "drive_time_s": 1.0,
         "recovered": {"lost": []},
     }  # fmt: skip

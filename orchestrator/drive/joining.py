@@ -1,0 +1,70 @@
+"""Waits until all processes of a drive are on the bus, and the vehicle has said what it is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.drive import InfoRequest
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.intake import unannounced
+from foretwin.orchestrator.drive.process_watch import ProcessWatch
+from foretwin.orchestrator.drive.supervision import DriveError
+
+START_TIMEOUT_S = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joining:
+    """The beginning of one drive; `look_after` is called again and again meanwhile."""
+
+    bus: Bus
+    conductor: Conductor
+    watch: ProcessWatch
+    look_after: Callable[[Conductor, float], None]
+    stop: Callable[[], bool]
+
+    def all_there(self) -> bool:
+        """Wait for all; False where it was stopped. Raises DriveError where one stays away."""
+        conductor = self.conductor
+        expected = conductor.strangers.expected
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while not expected <= conductor.alive:
+            if self.stop():
+                return False
+            self.look_after(conductor, time.monotonic())
+            missing = ", ".join(sorted(expected - conductor.alive))
+            if self.watch.given_up & expected:
+                dead = ", ".join(sorted(self.watch.given_up & expected))
+                raise DriveError(f"cannot be started: {dead}; see log.jsonl")
+            if time.monotonic() > deadline:
+                raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
+            conductor.handle(conductor.mailbox.take(0.1))
+        return self._ask_info(deadline)
+
+    def _ask_info(self, deadline: float) -> bool:
+        conductor, config = self.conductor, self.conductor.plan.config
+        answers = Mailbox(4)
+        while not self.stop():
+            self.bus.request(
+                "info", InfoRequest(), answers, timeout_s=2.0, vehicle=config.vehicle_id
+            )
+            reply = answers.take(3.0)
+            if isinstance(reply, Reply) and reply.message is not None:
+                conductor.take_info(reply.message)
+                return True
+            if config.resolved_source == "live":
+                # A live car may start when it likes, and need not know our question.
+                while (item := conductor.mailbox.take()) is not None:
+                    conductor.handle(item)
+                self.look_after(conductor, time.monotonic())
+                first_ns = conductor.intake.first_stamp_ns
+                # A gateway knows our question, and the antenna's place.
+                if first_ns is not None and conductor.plan.ros2 is None:
+                    conductor.take_info(unannounced(config.vehicle_id, first_ns))
+                    return True
+            elif time.monotonic() > deadline:
+                raise DriveError("the vehicle does not say what it is; see log.jsonl")
+        return False

@@ -1,0 +1,269 @@
+"""The orchestrator of one drive: joins its processes, runs the loop over it, and ends it."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.cpu_use import CpuMeter
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.simulation import RunEnd
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.in_charge import InCharge
+from foretwin.orchestrator.drive.interrupt import Interruption
+from foretwin.orchestrator.drive.joining import Joining
+from foretwin.orchestrator.drive.live_loop import LiveLoop
+from foretwin.orchestrator.drive.lock_step import LockStepError, LockStepLoop
+from foretwin.orchestrator.drive.mission import Mission, MissionSettings
+from foretwin.orchestrator.drive.process_watch import ProcessWatch
+from foretwin.orchestrator.drive.processes import BUILDER, ORCHESTRATOR, ROUTER
+from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
+from foretwin.orchestrator.drive.router_start import join_bus
+from foretwin.orchestrator.drive.run_record import (
+    lost_lines,
+    reserve_record,
+    restart_troubles,
+    run_record,
+)
+from foretwin.orchestrator.drive.standing import go_on, read_standing, standing_of
+from foretwin.orchestrator.drive.start_worlds import prepare_start
+from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.drive.supervision import CRASH, DriveError, DriveProcesses, Life
+from foretwin.orchestrator.instructions import Notice
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, write_record
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.orchestrator.runner.supervisor import fold_stderr
+
+log = logging.getLogger(ORCHESTRATOR)
+
+END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
+"""What recorder and viewer get to write at the end of a drive, live and where nothing may miss."""
+LAST_WORDS_S = 0.1
+"""How long nothing may come from processes that have ended before all is taken for heard."""
+INTERRUPT_GRACE_S = 1.2
+
+EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
+_CODES = {"completed": EXIT_DONE, "interrupted": EXIT_INTERRUPTED, "failed": EXIT_FAILED}
+
+
+class CrashError(RuntimeError):
+    """An error of ours has ended an orchestrator; the next one goes on with the drive."""
+
+
+class Orchestrator:
+    """One drive, or what is left of it since another orchestrator died."""
+
+    def __init__(self, plan: DrivePlan, processes: DriveProcesses, life: Life) -> None:
+        self._plan, self._processes, self._life = plan, processes, life
+        self._interruption = Interruption()
+        self._watch = ProcessWatch(processes)
+        self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
+        self._failed_at_end = False
+        self._before = read_standing(life.standing)
+        self._loop: LiveLoop | None = None
+        self._handed_over: object = None
+        self._mission = Mission(
+            WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
+            MissionSettings(
+                radius_m=plan.config.radius_m,
+                look_ahead_s=plan.config.look_ahead_s,
+                horizon_s=plan.config.horizon_s,
+            ),
+        )
+
+    def run(self) -> int:
+        """Run to the end, whatever ends it; the run's files are complete afterwards.
+
+        Returns the exit code. Raises CrashError where the drive goes on without this one, and what
+        ended the drive where that is an error.
+        """
+        plan = self._plan
+        with join_bus(plan) as bus:
+            tables = ResultTables(
+                plan.folder / RESULTS, plan.origin, lossless=plan.config.lock_step, keep=plan.keep
+            )
+            conductor = Conductor(plan, bus, self._mission, tables)
+            exit_word = "failed"
+            with ProgressLine(conductor, self._mission) as line:
+                conductor.events.on_event = line.tell
+                try:
+                    exit_word = self._go(bus, conductor, line)
+                except Exception as error:
+                    log.exception("the orchestrator ended by an error")
+                    if self._may_be_followed(error):
+                        self._leave_to_next(conductor)
+                        raise CrashError(str(error)) from error
+                    self._end(bus, conductor, line, exit_word)
+                    raise
+                whole = self._end(bus, conductor, line, exit_word)
+        if self._failed_at_end:
+            return EXIT_FAILED
+        code = _CODES[exit_word]
+        return EXIT_PARTLY if code == EXIT_DONE and not whole else code
+
+    def _may_be_followed(self, error: Exception) -> bool:
+        """Whether another orchestrator may do better; what is true for each ends the drive."""
+        told = isinstance(error, (DriveError, LockStepError))
+        return not (told or self._life.last or self._loop is None) and self._processes.start_again
+
+    def _leave_to_next(self, conductor: Conductor) -> None:
+        self._hand_over(conductor)
+        conductor.route.close()
+        conductor.beside.close()
+        conductor.tables.leave()
+
+    def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> str:
+        """Run the drive; returns how it ended, in a word."""
+        plan, before = self._plan, self._before
+        conductor.join()
+        if before is None:
+            # A run that is listed can be spoken to: questions wait in the mailbox from here on.
+            reserve_record(plan, plan.folder / RECORD)
+        if before is not None:
+            crashed = self._life.ended_by[-1] == CRASH
+            go_on(conductor, self._watch, before, plan.folder / RESULTS, crashed=crashed)
+            self._tell_of_restart(conductor)
+            if before.exit_word or self._life.last:
+                return before.exit_word or "failed"
+        else:
+            line.say(f"run {plan.folder}")
+            line.say(plan.config.tuning_choice.text)
+            if plan.config.resolved_source == "live":
+                line.say(waiting_text(plan))
+            joining = Joining(bus, conductor, self._watch, self._look_after, self._stop)
+            if not joining.all_there():
+                return "interrupted"
+            prepare_start(plan, conductor, look_after=self._look_after, stop=self._stop)
+        bus.declare_alive(alive_key(run=plan.run_id, process=ORCHESTRATOR))
+        self._meter.ready()
+
+        def housekeeping(now_s: float) -> None:
+            self._look_after(conductor, now_s)
+            self._processes.let_give_way(conductor.alive, now_s)
+            conductor.rounds.dispatcher.give_out()
+            self._keep_junctions(conductor, now_s)
+            self._meter.look()
+            line.update(now_s)
+
+        loop: LockStepLoop | LiveLoop
+        if plan.config.lock_step:
+            loop = LockStepLoop(conductor, housekeeping=housekeeping, stop=self._stop)
+        else:
+            # What has stopped towards a vehicle must not resume by itself.
+            towards = plan.towards_vehicle and before is None
+            say_in_charge = InCharge(bus, plan).say if towards else lambda: None
+
+            def each_turn() -> None:
+                say_in_charge()
+                self._hand_over_news(conductor)
+
+            loop = self._loop = LiveLoop(
+                conductor,
+                housekeeping=housekeeping,
+                stop=self._stop,
+                each_turn=each_turn,
+                before=None if before is None else before.grid,
+            )
+        ended = loop.run()
+        if self._watch.ended_by is not None and not self._asked_to_end:
+            raise DriveError(f"{self._watch.ended_by}; see log.jsonl")
+        if not ended:
+            return "interrupted"
+        conductor.finish()
+        return "completed"
+
+    @property
+    def _asked_to_end(self) -> bool:
+        return self._interruption.asked or self._processes.over
+
+    def _stop(self) -> bool:
+        return self._asked_to_end or self._watch.ended_by is not None
+
+    def _tell_of_restart(self, conductor: Conductor) -> None:
+        how = self._life.ended_by[-1]
+        conductor.tell(Notice("warning", f"the orchestrator ended by {how}; this is another one"))
+        if self._plan.towards_vehicle:
+            stays = "nothing goes towards the vehicle any more: that does not resume by itself"
+            conductor.tell(Notice("warning", stays))
+
+    def _hand_over_news(self, conductor: Conductor) -> None:
+        """Hand over where the drive stands, where a round or job has begun or ended since."""
+        rounds = conductor.rounds
+        jobs, tally = rounds.dispatcher.dispatch.count, rounds.tally
+        news = tally.due, tally.ended, jobs.given, jobs.results, jobs.refused, jobs.lost
+        if news != self._handed_over:
+            self._handed_over = news
+            self._hand_over(conductor)
+
+    def _hand_over(self, conductor: Conductor, *, exit_word: str = "") -> None:
+        """Let the supervisor have what the next one goes on from; lock step begins anew."""
+        if not self._plan.config.lock_step:
+            grid = None if self._loop is None else self._loop.grid
+            self._processes.keep(
+                standing_of(conductor, self._watch, grid=grid, exit_word=exit_word)
+            )
+
+    def _keep_junctions(self, conductor: Conductor, now_s: float) -> None:
+        news = self._mission.visits.take_news()
+        conductor.tables.add("junctions", [visit.row(mono_s=now_s) for visit in news])
+
+    def _look_after(self, conductor: Conductor, now_s: float) -> None:
+        self._watch.look_after(conductor, now_s)
+        if BUILDER in conductor.alive:
+            conductor.worlds.ask_again(now_s)
+
+    def _end(
+        self,
+        bus: ZenohBus,
+        conductor: Conductor,
+        line: ProgressLine,
+        exit_word: str,
+    ) -> bool:
+        """End everything and say how it went; returns whether nothing of the run is lost."""
+        plan = self._plan
+        self._hand_over(conductor, exit_word=exit_word)
+        self._meter.write()  # what follows is no part of the drive
+        end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
+        bus.publish("run_end", end, run=plan.run_id)
+        to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
+        quick = exit_word != "completed"
+        grace_s = INTERRUPT_GRACE_S if quick else to_write_s
+        if killed := self._processes.stop(grace_s=grace_s, but={ROUTER}):
+            log.warning("had to kill %s", ", ".join(killed))
+        try:
+            while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
+                conductor.handle(item)
+        except Exception:
+            # An error of ours: what was found until here is written all the same.
+            log.exception("the last messages could not be taken")
+            exit_word = "failed"
+            self._failed_at_end = True
+        self._processes.stop(grace_s=0.0)  # the router: nobody has anything to say any more
+        conductor.rounds.close()
+        conductor.changes.refuse_all("the drive is over")
+        conductor.beside.close()
+        conductor.route.close()
+        now_s = time.monotonic()
+        self._keep_junctions(conductor, now_s)
+        conductor.tables.close()
+        now_s = time.monotonic()
+        record = run_record(
+            conductor,
+            self._processes.restarted,
+            exit_word=exit_word,
+            ended_by=self._life.ended_by,
+            wall_s=now_s - self._life.began_s,
+            mono_s=now_s,
+            troubles=[*self._watch.troubles, *restart_troubles(plan, self._life.ended_by)],
+        )
+        write_record(record, plan.folder / RECORD)
+        logging.shutdown()
+        with contextlib.suppress(OSError):  # a full disk has been told of
+            fold_stderr(plan.processes_dir, plan.folder / LOG)
+        lost = lost_lines(record)
+        line.say("\n".join([summary_text(record), *lost]))
+        return not lost

@@ -1,0 +1,159 @@
+"""The supervisor and its forks, in interpreters of their own: what one dies of the next is told."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+COVERS = ("foretwin.orchestrator.drive.interrupt",)
+
+HEAD = """
+import logging, os, signal, sys, time
+from pathlib import Path
+from types import SimpleNamespace
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.drive import foreground, supervisor_link
+from foretwin.orchestrator.drive.supervision import CRASHED, DriveError
+from foretwin.orchestrator.runner.supervisor import Supervisor
+
+foreground.start_all = lambda supervisor, plan: None
+foreground.forget_results = lambda plan: print("forgets", flush=True)
+supervisor_link.rows_by_id = lambda plan: {}
+Supervisor.pause_s = lambda self, name, now_s, left=[0.0, 0.0, 0.0]: left.pop() if left else None
+folder = Path(sys.argv[1])
+config = SimpleNamespace(lock_step=False)
+plan = SimpleNamespace(folder=folder, processes_dir=folder / "processes", config=config)
+
+logging.disable()
+
+def die(number=signal.SIGKILL):
+    os.kill(os.getpid(), number)
+
+def supervise(orchestrate):
+    return foreground.Foreground(plan, orchestrate).run()
+"""
+
+
+def run(folder: Path, script: str) -> list[str]:
+    """Run a script in a fresh interpreter; returns the lines that it and its forks print."""
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", HEAD + textwrap.dedent(script), str(folder)],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return [*done.stdout.splitlines(), *done.stderr.splitlines()]
+
+
+def test_the_next_one_goes_on_with_what_the_last_one_left(tmp_path: Path) -> None:
+    assert run(tmp_path, """
+        def orchestrate(plan, link, life):
+            print(life.standing, life.ended_by, life.last, flush=True)
+            link.keep(f"left by {len(life.ended_by)}".encode())
+            match len(life.ended_by):
+                case 0:
+                    die()
+                case 1:
+                    return CRASHED
+            return 3
+        print(supervise(orchestrate))
+    """) == [
+        "b'' () False",
+        "b'left by 0' ('signal 9 (SIGKILL)',) False",
+        "b'left by 1' ('signal 9 (SIGKILL)', 'an error of its own') False",
+        "3",
+    ]  # fmt: skip
+
+
+def test_one_that_dies_again_and_again_brings_the_drive_to_its_end(tmp_path: Path) -> None:
+    assert run(tmp_path, """
+        def orchestrate(plan, link, life):
+            link.keep(b"far")
+            if not life.last:
+                die(signal.SIGSEGV)
+            print(len(life.ended_by), life.standing)
+            return 1
+        print(supervise(orchestrate))
+    """) == ["4 b'far'", "1"]  # fmt: skip
+
+
+def test_where_even_the_last_one_dies_it_is_said_what_to_do(tmp_path: Path) -> None:
+    code, said = run(
+        tmp_path,
+        """
+        def orchestrate(plan, link, life):
+            link.keep(b"far")
+            die()
+        print(supervise(orchestrate))
+    """,
+    )
+    assert code == "1"
+    assert said == (
+        "error: the orchestrator ended by signal 9 (SIGKILL), the last of 5 times; "
+        f"`foretwin recover {tmp_path}` makes readable what there is"
+    )
+
+
+def test_in_lock_step_all_is_played_again(tmp_path: Path) -> None:
+    assert run(tmp_path, """
+        config.lock_step = True
+        def orchestrate(plan, link, life):
+            if not life.ended_by:
+                die()
+            print(life.standing)
+            return 0
+        print(supervise(orchestrate))
+    """) == ["forgets", "b''", "0"]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_what_ends_a_drive_reaches_the_orchestrator(tmp_path: Path, number: str) -> None:
+    assert run(tmp_path, f"""
+        def orchestrate(plan, link, life):
+            os.kill(os.getppid(), signal.{number})
+            while not link.over:
+                link.poll(0.0)
+                time.sleep(0.01)
+            return 130
+        print(supervise(orchestrate))
+    """) == ["130"]  # fmt: skip
+
+
+def test_who_is_alone_is_told_and_ends(tmp_path: Path) -> None:
+    run(
+        tmp_path,
+        """
+        def orchestrate(plan, link, life):
+            os.kill(os.getppid(), signal.SIGKILL)
+            while not link.over:
+                link.poll(0.0)
+                time.sleep(0.01)
+            (folder / "alone").write_text(str(link.alone))
+            return 0
+        if os.fork():
+            while not (folder / "alone").exists() or not (folder / "alone").read_text():
+                time.sleep(0.01)
+        else:
+            supervise(orchestrate)
+    """,
+    )
+    assert (tmp_path / "alone").read_text() == "True"
+
+
+def test_errors_of_the_user_and_of_ours_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    assert run(tmp_path / "run", """
+        def refuses(by_user):
+            def orchestrate(plan, link, life):
+                link.refuse("no such port", by_user=by_user)
+                return 1
+            return orchestrate
+        for by_user in (False, True):
+            try:
+                supervise(refuses(by_user))
+            except (DriveError, UserError) as error:
+                print(type(error).__name__, error, folder.exists())
+    """) == ["DriveError no such port True", "UserError no such port False"]  # fmt: skip
