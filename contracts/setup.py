@@ -9,6 +9,7 @@ from foretwin.contracts.process_setup import read_setup as read_setup
 from foretwin.contracts.process_setup import write_setup as write_setup
 from foretwin.contracts.roles import MirrorCast
 from foretwin.contracts.segments import Roll
+from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION
 
@@ -52,6 +53,8 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
     mapping_name: str
     drive_frame: LocalFrame
     towards_vehicle: bool = False
+    order_keys: OrderKeys | None = None
+    """Whose orders towards the vehicle count; None: nobody's."""
     vehicle: VehicleParameters | None = None
     """Of the car: the size of its twin."""
     listens_only: bool = False

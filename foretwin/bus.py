@@ -13,6 +13,8 @@ from foretwin.contracts.joining import RunningDrive, newest_running, running_dri
 from foretwin.contracts.keys import alive_key, run_of_alive_key
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
 from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.signing import OrderSigner
+from foretwin.contracts.towards_vehicle import VehicleCommand
 
 __all__ = [
     "Alive",
@@ -22,12 +24,14 @@ __all__ = [
     "GeoPoint",
     "LocalFrame",
     "Mailbox",
+    "OrderSigner",
     "PlannedMotions",
     "PlannerScene",
     "Received",
     "RoadUser",
     "RoadUsers",
     "RunningDrive",
+    "VehicleCommand",
     "ZenohBus",
     "alive_key",
     "geo_from_local",

@@ -10,6 +10,7 @@ from foretwin.contracts.access import BusMember
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
@@ -83,6 +84,8 @@ class DrivePlan(DriveInputs):
     live_view: str
     local: LocalBus | None = None
     """The bus of this host; None where anybody may join at `endpoint`."""
+    order_keys: OrderKeys | None = None
+    """Whose orders towards the vehicle count, while anything may go there."""
 
     @property
     def router_bus(self) -> BusSetup:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import logging
 import time
 from pathlib import Path
@@ -12,8 +13,10 @@ from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.new_folder import new_folder
 from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
+from foretwin.contracts.signing import OrderSigner
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.foreground import Foreground, start_all
+from foretwin.orchestrator.drive.in_charge import SwornIn, sworn_in
 from foretwin.orchestrator.drive.orchestrator import CrashError, Orchestrator
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, SUPERVISOR
@@ -45,21 +48,24 @@ def carry_out(plan: DrivePlan) -> int:
     This process becomes the supervisor, and forks the orchestrator. Where it cannot be forked,
     since threads run in it, it is both, and nobody starts the orchestrator again.
     """
-    with run_lock(plan.folder):
+    with run_lock(plan.folder), sworn_in(plan) as sworn:
         _log_as(SUPERVISOR, plan)
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
-        plan = on_local_bus(plan)
+        plan = on_local_bus(sworn.plan)
         try:
-            return _supervise(plan)
+            return _supervise(SwornIn(plan, sworn.signer))
         finally:
             _take_passwords_away(plan)
 
 
-def _supervise(plan: DrivePlan) -> int:
+def _supervise(sworn: SwornIn) -> int:
+    plan = sworn.plan
     planner = RoundPlanner(plan.config, plan.vehicle)
     trouble = trouble_with_forking()
     if trouble is None:
-        return Foreground(plan, orchestrate).run(meanwhile=planner.draw_cases)
+        return Foreground(plan, functools.partial(orchestrate, signer=sworn.signer)).run(
+            meanwhile=planner.draw_cases
+        )
     log.info("nobody will start the orchestrator again: %s", trouble)
     supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
     try:
@@ -67,7 +73,9 @@ def _supervise(plan: DrivePlan) -> int:
         planner.draw_cases()
         with trace.whole_run(plan.trace_dir, ORCHESTRATOR):
             life = Life(time.monotonic())
-            return Orchestrator(plan, OwnProcesses(plan, supervisor), life).run()
+            return Orchestrator(
+                plan, OwnProcesses(plan, supervisor), life, signer=sworn.signer
+            ).run()
     finally:
         supervisor.stop(grace_s=0.0)
 
@@ -77,12 +85,14 @@ def _take_passwords_away(plan: DrivePlan) -> None:
         plan.local.remove()
 
 
-def orchestrate(plan: DrivePlan, link: SupervisorLink, life: Life) -> int:
+def orchestrate(
+    plan: DrivePlan, link: SupervisorLink, life: Life, *, signer: OrderSigner | None = None
+) -> int:
     """Be the orchestrator of a drive, forked by its supervisor; returns the exit code."""
     _log_as(ORCHESTRATOR, plan)
     try:
         with trace.whole_run(plan.trace_dir, ORCHESTRATOR):
-            return Orchestrator(plan, link, life).run()
+            return Orchestrator(plan, link, life, signer=signer).run()
     except CrashError:
         return CRASHED
     except UserError as error:

@@ -9,6 +9,7 @@ import time
 from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.simulation import RunEnd
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.in_charge import InCharge
@@ -57,8 +58,16 @@ class CrashError(RuntimeError):
 class Orchestrator:
     """One drive, or what is left of it since another orchestrator died."""
 
-    def __init__(self, plan: DrivePlan, processes: DriveProcesses, life: Life) -> None:
+    def __init__(
+        self,
+        plan: DrivePlan,
+        processes: DriveProcesses,
+        life: Life,
+        *,
+        signer: OrderSigner | None = None,
+    ) -> None:
         self._plan, self._processes, self._life = plan, processes, life
+        self._signer = signer
         self._interruption = Interruption()
         self._watch = ProcessWatch(processes)
         self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
@@ -155,7 +164,7 @@ class Orchestrator:
         else:
             # What has stopped towards a vehicle must not resume by itself.
             towards = plan.towards_vehicle and before is None
-            say_in_charge = InCharge(bus, plan).say if towards else lambda: None
+            say_in_charge = InCharge(bus, plan, self._signer).say if towards else lambda: None
 
             def each_turn() -> None:
                 say_in_charge()

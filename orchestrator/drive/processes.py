@@ -204,6 +204,7 @@ def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
         mapping_name=plan.ros2.name,
         drive_frame=plan.drive_frame,
         towards_vehicle=plan.config.towards_vehicle,
+        order_keys=plan.order_keys,
         vehicle=plan.vehicle,
     )
 

@@ -33,6 +33,7 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
             vehicle_id=setup.vehicle_id,
             drive_frame=setup.drive_frame,
             flag_on=setup.towards_vehicle,
+            order_keys=setup.order_keys,
             car=setup.vehicle,
         )
         life.ready()

@@ -20,13 +20,14 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.simulation import Event, MirrorSample
-from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
+from foretwin.contracts.towards_vehicle import Authority, OrderKeys, VehicleCommand
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.mapping import Mapping, OutRow, Source
 from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
+from foretwin.telemetry.ros2.orders import Orders
 from foretwin.telemetry.ros2.outwards import Outwards
 from foretwin.telemetry.ros2.safety import VehicleGate
 from foretwin.telemetry.ros2.sender import RosSender
@@ -57,13 +58,15 @@ class Gateway:
         vehicle_id: str,
         drive_frame: LocalFrame,
         flag_on: bool,
+        order_keys: OrderKeys | None = None,
         car: VehicleParameters | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         """Subscribe to what the mapping names; `flag_on` is the command line's switch.
 
-        `car` gives the size of the car's own twin, where that goes out.
+        `order_keys` say whose orders count: without them none does, and nothing goes towards the
+        vehicle. `car` gives the size of the car's own twin, where that goes out.
         """
         self._mapping, self._bus, self._foreign = mapping, bus, foreign
         self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
@@ -91,13 +94,14 @@ class Gateway:
             alt_m=(mapping.map_frame or drive_frame).origin.alt_m,
         )
         self._diagnostics = DiagnosticLevels()
-        self._inbox, self._orders, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
+        self._inbox, self._views = Mailbox(2048), Mailbox(256)
+        self._orders: Orders | None = None
         self._logged_gate = self.gate.state
         self._out.warm_up()
         for key, history in self.inwards.key_expressions():
             foreign.subscribe(key, self._inbox, history=history)
         bus.serve("info", self._views, vehicle=vehicle_id)
-        self._listen(run_id)
+        self._listen(run_id, order_keys)
         self._sender.announce(
             [
                 *mapping.inwards,
@@ -143,17 +147,21 @@ class Gateway:
             "gate": dict(self.gate.counts),
             "dropped": {
                 "samples": self._inbox.dropped,
-                "words": self._orders.dropped,
+                "words": 0 if self._orders is None else self._orders.dropped,
                 "views": self._views.dropped,
             },
         }
 
-    def _listen(self, run_id: str) -> None:
+    def _listen(self, run_id: str, order_keys: OrderKeys | None) -> None:
         sources = {row.source for row in self._mapping.outwards}
-        if self.gate.state != "off":
-            self._bus.subscribe("authority", self._orders, run=run_id)
-            if "vehicle_command" in sources:
-                self._bus.subscribe("vehicle_command", self._orders, run=run_id)
+        if self.gate.state != "off" and order_keys is not None:
+            self._orders = Orders(
+                self._bus,
+                run_id=run_id,
+                keys=order_keys,
+                commands="vehicle_command" in sources,
+                refusals=self.refusals,
+            )
         mirrored = bool(self._mapping.mirrored)
         if sources & {"state", "clock"} or self._virtual.has_own or mirrored:
             self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
@@ -166,13 +174,12 @@ class Gateway:
                 self._bus.subscribe(channel, self._views, run=run_id)
 
     def _take_orders(self) -> None:
-        """Take all orders of the orchestrator, then look whether the gate may stay open."""
-        while (item := self._orders.take()) is not None:
-            message = self._decoded(item)
-            if isinstance(message, Authority):
-                self.gate.heartbeat(message.sent_mono_ns, now_ns=self._mono_ns())
-            elif isinstance(message, VehicleCommand):
-                self._command(message)
+        """Take the orders that have come, then look whether the gate may stay open."""
+        for order in self._orders.take() if self._orders is not None else ():
+            if isinstance(order, Authority):
+                self.gate.heartbeat(order.sent_mono_ns, now_ns=self._mono_ns())
+            else:
+                self._command(order)
         if self.gate.state == "open":
             self.gate.look(now_ns=self._mono_ns(), link_up=self._foreign.connected)
         if self.gate.state != self._logged_gate:

@@ -68,7 +68,10 @@ class VehicleGate:
     def heartbeat(self, sent_ns: int, *, now_ns: int) -> None:
         """Take a heartbeat of the orchestrator, sent at `sent_ns`; one that is too old is none."""
         self.look(now_ns=now_ns, link_up=True)
-        if self._state not in ("waiting", "open") or not _is_fresh(sent_ns, now_ns):
+        if self._state not in ("waiting", "open"):
+            return
+        if not _is_fresh(sent_ns, now_ns):
+            self.counts["word too old or not yet due"] += 1
             return
         self._state = "open"
         self._last_heartbeat_ns = max(sent_ns, self._last_heartbeat_ns or sent_ns)

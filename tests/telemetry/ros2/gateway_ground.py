@@ -15,6 +15,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
 from foretwin.telemetry.ros_messages.parts import ros_message, typestore
+from tests.telemetry.ros2.order_side import OrderSide
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -189,6 +190,7 @@ def gateway_process(
         mapping_name="m.toml",
         drive_frame=FRAME,
         towards_vehicle=flag,
+        order_keys=OrderSide("r").keys,
     )
     write_setup(setup, file)
     command = [sys.executable, "-m", "foretwin.telemetry.ros2", "--setup", str(file)]

@@ -28,6 +28,7 @@ from tests.telemetry.ros2.gateway_ground import (
     mapping_text,
     steering,
 )
+from tests.telemetry.ros2.order_side import OrderSide
 
 COVERS = (
     "foretwin.telemetry.ros2.introduction",
@@ -44,12 +45,13 @@ TOWARDS = ("/control/cmd", "/perception/objects", "/clock")
 class Ground:
     """A gateway with a clock in the test's hand."""
 
-    def __init__(self, *, enabled: bool, flag: bool, **mapped: str) -> None:
+    def __init__(self, *, enabled: bool, flag: bool, keys: bool = True, **mapped: str) -> None:
         self.now_ns = S
         self.bus, self.foreign = MemoryBus(), RecordingForeign()
         self.inbox = Mailbox(100)
         for channel in ("gnss", "steering"):
             self.bus.subscribe(channel, self.inbox, vehicle="ego")
+        self.orders = OrderSide("r")
         self.gateway = Gateway(
             parse_mapping(mapping_text(enabled=enabled, **mapped), name="m.toml"),
             bus=self.bus,
@@ -58,6 +60,7 @@ class Ground:
             vehicle_id="ego",
             drive_frame=FRAME,
             flag_on=flag,
+            order_keys=self.orders.keys if keys else None,
             mono_ns=lambda: self.now_ns,
             wall_ns=lambda: 10**18 + self.now_ns,
         )
@@ -73,12 +76,12 @@ class Ground:
     def say_everything(self) -> None:
         """The orchestrator is in charge and says all that could go towards a vehicle."""
         self.arrive(STEERING_KEY + "RIHS01_x", steering(5 * S, 0.1))
-        self.bus.publish("authority", Authority(sent_mono_ns=self.now_ns), run="r")
+        self.orders.say(self.bus, Authority(sent_mono_ns=self.now_ns))
         self.step()
         command = VehicleCommand(
             stamp_ns=0, sent_mono_ns=self.now_ns, tire_angle_rad=0.2, accel_mps2=9.0, speed_mps=99.0
         )
-        self.bus.publish("vehicle_command", command, run="r")
+        self.orders.say(self.bus, command)
         user = RoadUser(
             user_id="u",
             kind="car",

@@ -89,15 +89,16 @@ from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
+from tests.telemetry.ros2.order_side import OrderSide
+orders = OrderSide("r")
 with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
     bus.declare_alive(alive_key(run="r", process="orchestrator"))
     print("ready", flush=True)
     while True:
         now = time.monotonic_ns()
-        bus.publish("authority", Authority(sent_mono_ns=now), run="r")
-        bus.publish("vehicle_command", VehicleCommand(
-            stamp_ns=0, sent_mono_ns=now, tire_angle_rad=0.1, accel_mps2=0.5, speed_mps=3.0),
-            run="r")
+        orders.say(bus, Authority(sent_mono_ns=now))
+        orders.say(bus, VehicleCommand(
+            stamp_ns=0, sent_mono_ns=now, tire_angle_rad=0.1, accel_mps2=0.5, speed_mps=3.0))
         time.sleep(0.01)
 """
 

@@ -27,6 +27,7 @@ from foretwin.telemetry.ros_messages.parts import (
 from tests.contracts.memory_bus import MemoryBus
 from tests.contracts.mirror_samples import mirror_sample
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
+from tests.telemetry.ros2.order_side import OrderSide
 
 S = 10**9
 CAR = load_vehicle(None)
@@ -81,6 +82,7 @@ class Ground:
     def __init__(self, *, dialect: str = "rmw_zenoh", flag: bool = True) -> None:
         self.now_ns = S
         self.bus, self.foreign = MemoryBus(), RecordingForeign()
+        self.orders = OrderSide("r")
         self.gateway = Gateway(
             parse_mapping(TEXT.format(dialect=dialect), name="m.toml"),
             bus=self.bus,
@@ -89,6 +91,7 @@ class Ground:
             vehicle_id="ego",
             drive_frame=DRIVE_FRAME,
             flag_on=flag,
+            order_keys=self.orders.keys,
             car=CAR,
             mono_ns=lambda: self.now_ns,
             wall_ns=lambda: 10**18 + self.now_ns,
@@ -108,7 +111,7 @@ class Ground:
 
     def say(self, sample: MirrorSample, *, passed_s: float = 0.1) -> None:
         self.now_ns += round(passed_s * S)
-        self.bus.publish("authority", Authority(sent_mono_ns=self.now_ns), run="r")
+        self.orders.say(self.bus, Authority(sent_mono_ns=self.now_ns))
         self.bus.publish("mirror", sample, run="r")
         self.gateway.step(0.0)
 

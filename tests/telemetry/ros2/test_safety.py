@@ -68,6 +68,40 @@ def test_a_word_that_comes_late_does_not_bridge_the_gap() -> None:
     assert gate.state == "shut"
 
 
+def test_a_stale_word_and_one_from_the_future_open_nothing_and_are_counted() -> None:
+    gate = VehicleGate(LIMITS, config_on=True, flag_on=True)
+    now = 10 * DEAD_MAN_NS
+    gate.heartbeat(now - DEAD_MAN_NS - 1, now_ns=now)
+    gate.heartbeat(now + 2 * MS, now_ns=now)
+    assert gate.state == "waiting"
+    assert gate.counts == {"word too old or not yet due": 2}
+    gate.heartbeat(now - DEAD_MAN_NS, now_ns=now)
+    assert gate.state == "open"
+
+
+DEFAULTS = {
+    "max_speed_mps": 8.0, "max_accel_mps2": 1.5, "max_decel_mps2": 4.0, "max_jerk_mps3": 4.0,
+    "max_tire_angle_rad": 0.5, "max_tire_rate_radps": 0.3, "max_rate_hz": 50.0,
+}  # fmt: skip
+
+
+def test_the_bounds_where_a_mapping_says_nothing() -> None:
+    """Numbers that a person relies on: whoever changes one changes it here too."""
+    assert msgspec.structs.asdict(LIMITS) == DEFAULTS
+
+
+def test_after_a_pause_a_command_jumps_no_further_than_after_a_tenth_of_a_second() -> None:
+    gate, now = open_gate(), 0
+    assert admit(gate, command(now), now) is not None
+    for _ in range(20):
+        now += 100 * MS
+        gate.heartbeat(now, now_ns=now)
+    out = admit(gate, command(now, tire=3.0, accel=-100.0), now)
+    assert out is not None
+    assert out.tire_angle_rad == pytest.approx(0.1 * LIMITS.max_tire_rate_radps)
+    assert out.accel_mps2 == pytest.approx(-0.1 * LIMITS.max_jerk_mps3)
+
+
 def test_a_lost_link_shuts() -> None:
     gate = open_gate()
     assert admit(gate, command(0), 0, link_up=False) is None

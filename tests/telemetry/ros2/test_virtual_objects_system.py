@@ -43,11 +43,13 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import Authority
+from tests.telemetry.ros2.order_side import OrderSide
+orders = OrderSide("r")
 with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
     bus.declare_alive(alive_key(run="r", process="orchestrator"))
     print("ready", flush=True)
     while True:
-        bus.publish("authority", Authority(sent_mono_ns=time.monotonic_ns()), run="r")
+        orders.say(bus, Authority(sent_mono_ns=time.monotonic_ns()))
         bus.publish("state", VehicleState(
             vehicle_id="ego", stamp_ns=time.time_ns(), position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
             speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0), vehicle="ego")
