@@ -10,6 +10,8 @@ from typing import TypeVar
 
 import msgspec
 
+from foretwin.contracts.campaign import TlsFiles
+
 _Setup = TypeVar("_Setup", bound="ProcessSetup")
 
 
@@ -30,6 +32,8 @@ class BusSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """The file with this process's name and password; see foretwin.contracts.credentials."""
     admits: Admission | None = None
     """Of the router alone; None: whoever comes may say anything."""
+    tls: TlsFiles | None = None
+    """Who this process is, on a bus over a network: both sides show certificates (mTLS)."""
 
 
 class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.campaign import TlsFiles
 from foretwin.contracts.credentials import read_credentials
 from foretwin.contracts.process_setup import BusSetup
 
@@ -56,6 +57,28 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
         settings["access_control"] = json.loads(setup.admits.access)
         if setup.admits.users_file is not None:
             settings["transport/auth/usrpwd"] = {"dictionary_file": setup.admits.users_file}
+    if setup.tls is not None:
+        settings |= tls_settings(setup.tls, router=router)
     for name, value in settings.items():
         config.insert_json5(name, json.dumps(value))
     return config
+
+
+def tls_settings(tls: TlsFiles, *, router: bool) -> dict[str, Any]:
+    """Return the settings of a session that speaks TLS alone, in which both sides are known.
+
+    Zenoh's clients trust the public web's authorities besides the one given here (1.10): the name
+    of the router's host must not be one for which such an authority gives out certificates.
+    """
+    side = "listen" if router else "connect"
+    return {
+        "transport/link/protocols": ["tls"],
+        "transport/link/tls": {
+            "root_ca_certificate": tls.authority,
+            f"{side}_certificate": tls.certificate,
+            f"{side}_private_key": tls.key,
+            "enable_mtls": True,
+            "verify_name_on_connect": True,
+            "close_link_on_expiration": True,
+        },
+    }

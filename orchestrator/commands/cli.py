@@ -30,6 +30,7 @@ from foretwin.orchestrator.commands.cli_options import (
     TuningOption,
 )
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
+from foretwin.orchestrator.commands.cli_secure import secure
 from foretwin.orchestrator.commands.cli_set import set_value
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
@@ -247,6 +248,7 @@ for about_logs in (convert, identify, gap, judge, recover, repeat):
     app.command()(about_logs)
 
 app.command("set")(set_value)
+app.add_typer(secure, name="secure")
 
 
 @app.command()

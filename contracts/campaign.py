@@ -1,0 +1,54 @@
+"""The folder of a campaign: who may join its bus over a network, each role with its certificate.
+
+    FOLDER/ca.pem, ca.key            of the campaign's own authority; the key makes further roles
+    FOLDER/ROLE/ca.pem               what a role needs, to be copied whole to where it runs:
+    FOLDER/ROLE/certificate.pem      whom to trust, who it is,
+    FOLDER/ROLE/key.pem              and the proof of it
+
+The common name of a certificate is its role; the router's access rules go by it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, get_args
+
+import msgspec
+
+from foretwin.contracts.errors import UserError
+
+CampaignRole = Literal[
+    "router", "orchestrator", "worker", "viewer", "recorder", "car", "planner", "operator"
+]
+CAMPAIGN_ROLES: tuple[CampaignRole, ...] = get_args(CampaignRole)
+AUTHORITY, AUTHORITY_KEY = "ca.pem", "ca.key"
+CERTIFICATE, KEY = "certificate.pem", "key.pem"
+_OTHERS = 0o077
+
+
+class TlsFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the certificate of a process lies, its key, and the authority that it trusts."""
+
+    authority: str
+    certificate: str
+    key: str
+
+
+def role_files(campaign: Path, role: CampaignRole) -> TlsFiles:
+    """Return a role's files in the folder of a campaign; raises UserError, see `files_in`."""
+    return files_in(campaign / role, f"foretwin secure add {role} --folder {campaign}")
+
+
+def files_in(folder: Path, how_to_make: str = "foretwin secure add ROLE") -> TlsFiles:
+    """Return the files of one role's own folder, with whole paths.
+
+    Raises UserError where one is missing or a key can be read by other users of this machine.
+    """
+    files = [(folder / name).resolve() for name in (AUTHORITY, CERTIFICATE, KEY)]
+    for file in files:
+        if not file.is_file():
+            raise UserError(f"{file}: missing; `{how_to_make}` makes it")
+    key = files[2]
+    if mode := key.stat().st_mode & _OTHERS:
+        raise UserError(f"{key}: others may read it (mode {mode:03o}); chmod 600 mends that")
+    return TlsFiles(authority=str(files[0]), certificate=str(files[1]), key=str(key))

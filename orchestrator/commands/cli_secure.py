@@ -1,0 +1,55 @@
+"""The command line of a campaign's certificates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+secure = typer.Typer(
+    help="Certificates for a bus over a network: who may join, and as what (docs/security.md).",
+    no_args_is_help=True,
+)
+
+FolderOption = Annotated[
+    Path, typer.Option("--folder", help="the campaign's folder, its owner's alone")
+]
+HostOption = Annotated[
+    list[str] | None,
+    typer.Option("--host", help="name or address at which the router is reached; may be repeated"),
+]
+
+
+@secure.command("init")
+def init(
+    folder: FolderOption,
+    host: HostOption = None,
+    campaign_days: Annotated[int, typer.Option(help="how long the campaign goes on")] = 30,
+    days: Annotated[int, typer.Option(help="how long a role's certificate holds")] = 7,
+) -> None:
+    """Begin a campaign: an authority of its own, and certificates for a drive's processes."""
+    from foretwin.orchestrator.commands.secure import begin
+
+    raise typer.Exit(begin(folder, hosts=host or (), days=campaign_days, role_days=days))
+
+
+@secure.command("add")
+def add(
+    role: Annotated[str, typer.Argument(help="car, planner, operator, or any to renew it")],
+    folder: FolderOption,
+    host: HostOption = None,
+    days: Annotated[int, typer.Option(help="how long the certificate holds")] = 7,
+) -> None:
+    """Make or renew a role's certificate; its folder is what its host needs."""
+    from foretwin.orchestrator.commands.secure import add as add_role
+
+    raise typer.Exit(add_role(folder, role, hosts=host or (), days=days))
+
+
+@secure.command("show")
+def show(folder: FolderOption) -> None:
+    """Say for how long each certificate holds, and what is wrong with any."""
+    from foretwin.orchestrator.commands.secure import show as show_roles
+
+    raise typer.Exit(show_roles(folder))
