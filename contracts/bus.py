@@ -63,7 +63,9 @@ class ZenohSession:
         try:
             self._session: Any = zenoh.open(zenoh_config(setup, router=router))
         except zenoh.ZError as error:
-            raise BusUnreachable(f"no Zenoh router at {setup.endpoint}: {error}") from error
+            raise BusUnreachable(
+                f"no Zenoh router at {setup.endpoint}: {_why(setup, router) or error}"
+            ) from error
 
     def __enter__(self) -> Self:
         return self
@@ -123,6 +125,15 @@ class ZenohSession:
         self._declared.clear()
         if not self._session.is_closed():
             self._session.close()
+
+
+def _why(setup: BusSetup, router: bool) -> str:
+    """Return why a client with a certificate is refused, as far as that can be found out."""
+    if setup.tls is None or router:
+        return ""
+    from foretwin.contracts.why_refused import ADMITTED, likely_causes
+
+    return "; ".join(likely_causes(setup)) or ADMITTED
 
 
 class ZenohBus(ZenohSession):

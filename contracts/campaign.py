@@ -35,11 +35,11 @@ class TlsFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def role_files(campaign: Path, role: CampaignRole) -> TlsFiles:
-    """Return a role's files in the folder of a campaign; raises UserError, see `files_in`."""
-    return files_in(campaign / role, f"foretwin secure add {role} --folder {campaign}")
+    """Return a role's files in the folder of a campaign; raises UserError, see `certificate_in`."""
+    return certificate_in(campaign / role, f"foretwin secure add {role} --folder {campaign}")
 
 
-def files_in(folder: Path, how_to_make: str = "foretwin secure add ROLE") -> TlsFiles:
+def certificate_in(folder: Path, how_to_make: str = "foretwin secure add ROLE") -> TlsFiles:
     """Return the files of one role's own folder, with whole paths.
 
     Raises UserError where one is missing or a key can be read by other users of this machine.

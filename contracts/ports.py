@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 import socket
+from typing import NamedTuple
 
 LOOPBACK = "127.0.0.1"
 _PORTS = range(20_000, 32_000)
@@ -55,14 +56,48 @@ def trouble_with_endpoint(endpoint: str) -> str | None:
     return None
 
 
-def trouble_with_bus(endpoint: str | None, *, insecure: bool) -> str | None:
-    """Return what is wrong with where a drive's bus shall be, None where nothing is."""
+_TLS_PLACE = re.compile(r"tls/(?P<host>\[[0-9A-Fa-f:.]+\]|[^\[\]:/?#]+):(?P<port>[0-9]{1,5})")
+
+
+class TlsPlace(NamedTuple):
+    """Where a router listens for TLS."""
+
+    host: str
+    port: int
+
+
+def tls_place(endpoint: str) -> TlsPlace | None:
+    """Return host and port of `tls/HOST:PORT`, None for any other endpoint.
+
+    What may stand behind ? or # are settings of the link, which could undo ours.
+    """
+    found = _TLS_PLACE.fullmatch(endpoint)
+    return None if found is None else TlsPlace(found["host"].strip("[]"), int(found["port"]))
+
+
+def trouble_with_bus(endpoint: str | None, *, insecure: bool, secure: str | None) -> str | None:
+    """Return what is wrong with where a drive's bus shall be, None where nothing is.
+
+    `secure` is the folder of a campaign's certificates.
+    """
     if endpoint is None:
         own = "without one the bus is a socket of this user's alone"
+        if secure is not None:
+            return f"--secure {secure}: needs an endpoint tls/HOST:PORT; {own}"
         return f"--insecure: needs an endpoint; {own}" if insecure else None
     if trouble := trouble_with_endpoint(endpoint):
         return f"endpoint {endpoint!r}: {trouble}"
+    if secure is not None:
+        if insecure:
+            return f"--insecure: not with --secure {secure}"
+        only = f"endpoint {endpoint!r}: with --secure tls/HOST:PORT and nothing else"
+        return only if tls_place(endpoint) is None else None
+    if endpoint.startswith("tls/"):
+        return f"endpoint {endpoint}: needs --secure FOLDER (foretwin secure init)"
     if not insecure:
         open_to_all = "whoever reaches it may speak as the car and end the drive"
-        return f"endpoint {endpoint}: {open_to_all}; if that shall be so, add --insecure"
+        return (
+            f"endpoint {endpoint}: {open_to_all}; take tls/HOST:PORT with --secure FOLDER, or, if "
+            "that shall be so, add --insecure"
+        )
     return None

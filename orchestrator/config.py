@@ -127,6 +127,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Where the router listens, such as tcp/127.0.0.1:7447; None takes a socket of this user's."""
     insecure: bool = False
     """Whether whoever reaches `endpoint` may say anything."""
+    secure: str | None = None
+    """A campaign's folder: the bus is over a network, and each role shows its certificate."""
     standin_plan_shift_m: float = 0.0
     standin_parameters: str | None = None
     """What the stand-in car really is, hidden from the twin: a TOML file, or the bundled one."""
@@ -191,7 +193,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             yield trouble is None, f"vehicles, {other.id}: {trouble}"
         shift_m = self.standin_plan_shift_m
         yield math.isfinite(shift_m), f"standin_plan_shift_m {shift_m}: a finite number of metres"
-        place = trouble_with_bus(self.endpoint, insecure=self.insecure)
+        place = trouble_with_bus(self.endpoint, insecure=self.insecure, secure=self.secure)
         yield place is None, f"{place}"
         yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]

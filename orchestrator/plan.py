@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from foretwin.contracts.access import BusMember
+from foretwin.contracts.campaign import role_files
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
@@ -90,10 +93,16 @@ class DrivePlan(DriveInputs):
     @property
     def router_bus(self) -> BusSetup:
         """How the router is set."""
+        if self.config.secure is not None:
+            tls = role_files(Path(self.config.secure), "router")
+            return msgspec.structs.replace(self.bus, tls=tls, admits=admission(self.run_id))
         return self.bus if self.local is None else self.local.router
 
     def bus_of(self, member: BusMember) -> BusSetup:
         """Return how one of the drive's processes joins the bus."""
+        if self.config.secure is not None:
+            tls = role_files(Path(self.config.secure), member.role)
+            return msgspec.structs.replace(self.bus, tls=tls)
         return self.bus if self.local is None else self.local.setup_of(member.name)
 
     @property

@@ -26,11 +26,13 @@ from foretwin.orchestrator.commands.cli_options import (
     LeastFuturesOption,
     MapArgument,
     OutOption,
+    SecureOption,
     ServiceRoadsOption,
     TuningOption,
 )
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
-from foretwin.orchestrator.commands.cli_secure import secure
+from foretwin.orchestrator.commands.cli_secure import doctor
+from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
@@ -103,6 +105,8 @@ def drive(
     trace: Annotated[
         bool, typer.Option("--trace", help="what each process does when, as RUN/trace.json")
     ] = False,
+    endpoint: EndpointOption = None,
+    secure: SecureOption = None,
     ros2: Annotated[
         str | None, typer.Option(help="mapping of the live car's ROS 2 topics, TOML, or autoware")
     ] = None,
@@ -248,7 +252,7 @@ for about_logs in (convert, identify, gap, judge, recover, repeat):
     app.command()(about_logs)
 
 app.command("set")(set_value)
-app.add_typer(secure, name="secure")
+app.add_typer(secure_commands, name="secure")
 
 
 @app.command()
@@ -261,12 +265,7 @@ def view(
     raise typer.Exit(open_view(run_folder))
 
 
-@app.command()
-def doctor() -> None:
-    """Say what this machine has and what is missing."""
-    from foretwin.orchestrator.commands.doctor import examine
-
-    raise typer.Exit(examine())
+app.command()(doctor)
 
 
 def run(arguments: list[str]) -> int:

@@ -28,9 +28,13 @@ TuningOption = Annotated[
 ]
 EndpointOption = Annotated[
     str | None,
-    typer.Option(help="where the bus listens, such as tcp/127.0.0.1:7447 with --insecure"),
+    typer.Option(help="where the bus listens, such as tls/HOST:7447 with --secure"),
 ]
 InsecureOption = Annotated[
     bool, typer.Option("--insecure", help="whoever reaches the endpoint may say anything")
+]
+SecureOption = Annotated[
+    str | None,
+    typer.Option(help="a campaign's folder (foretwin secure init): who speaks shows a certificate"),
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]

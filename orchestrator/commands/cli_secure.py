@@ -1,4 +1,4 @@
-"""The command line of a campaign's certificates."""
+"""The command line of a campaign's certificates, and of what keeps somebody from a bus."""
 
 from __future__ import annotations
 
@@ -53,3 +53,20 @@ def show(folder: FolderOption) -> None:
     from foretwin.orchestrator.commands.secure import show as show_roles
 
     raise typer.Exit(show_roles(folder))
+
+
+def doctor(
+    endpoint: Annotated[
+        str | None, typer.Option(help="tls/HOST:PORT of a drive that lets nobody in")
+    ] = None,
+    secure: Annotated[
+        Path | None, typer.Option(help="the campaign's folder, or that of one role")
+    ] = None,
+    role: Annotated[str, typer.Option(help="who is not let in")] = "car",
+) -> None:
+    """Say what this machine has and what is missing, or why a bus lets one of its roles not in."""
+    from foretwin.orchestrator.commands.doctor import examine, examine_bus
+
+    if endpoint is None and secure is None:
+        raise typer.Exit(examine())
+    raise typer.Exit(examine_bus(endpoint, secure, role=role))

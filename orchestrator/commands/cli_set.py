@@ -24,8 +24,11 @@ def set_value(
         typer.Option(help="id or folder of the run [default: the newest one running]"),
     ] = None,
     out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
+    secure: Annotated[
+        Path | None, typer.Option(help="the operator's certificate, where the drive wants one")
+    ] = None,
 ) -> None:
     """Change a running drive: a vehicle's role, the twins' correction, the car's parameters."""
     from foretwin.orchestrator.commands.set import set_in_drive
 
-    say(set_in_drive(assignment, run=run, out=out))
+    say(set_in_drive(assignment, run=run, out=out, secure=secure))

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
 
 Verdict = Literal["ok", "missing", "note"]
@@ -38,6 +39,42 @@ def examine() -> int:
     return 3 if any(f.verdict == "missing" for f in findings) else 0
 
 
+def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> int:
+    """Print why a bus with certificates does not let a role in; 3 where a cause was found.
+
+    Raises UserError where endpoint or folder are missing or no such thing.
+    """
+    from foretwin.contracts.bus import BusUnreachable, ZenohBus
+    from foretwin.contracts.campaign import CAMPAIGN_ROLES, certificate_in, role_files
+    from foretwin.contracts.ports import tls_place
+    from foretwin.contracts.setup import BusSetup
+    from foretwin.contracts.why_refused import ADMITTED, likely_causes
+
+    if endpoint is None or folder is None or tls_place(endpoint) is None:
+        raise UserError(
+            "doctor needs both --endpoint tls/HOST:PORT and --secure FOLDER, or neither"
+        )
+    known = next((one for one in CAMPAIGN_ROLES if one == role), None)
+    if known is None:
+        raise UserError(f"--role {role}: one of {', '.join(CAMPAIGN_ROLES)}")
+    own = not (folder / known).is_dir()
+    setup = BusSetup(
+        endpoint=endpoint, tls=certificate_in(folder) if own else role_files(folder, known)
+    )
+    causes = list(likely_causes(setup))
+    for cause in causes:
+        say(f"cause    {cause}")
+    if causes:
+        return 3
+    try:
+        with ZenohBus(setup):
+            say(f"ok       {ADMITTED}")
+    except BusUnreachable as error:
+        say(f"cause    {error}")
+        return 3
+    return 0
+
+
 def _python() -> CheckResult:
     good = sys.version_info >= (3, 11)
     return CheckResult(
@@ -59,7 +96,16 @@ def _tuning() -> CheckResult:
 
 
 def _packages() -> CheckResult:
-    names = ("mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "shapely", "pyproj", "pyarrow")
+    names = (
+        "mujoco",
+        "eclipse-zenoh",
+        "rerun-sdk",
+        "osmium",
+        "shapely",
+        "pyproj",
+        "pyarrow",
+        "cryptography",
+    )
     versions, absent = [], []
     for name in names:
         try:

@@ -128,7 +128,8 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
     inputs = {"log": str(first_left(run / DRIVE)), "source": "log", "map": map_file, "route": route}
     alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
     workers = {"workers": min(was.workers, most_workers())}  # it may come from a larger machine
-    no_car = {"endpoint": None, "insecure": False, "ros2": None, "towards_vehicle": False}
+    no_bus = {"endpoint": None, "insecure": False, "secure": None}
+    no_car = no_bus | {"ros2": None, "towards_vehicle": False}
     return msgspec.structs.replace(was, **inputs, **alone, **workers, **no_car).validate()
 
 

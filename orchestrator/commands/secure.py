@@ -11,7 +11,7 @@ from foretwin.contracts.campaign import (
     CAMPAIGN_ROLES,
     CERTIFICATE,
     CampaignRole,
-    files_in,
+    certificate_in,
 )
 from foretwin.contracts.certificates import UTC, read_certificate, time_trouble, troubles
 from foretwin.contracts.errors import UserError
@@ -57,7 +57,7 @@ def show(folder: Path) -> int:
     for role in CAMPAIGN_ROLES:
         if not (folder / role).is_dir():
             continue
-        files = files_in(folder / role)
+        files = certificate_in(folder / role)
         certificate = read_certificate(Path(files.certificate))
         for_hosts = f", for {', '.join(certificate.hosts)}" if certificate.hosts else ""
         say(f"{role}: until {certificate.last:%Y-%m-%d %H:%M} UTC{for_hosts}")

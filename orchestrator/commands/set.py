@@ -6,14 +6,18 @@ from pathlib import Path
 
 from foretwin.contracts.bus import Bus, BusUnreachable, ZenohBus, ask
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.joining import newest_running, running_drive
+from foretwin.contracts.joining import RunningDrive, newest_running, running_drive
+from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.tuning import SetReply, SetRequest
+from foretwin.orchestrator.campaign.joining import own_certificate
 
 ANSWER_S = 120.0
 """A change waits for the drive to begin and for the round in progress; that may take a while."""
 
 
-def set_in_drive(assignment: str, *, run: Path | None, out: Path) -> str:
+def set_in_drive(
+    assignment: str, *, run: Path | None, out: Path, secure: Path | None = None
+) -> str:
     """Ask the drive `run`, or the newest running one below `out`; returns what counts now.
 
     Raises UserError, in one line, where the assignment or the run cannot be used or the drive
@@ -25,12 +29,26 @@ def set_in_drive(assignment: str, *, run: Path | None, out: Path) -> str:
     drive = newest_running(out) if run is None else running_drive(_folder(run, out))
     request = SetRequest(key=key.strip(), value=value.strip())
     try:
-        with ZenohBus(drive.bus("operator")) as bus:
+        with ZenohBus(_bus_of(drive, secure)) as bus:
             return f"{drive.run_id}: {ask_drive(bus, drive.run_id, request)}"
-    except BusUnreachable:
+    except BusUnreachable as error:
+        if drive.endpoint.startswith("tls/"):
+            raise UserError(f"{drive.folder}: {error}") from None
         raise UserError(
             f"{drive.folder}: nobody listens at {drive.endpoint}; was the drive killed?"
         ) from None
+
+
+def _bus_of(drive: RunningDrive, secure: Path | None) -> BusSetup:
+    """Return how to reach a drive; over a network as its operator."""
+    if not drive.endpoint.startswith("tls/"):
+        return drive.bus("operator")
+    if secure is None:
+        raise UserError(
+            f"{drive.folder}: the drive listens at {drive.endpoint}: --secure FOLDER, with the "
+            "operator's certificate (foretwin secure add operator)"
+        )
+    return BusSetup(endpoint=drive.endpoint, tls=own_certificate(secure, "operator"))
 
 
 def ask_drive(bus: Bus, run_id: str, request: SetRequest, *, timeout_s: float = ANSWER_S) -> str:

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.campaign import role_files
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.campaign.joining import check_campaign
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
@@ -56,6 +58,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
     ros2 = read_ros2(config)
+    if config.secure is not None and config.endpoint is not None:
+        check_campaign(Path(config.secure), config.endpoint, car=_starts_a_car(config))
     map_file = Path(config.map) if config.map else MAP_FILE
     source = config.resolved_source
     info, positions, log_file = None, None, None
@@ -109,6 +113,12 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         standin=standin,
         ros2=ros2,
     )
+
+
+def _starts_a_car(config: DriveConfig) -> bool:
+    """Whether a process of the drive speaks as a vehicle: a stand-in, a replay or a gateway."""
+    gateways = [config.ros2, *(other.ros2 for other in config.vehicles)]
+    return config.resolved_source != "live" or any(one is not None for one in gateways)
 
 
 def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
@@ -195,7 +205,11 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
         **{name: getattr(inputs, name) for name in DriveInputs.__dataclass_fields__},
         run_id=run_id,
         folder=folder.resolve(),
-        bus=BusSetup(endpoint=config.endpoint or "", lossless=config.lock_step),
+        bus=BusSetup(
+            endpoint=config.endpoint or "",
+            lossless=config.lock_step,
+            tls=None if config.secure is None else role_files(Path(config.secure), "orchestrator"),
+        ),
         live_view=live,
     )
     if plan.standin is not None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.contracts.campaign import CAMPAIGN_ROLES, files_in, role_files
+from foretwin.contracts.campaign import CAMPAIGN_ROLES, certificate_in, role_files
 from foretwin.contracts.errors import UserError
 
 
@@ -23,7 +23,7 @@ def role_folder(campaign: Path, role: str) -> Path:
 def test_a_roles_files_are_named_whole(tmp_path: Path, role: str) -> None:
     folder = role_folder(tmp_path, role)
     files = role_files(tmp_path, role)  # type: ignore[arg-type]
-    assert files == files_in(folder)
+    assert files == certificate_in(folder)
     assert [Path(one).read_text() for one in (files.authority, files.certificate, files.key)] == [
         "ca.pem", "certificate.pem", "key.pem"
     ]  # fmt: skip

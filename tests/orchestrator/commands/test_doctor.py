@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.ports import free_port
 from foretwin.orchestrator import config
 from foretwin.orchestrator.commands import doctor
+from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.doctor import CheckResult, examine
+from tests.orchestrator.campaign.campaigns import campaign, expired
 
 
 def findings() -> dict[str, CheckResult]:
@@ -83,3 +86,24 @@ def test_it_says_whether_a_drive_watches_its_vehicle_here_and_why() -> None:
     assert found.verdict == ("ok" if "report" in found.text.split(":")[0] else "note")
     assert "processor" in found.text
     assert "2 workers" in found.text
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ((), 3, "cause    nobody listens at localhost:"),
+        (("--role", "cat"), 2, "--role cat: one of router, orchestrator"),
+        (("--endpoint", "tcp/localhost:1"), 2, "doctor needs both --endpoint tls/HOST:PORT"),
+        (("--role", "viewer"), 3, "expired"),
+    ],
+)
+def test_who_is_not_let_in_asks_it_why(
+    words: tuple[str, ...], code: int, said: str, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    folder = campaign(tmp_path / "c", age_days=3.0)
+    expired(folder, "viewer")
+    given = ["--endpoint", f"tls/localhost:{free_port()}", "--secure", str(folder), *words]
+    assert run(["doctor", *given]) == code
+    out = capsys.readouterr()
+    assert said in out.out + out.err

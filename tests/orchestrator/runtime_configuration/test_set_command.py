@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.joining import newest_running, running_drive
-from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.ports import free_endpoint, free_port
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
+from tests.orchestrator.campaign.campaigns import campaign
 
 COVERS = (
     "foretwin.orchestrator.commands.cli_set",
@@ -72,3 +73,16 @@ def test_a_record_without_an_endpoint_is_named(tmp_path: Path) -> None:
     (folder / "run.json").write_text('{"run_id": "old", "exit": "running"}')
     with pytest.raises(ValueError, match=r"old/run\.json: does not say where the drive listens"):
         running_drive(folder)
+
+
+def test_a_drive_over_a_network_wants_its_operator(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = f"tls/localhost:{free_port()}"
+    _run(tmp_path / "runs", "20261121-100000-aaaa", "running", where)
+    asked = ["set", "role.ego=twin", "--out", str(tmp_path / "runs")]
+    assert run(asked) == EXIT_USER
+    assert "--secure FOLDER, with the operator's certificate" in capsys.readouterr().err
+    folder = campaign(tmp_path / "c")
+    assert run([*asked, "--secure", str(folder)]) == EXIT_USER
+    assert "nobody listens at localhost" in capsys.readouterr().err

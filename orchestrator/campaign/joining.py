@@ -1,0 +1,56 @@
+"""How the processes of a drive join its bus over a network: each by the certificate of its role."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+from foretwin.contracts.campaign import CampaignRole, TlsFiles, certificate_in, role_files
+from foretwin.contracts.certificates import (
+    UTC,
+    host_trouble,
+    read_certificate,
+    time_trouble,
+    troubles,
+)
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.ports import tls_place
+
+LOCAL_ROLES: tuple[CampaignRole, ...] = ("router", "orchestrator", "worker", "viewer", "recorder")
+"""Of the processes that every drive starts itself."""
+
+
+def check_campaign(
+    folder: Path, endpoint: str, *, car: bool, now: datetime.datetime | None = None
+) -> None:
+    """Raise UserError where a process of a drive could not join; `car`: one of them is the car's.
+
+    Said before anything is started: a process that is refused hears nothing but a time-out.
+    """
+    now = now or datetime.datetime.now(UTC)
+    roles = (*LOCAL_ROLES, "car") if car else LOCAL_ROLES
+    for role in roles:
+        for line in troubles(role_files(folder, role), now=now):
+            raise UserError(line)
+    place = tls_place(endpoint)
+    assert place is not None
+    if (trouble := host_trouble(role_files(folder, "router"), place.host)) is not None:
+        raise UserError(trouble)
+
+
+def ends(folder: Path, *, car: bool) -> datetime.datetime:
+    """Return when the first link of a drive closes since a certificate has expired."""
+    roles = (*LOCAL_ROLES, "car") if car else LOCAL_ROLES
+    return min(read_certificate(Path(role_files(folder, role).certificate)).last for role in roles)
+
+
+def own_certificate(folder: Path, role: CampaignRole) -> TlsFiles:
+    """Return a role's files from the folder of its campaign or from the role's own, copied one.
+
+    Raises UserError where they are missing or out of time.
+    """
+    files = role_files(folder, role) if (folder / role).is_dir() else certificate_in(folder)
+    certificate = read_certificate(Path(files.certificate))
+    if line := time_trouble(certificate, files.certificate, now=datetime.datetime.now(UTC)):
+        raise UserError(line)
+    return files
