@@ -41,6 +41,7 @@ def run_router(argv: list[str] | None = None) -> None:
         setup = read_setup(file, RouterSetup)
     except (msgspec.DecodeError, OSError) as problem:
         parser.exit(2, f"{file}: {problem}\n")
+    zenoh.init_log_from_env_or("warn")  # whom TLS turns away is told nowhere else
     word_file = Path(setup.word_file)
     try:
         session = zenoh.open(zenoh_config(setup.bus, router=True))

@@ -7,6 +7,7 @@ road user for the car's own stack.
 from __future__ import annotations
 
 from foretwin.contracts.bus import Alive, Bus, BusUnreachable, Mailbox, Received, ZenohBus
+from foretwin.contracts.campaign import certificate_in
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.joining import RunningDrive, newest_running, running_drive
@@ -34,6 +35,7 @@ __all__ = [
     "VehicleCommand",
     "ZenohBus",
     "alive_key",
+    "certificate_in",
     "geo_from_local",
     "newest_running",
     "run_of_alive_key",

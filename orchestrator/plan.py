@@ -16,6 +16,7 @@ from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.campaign.joining import admission
 from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
 from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import datetime
+import json
 from pathlib import Path
 
-from foretwin.contracts.campaign import CampaignRole, TlsFiles, certificate_in, role_files
+from foretwin.contracts.access import BusMember, access_control
+from foretwin.contracts.campaign import (
+    CAMPAIGN_ROLES,
+    CampaignRole,
+    TlsFiles,
+    certificate_in,
+    role_files,
+)
 from foretwin.contracts.certificates import (
     UTC,
     host_trouble,
@@ -15,6 +23,7 @@ from foretwin.contracts.certificates import (
 )
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.ports import tls_place
+from foretwin.contracts.process_setup import Admission
 
 LOCAL_ROLES: tuple[CampaignRole, ...] = ("router", "orchestrator", "worker", "viewer", "recorder")
 """Of the processes that every drive starts itself."""
@@ -36,6 +45,13 @@ def check_campaign(
     assert place is not None
     if (trouble := host_trouble(role_files(folder, "router"), place.host)) is not None:
         raise UserError(trouble)
+
+
+def admission(run_id: str) -> Admission:
+    """Return whom a run's router lets in by their certificates, and what each role may say."""
+    members = [BusMember(role, role) for role in CAMPAIGN_ROLES if role != "router"]
+    access = access_control(members, subject="cert_common_names", run_id=run_id)
+    return Admission(access=json.dumps(access))
 
 
 def ends(folder: Path, *, car: bool) -> datetime.datetime:

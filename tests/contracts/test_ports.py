@@ -10,6 +10,8 @@ from foretwin.contracts.ports import (
     LOOPBACK,
     free_endpoint,
     free_port,
+    tls_place,
+    trouble_with_bus,
     trouble_with_endpoint,
 )
 
@@ -51,3 +53,45 @@ def test_endpoints_of_zenoh_are_taken(endpoint: str) -> None:
 )
 def test_an_endpoint_that_is_none_is_told_what_it_lacks(endpoint: str, right: str) -> None:
     assert trouble_with_endpoint(endpoint) == right
+
+
+TLS = "tls/localhost:7447"
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "insecure", "secure", "said"),
+    [
+        (None, False, None, None),
+        ("tcp/127.0.0.1:7447", True, None, None),
+        ("tcp/127.0.0.1:7447", False, None, "whoever reaches it may speak as the car"),
+        (TLS, False, "c", None),
+        (TLS, True, "c", "--insecure: not with --secure c"),
+        (TLS, False, None, "needs --secure FOLDER"),
+        (TLS, True, None, "needs --secure FOLDER"),
+        (None, False, "c", "needs an endpoint tls/HOST:PORT"),
+        ("tcp/127.0.0.1:7447", False, "c", "with --secure tls/HOST:PORT and nothing else"),
+        (f"{TLS}#enable_mtls=false", False, "c", "with --secure tls/HOST:PORT and nothing else"),
+        ("tls/localhost", False, "c", "HOST:PORT with a port"),
+    ],
+)
+def test_where_a_bus_may_be(
+    endpoint: str | None, insecure: bool, secure: str | None, said: str | None
+) -> None:
+    trouble = trouble_with_bus(endpoint, insecure=insecure, secure=secure)
+    assert trouble == said or (trouble is not None and said is not None and said in trouble)
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "place"),
+    [
+        (TLS, ("localhost", 7447)),
+        ("tls/[::1]:7447", ("::1", 7447)),
+        (f"{TLS}#enable_mtls=false", None),
+        (f"{TLS}?rel=1", None),
+        ("tcp/localhost:7447", None),
+    ],
+)
+def test_a_place_is_host_and_port_and_nothing_else(
+    endpoint: str, place: tuple[str, int] | None
+) -> None:
+    assert tls_place(endpoint) == place

@@ -95,19 +95,3 @@ def test_the_error_of_a_refused_client_says_why(
         setup = BusSetup(endpoint=endpoint, tls=role_files(campaigns / "other", role))
         with pytest.raises(BusUnreachable, match=said), contextlib.closing(ZenohBus(setup)):
             pass
-
-
-@pytest.mark.parametrize(
-    ("endpoint", "place"),
-    [
-        ("tls/localhost:7447", ("localhost", 7447)),
-        ("tls/[::1]:7447", ("::1", 7447)),
-        ("tls/localhost:7447#enable_mtls=false", None),
-        ("tls/localhost:7447?rel=1", None),
-        ("tcp/localhost:7447", None),
-    ],
-)
-def test_a_place_is_host_and_port_and_nothing_else(
-    endpoint: str, place: tuple[str, int] | None
-) -> None:
-    assert tls_place(endpoint) == place
