@@ -90,7 +90,7 @@ class Channel(NamedTuple):
     @property
     def most_bytes(self) -> int:
         """How large a message may be."""
-        return MOST_SAMPLE_BYTES if self.qos == LIVE else MOST_BYTES
+        return MOST_SAMPLE_BYTES if self.qos in (LIVE, RECORDED) else MOST_BYTES
 
 
 _VEHICLE, _RUN = "vehicle/{vehicle}", "run/{run}"
@@ -192,6 +192,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     (_RUN, LIVE, _ORCHESTRATOR): {
         "other_vehicles": Channel(roles.OtherVehicles, 50, "states of the vehicles beside the car"),
         "authority": Channel(towards_vehicle.Authority, 20, "the orchestrator is in charge"),
+    },
+    # Nothing of ours says it; a planner that may, signs it with the run's key.
+    (_RUN, LIVE, _PLANNER): {
         "vehicle_command": Channel(towards_vehicle.VehicleCommand, 50, "what the vehicle shall do"),
     },
     (_RUN, LIVE, _OPERATOR): {

@@ -105,7 +105,6 @@ def drive(
     trace: Annotated[
         bool, typer.Option("--trace", help="what each process does when, as RUN/trace.json")
     ] = False,
-    endpoint: EndpointOption = None,
     secure: SecureOption = None,
     ros2: Annotated[
         str | None, typer.Option(help="mapping of the live car's ROS 2 topics, TOML, or autoware")

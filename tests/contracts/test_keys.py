@@ -81,3 +81,13 @@ def test_an_empty_or_missing_id_is_named() -> None:
 def test_an_unknown_channel_names_the_known_ones() -> None:
     with pytest.raises(KeyError, match=r"unknown channel 'gps'; known: active_world, .*gnss"):
         key("gps", vehicle="ego")
+
+
+@pytest.mark.parametrize("name", [*TELEMETRY_CHANNELS, "state", "route", "authority"])
+def test_what_comes_often_is_small(name: str) -> None:
+    assert CHANNELS[name].most_bytes == 2**20
+
+
+@pytest.mark.parametrize("name", ["job", "round", "mirror"])
+def test_results_may_be_large(name: str) -> None:
+    assert CHANNELS[name].most_bytes == 32 * 2**20
