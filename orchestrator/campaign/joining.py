@@ -29,6 +29,10 @@ LOCAL_ROLES: tuple[CampaignRole, ...] = ("router", "orchestrator", "worker", "vi
 """Of the processes that every drive starts itself."""
 
 
+_ONE_PROCESS = "orchestrator", "viewer", "recorder"
+"""Roles of a single process, named like them: they can hold no other one's token."""
+
+
 def check_campaign(
     folder: Path, endpoint: str, *, car: bool, now: datetime.datetime | None = None
 ) -> None:
@@ -49,7 +53,11 @@ def check_campaign(
 
 def admission(run_id: str) -> Admission:
     """Return whom a run's router lets in by their certificates, and what each role may say."""
-    members = [BusMember(role, role) for role in CAMPAIGN_ROLES if role != "router"]
+    members = [
+        BusMember(role, role, process_id=role if role in _ONE_PROCESS else "*")
+        for role in CAMPAIGN_ROLES
+        if role != "router"
+    ]
     access = access_control(members, subject="cert_common_names", run_id=run_id)
     return Admission(access=json.dumps(access))
 

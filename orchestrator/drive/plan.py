@@ -60,6 +60,9 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     ros2 = read_ros2(config)
     if config.secure is not None and config.endpoint is not None:
         check_campaign(Path(config.secure), config.endpoint, car=_starts_a_car(config))
+        if ros2 is not None and ros2.mapping.endpoint is None:
+            no_place = "with --secure its endpoint must be named: the run's own speaks no ROS"
+            raise ConfigError(f"{ros2.name}: {no_place}")
     map_file = Path(config.map) if config.map else MAP_FILE
     source = config.resolved_source
     info, positions, log_file = None, None, None

@@ -125,5 +125,5 @@ ROGUES: tuple[Rogue, ...] = (
           _says(lambda run: key("mirror", run=run), lambda: bytes(33 * 2**20))),
     Rogue("a car sends no messages", "car", "run.json", _malformed_telemetry),
     Rogue("a car sends too much", "car", "run.json",
-          _says(lambda _: key("gnss", vehicle="ego"), lambda: bytes(2**20 + 1))),
+          _says(lambda _: key("gnss", vehicle="ego"), lambda: bytes(8 * 2**20))),
 )  # fmt: skip

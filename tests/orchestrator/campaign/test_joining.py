@@ -16,6 +16,7 @@ from foretwin.orchestrator.campaign.joining import (
     check_campaign,
     own_certificate,
 )
+from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, member, process_ids
 from tests.orchestrator.campaign.campaigns import campaign, expired
 from tests.orchestrator.trip import town_plan
@@ -66,3 +67,15 @@ def test_a_role_joins_from_the_campaign_or_from_its_own_folder(tmp_path: Path) -
     expired(folder, "operator")
     with pytest.raises(UserError, match="expired"):
         own_certificate(folder, "operator")
+
+
+def test_ros_has_no_certificate_of_the_runs_bus(tmp_path: Path) -> None:
+    config = msgspec.structs.replace(
+        town_plan(tmp_path).config,
+        secure=str(campaign(tmp_path / "c")),
+        endpoint=ENDPOINT,
+        source="live",
+        ros2="autoware",
+    )
+    with pytest.raises(UserError, match="with --secure its endpoint must be named"):
+        read_inputs(config)
