@@ -69,9 +69,7 @@ def test_whoever_changes_an_order_breaks_its_signature(field: str) -> None:
 )
 def test_forged_orders_are_refused_and_move_no_number(forged: VehicleCommand) -> None:
     checking, true = check(), signer()
-    checking.check(true.signed(COMMAND), where="w")
-    late = msgspec.structs.replace(forged, number=max(forged.number, 2**61))
-    assert refusal(checking, late) == "not signed with this run's key"
+    assert refusal(checking, forged) == "not signed with this run's key"
     checking.check(true.signed(COMMAND), where="w")
 
 
