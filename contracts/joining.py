@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 from foretwin.contracts.credentials import credentials_file
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.process import is_held
 from foretwin.contracts.process_setup import BusSetup
 
 
 class RunningDrive(NamedTuple):
-    """A drive whose record says that it goes on."""
+    """A drive whose record says that it goes on, and whose processes do."""
 
     run_id: str
     folder: Path
@@ -40,7 +41,8 @@ def newest_running(out: Path) -> RunningDrive:
 
 
 def running_drive(folder: Path) -> RunningDrive:
-    """Return the drive of a run's folder; raises UserError where it is none or has ended."""
+    """Return the drive of a run's folder; raises UserError where it is none, has ended or was
+    killed: who drives holds the lock on the log."""
     file = folder / "run.json"
     try:
         record = json.loads(file.read_text(encoding="utf-8"))
@@ -51,6 +53,10 @@ def running_drive(folder: Path) -> RunningDrive:
         raise UserError(f"{folder}: the run has ended ({exit_word})")
     if not isinstance(record.get("endpoint"), str):
         raise UserError(f"{file}: does not say where the drive listens")
+    log = folder / "log.jsonl"
+    if not (log.is_file() and is_held(log)):
+        how = f"`foretwin recover {folder}` makes its results readable"
+        raise UserError(f"{folder}: the drive was killed; {how}")
     shown = record.get("credentials")
     credentials = Path(shown) if isinstance(shown, str) else None
     return RunningDrive(run_id, folder, record["endpoint"], credentials)

@@ -35,7 +35,7 @@ def set_in_drive(
         if drive.endpoint.startswith("tls/"):
             raise UserError(f"{drive.folder}: {error}") from None
         raise UserError(
-            f"{drive.folder}: nobody listens at {drive.endpoint}; was the drive killed?"
+            f"{drive.folder}: nobody listens at {drive.endpoint}, though the drive goes on"
         ) from None
 
 

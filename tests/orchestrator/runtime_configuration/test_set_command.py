@@ -9,6 +9,7 @@ import pytest
 
 from foretwin.contracts.joining import newest_running, running_drive
 from foretwin.contracts.ports import free_endpoint, free_port
+from foretwin.contracts.process import hold
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
 from tests.orchestrator.campaign.campaigns import campaign
 
@@ -19,11 +20,21 @@ COVERS = (
 )
 
 
-def _run(out: Path, name: str, exit_word: str, endpoint: str = "tcp/127.0.0.1:7447") -> Path:
+def _run(
+    out: Path,
+    name: str,
+    exit_word: str,
+    endpoint: str = "tcp/127.0.0.1:7447",
+    *,
+    killed: bool = False,
+) -> Path:
     folder = out / name
     folder.mkdir(parents=True)
     record = {"run_id": name, "exit": exit_word, "endpoint": endpoint}
     (folder / "run.json").write_text(json.dumps(record).ljust(2000))
+    (folder / "log.jsonl").touch()
+    if exit_word == "running" and not killed:
+        hold(folder / "log.jsonl")
     return folder
 
 
@@ -31,6 +42,7 @@ def test_the_newest_drive_that_goes_on_is_meant(tmp_path: Path) -> None:
     _run(tmp_path, "20261121-100000-aaaa", "running")
     newest = _run(tmp_path, "20261121-110000-bbbb", "running")
     _run(tmp_path, "20261121-120000-cccc", "completed")
+    _run(tmp_path, "20261121-130000-dddd", "running", killed=True)
     (tmp_path / "notes.txt").write_text("no run")
     found = newest_running(tmp_path)
     assert (found.run_id, found.folder) == (newest.name, newest)
@@ -60,11 +72,20 @@ def test_what_cannot_be_asked_ends_in_one_line(
 def test_a_drive_that_was_killed_is_told_apart(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
-    folder = _run(tmp_path, "killed", "running", endpoint := free_endpoint())
+    folder = _run(tmp_path, "killed", "running", killed=True)
     assert run(["set", "role.ego=twin", "--run", str(folder)]) == EXIT_USER
     (line,) = capsys.readouterr().err.splitlines()
-    assert f"nobody listens at {endpoint}; was the drive killed?" in line
+    assert f"the drive was killed; `foretwin recover {folder}` makes" in line
+
+
+def test_a_drive_whose_router_does_not_answer_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
+    folder = _run(tmp_path, "deaf", "running", endpoint := free_endpoint())
+    assert run(["set", "role.ego=twin", "--run", str(folder)]) == EXIT_USER
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"nobody listens at {endpoint}" in line
 
 
 def test_a_record_without_an_endpoint_is_named(tmp_path: Path) -> None:
