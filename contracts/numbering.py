@@ -130,6 +130,17 @@ class Numberings(msgspec.Struct):
         stream.go_on(seq, sent_ns)
         return name
 
+    def take_up(self, channel: str, seq: int) -> bool:
+        """Take a number whose sender is not told: of who was heard last first; returns whether it
+        had not come."""
+        for one in reversed([one for one in self.streams.values() if one.channel == channel]):
+            if one.fill(seq, one.newest_sent_ns):
+                return True
+            if one.is_next(seq):
+                one.go_on(seq, one.newest_sent_ns)
+                return True
+        return False
+
     def reach(self, channel: str, count: int, *, sender: int | str = 0) -> None:
         """Count as missing what has not come of the first `count` messages of a sender."""
         lives = list(self._lives(channel, sender))

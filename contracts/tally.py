@@ -32,6 +32,9 @@ class Tally(msgspec.Struct):
     recorded: dict[str, int] = {}
     unwritten: dict[str, int] = {}
     refused: dict[str, int] = {}
+    part: int = 1
+    """The part of the recording that was written when this was, and how many messages it held."""
+    in_part: int = 0
 
     def settle(self, fate: Fate, channel: str) -> int:
         """Count what became of one message that came; returns how many of its channel fared so."""

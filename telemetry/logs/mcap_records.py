@@ -40,6 +40,8 @@ class Record(NamedTuple):
     kind: str
     log_time_ns: int
     data: bytes
+    sequence: int = 0
+    """Its sender's number."""
 
 
 class Contents(NamedTuple):
@@ -139,9 +141,22 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
             reader = make_reader(file, validate_crcs=True)
             for schema, channel, message in reader.iter_messages(topics=topics):
                 if schema is not None:
-                    yield Record(channel.topic, schema.name, message.log_time, message.data)
+                    yield Record(
+                        channel.topic,
+                        schema.name,
+                        message.log_time,
+                        message.data,
+                        message.sequence,
+                    )
         except BROKEN as error:
             raise LogError(f"{path}: damaged MCAP: {type(error).__name__} {error}") from None
+
+
+def in_file_order(path: Path) -> Iterator[Record]:
+    """Yield all messages from the beginning to the end, or to where the file is torn."""
+    for item in _Linear(path):
+        if isinstance(item, Record):
+            yield item
 
 
 def _read_through(path: Path) -> Contents:
@@ -214,7 +229,9 @@ class _Linear:
                         channel = channels[item.channel_id]
                         if channel.schema_id in by_id:
                             kind = by_id[channel.schema_id].name
-                            yield Record(channel.topic, kind, item.log_time, item.data)
+                            yield Record(
+                                channel.topic, kind, item.log_time, item.data, item.sequence
+                            )
             except LogError:
                 raise
             except BROKEN:

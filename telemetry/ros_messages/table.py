@@ -134,6 +134,11 @@ def kind_of(topic: str) -> str | None:
     return _READ[topic][1].kind if topic in _READ else None
 
 
+def channel_of(topic: str) -> str | None:
+    """Return the channel of one of our own topics that is read back, None for any other."""
+    return _READ[topic][0] if topic in _READ else None
+
+
 def message_of(topic: str, ros: Any, frame: LocalFrame | None) -> tuple[str, msgspec.Struct]:
     """Return channel and message of a decoded message of a topic that has a `kind_of`."""
     channel, row = _READ[topic]

@@ -19,7 +19,12 @@ class Disk:
 
     def open_part(self, path: Path, *, part: int) -> DriveWriter:
         path.touch()
-        return DriveWriter(_FileOn(self, path), info=INFO, part=part)  # type: ignore[arg-type]
+        raw = _FileOn(self, path)
+        try:
+            return DriveWriter(raw, info=INFO, part=part)  # type: ignore[arg-type]
+        except OSError:
+            raw.close()  # else it writes its copy whenever it is collected, over a later file
+            raise
 
     def clock(self) -> float:
         return self.now_s

@@ -169,6 +169,32 @@ def test_who_goes_on_with_a_recording_takes_nothing_twice(tmp_path: Path) -> Non
     assert read_tally(tally_file(path)) == again.tally
 
 
+@pytest.mark.parametrize("flushed", [0, 80])
+def test_what_was_written_after_the_last_tally_is_not_taken_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flushed: int
+) -> None:
+    path = tmp_path / "drive.mcap"
+    killed = DriveRecording(path)
+    killed.add("imu", imu(1000), sender=5, seq=0)  # of a car that was started again since
+    killed.add("speed", SpeedSample(stamp_ns=START_NS, speed_mps=1.0), sender=7, seq=0)
+    for number in range(100):
+        killed.add("imu", imu(number), sender=7, seq=number)
+        if number == flushed:
+            killed.flush()
+    with monkeypatch.context() as starved:  # killed before it came to write its tally
+        starved.setattr(module, "write_tally", lambda *_: None)
+        killed.flush()
+    kill(killed)
+    again = DriveRecording(path)
+    for number in range(50, 200):
+        again.add("imu", imu(number), sender=7, seq=number)
+    again.finish()
+    found = Counter(message.stamp_ns - START_NS for message in recorded(path))
+    assert found == Counter([0, *range(200), 1000])
+    assert again.tally.recorded == {"imu": 201, "speed": 1}
+    assert balances(again)
+
+
 def test_what_a_killed_recorder_had_and_nobody_has_any_more_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "drive.mcap"
     killed = DriveRecording(path)
