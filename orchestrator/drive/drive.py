@@ -21,7 +21,7 @@ from foretwin.orchestrator.drive.orchestrator import CrashError, Orchestrator
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, SUPERVISOR
 from foretwin.orchestrator.drive.router_start import on_local_bus
-from foretwin.orchestrator.drive.supervision import CRASHED, Life, OwnProcesses
+from foretwin.orchestrator.drive.supervision import CRASHED, DriveError, Life, OwnProcesses
 from foretwin.orchestrator.drive.supervisor_link import SupervisorLink
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.run_state import LOG, run_lock
@@ -98,7 +98,8 @@ def orchestrate(
     except UserError as error:
         link.refuse(str(error), by_user=True)
     except Exception as error:
-        link.refuse(f"{type(error).__name__}: {one_line(error)}", by_user=False)
+        told = str(error) if isinstance(error, DriveError) else one_line(error)
+        link.refuse(told, by_user=False)
     finally:
         if link.alone:
             _take_passwords_away(plan)

@@ -46,6 +46,8 @@ END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
 LAST_WORDS_S = 0.1
 """How long nothing may come from processes that have ended before all is taken for heard."""
 INTERRUPT_GRACE_S = 1.2
+DEATH_TOLD_S = 2.0
+"""How long after a silence the supervisor's word of a death may take on a busy machine."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
 _CODES = {"completed": EXIT_DONE, "interrupted": EXIT_INTERRUPTED, "failed": EXIT_FAILED}
@@ -177,13 +179,27 @@ class Orchestrator:
                 each_turn=each_turn,
                 before=None if before is None else before.grid,
             )
-        ended = loop.run()
+        ended = False
+        try:
+            ended = loop.run()
+        except LockStepError:
+            # Who does not answer may have died: that is told next.
+            if not self._hears_of_death(conductor):
+                raise
         if self._watch.ended_by is not None and not self._asked_to_end:
             raise DriveError(f"{self._watch.ended_by}; see log.jsonl")
         if not ended:
             return "interrupted"
         conductor.finish()
         return "completed"
+
+    def _hears_of_death(self, conductor: Conductor) -> bool:
+        """Wait a moment for the supervisor's word that somebody has died who ends the drive."""
+        deadline_s = time.monotonic() + DEATH_TOLD_S
+        while self._watch.ended_by is None and time.monotonic() < deadline_s:
+            self._look_after(conductor, time.monotonic())
+            conductor.handle(conductor.mailbox.take(LAST_WORDS_S))
+        return self._watch.ended_by is not None
 
     @property
     def _asked_to_end(self) -> bool:

@@ -20,7 +20,7 @@ from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.orchestrator.record.ledger import Ledger
-from tests.system.foretwin_command import child_pids, foretwin, started, wait_for
+from tests.system.foretwin_command import child_pids, foretwin, orchestrator_pid, started, wait_for
 from tests.system.test_faults import LIVE, assert_nothing_left, says, under_way
 
 ENDS_WITHIN_S = 240.0
@@ -118,7 +118,7 @@ def test_the_ledger_balances_after_freezes_kills_and_strangers(tmp_path: Path) -
             os.kill(child_pids(run)["w0"], signal.SIGSTOP)
             wait_for(lambda: says(run, "w0 ended with code -9; started again"), "its end")
             thawed_s = time.monotonic() + 3.0
-            with frozen(process.pid):
+            with frozen(orchestrator_pid(run)):
                 wait_for(lambda: time.monotonic() > thawed_s, "three seconds")
             os.kill(child_pids(run)["w1"], signal.SIGKILL)
             wait_for(lambda: says(run, "w1 ended with code -9; started again"), "the death")

@@ -61,7 +61,9 @@ def test_a_port_that_is_taken_is_said_in_a_line_and_leaves_nothing(tmp_path: Pat
     with socket.create_server((LOOPBACK, 0)) as other:
         port = other.getsockname()[1]
         config = tmp_path / "drive.toml"
-        config.write_text(f'endpoint = "tcp/{LOOPBACK}:{port}"\n', encoding="utf-8")
+        config.write_text(
+            f'endpoint = "tcp/{LOOPBACK}:{port}"\ninsecure = true\n', encoding="utf-8"
+        )
         arguments = ["drive", "--view", "none", "--out", str(tmp_path / "new" / "runs")]
         done = subprocess.run(
             [sys.executable, "-P", "-m", "foretwin", *arguments, "--config", str(config), *SHORT],

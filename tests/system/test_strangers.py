@@ -101,7 +101,7 @@ def test_a_drive_survives_a_stranger_and_counts_what_it_said(tmp_path: Path) -> 
     refused = {(one["sender"], one["reason"]): one["count"] for one in kinds}
     own = f"run/{record['run_id']}"
     assert refused[f"{own}/mirror", "no message"] >= 1
-    assert refused["vehicle/ego/telemetry/plan", "PlannedTrajectory: yaw_rad of another shape"] == 1
+    assert refused["vehicle/ego/telemetry/plan", "PlannedTrajectory: yaw_rad of another shape"] >= 1
     assert refused["vehicle/ego/telemetry/objects", "road users that cannot be"] >= 3
     assert refused["vehicle/ego/telemetry/gnss", "GnssFix: lon_deg not finite"] >= 3
     assert any("sent to many keys at once" in reason for _, reason in refused)
