@@ -153,7 +153,10 @@ class TuningWorker:
         if missing or (self._watch is None and self._held):
             return
         question, self._question = self._question, None
-        held, self._held = sorted(self._held, key=lambda one: one[0]), []
+        # On a busy machine some of what the car sends in the next step is here already.
+        due = [one for one in self._held if one[0][2] < counts.get(one[1], 0)]
+        self._held = [one for one in self._held if one[0][2] >= counts.get(one[1], 0)]
+        held = sorted(due, key=lambda one: one[0])
         by_field: dict[str, list[Any]] = {field: [] for _, field in _FINDINGS.values()}
         for _, channel, message in held:
             for finding in self._weigh(channel, message):
