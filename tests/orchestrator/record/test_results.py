@@ -84,12 +84,18 @@ def test_results_that_take_too_long_are_said_and_stay(
     )
     tables = ResultTables(tmp_path / "results", {})
     tables.add("events", [event(1)])
+    stream = tmp_path / "results" / "events.arrows"
+
+    def written() -> bool:
+        found = StreamReader(stream).records() if stream.is_file() else ()
+        return bool(sum(rows.num_rows for rows in found) == 1)
+
+    wait_for(written, "the row in its stream")
     tables.close(0.2)
     (trouble,) = tables.troubles
     assert "nothing was written for 0.2 s" in trouble
     assert f"foretwin recover {tmp_path}" in trouble
-    stream = StreamReader(tmp_path / "results" / "events.arrows")
-    assert sum(rows.num_rows for rows in stream.records()) == 1
+    assert written()
 
     disk_answers.set()
     tables.close()
