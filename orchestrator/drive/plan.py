@@ -60,9 +60,6 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     ros2 = read_ros2(config)
     if config.secure is not None and config.endpoint is not None:
         check_campaign(Path(config.secure), config.endpoint, car=_starts_a_car(config))
-        if ros2 is not None and ros2.mapping.endpoint is None:
-            no_place = "with --secure its endpoint must be named: the run's own speaks no ROS"
-            raise ConfigError(f"{ros2.name}: {no_place}")
     map_file = Path(config.map) if config.map else MAP_FILE
     source = config.resolved_source
     info, positions, log_file = None, None, None
@@ -110,7 +107,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         route_source=route_source,
         drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
         vehicle=vehicle,
-        beside=tuple(_read_beside(one, vehicle) for one in config.vehicles),
+        beside=tuple(_read_beside(one, config, vehicle) for one in config.vehicles),
         log_file=log_file,
         info=info,
         standin=standin,
@@ -137,10 +134,12 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
     return log.info, line.lat_lon_deg
 
 
-def _read_beside(config: OtherVehicleConfig, own: VehicleParameters) -> OtherVehiclePlan:
+def _read_beside(
+    config: OtherVehicleConfig, drive: DriveConfig, own: VehicleParameters
+) -> OtherVehiclePlan:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
     if config.log is None:
-        ros2 = read_ros2_beside(config)
+        ros2 = read_ros2_beside(config, drive)
         return OtherVehiclePlan(config, vehicle, commands_recorded=config.live, ros2=ros2)
     file = Path(config.log)
     if not file.exists():

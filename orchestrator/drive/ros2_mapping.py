@@ -30,10 +30,10 @@ def read_ros2(config: DriveConfig) -> MappingFile | None:
             raise MappingError(f"{where}: not in the drive's [[vehicles]], which are {known}")
         if beside[name].seen_as is not None:
             raise MappingError(f"{where}: the car detects it itself; nothing of that comes back")
-    return read
+    return _reachable(read, config)
 
 
-def read_ros2_beside(config: OtherVehicleConfig) -> MappingFile | None:
+def read_ros2_beside(config: OtherVehicleConfig, drive: DriveConfig) -> MappingFile | None:
     """Return the mapping of a vehicle beside the car, None where it speaks no ROS 2.
 
     Raises MappingError or FileNotFoundError, one line.
@@ -43,4 +43,14 @@ def read_ros2_beside(config: OtherVehicleConfig) -> MappingFile | None:
     read = read_mapping(Path(config.ros2))
     if not read.mapping.inwards:
         raise MappingError(f"{read.name}: no [[in]]: nothing of {config.id} would be heard")
+    return _reachable(read, drive)
+
+
+def _reachable(read: MappingFile, config: DriveConfig) -> MappingFile:
+    """Return a mapping whose topics can come; raises MappingError where nobody could send any."""
+    if read.mapping.endpoint is None and not config.insecure:
+        raise MappingError(
+            f"{read.name}: endpoint must be named, that of the car's router or bridge: the run's "
+            "own bus speaks ROS with --endpoint tcp/HOST:PORT --insecure alone"
+        )
     return read

@@ -74,8 +74,9 @@ def test_ros_has_no_certificate_of_the_runs_bus(tmp_path: Path) -> None:
         town_plan(tmp_path).config,
         secure=str(campaign(tmp_path / "c")),
         endpoint=ENDPOINT,
+        insecure=False,
         source="live",
         ros2="autoware",
     )
-    with pytest.raises(UserError, match="with --secure its endpoint must be named"):
+    with pytest.raises(UserError, match="endpoint must be named, that of the car"):
         read_inputs(config)

@@ -154,7 +154,10 @@ def test_a_route_from_the_car_needs_a_car_and_a_mapping_that_hear_of_it(tmp_path
         read_ros2(config)
     file = tmp_path / "m.toml"
     file.write_text(AUTOWARE.read_text().replace("# [map]\n# ", "[map]\n").replace("# lon", "lon"))
-    assert read_ros2(msgspec.structs.replace(config, ros2=str(file))) is not None
+    with_route = msgspec.structs.replace(config, ros2=str(file))
+    with pytest.raises(MappingError, match="endpoint must be named, that of the car's router"):
+        read_ros2(with_route)  # nothing of a car could come
+    assert read_ros2(msgspec.structs.replace(with_route, insecure=True)) is not None
     file.write_text('dialect = "ros2dds"\n')
     with pytest.raises(MappingError, match=r"needs an \[\[in\]\] of type autoware_planning_msgs"):
         read_ros2(msgspec.structs.replace(config, ros2=str(file)))
