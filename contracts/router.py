@@ -18,6 +18,7 @@ from pathlib import Path
 import msgspec
 import zenoh
 
+from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.process_setup import RouterSetup, read_setup
 from foretwin.contracts.zenoh_config import zenoh_config
@@ -42,7 +43,7 @@ def run_router(argv: list[str] | None = None) -> None:
     except (msgspec.DecodeError, OSError) as problem:
         parser.exit(2, f"{file}: {problem}\n")
     zenoh.init_log_from_env_or("warn")  # whom TLS turns away is told nowhere else
-    word_file = Path(setup.word_file)
+    word_file, meter = Path(setup.word_file), CpuMeter(file.parent, file.stem)
     try:
         session = zenoh.open(zenoh_config(setup.bus, router=True))
     except zenoh.ZError as error:
@@ -50,8 +51,10 @@ def run_router(argv: list[str] | None = None) -> None:
         parser.exit(2, f"router: {error}\n")
     with session:
         _say(word_file, LISTENS)
+        meter.ready()
         while not ended.wait(_LOOK_S) and os.getppid() == parent:
-            pass
+            meter.look()
+    meter.write()
     if os.getppid() != parent and setup.folder is not None:
         shutil.rmtree(setup.folder, ignore_errors=True)
     sys.stderr.flush()

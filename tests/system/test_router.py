@@ -44,6 +44,7 @@ def assert_balanced(run: Path) -> None:
     record: dict[str, Any] = json.loads((run / "run.json").read_text(encoding="utf-8"))
     assert record["exit"] == "completed"
     assert record["troubles"] == []
+    assert record["processor"]["router"]["cpu_s"] > 0.0
     telemetry, rounds, jobs = (record["ledger"][name] for name in ("telemetry", "rounds", "jobs"))
     assert telemetry["published"] == telemetry["recorded"] > 0
     assert telemetry["lost"] == 0
