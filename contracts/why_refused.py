@@ -21,7 +21,7 @@ from foretwin.contracts.process_setup import BusSetup
 _REACH_S, _ALERT_S = 3.0, 0.5
 ADMITTED = (
     "the router takes this certificate; what is refused beyond that is not of the role (the access "
-    "rules go by it and say nothing to who is refused; run.json counts it), or of another run"
+    "rules go by it and say nothing to who is refused), or of another run"
 )
 _MEANINGS = {
     "CERTIFICATE_EXPIRED": "the router says that the certificate has expired: make another "
