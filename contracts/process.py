@@ -7,7 +7,6 @@ Ctrl-C is the orchestrator's business: children ignore SIGINT.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import fcntl
 import json
@@ -21,8 +20,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-import msgspec
-
 from foretwin.contracts import trace
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
 from foretwin.contracts.cpu_use import CpuMeter
@@ -30,8 +27,9 @@ from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.process_setup import setup_given
 from foretwin.contracts.refusals import Refusals
-from foretwin.contracts.setup import ProcessSetup, read_setup
+from foretwin.contracts.setup import ProcessSetup
 from foretwin.contracts.terminal import say
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
@@ -182,13 +180,7 @@ def run_process(
     codes: 0 done, 2 something wrong with setup or input, in one line, 1 any other error.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--setup", type=Path, required=True, help="JSON file written by foretwin")
-    file = parser.parse_args(argv).setup
-    try:
-        setup = read_setup(file, kind)
-    except (msgspec.DecodeError, OSError) as problem:
-        parser.exit(2, f"{file}: {problem}\n")
+    file, setup = setup_given(kind, argv)
     hold(file)
     log_to_file(setup)
     if setup.trace_dir is not None:

@@ -5,6 +5,7 @@ The router must start at once and stay small: nothing here knows frames, vehicle
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 from typing import TypeVar
 
@@ -64,3 +65,17 @@ def write_setup(setup: ProcessSetup, path: Path) -> None:
 def read_setup(path: Path, kind: type[_Setup]) -> _Setup:
     """Read a setup of type `kind`; raises msgspec.ValidationError naming the field at fault."""
     return msgspec.json.decode(path.read_bytes(), type=kind)
+
+
+def setup_given(kind: type[_Setup], argv: list[str] | None = None) -> tuple[Path, _Setup]:
+    """Return the file that a process's `--setup FILE` names, and what it holds.
+
+    Leaves with exit code 2, in one line, where that cannot be read.
+    """
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--setup", type=Path, required=True, help="JSON file written by foretwin")
+    file = parser.parse_args(argv).setup
+    try:
+        return file, read_setup(file, kind)
+    except (msgspec.DecodeError, OSError) as problem:
+        parser.exit(2, f"{file}: {problem}\n")

@@ -7,7 +7,6 @@ that started it.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import signal
@@ -15,12 +14,12 @@ import sys
 import threading
 from pathlib import Path
 
-import msgspec
 import zenoh
 
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
-from foretwin.contracts.process_setup import RouterSetup, read_setup
+from foretwin.contracts.process_setup import RouterSetup, setup_given
+from foretwin.contracts.terminal import say
 from foretwin.contracts.zenoh_config import zenoh_config
 
 LISTENS = "listens"
@@ -35,20 +34,15 @@ def run_router(argv: list[str] | None = None) -> None:
     parent = os.getppid()
     ended = threading.Event()
     on_end_signals(ended.set)
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--setup", type=Path, required=True, help="JSON file written by foretwin")
-    file = parser.parse_args(argv).setup
-    try:
-        setup = read_setup(file, RouterSetup)
-    except (msgspec.DecodeError, OSError) as problem:
-        parser.exit(2, f"{file}: {problem}\n")
+    file, setup = setup_given(RouterSetup, argv)
     zenoh.init_log_from_env_or("warn")  # whom TLS turns away is told nowhere else
     word_file, meter = Path(setup.word_file), CpuMeter(file.parent, file.stem)
     try:
         session = zenoh.open(zenoh_config(setup.bus, router=True))
     except zenoh.ZError as error:
         _say(word_file, " ".join(str(error).split()))
-        parser.exit(2, f"router: {error}\n")
+        say(f"router: {error}", error=True)
+        sys.exit(2)
     with session:
         _say(word_file, LISTENS)
         meter.ready()
