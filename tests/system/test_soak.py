@@ -1,8 +1,12 @@
-"""Nothing grows with a drive: what takes each sample, and real processes over half an hour."""
+"""Nothing grows with a drive: what takes each sample, and real processes over half an hour.
+
+For a sixth of the half hour, from the tenth minute on, the car says ten times as much.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +30,8 @@ from tests.growth import entries
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
-from tests.system.foretwin_command import foretwin
+from tests.system.busy_car import SPELL_S
+from tests.system.foretwin_command import Finished, run_folder, started
 from tests.viewer import scene
 from tests.viewer.shown import monitor_of
 
@@ -35,6 +40,26 @@ SOAK_MIN = float(os.environ.get("FORETWIN_SOAK_MIN", "30"))
 MOST_MB_PER_H = 5.0
 VIEW_PART_MB = 40.0
 """What Rerun holds of the file that the viewer writes, at most: its index goes with each part."""
+CALM_HZ = 320.0
+"""So many samples a stand-in car sends in each second, at most."""
+DAY_GB = 40.0
+"""What a drive of 24 h leaves, extrapolated; `--keep` bounds it."""
+WITH_A_BUSY_CAR = """
+from foretwin.__main__ import main
+from foretwin.orchestrator.runner.supervisor import FreshInterpreter
+
+class Launcher(FreshInterpreter):
+    def __call__(self, *, module, setup):
+        if module != "telemetry.standin":
+            return super().__call__(module=module, setup=setup)
+        other = FreshInterpreter(self._folder, package="tests.system")
+        return other(module="busy_car", setup=setup)
+
+from foretwin.orchestrator.drive import foreground
+foreground.FreshInterpreter = Launcher
+main()
+"""
+"""A drive whose stand-in car is that of `busy_car`."""
 SAMPLES, GROWN_BY = 1500, 100
 STEP_NS = 20_000_000
 Feed = Callable[[int], None]
@@ -125,22 +150,37 @@ def test_a_list_of_all_samples_would_be_noticed() -> None:
 
 @pytest.mark.judge
 @pytest.mark.timeout(60.0 * (SOAK_MIN + 10.0))
-def test_no_process_grows_over_a_long_drive(tmp_path: Path) -> None:
+def test_no_process_grows_over_a_long_drive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of 5 min in which it settles, and 10 over which growth can be told, nothing is shorter."""
+    whole_s = 60.0 * SOAK_MIN
+    monkeypatch.setenv(SPELL_S, f"{whole_s / 3.0},{whole_s / 2.0}")
     route = json.loads(ROUTE_FILE.read_text(encoding="utf-8"))
     feature = route["features"][0] if "features" in route else route
     there = feature["geometry"]["coordinates"]
     back = there[-2:0:-1]
-    feature["geometry"]["coordinates"] = [*(there + back) * round(SOAK_MIN), there[0]]
+    feature["geometry"]["coordinates"] = [*(there + back) * math.ceil(SOAK_MIN), there[0]]
     (tmp_path / "loop.geojson").write_text(json.dumps(route), encoding="utf-8")
-    arguments = ("--route", "loop.geojson", "--end", f"{60.0 * SOAK_MIN:.0f}", "--tuning", "report")
-    done = foretwin(tmp_path / "runs", *arguments, timeout_s=60.0 * (SOAK_MIN + 5.0))
+    out = tmp_path / "runs"
+    arguments = ("--route", "loop.geojson", "--end", f"{whole_s:.0f}", "--tuning", "report")
+    with started(out, *arguments, entry=("-c", WITH_A_BUSY_CAR)) as process:
+        screen, _ = process.communicate(timeout=whole_s + 300.0)
+    done = Finished(process.returncode, screen, run_folder(out))
 
     record = done.record()
     assert record["exit"] == "completed", done.screen
+    telemetry = record["ledger"]["telemetry"]
+    assert telemetry["published"] > 2.0 * CALM_HZ * whole_s, "the car was never busy"
+    assert telemetry["recorded"] + telemetry["lost"] == telemetry["published"]
     assert set(record["memory"]) >= {"orchestrator", "recorder", "viewer", "mirror", "w0", "w1"}
+    print(json.dumps({name: record[name] for name in ("memory", "processor", "ledger")}, indent=1))
     view = record["memory"].pop("viewer")
     assert view["most"] - view["settled"] < VIEW_PART_MB
     grown = {name: held["per_hour"] for name, held in record["memory"].items()}
     assert None not in grown.values(), f"too short: FORETWIN_SOAK_MIN is {SOAK_MIN:g}"
     assert {name: by for name, by in grown.items() if by > MOST_MB_PER_H} == {}
+    assert done.run is not None
+    day_gb = sum(one.stat().st_size for one in done.run.rglob("*")) * 86_400.0 / whole_s / 1e9
+    print(f"a day is {day_gb:.1f} GB, with a sixth of it at ten times the samples")
+    assert day_gb < DAY_GB
