@@ -22,6 +22,9 @@ log = logging.getLogger("results")
 WAITING_BYTES = 64 * 1024 * 1024
 """So much may wait for a disk that takes nothing; rows after that are lost, and counted."""
 
+NAMED = {"futures": {"jobs"}, "road_users": {"jobs"}, "rounds": {"futures"}}
+"""Tables whose rows say of which job or round they are, by those of them that come first."""
+
 Rows = Sequence[Mapping[str, Any]]
 
 
@@ -67,13 +70,19 @@ class RunStreams:
                 self._make_record(table, rows)
                 rows.clear()
         self.failing = None
-        # What others name comes first: jobs before futures, futures before rounds.
+        # What others name comes first, jobs before futures, futures before rounds; where a disk
+        # has room for the small ones alone, those who name what is not written wait, too.
+        not_written: set[str] = set()
         for table in reversed(list(self._schemas)):
+            if NAMED.get(table, set()) & not_written:
+                not_written.add(table)
+                continue
             try:
                 self._append(table)
                 if sync:
                     self._streams[table].sync()
             except OSError as error:
+                not_written.add(table)
                 self.failing = self.failing or one_line(error)
 
     def put_away(self, roll: Roll) -> list[Path]:

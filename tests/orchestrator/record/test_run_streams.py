@@ -131,3 +131,29 @@ def test_rows_that_others_name_are_written_first(
     streams.close()
 
     assert written == ["jobs.arrows", "futures.arrows"]
+
+
+def test_who_names_others_waits_for_them_on_a_disk_with_little_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill then leaves no round without its futures: it counts as one that is cut off."""
+    streams = RunStreams(tmp_path, {"rounds": SCHEMA, "futures": SCHEMA, "a": SCHEMA})
+    streams.write(sync=False)
+    really, full = os.pwrite, True
+
+    def pwrite(descriptor: int, *what: Any) -> int:
+        name = Path(f"/proc/self/fd/{descriptor}").readlink().name
+        if full and name == "futures.arrows":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return really(descriptor, *what)
+
+    monkeypatch.setattr(os, "pwrite", pwrite)
+    for table in ("rounds", "futures", "a"):
+        streams.take(table, rows(0, 1))
+    streams.write(sync=True)
+    held = [read(tmp_path / f"{table}.arrows") for table in ("a", "futures", "rounds")]
+    assert held == [rows(0, 1), [], []]
+    full = False
+    streams.write(sync=True)
+    streams.close()
+    assert read(tmp_path / "futures.arrows") == read(tmp_path / "rounds.arrows") == rows(0, 1)
