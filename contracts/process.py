@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import logging
 import os
 import signal
@@ -27,6 +26,7 @@ from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.log_file import JsonLines, LogFile
 from foretwin.contracts.process_setup import setup_given
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup
@@ -39,34 +39,10 @@ ORCHESTRATOR_GRACE_S = 30.0
 taken for gone. One that has died is seen at once by those that it started."""
 
 
-class JsonLines(logging.Formatter):
-    """One JSON object per line: wall time, process, level, text, and the traceback if any."""
-
-    def __init__(self, process_id: str) -> None:
-        super().__init__()
-        self._process_id = process_id
-
-    def format(self, record: logging.LogRecord) -> str:
-        """Return the record as one line."""
-        line = {
-            "wall_s": round(record.created, 3),
-            "process": self._process_id,
-            "level": record.levelname.lower(),
-            "source": record.name,
-            "text": record.getMessage(),
-        }
-        if record.exc_info:
-            line["traceback"] = self.formatException(record.exc_info)
-        return json.dumps(line, ensure_ascii=False)
-
-
 def log_to_file(setup: ProcessSetup) -> None:
-    """Send the process's log to the run's file; short appends of several processes interleave.
-
-    A log that cannot be written (a full disk) is lost in silence: it must not end a drive.
-    """
+    """Send the process's log to the run's file."""
     logging.raiseExceptions = False
-    handler = logging.FileHandler(setup.log_file, encoding="utf-8", delay=True)
+    handler = LogFile(Path(setup.log_file))
     handler.setFormatter(JsonLines(setup.process_id))
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
 

@@ -1,0 +1,87 @@
+"""The log of a run: whatever the disk does, it ends no process and holds whole lines."""
+
+from __future__ import annotations
+
+import errno
+import json
+import logging
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.log_file import JsonLines, LogFile
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "log.jsonl"
+
+
+@pytest.fixture
+def log(file: Path) -> Iterator[logging.Logger]:
+    log, handler = logging.Logger("here", logging.INFO), LogFile(file)
+    handler.setFormatter(JsonLines("p0"))
+    log.addHandler(handler)
+    yield log
+    handler.close()
+
+
+def texts(file: Path) -> list[str]:
+    return [json.loads(line)["text"] for line in file.read_text(encoding="utf-8").splitlines()]
+
+
+def test_a_line_tells_when_who_how_bad_and_what(file: Path, log: logging.Logger) -> None:
+    log.info("a %s", "b")
+    try:
+        raise ValueError("wrong")
+    except ValueError:
+        log.exception("c\nd \ud800")
+    first, second = map(json.loads, file.read_text(encoding="utf-8").splitlines())
+    assert {**first, "wall_s": 0.0} == {
+        "wall_s": 0.0, "process": "p0", "level": "info", "source": "here", "text": "a b",
+    }  # fmt: skip
+    assert first["wall_s"] > 1e9
+    assert second["text"].startswith("c\nd ")
+    assert "ValueError: wrong" in second["traceback"]
+
+
+def test_several_append_to_one_file(file: Path, log: logging.Logger) -> None:
+    other = LogFile(file)
+    for number in range(3):
+        log.info("ours %d", number)
+        other.emit(logging.LogRecord("there", 20, "", 0, '{"text": "theirs"}', (), None))
+    other.close()
+    assert texts(file) == ["ours 0", "theirs", "ours 1", "theirs", "ours 2", "theirs"]
+
+
+def test_a_full_disk_loses_its_lines_alone(
+    file: Path, log: logging.Logger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    really, room = os.write, 7
+
+    def write(descriptor: int, data: bytes) -> int:
+        if not room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return really(descriptor, data[:room])
+
+    log.info("before")
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "write", write)
+        log.info("torn")
+        room = 0
+        log.info("lost")
+        logging.shutdown([lambda: log.handlers[0]])  # type: ignore[list-item]
+    log.info("after")
+    assert file.read_text(encoding="utf-8").splitlines()[1] == '{"wall_'
+    lines = file.read_text(encoding="utf-8").splitlines()
+    assert [json.loads(lines[number])["text"] for number in (0, 2)] == ["before", "after"]
+    assert len(lines) == 3
+
+
+def test_a_file_that_cannot_be_opened_ends_nothing(tmp_path: Path) -> None:
+    handler = LogFile(tmp_path / "missing" / "log.jsonl")
+    handler.emit(logging.LogRecord("here", 20, "", 0, "a", (), None))
+    handler.close()
+    handler.close()
