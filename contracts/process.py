@@ -34,10 +34,6 @@ from foretwin.contracts.terminal import say
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
 
-ORCHESTRATOR_GRACE_S = 30.0
-"""A lost link comes back within this time, and an orchestrator that stood still goes on, or it is
-taken for gone. One that has died is seen at once by those that it started."""
-
 
 def log_to_file(setup: ProcessSetup) -> None:
     """Send the process's log to the run's file."""
@@ -90,7 +86,7 @@ class ProcessLife:
         """Whether the process should finish what it holds and leave."""
         self._look()
         since_s = self._gone_since_s
-        if since_s is not None and self._mono_s() - since_s > ORCHESTRATOR_GRACE_S:
+        if since_s is not None and self._mono_s() - since_s > self._setup.grace_s:
             self.terminated.set()
         if os.getppid() != self._parent:
             self.terminated.set()

@@ -47,6 +47,9 @@ class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     log_file: str
     trace_dir: str | None = None
     """Where it leaves what it did when; None: nowhere. See foretwin.contracts.trace."""
+    grace_s: float = 30.0
+    """A lost link comes back within this time, and an orchestrator that stood still goes on, or it
+    is taken for gone. One that has died is seen at once by those that it started."""
 
 
 class RouterSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -15,7 +15,7 @@ from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
 from foretwin.contracts.keys import alive_key, key
 from foretwin.contracts.mailbox import Received
 from foretwin.contracts.ports import free_endpoint
-from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
+from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, take
@@ -57,6 +57,7 @@ class Run:
             vehicle_id="ego",
             bus=BusSetup(endpoint=free_endpoint()),
             log_file=str(folder / "log.jsonl"),
+            grace_s=1.0,
         )
         self._file = folder / "p0.json"
         write_setup(self.setup, self._file)
@@ -143,7 +144,7 @@ def test_it_waits_out_the_grace_once_the_orchestrator_is_gone() -> None:
 
     bus.lose(orchestrator)
     assert not life.over
-    now_s += ORCHESTRATOR_GRACE_S
+    now_s += setup.grace_s
     assert not life.over
     now_s += 0.1
     assert life.over

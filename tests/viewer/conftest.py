@@ -56,6 +56,7 @@ class ViewerRun:
             vehicle_id=VEHICLE,
             bus=bus_setup,
             log_file=str(self.log),
+            grace_s=5.0,
             file=str(self.recording),
             worlds_dir=str(worlds),
             drive_frame=scene.DRIVE_FRAME,

@@ -15,7 +15,7 @@ import pytest
 
 from foretwin.contracts.bus import Mailbox, Received, ZenohBus
 from foretwin.contracts.drive import SpeedSample
-from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
+from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
@@ -40,6 +40,11 @@ class Wall:
         return self.now_s
 
 
+SETUP = ProcessSetup(
+    run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
+)
+
+
 def recorder(
     bus: MemoryBus,
     recording: DriveRecording,
@@ -47,13 +52,10 @@ def recorder(
     lossless: bool = True,
     mono_s: Any = time.monotonic,
 ) -> RecorderProcess:
-    setup = ProcessSetup(
-        run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
-    )
     return RecorderProcess(
         recording,
         bus=bus,
-        life=ProcessLife(setup, bus, mono_s=mono_s),
+        life=ProcessLife(SETUP, bus, mono_s=mono_s),
         run_id="r1",
         vehicle_id="car",
         lossless=lossless,
@@ -126,11 +128,11 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
     bus.lose(ORCHESTRATOR)
     assert process.step(), "a link may come back"
     bus.declare_alive(ORCHESTRATOR)
-    wall.now_s += 2.0 * ORCHESTRATOR_GRACE_S
+    wall.now_s += 2.0 * SETUP.grace_s
     assert process.step()
     bus.lose(ORCHESTRATOR)
     assert process.step()
-    wall.now_s += 1.1 * ORCHESTRATOR_GRACE_S
+    wall.now_s += 1.1 * SETUP.grace_s
     assert not process.step()
     process.finish()
 

@@ -13,7 +13,7 @@ from foretwin.contracts.drive import (
     VehicleInfo,
 )
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
+from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.processes.replay import ReplaySource
@@ -22,6 +22,11 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, recorded_minute
 
 ORCHESTRATOR = alive_key(run="r", process="orchestrator")
+
+
+SETUP = ProcessSetup(
+    run_id="r", process_id="vehicle", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
+)
 
 
 class Rig:
@@ -34,17 +39,10 @@ class Rig:
         for channel in ("gnss", "speed", "end"):
             self.bus.subscribe(channel, self.inbox, vehicle="car")
         source = ReplaySource(recorded_minute(), vehicle_id="car", end_s=end_s)
-        setup = ProcessSetup(
-            run_id="r",
-            process_id="vehicle",
-            vehicle_id="car",
-            bus=BusSetup(endpoint=""),
-            log_file="",
-        )
         self.process = VehicleProcess(
             source,
             bus=self.bus,
-            life=ProcessLife(setup, self.bus, mono_s=lambda: self.now_s),
+            life=ProcessLife(SETUP, self.bus, mono_s=lambda: self.now_s),
             vehicle_id="car",
             speed=speed,
             mono_s=lambda: self.now_s,
@@ -143,14 +141,14 @@ def test_it_leaves_when_the_orchestrator_stays_away() -> None:
     assert rig.process.step()
     rig.bus.lose(ORCHESTRATOR)
     assert rig.process.step()
-    rig.now_s += 0.5 * ORCHESTRATOR_GRACE_S
+    rig.now_s += 0.5 * SETUP.grace_s
     rig.bus.declare_alive(ORCHESTRATOR)
     assert rig.process.step()
-    rig.now_s += 2.0 * ORCHESTRATOR_GRACE_S
+    rig.now_s += 2.0 * SETUP.grace_s
     assert rig.process.step()
     rig.bus.lose(ORCHESTRATOR)
     rig.process.step()
-    rig.now_s += 1.1 * ORCHESTRATOR_GRACE_S
+    rig.now_s += 1.1 * SETUP.grace_s
     assert not rig.process.step()
 
 
