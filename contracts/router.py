@@ -7,6 +7,7 @@ that started it.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -56,10 +57,17 @@ def run_router(argv: list[str] | None = None) -> None:
 
 
 def _say(word_file: Path, word: str) -> None:
-    """Let who waits for the router read all of its word or nothing."""
+    """Let who waits for the router read all of its word or nothing.
+
+    Nobody waits for one that is started again, perhaps on a full disk: that ends no router.
+    """
     partial = word_file.with_suffix(".partial")
-    partial.write_text(word, encoding="utf-8")
-    partial.replace(word_file)
+    try:
+        partial.write_text(word, encoding="utf-8")
+        partial.replace(word_file)
+    except OSError:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

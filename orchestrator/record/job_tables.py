@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import platform
 from collections.abc import Iterable
@@ -115,10 +116,35 @@ def played_with() -> dict[str, str]:
 
 
 def keep_vehicles(folder: Path, vehicles: Iterable[VehicleParameters]) -> None:
-    """Write parameters into a run's or sweep's folder, under the digests that jobs name."""
+    """Write parameters into a run's or sweep's folder, under the digests that jobs name.
+
+    Those that are there stay as they are. Raises OSError.
+    """
     (folder / VEHICLES).mkdir(parents=True, exist_ok=True)
     for vehicle in vehicles:
-        write_message(vehicle, folder / VEHICLES / f"{vehicle_digest(vehicle)}.vehicle")
+        file = folder / VEHICLES / f"{vehicle_digest(vehicle)}.vehicle"
+        if not file.exists():
+            write_message(vehicle, file)
+
+
+class VehicleKeeper:
+    """Keeps the parameters that a drive's jobs name; what a full disk does not take waits."""
+
+    def __init__(self, folder: Path, vehicle: VehicleParameters) -> None:
+        self._folder, self._waiting = folder, [vehicle]
+        self.write()
+
+    def add(self, vehicle: VehicleParameters) -> None:
+        """Take parameters that jobs will name."""
+        self._waiting.append(vehicle)
+        self.write()
+
+    def write(self) -> None:
+        """Write what waits, where the disk takes it now; never raises."""
+        if self._waiting:
+            with contextlib.suppress(OSError):
+                keep_vehicles(self._folder, self._waiting)
+                self._waiting.clear()
 
 
 def as_table(name: str, rows: list[Row], metadata: dict[str, str] | None = None) -> pa.Table:

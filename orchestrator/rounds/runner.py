@@ -21,13 +21,9 @@ from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports, LatestState, Notice, RoundIntent
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.columns import row_of
-from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
+from foretwin.orchestrator.record.job_tables import VehicleKeeper, job_row, road_user_rows
 from foretwin.orchestrator.record.ledger import RoundTally
-from foretwin.orchestrator.record.result_rows import (
-    plan_row,
-    round_futures,
-    round_row,
-)
+from foretwin.orchestrator.record.result_rows import plan_row, round_futures, round_row
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.news import RoundNews
@@ -82,7 +78,7 @@ class RoundRunner:
         self.windows = OpenWindows(plan.vehicle, horizon_s=plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
         self.draw_cases = self._planner.draw_cases
-        keep_vehicles(plan.folder, [plan.vehicle])
+        self._vehicles = VehicleKeeper(plan.folder, plan.vehicle)
         self.pace = RoundPace(
             most=plan.config.futures,
             least=plan.config.fewest_futures,
@@ -111,6 +107,7 @@ class RoundRunner:
         started_mono_ns: int,
     ) -> None:
         """Open a round and give its jobs out."""
+        self._vehicles.write()
         self.futures.off_lanes_rounds += intent.off_lanes_m > 0.0
         round_id, self.next_round_id = self.next_round_id, self.next_round_id + 1
         pace, lock_step = self.pace.now, self._plan.config.lock_step
@@ -144,7 +141,7 @@ class RoundRunner:
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
         """Plan rounds for these parameters from now on, which workers have as `version`."""
         self._planner.use_vehicle(vehicle, version)
-        keep_vehicles(self._plan.folder, [vehicle])
+        self._vehicles.add(vehicle)
 
     def next_is_due(self) -> None:
         """Give up the round that is open at its deadline where nobody will or can complete it."""

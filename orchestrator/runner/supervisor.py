@@ -181,8 +181,14 @@ class Supervisor:
         return Supervisor(self.launch, self.started, self.restarted, _deaths=self._deaths)
 
     def _start_again(self, managed: _Managed, now_s: float) -> None:
-        process_id, managed.due_s = managed.setup.process_id, None
-        managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+        process_id = managed.setup.process_id
+        try:
+            managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+        except OSError as error:  # no memory, no room, no descriptor: that passes
+            log.warning("%s cannot be started now: %s", process_id, error)
+            managed.due_s = now_s + FIRST_PAUSE_S
+            return
+        managed.due_s = None
         if managed.row.nice:
             self._to_give_way[process_id] = now_s + GIVES_WAY_AFTER_S
         log.info("started %s again as process %d", process_id, managed.child.pid)

@@ -99,6 +99,18 @@ def test_a_port_that_is_taken_is_said_and_nothing_listens(tmp_path: Path) -> Non
             assert process.wait(DEADLINE_S) == 2
 
 
+def test_a_router_that_cannot_say_its_word_goes_on(tmp_path: Path) -> None:
+    """Nobody waits for it where one is started again, and the disk may be full."""
+    endpoint, word = free_endpoint(), tmp_path / "router.partial"
+    word.mkdir()  # nothing can be written there
+    with router(tmp_path, endpoint) as process:
+        setup = BusSetup(endpoint=endpoint)
+        with ZenohBus(setup) as near:
+            assert near.connected
+        assert process.poll() is None
+    assert not (tmp_path / "router.word").exists()
+
+
 def test_a_router_starts_without_what_it_does_not_need(tmp_path: Path) -> None:
     code = (
         "import sys, foretwin.contracts.router; "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import msgspec
@@ -43,3 +44,17 @@ def test_a_setup_of_another_process_is_refused_by_the_field(tmp_path: Path) -> N
     write_setup(SETUPS[0], tmp_path / "setup.json")
     with pytest.raises(msgspec.ValidationError, match="unknown field `log`"):
         read_setup(tmp_path / "setup.json", RecorderSetup)
+
+
+def test_a_setup_that_is_there_needs_no_room_on_a_full_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    write_setup(SETUPS[0], tmp_path / "setup.json")
+    monkeypatch.setattr(Path, "write_bytes", full)
+    write_setup(SETUPS[0], tmp_path / "setup.json")
+    assert read_setup(tmp_path / "setup.json", ReplaySetup) == SETUPS[0]
+    with pytest.raises(OSError, match="No space"):
+        write_setup(SETUPS[1], tmp_path / "setup.json")

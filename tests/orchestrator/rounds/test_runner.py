@@ -13,6 +13,7 @@ import pytest
 from foretwin.contracts.drive import SignalState, VehicleState
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.simulation import Event
+from foretwin.orchestrator.record import job_tables
 from foretwin.orchestrator.rounds import runner
 from foretwin.orchestrator.rounds.jobs import _signals, planners_of
 from foretwin.orchestrator.rounds.pace import Pace
@@ -42,6 +43,32 @@ def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) ->
     assert first.futures[0].name == "nominal"
     assert len({(job.state.stamp_ns, job.cruise_speed_mps, job.seed) for job in jobs}) == 1
     assert house.conductor.rounds.futures.count == futures
+
+
+def test_parameters_that_a_full_disk_does_not_take_are_written_with_the_next_round(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError("No space left on device")
+
+    house = House(tmp_path)
+    house.drive(20)
+    rounds = house.conductor.rounds
+    other = msgspec.structs.replace(house.plan.vehicle, mass_kg=1234.0)
+    vehicles = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.vehicle")}
+    assert len(vehicles) == 1
+    with monkeypatch.context() as patched:
+        patched.setattr(job_tables, "keep_vehicles", full)
+        rounds.use_vehicle(other, 1)
+        assert house.conductor.start_round()
+    house.workers[0].answer()
+    house.work()
+    house.drive(40)
+    assert house.conductor.start_round()
+    house.tables.close()
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.vehicle")}
+    assert len(kept) == 2
+    assert vehicles.items() <= kept.items(), "what is there stays"
 
 
 def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) -> None:

@@ -129,6 +129,26 @@ def test_who_keeps_dying_is_started_after_pauses_that_grow_and_then_given_up() -
     assert supervisor.running() == []
 
 
+def test_who_cannot_be_started_now_is_started_later() -> None:
+    """A machine without memory, or a full disk, ends no supervisor."""
+    children, troubles = [FakeChild(), FakeChild()], iter([None, OSError(12, "no memory"), None])
+
+    def launch(*, module: str, setup: ProcessSetup) -> FakeChild:
+        if (trouble := next(troubles)) is not None:
+            raise trouble
+        return children[supervisor.started + supervisor.restarted]
+
+    supervisor = Supervisor(launch)
+    supervisor.start(row("recorder"), setup("recorder"))
+    children[0].exit_code = -9
+    (death,) = supervisor.poll(1.0)
+    assert death.restarted
+    assert supervisor.poll(1.5) == []
+    assert (supervisor.running(), supervisor.restarted) == ([], 0)
+    assert supervisor.poll(2.0) == []
+    assert (supervisor.running(), supervisor.restarted) == (["recorder"], 1)
+
+
 def test_a_death_long_ago_is_forgotten() -> None:
     supervisor, children = supervised()
     supervisor.start(row("viewer"), setup("viewer"))
