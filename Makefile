@@ -45,9 +45,9 @@ bench: setup
 judge: setup
 	$(BIN)/pytest -m judge
 
-# Drives that faults happen to: make chaos COUNT=1000 SEED=7
+# Drives that faults happen to: make chaos COUNT=1000 SEED=7; with FROM=12 it goes on at drive 12
 chaos: setup
-	$(BIN)/python -m tests.chaos --count $(or $(COUNT),100) --seed $(or $(SEED),0)
+	$(BIN)/python -m tests.chaos --count $(or $(COUNT),100) --seed $(or $(SEED),0) --from $(or $(FROM),0)
 
 clean:
 	rm -rf $(VENV) build dist

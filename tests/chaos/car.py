@@ -1,7 +1,8 @@
 """A live car whose clock jumps and that says ten times as much when it is told to:
 `python -m tests.chaos.car --setup FILE` (`StandinSetup`).
 
-SIGUSR1 sets its clock, by how much its seed says; SIGUSR2 begins a burst of two seconds.
+SIGUSR1 sets its clock, by how much its seed says; SIGUSR2 begins a burst of two seconds. One that
+is started again has driven on meanwhile.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import logging
 import random
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,6 +39,12 @@ class ErraticSource:
         self._offset_ns = 0
         self._burst_until_ns = 0
         self._now_ns = source.first_stamp_ns
+
+    def drive_on(self, for_ns: int) -> None:
+        """Let nothing come of what it drives first."""
+        self.first_stamp_ns += for_ns
+        for _ in self._source.advance(self.first_stamp_ns - 1):
+            pass
 
     @property
     def ended(self) -> bool:
@@ -80,6 +88,11 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
         ),
         seed=setup.seed,
     )
+    begun = Path(setup.path_file).with_name("car.begun")
+    if begun.exists():
+        source.drive_on(time.monotonic_ns() - int(begun.read_text()))
+    else:
+        begun.write_text(str(time.monotonic_ns()))
     signal.signal(signal.SIGUSR1, lambda *_: source.set_clock())
     signal.signal(signal.SIGUSR2, lambda *_: source.begin_burst())
     serve_vehicle(source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed)

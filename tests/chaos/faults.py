@@ -7,21 +7,37 @@ when it happens, since only the run itself knows its processes.
 from __future__ import annotations
 
 import random
-from typing import NamedTuple
+from typing import Literal, NamedTuple
+
+Source = Literal["standin", "log", "live"]
+"""Where the samples of a drive come from; `live` is a car of somebody else's behind a link."""
+BusKind = Literal["socket", "open", "tls"]
+"""A socket with passwords, a network's endpoint that asks nobody, or one with certificates."""
 
 ENDERS = ("kill", "segv", "term", "hup")
 """Signals that end who gets them."""
-SERVANTS = (
-    "w", "w", "mirror", "builder", "tuning", "recorder", "recorder", "viewer", "router", "other",
+DEADLY = (*ENDERS, "memory")
+"""What ends a process, or may."""
+STARTED_AGAIN = (
+    "w", "w", "mirror", "builder", "tuning", "recorder", "recorder", "viewer", "router",
 )  # fmt: skip
-"""Kinds of processes that are started again; `other` is any that stands in no table here."""
-ALL = (*SERVANTS, "vehicle", "orchestrator")
-LAST = ("orchestrator", "orchestrator", "vehicle", "command")
-"""Of whom a signal is, or may be, the end of the drive: the last of its faults."""
+"""Kinds of processes that the supervisor starts again, whatever ends them."""
+OUTSIDE = {"live": "car", "planner": "planner"}
+"""Who takes part and is none of the run's, by what brings it."""
+LAST = ("supervisor", "supervisor", "orchestrator", "vehicle")
+"""Whose end is, or may be, the end of the drive: the last of its faults."""
 
 DRIVING_S = 22.0
 _FIRST_S, _LAST_S = 0.5, DRIVING_S - 2.0
-_FAULTS = 10
+_FAULTS = 20
+
+WEIGHTS = {
+    "kill": 8, "segv": 4, "term": 3, "hup": 3, "stop": 5, "memory": 3, "full": 2, "read_only": 2,
+    "power": 2, "cut": 4, "delay": 2, "loss": 2, "clock": 3, "host_clock": 2, "burst": 2,
+    "messages": 4,
+}  # fmt: skip
+OF_LINKS = frozenset({"cut", "delay", "loss", "clock"})
+"""What only a car behind a link meets."""
 
 
 class Fault(NamedTuple):
@@ -42,11 +58,14 @@ class Fault(NamedTuple):
 
 
 class Case(NamedTuple):
-    """One drive and its faults, in their order; `linked` is a live car behind a link."""
+    """One drive and its faults, in their order."""
 
     seed: int
     number: int
-    linked: bool
+    source: Source
+    bus: BusKind
+    planner: bool
+    """Whether a driving stack in a process of somebody else's drives the futures."""
     faults: tuple[Fault, ...]
 
     @property
@@ -54,34 +73,54 @@ class Case(NamedTuple):
         """How the case is had again."""
         return f"--seed {self.seed} --drive {self.number}"
 
+    @property
+    def kind(self) -> str:
+        """What drives and how it is joined, in words."""
+        return f"{self.source} {self.bus}{' planner' if self.planner else ''}"
+
 
 def draw(seed: int, number: int) -> Case:
     """Return the drive of a number, the same for the same seed."""
     chance = random.Random(f"{seed}/{number}")
-    linked = chance.random() < 0.3
-    faults = [_draw_one(chance, linked) for _ in range(_FAULTS - 1)]
+    source: Source = chance.choices(("standin", "log", "live"), (0.4, 0.25, 0.35))[0]
+    bus: BusKind = chance.choices(("socket", "open"), (0.6, 0.4))[0]
+    if source == "live":
+        bus = chance.choices(("open", "tls"), (0.6, 0.4))[0]
+    planner = bus != "tls" and chance.random() < 0.3
+    there = [*STARTED_AGAIN, "orchestrator", "orchestrator"]
+    there += ["car"] * (source == "live") + ["planner", "planner"] * planner
+    stays = ["supervisor", *(["vehicle"] if source != "live" else []), *there]
+    faults = [_draw_one(chance, source, bus, there, stays) for _ in range(_FAULTS)]
     faults = _apart(sorted(faults))
-    if not linked and chance.random() < 0.5:
-        last = Fault(chance.uniform(_LAST_S - 8.0, _LAST_S), chance.choice(ENDERS), "")
-        target = chance.choice(LAST)
+    if chance.random() < 0.5:
+        last = Fault(chance.uniform(_LAST_S - 6.0, _LAST_S), chance.choice(DEADLY), "", 3.0)
+        whose = [one for one in LAST if source != "live" or one != "vehicle"]
+        last = last._replace(target=chance.choice(whose), strength=chance.random())
         faults = [one for one in faults if one.at_s < last.at_s]
-        faults.append(last._replace(target=target))
-    return Case(seed, number, linked, tuple(faults))
+        faults.append(last._replace(for_s=3.0 if last.what == "memory" else 0.0))
+    return Case(seed, number, source, bus, planner, tuple(faults))
 
 
-def _draw_one(chance: random.Random, linked: bool) -> Fault:
+def _draw_one(
+    chance: random.Random, source: Source, bus: BusKind, there: list[str], stays: list[str]
+) -> Fault:
     at_s = chance.uniform(_FIRST_S, _LAST_S)
     what = chance.choices(tuple(WEIGHTS), tuple(WEIGHTS.values()))[0]
-    if what in OF_LINKS and not linked:
+    if what in OF_LINKS and source != "live":
         what = "kill"
+    if what == "loss" and bus == "tls":
+        what = "cut"  # no certificate is for a host of the moment
     strength = chance.random()
     match what:
         case "kill" | "segv" | "term" | "hup":
-            return Fault(at_s, what, chance.choice(SERVANTS))
+            target = chance.choice(there)
+            if target == "orchestrator" and what in ("term", "hup"):
+                what = "kill"  # those ask it to end the drive
+            return Fault(at_s, what, target)
         case "stop":
-            return Fault(at_s, what, chance.choice(ALL), chance.uniform(2.0, 10.0))
+            return Fault(at_s, what, chance.choice(stays), chance.uniform(2.0, 10.0))
         case "memory":
-            return Fault(at_s, what, chance.choice(SERVANTS), chance.uniform(2.0, 5.0), strength)
+            return Fault(at_s, what, chance.choice(there), chance.uniform(2.0, 5.0), strength)
         case "full" | "read_only":
             return Fault(at_s, what, "disk", chance.uniform(2.0, 8.0))
         case "cut":
@@ -92,18 +131,14 @@ def _draw_one(chance: random.Random, linked: bool) -> Fault:
             return Fault(at_s, what, "link", chance.uniform(2.0, 8.0))
         case "clock":
             return Fault(at_s, what, "car", 0.0, strength)
+        case "host_clock":
+            return Fault(at_s, what, "host", 0.0, strength)
         case "burst":
-            return Fault(at_s, what, "car" if linked else "stranger", 2.0)
+            return Fault(at_s, what, "car" if source == "live" else "stranger", 2.0, strength)
+        case "messages":
+            return Fault(at_s, what, "stranger", 0.0, strength)
         case _:
-            return Fault(at_s, what, strength=strength)
-
-
-WEIGHTS = {
-    "kill": 6, "segv": 2, "term": 2, "hup": 2, "stop": 4, "memory": 2, "full": 2, "read_only": 1,
-    "power": 3, "cut": 4, "delay": 2, "loss": 2, "clock": 3, "burst": 2, "messages": 3,
-}  # fmt: skip
-OF_LINKS = frozenset({"cut", "delay", "loss", "clock"})
-"""What only a car behind a link meets."""
+            return Fault(at_s, what, "run", strength=strength)
 
 
 def _apart(faults: list[Fault]) -> list[Fault]:
@@ -115,10 +150,10 @@ def _apart(faults: list[Fault]) -> list[Fault]:
     until_s: dict[str, float] = {}
     deaths: dict[str, int] = {}
     for one in faults:
-        thing = one.target or one.what
+        thing = f"{one.target} {one.what}" if one.target == "stranger" else one.target
         if one.at_s < until_s.get(thing, 0.0):
             continue
-        deadly = one.what in ENDERS or one.what in ("memory", "stop")
+        deadly = one.what in DEADLY or one.what == "stop"
         if deadly and deaths.get(thing, 0) >= 4:
             continue
         deaths[thing] = deaths.get(thing, 0) + deadly

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
+import random
 import resource
 import signal
 import subprocess
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.joining import running_drive
 from tests.chaos.disk import SmallDisk
-from tests.chaos.faults import ENDERS, SERVANTS, Fault
+from tests.chaos.faults import ENDERS, OUTSIDE, Fault
+from tests.chaos.host_clock import HostClock
 from tests.chaos.link import Link
+from tests.chaos.outsiders import Outsider
 from tests.chaos.run_processes import Member, members
-from tests.chaos.stranger import burst, say_anything
+from tests.chaos.stranger import burst, guise, say_anything
 from tests.system.foretwin_command import is_running
 
 _SIGNALS = {
     "kill": signal.SIGKILL, "segv": signal.SIGSEGV, "term": signal.SIGTERM, "hup": signal.SIGHUP,
 }  # fmt: skip
-_KNOWN = frozenset({*SERVANTS, "vehicle", "orchestrator", "router", "command"})
 _HEADROOM_BYTES = 32 * 2**20
 _FREE = resource.RLIM_INFINITY
 
@@ -36,10 +40,14 @@ class Done:
     member: Member | None
     at_ns: int
     words: str = ""
+    over: bool = False
+    """Whether it was taken back."""
+    deadly: bool = False
+    """Whether the process it happened to did not live on."""
 
     @property
     def kind(self) -> str:
-        """The kind of process it happened to."""
+        """The kind of process it happened to, else of thing."""
         return self.member.kind if self.member else self.fault.target
 
     def __str__(self) -> str:
@@ -55,24 +63,33 @@ class Injection:
     mark: str
     command: subprocess.Popen[bytes]
     disk: SmallDisk
+    clock: HostClock
     link: Link | None
-    car: subprocess.Popen[bytes] | None
+    outsiders: Sequence[Outsider]
+    campaign: Path | None
+    scratch: Path
     done: list[Done] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
+    skipped: list[Fault] = field(default_factory=list)
     _threads: list[threading.Thread] = field(default_factory=list)
 
     def begin(self, fault: Fault) -> Done | None:
         """Let it happen; None where it cannot here."""
         member = self._member(fault)
         done = Done(fault, member, time.monotonic_ns())
-        happened = self._begin(fault, member, done)
-        (self.done if happened else self.skipped).append(done if happened else str(fault))  # type: ignore[arg-type]
-        return done if happened else None
+        if not self._begin(fault, member, done):
+            self.skipped.append(fault)
+            return None
+        self.done.append(done)
+        return done
 
     def end(self, done: Done) -> None:
-        """Take it back."""
+        """Take it back, once."""
+        if done.over:
+            return
+        done.over = True
         match done.fault.what:
-            case "stop" | "memory" if done.member is not None and is_running(done.member.pid):
+            case "stop" | "memory" if done.member is not None:
+                done.deadly = not is_running(done.member.pid)
                 with contextlib.suppress(ProcessLookupError):
                     if done.fault.what == "stop":
                         os.kill(done.member.pid, signal.SIGCONT)
@@ -86,7 +103,9 @@ class Injection:
                 self.link.mend()
 
     def close(self) -> None:
-        """Wait for who still speaks."""
+        """Take back what lasts, and wait for who still speaks."""
+        for done in self.done:
+            self.end(done)
         for thread in self._threads:
             thread.join()
 
@@ -104,6 +123,9 @@ class Injection:
                 return self.link is not None and self.link.befall(fault.what)
             case "clock":
                 return self._tell_car(signal.SIGUSR1)
+            case "host_clock":
+                done.words = self.clock.set(fault.strength)
+                return True
             case "burst" if fault.target == "car":
                 return self._tell_car(signal.SIGUSR2)
             case "burst" | "messages":
@@ -111,20 +133,22 @@ class Injection:
             case "power":
                 return True
             case what:
-                return self._signal(member, _SIGNALS[what])
+                done.deadly = self._signal(member, _SIGNALS[what])
+                return done.deadly
 
     def _member(self, fault: Fault) -> Member | None:
-        """Return who it happens to: of the kind that was drawn, else any that is started again."""
+        """Return who it happens to, None where nobody of that kind lives at the moment."""
         if fault.what not in (*ENDERS, "stop", "memory"):
             return None
-        there = members(self.run, self.mark, self.command.pid)
-        wanted = fault.target
-        if wanted == "command" and not any(one.name == wanted for one in there):
-            wanted = "orchestrator"
-        found = [one for one in there if one.kind == wanted]
-        if wanted == "other":
-            found = [one for one in there if one.kind not in _KNOWN or one.kind == wanted]
-        found = found or [one for one in there if one.kind in SERVANTS]
+        if fault.target in OUTSIDE.values():
+            there = [
+                Member(one.name, one.pid)
+                for one in self.outsiders
+                if one.pid is not None and one.name == fault.target
+            ]
+        else:
+            there = members(self.run, self.mark, self.command.pid)
+        found = [one for one in there if one.kind == fault.target]
         return found[int(1000 * fault.at_s) % len(found)] if found else None
 
     def _signal(self, member: Member | None, number: signal.Signals) -> bool:
@@ -150,29 +174,30 @@ class Injection:
         return False
 
     def _tell_car(self, number: signal.Signals) -> bool:
-        if self.car is None or self.car.poll() is not None:
+        car = next((one for one in self.outsiders if one.name == "car"), None)
+        if car is None or car.pid is None:
             return False
-        self.car.send_signal(number)
+        os.kill(car.pid, number)
         return True
 
     def _speak(self, fault: Fault, done: Done) -> bool:
         try:
-            record = json.loads((self.run / "run.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            drive = running_drive(self.run)
+        except UserError:
             return False
-        endpoint, run_id = record.get("endpoint"), record["run_id"]
-        if endpoint is None:
-            return False
+        chance = random.Random(fault.strength)
+        who = guise(drive, self.campaign, self.scratch, chance)
+        done.words = who.name
 
         def speak() -> None:
             try:
                 done.words = (
-                    burst(endpoint, run_id, fault.for_s)
+                    burst(who, drive.run_id, fault.for_s)
                     if fault.what == "burst"
-                    else say_anything(endpoint, run_id, fault.strength)
+                    else say_anything(who, drive.run_id, chance)
                 )
             except Exception as error:
-                done.words = f"{type(error).__name__}: {error}"[:120]
+                done.words = f"{who.name}, {type(error).__name__}: {error}"[:120]
 
         self._threads.append(threading.Thread(target=speak, daemon=True))
         self._threads[-1].start()

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow.parquet as pq
 
 from foretwin.contracts.segments import segments_of
-from foretwin.telemetry.standin.sensors import PERIOD_MS
-from foretwin.telemetry.standin.source import START_STAMP_NS
-from tests.chaos.faults import Case
-from tests.chaos.injection import Done
+from tests.chaos.faults import ENDERS
+from tests.chaos.left import Left
+from tests.chaos.losses import wrong_losses
 from tests.chaos.power_cut import read_syncs, unsynced, wrong_after
 from tests.telemetry.own_recordings import read_drive
 
 KILLED = ("kill", "segv")
-MOST_LOST_S = 1.0
-"""Of the telemetry, to one kill."""
 UNIQUE = {
     "rounds": ("round_id",), "futures": ("round_id", "index"), "jobs": ("job_sha256",),
-    "comparisons": ("stamp_ns", "horizon_s"), "mirror": ("stamp_ns",),
+    "comparisons": ("round_id", "horizon_s"), "mirror": ("stamp_ns",),
 }  # fmt: skip
 """What no two rows of a table have in common."""
+CUTS = 4
+"""At so many syncs besides each instant that was drawn."""
 _TEMPORARY = ("*.writing", "*.arrows", "*.stderr", "*.tmp", "*.partial")
 _MOST_PUBLISHED = 1_000_000
 """A car sends 300 a second, bursts and strangers some thousands."""
@@ -35,38 +35,13 @@ _STILL = frozenset({"recorder", "mirror", "vehicle", "orchestrator", "router", "
 """Where none of these was disturbed, what they write comes to the disk in time."""
 
 
-class Left(NamedTuple):
-    """What a drive left, and what had befallen it."""
-
-    case: Case
-    run: Path
-    code: int
-    done: list[Done]
-    screen: str
-    temporary: tuple[Path, ...]
-    """Folders where nothing may stay."""
-    syncs: Path
-    scratch: Path
-    recovered: tuple[int, str] | None
-    """Exit code and screen of `foretwin recover`, where the drive's record could not be written."""
-    begun_ns: int
-
-    def befell(self, *kinds: str, what: tuple[str, ...] = ()) -> list[Done]:
-        """Return the faults of these kinds of processes, and of these faults."""
-        return [
-            one
-            for one in self.done
-            if (not kinds or one.kind in kinds) and (not what or one.fault.what in what)
-        ]
-
-
 def wrong_with(left: Left) -> list[str]:
     """Return what is wrong, in words."""
     found = [*_wrong_codes(left), *_wrong_files(left)]
     try:
         record = json.loads((left.run / "run.json").read_text(encoding="utf-8"))
         found += [*_wrong_ledger(left, record), *_wrong_words(left, record)]
-        found += [*_wrong_tables(left.run / "results"), *_lost_telemetry(left)]
+        found += [*_wrong_tables(left.run / "results"), *wrong_losses(left, record)]
         found += _wrong_power(left)
     except Exception as error:
         found.append(f"cannot be looked at: {type(error).__name__}: {error}")
@@ -76,12 +51,14 @@ def wrong_with(left: Left) -> list[str]:
 def fitting_codes(left: Left) -> set[int]:
     """Return the exit codes that fit what befell a drive."""
     codes = {0, 3}
-    asked = left.befell("orchestrator", "command", what=("term", "hup"))
+    asked = left.befell("orchestrator", "supervisor", what=("term", "hup"))
     if asked:
         codes = {130}
-    if left.befell("vehicle", what=("kill", "segv", "term", "hup")):
+    if left.befell("vehicle", what=ENDERS):
         codes = codes | {1, 130} if asked else {1}
-    for one in left.befell("command", what=KILLED):
+    if left.befell("vehicle", "supervisor", "orchestrator", what=("memory",)):
+        codes = codes | {1}
+    for one in left.befell("supervisor", what=KILLED):
         codes = codes | {-9 if one.fault.what == "kill" else -11}
     return codes
 
@@ -147,29 +124,6 @@ def _wrong_tables(results: Path) -> Iterator[str]:
             yield f"rounds without futures: {sorted(rounds - with_futures)[:5]}"
 
 
-def _lost_telemetry(left: Left) -> Iterator[str]:
-    """Whether any samples of the stand-in's regular ones are missing that no kill explains."""
-    if left.case.linked:
-        return
-    kinds = ("recorder", "vehicle", "router", "orchestrator", "command", "other")
-    # A limit on its memory may end a process as well.
-    kills = left.befell(*kinds, what=(*KILLED, "memory", "term", "hup"))
-    held: dict[str, set[int]] = {name: set() for name in PERIOD_MS}
-    for part in segments_of(left.run / "drive.mcap"):
-        for channel, message in read_drive(part):
-            if channel in held:
-                held[channel].add(message.stamp_ns)  # type: ignore[attr-defined]
-    newest_ns = max((max(stamps) for stamps in held.values() if stamps), default=0)
-    for channel, period_ms in PERIOD_MS.items():
-        period_ns = period_ms * 1_000_000
-        due = range(START_STAMP_NS, newest_ns - 200_000_000, period_ns)
-        missing = sum(stamp_ns not in held[channel] for stamp_ns in due)
-        lost_s = missing * period_ns * 1e-9
-        # On a busy machine whatever happens each second happens some tenths later.
-        if lost_s > 1.3 * MOST_LOST_S * len(kills):
-            yield f"{lost_s:.2f} s of {channel} are lost, of {len(kills)} kills"
-
-
 def _wrong_files(left: Left) -> Iterator[str]:
     temporary = [path.name for name in _TEMPORARY for path in left.run.rglob(name)]
     if temporary and not (left.code == 3 and left.befell("disk")):
@@ -180,20 +134,24 @@ def _wrong_files(left: Left) -> Iterator[str]:
         # The log of an internal error is named on the screen, for who reports it.
         if stays := sorted(str(path.relative_to(folder)) for path in found):
             yield f"stays in {folder.name}: {stays[:5]}"
-    if not left.befell("viewer", "disk", "other", "orchestrator", "command"):
+    if not left.befell("viewer", "disk", "orchestrator", "supervisor"):
         shown = left.run / "monitor.rrd"
         if not shown.exists() or not shown.stat().st_size:
             yield "monitor.rrd is missing or empty"
 
 
 def _wrong_power(left: Left) -> Iterator[str]:
+    """Cut the power at a drawn instant, and where what was written up to a drawn sync is there."""
     syncs = read_syncs(left.syncs)
+    of_run = [one.ns for one in syncs if left.run in one.path.parents]
     for number, one in enumerate(left.befell(what=("power",))):
-        chance = random.Random(f"{left.case.seed}/{left.case.number}/{number}")
+        seed = f"{left.case.seed}/{left.case.number}/{number}"
+        chance = random.Random(seed)
         cut_ns = one.at_ns + chance.randrange(1_000_000_000)
         before = {other.kind for other in left.done if other.at_ns <= cut_ns}
-        if not before & _STILL and not left.case.linked:
+        if not before & _STILL and left.case.source != "live":
             yield from unsynced(syncs, left.run, left.begun_ns, cut_ns)
-        target = left.scratch / f"power-cut-{number}"
-        seed = f"{left.case.seed}/{left.case.number}/{number}"
-        yield from wrong_after(left.run, left.syncs, cut_ns, target, seed)
+        for cut, at_ns in enumerate([cut_ns, *chance.choices(of_run, k=CUTS)]):
+            target = left.scratch / f"power-cut-{number}-{cut}"
+            yield from wrong_after(left.run, left.syncs, at_ns, target, f"{seed}/{cut}")
+            shutil.rmtree(target)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import random
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -78,11 +79,11 @@ def wrong_after(run: Path, copies: Path, cut_ns: int, target: Path, seed: str) -
     """Cut the power of a run at an instant, recover it, and return what is wrong with the rest."""
     cut_power(run, copies, cut_ns, target, random.Random(seed))
     before = {path.name: whole_of(path) for path in parts_of(target)}
+    wrong = [*_torn_below(target, on_the_disk(read_syncs(copies), run, cut_ns))]
     try:
         recovered = recover(target)
     except Exception as error:
         return [f"power cut: recover: {type(error).__name__}: {error}"]
-    wrong = []
     for name, count in before.items():
         told = [part.text for part in recovered.parts if part.text.startswith(f"{name_in(name)}:")]
         if not any(f" {count} rows" in text or f" {count} messages" in text for text in told):
@@ -106,6 +107,22 @@ def whole_of(path: Path) -> int:
     if path.suffix == SUFFIX:
         return sum(rows.num_rows for rows in StreamReader(path).records())
     return look_through(path).messages
+
+
+def _torn_below(target: Path, synced: dict[str, Sync]) -> Iterator[str]:
+    """Say which files are torn before where they had been synced: not at the end of a record."""
+    for path in parts_of(target):
+        size = synced[str(path.relative_to(target))].size
+        if path.suffix == SUFFIX:
+            reader = StreamReader(path)
+            for _ in reader.records():
+                pass
+            whole = reader.whole_bytes
+        else:
+            found = look_through(path)
+            whole = size if found.ended else found.data_bytes
+        if whole < size:
+            yield f"power cut: {path.name} was synced up to {size}, and is whole up to {whole}"
 
 
 def unsynced(syncs: list[Sync], run: Path, begun_ns: int, cut_ns: int) -> list[str]:

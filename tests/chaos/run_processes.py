@@ -31,7 +31,8 @@ def members(run: Path, mark: str, command_pid: int) -> list[Member]:
     """Return the processes of a run that live, sorted by name.
 
     Who was started with a setup is named by it. The command is the supervisor; the orchestrator is
-    who was forked from it last. What else carries the mark is `other`.
+    who was forked from it last. What else carries the mark is `other`, a command that looks at
+    something for a moment.
     """
     found = []
     orchestrator = _forked_last(run / "log.jsonl")
@@ -39,7 +40,7 @@ def members(run: Path, mark: str, command_pid: int) -> list[Member]:
         if (name := _setup_name(pid, run)) is None:
             name = "other"
             if pid == command_pid:
-                name = "command"
+                name = "supervisor"
             if pid == orchestrator:
                 name = "orchestrator"
         found.append(Member(name, pid))

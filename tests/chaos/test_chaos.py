@@ -1,182 +1,92 @@
-"""The chaos that drives are put through: drawn from a seed, and what is wrong is noticed."""
+"""The chaos that drives are put through: what is drawn, whom it finds, and what is said of it."""
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import shutil
 import subprocess
 import sys
+import time
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
-from foretwin.orchestrator.record.table_stream import StreamReader
 from tests.chaos import __main__ as chaos
-from tests.chaos import power_cut
 from tests.chaos.disk import small_disk
-from tests.chaos.faults import WEIGHTS, Fault, draw
-from tests.chaos.injection import Done
-from tests.chaos.invariants import Left, wrong_with
-from tests.chaos.run_processes import MARK, Member, end_all, marked, members
-from tests.orchestrator.record.ended_badly import killed_run
-from tests.system.foretwin_command import is_running, wait_for
+from tests.chaos.faults import DEADLY, LAST, OF_LINKS, OUTSIDE, STARTED_AGAIN, WEIGHTS, Case, draw
+from tests.chaos.host_clock import CLOCK, HostClock
+from tests.chaos.outsiders import Outsider
+from tests.chaos.run_processes import MARK, end_all, marked, members
+from tests.chaos.table import Consequence, DriveLine, keep, kept, table_of
+from tests.chaos.watcher import Seen, back_after_s
+from tests.system.foretwin_command import REPOSITORY, is_running, wait_for
 
 SEED = int(os.environ.get("FORETWIN_CHAOS_SEED", "0")) or random.SystemRandom().randrange(1, 10**6)
-BALANCED = {
-    "telemetry": {"published": 0, "recorded": 0, "lost": 0},
-    "rounds": {"due": 3, "run": 1, "missed": 1, "spared": 1, "unseeded": 0, "given_up": 0},
-    "jobs": {"given": 2, "results": 1, "refused": 1, "lost": 0},
-}
 
 
 @pytest.mark.chaos
 @pytest.mark.judge
 @pytest.mark.timeout(3600)
-def test_whatever_befalls_drives_they_end_well(capsys: pytest.CaptureFixture[str]) -> None:
+def test_whatever_befalls_drives_they_end_well(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     with capsys.disabled():
-        assert chaos.run(SEED, count=60), f"FORETWIN_CHAOS_SEED={SEED} draws the same again"
+        print(f"FORETWIN_CHAOS_SEED={SEED}")
+        well = chaos.run(SEED, count=60, file=tmp_path / "drives.jsonl")
+    assert well, f"FORETWIN_CHAOS_SEED={SEED} draws the same again"
 
 
-def test_a_seed_draws_the_same_drives_and_all_faults_come() -> None:
-    cases = [draw(7, number) for number in range(120)]
-    assert cases == [draw(7, number) for number in range(120)]
-    drawn = Counter(one.what for case in cases for one in case.faults)
-    assert drawn.keys() == WEIGHTS.keys()
-    assert 700 < drawn.total() < 1200
+@pytest.fixture(scope="module")
+def cases() -> list[Case]:
+    return [draw(7, number) for number in range(400)]
+
+
+def test_a_seed_draws_the_same_drives(cases: list[Case]) -> None:
+    assert cases == [draw(7, number) for number in range(400)]
+    assert cases[:9] != [draw(8, number) for number in range(9)]
+
+
+def test_1000_faults_are_little_more_than_an_hour(cases: list[Case]) -> None:
+    assert sum(len(case.faults) for case in cases[:75]) > 1000
+
+
+def test_everything_befalls_everybody(cases: list[Case]) -> None:
+    drawn = Counter((one.what, one.target) for case in cases for one in case.faults)
+    started_again = {*STARTED_AGAIN, *OUTSIDE.values(), "orchestrator"}
+    for what in ("kill", "segv", "memory", "stop"):
+        for whom in {*started_again, "supervisor", "vehicle"}:
+            assert drawn[what, whom], (what, whom)
+    for what in ("term", "hup"):
+        for whom in {*started_again, *LAST}:
+            assert drawn[what, whom], (what, whom)
+    assert {what for what, _ in drawn} == set(WEIGHTS)
+    kinds = Counter((case.source, case.bus) for case in cases)
+    assert set(kinds) == {
+        ("standin", "socket"), ("standin", "open"), ("log", "socket"), ("log", "open"),
+        ("live", "open"), ("live", "tls"),
+    }  # fmt: skip
+    assert min(kinds.values()) > 20
+
+
+def test_what_ends_a_drive_comes_last_and_what_is_not_there_is_not_drawn(
+    cases: list[Case],
+) -> None:
     for case in cases:
         times = [one.at_s for one in case.faults]
         assert times == sorted(times)
-        assert sum(one.target in ("command", "vehicle") for one in case.faults[:-1]) <= 4
-
-
-def whole_run(folder: Path, **changed: Any) -> Path:
-    """A run's folder after its end, as far as it is looked at."""
-    results = folder / "results"
-    results.mkdir(parents=True)
-    rounds = pa.table({"round_id": [0, 1]})
-    futures = pa.table({"round_id": [0, 0, 1], "index": [0, 1, 0]})
-    pq.write_table(rounds, results / "rounds.parquet")
-    pq.write_table(futures, results / "futures.parquet")
-    pq.write_table(pa.table({"job_sha256": ["a", "b"]}), results / "jobs.parquet")
-    (folder / "monitor.rrd").write_text("shown")
-    record = {"exit": "completed", "troubles": [], "ledger": BALANCED} | changed
-    (folder / "run.json").write_text(json.dumps(record))
-    return folder
-
-
-def left(run: Path, *done: Done, code: int = 0, screen: str = "done") -> Left:
-    syncs = run.parent / "syncs"
-    return Left(draw(1, 0), run, code, list(done), screen, (run.parent / "tmp",), syncs,
-                run.parent, None, 0)  # fmt: skip
-
-
-def befell(what: str, kind: str) -> Done:
-    return Done(Fault(1.0, what, kind), Member(kind, 1), 0)
-
-
-def test_a_drive_that_ended_well_is_well(tmp_path: Path) -> None:
-    assert wrong_with(left(whole_run(tmp_path / "run"))) == []
-
-
-@pytest.mark.parametrize(
-    ("done", "code", "exit_word", "well"),
-    [
-        ([("kill", "w")], 0, "completed", True), ([("kill", "w")], 130, "interrupted", False),
-        ([("term", "orchestrator")], 130, "interrupted", True),
-        ([("hup", "orchestrator")], 0, "completed", False),
-        ([("kill", "vehicle")], 1, "failed", True), ([("stop", "vehicle")], 1, "failed", False),
-        ([("stop", "orchestrator")], 1, "failed", False), ([], 1, "completed", False),
-        ([("memory", "orchestrator")], 2, "failed", False), ([], 0, "running", False),
-    ],
-)  # fmt: skip
-def test_the_exit_code_fits_what_befell(
-    tmp_path: Path, done: list[tuple[str, str]], code: int, exit_word: str, well: bool
-) -> None:
-    run = whole_run(tmp_path / "run", exit=exit_word)
-    found = wrong_with(left(run, *(befell(*one) for one in done), code=code))
-    assert (found == []) is well, found
-
-
-@pytest.mark.parametrize("part", BALANCED)
-def test_a_ledger_that_does_not_balance_is_noticed(tmp_path: Path, part: str) -> None:
-    name = next(iter(BALANCED[part]))
-    ledger = BALANCED | {part: BALANCED[part] | {name: 7}}
-    (found,) = wrong_with(left(whole_run(tmp_path / "run", ledger=ledger)))
-    assert f"the ledger of {part} does not balance" in found
-
-
-def test_what_is_doubled_lost_untold_or_left_behind_is_noticed(tmp_path: Path) -> None:
-    run = whole_run(tmp_path / "run", troubles=["rows are lost"])
-    twice = pa.table({"round_id": [0, 0], "index": [1, 1]})
-    pq.write_table(twice, run / "results" / "futures.parquet")
-    (run / "results" / "rounds.parquet.writing").touch()
-    (tmp_path / "tmp").mkdir()
-    (tmp_path / "tmp" / "socket").touch()
-    found = "\n".join(wrong_with(left(run)))
-    for word in ("twice in futures", "rounds without futures: [1]", "something is lost",
-                 "rounds.parquet.writing", "stays in tmp: ['socket']"):  # fmt: skip
-        assert word in found
-    assert "does not say of what" in "\n".join(wrong_with(left(run, code=3)))
-    assert "traceback" in "\n".join(wrong_with(left(run, screen="Traceback (most")))
-
-
-def cut_run(tmp_path: Path) -> tuple[Path, Path]:
-    """A run under way whose streams and recording are on the disk, and what told of it."""
-    run, copies = killed_run(tmp_path / "run"), tmp_path / "disk" / "syncs"
-    copies.mkdir(parents=True)
-    with power_cut.log_of(copies).open("w") as log:
-        for path in [run / "run.json", *power_cut.parts_of(run)]:
-            known = path.stat()
-            os.link(path, copies / str(known.st_ino))
-            line = {"ns": 5, "path": str(path), "inode": known.st_ino, "bytes": known.st_size}
-            log.write(json.dumps(line) + "\n")
-    return run, copies
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_what_came_to_the_disk_is_there_after_a_power_cut(tmp_path: Path, seed: int) -> None:
-    run, copies = cut_run(tmp_path)
-    assert power_cut.wrong_after(run, copies, 9, tmp_path / "cut", str(seed)) == []
-    assert pq.read_table(tmp_path / "cut" / "results" / "rounds.parquet").num_rows == 3
-
-
-def test_rows_that_recovery_loses_are_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run, copies = cut_run(tmp_path)
-    really = StreamReader.records
-    count = power_cut.whole_of
-    monkeypatch.setattr(power_cut, "whole_of", lambda path: count(path))
-    monkeypatch.setattr(
-        "foretwin.orchestrator.record.derive.StreamReader.records",
-        lambda self: iter(list(really(self))[:-1]) if _from_recovery() else really(self),
-    )
-    found = power_cut.wrong_after(run, copies, 9, tmp_path / "cut", "0")
-    assert any("rounds.arrows held 3" in one for one in found), found
-
-
-def _from_recovery() -> bool:
-    frame = sys._getframe()
-    while frame is not None:
-        if frame.f_code.co_name == "derive":
-            return True
-        frame = frame.f_back  # type: ignore[assignment]
-    return False
-
-
-def test_before_anything_came_to_the_disk_nothing_need_be_there(tmp_path: Path) -> None:
-    run, copies = cut_run(tmp_path)
-    syncs = power_cut.read_syncs(copies)
-    assert power_cut.on_the_disk(syncs, run, 4) == {}
-    assert len(power_cut.on_the_disk(syncs, run, 5)) == len(syncs) > 3
-    assert power_cut.unsynced(syncs, run, 0, 10**9) == []
-    assert len(power_cut.unsynced(syncs, run, 0, 4 * 10**9)) == 2
+        before = case.faults[:-1]
+        assert not [one for one in before if one.what in DEADLY and one.target in LAST[:1]]
+        assert not [one for one in before if one.what in DEADLY and one.target == "vehicle"]
+        asked = ("term", "hup")
+        assert not [one for one in before if one.what in asked and one.target == "orchestrator"]
+        deaths = Counter(one.target for one in before if one.what in (*DEADLY, "stop"))
+        assert max(deaths.values(), default=0) <= 4
+        whats, targets = {one.what for one in case.faults}, {one.target for one in case.faults}
+        assert case.source == "live" or not whats & OF_LINKS
+        assert case.planner or "planner" not in targets
+        assert ("vehicle" not in targets) if case.source == "live" else ("car" not in targets)
 
 
 def test_processes_of_a_drive_are_found_by_what_it_tells(tmp_path: Path) -> None:
@@ -195,9 +105,9 @@ def test_processes_of_a_drive_are_found_by_what_it_tells(tmp_path: Path) -> None
             wait_for(lambda: len(marked(mark)) == 3, "all of them")
             found = members(folder.parent, mark, command.pid)
             assert found == [
-                ("command", command.pid), ("orchestrator", fork.pid), ("w1", worker.pid),
+                ("orchestrator", fork.pid), ("supervisor", command.pid), ("w1", worker.pid),
             ]  # fmt: skip
-            assert [one.kind for one in found] == ["command", "orchestrator", "w"]
+            assert [one.kind for one in found] == ["orchestrator", "supervisor", "w"]
         finally:
             assert len(end_all(mark)) == 3
         wait_for(lambda: not is_running(worker.pid), "its end")
@@ -220,3 +130,83 @@ def test_a_small_disk_is_full_when_it_is_told_to_be(tmp_path: Path) -> None:
             disk.open_folders()
         (disk.folder / "inside" / "file").write_bytes(bytes(10_000))
     assert list((tmp_path / "disk").iterdir()) == []
+
+
+def test_who_takes_part_is_started_again_when_it_dies(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", "import time; time.sleep(600)"]
+    one = Outsider("car", words, tmp_path)
+    try:
+        first = one.process
+        one.look()
+        assert one.pid == first.pid
+        first.kill()
+        first.wait()
+        assert one.pid is None
+
+        def is_back() -> bool:
+            one.look()
+            return one.pid is not None
+
+        wait_for(is_back, "the next one")
+        assert one.pid != first.pid
+    finally:
+        one.close()
+    assert not is_running(one.process.pid)
+
+
+def test_the_clock_of_a_drive_s_host_can_be_set(tmp_path: Path) -> None:
+    clock = HostClock(tmp_path / "clock")
+    steps = {clock.set(number / 10) for number in range(40)}
+    assert len(steps) > 4
+    injected = Path(chaos.__file__).parent / "injected"
+    told = subprocess.run(
+        [sys.executable, "-c", "import time; print(time.time_ns(), round(1e9 * time.time()))"],
+        env=os.environ | {CLOCK: str(clock.file), "PYTHONPATH": f"{injected}:{REPOSITORY}"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    for ns in told.stdout.split():
+        assert abs(int(ns) - clock.offset_ns - time.time_ns()) < 20e9
+    assert abs(clock.offset_ns) > 100e9
+    clock.close()
+
+
+def test_how_soon_somebody_is_back() -> None:
+    s = 1_000_000_000
+    seen = [
+        Seen(1 * s, "w0", True), Seen(1 * s, "viewer", True), Seen(5 * s, "w0", False),
+        Seen(6 * s, "viewer", False), Seen(7 * s, "w0", True), Seen(9 * s, "viewer", True),
+    ]  # fmt: skip
+    assert back_after_s(seen, "w0", 4 * s) == pytest.approx(3.0)
+    assert back_after_s(seen, "viewer", 4 * s) == pytest.approx(5.0)
+    assert back_after_s(seen, "router", 4 * s) == pytest.approx(3.0)
+    assert back_after_s(seen, "w0", 6 * s) is None
+    assert back_after_s(seen, "w1", 0) is None
+
+
+def drive_line(number: int, *wrong: str, lost_s: float = 0.0, back_s: float = 1.0) -> DriveLine:
+    done = [
+        Consequence("kill", "w", "kill w", 3, None, back_s),
+        Consequence("kill", "recorder", "kill recorder", 3, lost_s, None),
+    ]
+    return DriveLine(
+        number=number, kind="log socket", revision="abc", code=3, wall_s=30.0, done=done,
+        skipped=[], wrong=list(wrong),
+    )  # fmt: skip
+
+
+def test_drives_are_kept_and_the_last_of_a_number_counts(tmp_path: Path) -> None:
+    file = tmp_path / "new" / "7.jsonl"
+    assert kept(file) == {}
+    for line in (drive_line(0, "hangs"), drive_line(1), drive_line(0)):
+        keep(file, line)
+    assert kept(file) == {0: drive_line(0), 1: drive_line(1)}
+
+
+def test_the_table_says_what_followed_and_what_was_worst() -> None:
+    drives = [drive_line(0, lost_s=0.25, back_s=2.5), drive_line(1, "hangs", back_s=0.5)]
+    table = table_of(drives).splitlines()
+    assert [line.split() for line in table[1:3]] == [
+        ["kill", "recorder", "2", "3:", "2", "1", "0.25", "-"],
+        ["kill", "w", "2", "3:", "2", "1", "-", "2.50"],
+    ]
+    assert table[-1] == "4 faults in 2 drives (abc), failed: [1]; 60 s"

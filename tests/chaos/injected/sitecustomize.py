@@ -1,14 +1,18 @@
 """Python imports this as it starts, where its folder is on PYTHONPATH: tells what comes to the
-disk, and when.
+disk, and when, and lets the host's clock be set.
 
 Each fsync adds a line to the file named by FORETWIN_CHAOS_SYNCS_LOG, which lies on another disk:
 the drive's may be full. The first of a file gives it a second name, by its inode, in the folder
 FORETWIN_CHAOS_SYNCS: whatever is renamed or removed later can be had as it was, for files here only
 grow.
+
+The file named by FORETWIN_CHAOS_CLOCK holds by how many nanoseconds the wall clock is off, for all
+processes of a drive at the same instant. Zenoh's own clock, which is no Python, stays.
 """
 
 import contextlib
 import json
+import mmap
 import os
 import stat
 import time
@@ -39,3 +43,10 @@ def _told(sync):
 
 if _FOLDER:
     os.fsync, os.fdatasync = _told(os.fsync), _told(os.fdatasync)
+
+if os.path.isfile(_CLOCK := os.environ.get("FORETWIN_CHAOS_CLOCK", "")):  # noqa: PTH113
+    with open(_CLOCK, "rb") as _file:  # noqa: PTH123
+        _offset = memoryview(mmap.mmap(_file.fileno(), 8, prot=mmap.PROT_READ)).cast("q")
+    _time_ns = time.time_ns
+    time.time_ns = lambda: _time_ns() + _offset[0]
+    time.time = lambda: time.time_ns() * 1e-9
