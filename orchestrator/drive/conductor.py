@@ -50,8 +50,7 @@ class Conductor:
 
     def __init__(self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables) -> None:
         self.plan, self.bus = plan, bus
-        self.mission = mission
-        self.tables = tables
+        self.mission, self.tables = mission, tables
         self.mailbox = Mailbox(
             MAILBOX_DEPTH, when_full="block" if plan.config.lock_step else "drop_oldest"
         )
@@ -266,7 +265,7 @@ class Conductor:
         if not is_identifier(process_id):
             raise Refused(item.key, "a token of no plain name")
         if process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
-            (self._process_up if item.up else self._process_down)(process_id)
+            (self._process_up if item.up else self.process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:
         self.alive.add(process_id)
@@ -290,7 +289,8 @@ class Conductor:
             self.worlds.prepare(process_id, world_id)
         self.rounds.dispatcher.give_out()
 
-    def _process_down(self, process_id: str) -> None:
+    def process_down(self, process_id: str) -> None:
+        """Count with a process no more: its token is gone, or it has died."""
         if process_id in self.alive:
             self.alive.discard(process_id)
             self.tuning.process_down(process_id)

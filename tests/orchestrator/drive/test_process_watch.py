@@ -79,6 +79,18 @@ def test_who_falls_silent_is_killed_and_started_again(watched: Watched) -> None:
     assert watched.started("w0") == 2
 
 
+def test_the_token_of_a_dead_process_is_not_that_of_the_next_one(watched: Watched) -> None:
+    """The bus may tell of the end after the system does: the next one has its time to start."""
+    watched.alive("w0")
+    watched.look(RECONNECT_S + 0.5)
+    watched.children["w0"][0].exit_code = -9
+    watched.look(2.0 * EVERY_S)
+    assert watched.started("w0") == 2
+    watched.house.conductor.process_down("w0")
+    watched.look(10.0 * HUNG_AFTER_S)
+    assert watched.started("w0") == 2
+
+
 def test_nobody_is_silent_while_the_link_is_away_and_a_little_longer(watched: Watched) -> None:
     watched.alive("w0")
     watched.look(RECONNECT_S + 0.5)
