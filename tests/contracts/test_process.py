@@ -104,7 +104,8 @@ def test_it_leaves_on_sigterm(run: Run) -> None:
 
 
 def test_it_leaves_when_the_orchestrator_is_gone(run: Run) -> None:
-    with run.process(WAITER) as process:
+    grace = "from foretwin.contracts import process\nprocess.ORCHESTRATOR_GRACE_S = 0.2\n"
+    with run.process(grace + WAITER) as process:
         take(run.alive)
         run.bus.close()
 

@@ -30,6 +30,7 @@ TOOL = "cosmic-ray==8.7.0"
 ROOMS = ("foretwin.contracts.", "foretwin.telemetry.ros2.", "foretwin.orchestrator.rounds.")
 LEAST_KILLED = 0.85
 UNNOTICED = 3
+DEAD: tuple[Fate, ...] = ("killed", "timed out")
 
 
 class Mutant(NamedTuple):
@@ -56,7 +57,7 @@ class Report(NamedTuple):
     @property
     def killed(self) -> float:
         """The share that tests noticed, or that never came to an end."""
-        dead = sum(fate in ("killed", "timed out") for _, fate in self.fates)
+        dead = sum(fate in DEAD for _, fate in self.fates)
         return dead / max(1, len(self.fates))
 
     @property
@@ -106,19 +107,23 @@ def try_all(mutants: Sequence[Mutant], tree: Checkout) -> list[tuple[Mutant, Fat
     for number, mutant in enumerate(mutants):
         fate = tree.fate(mutant.module, mutant.text)
         fates.append((mutant, fate))
-        if fate not in ("killed", "timed out"):
+        if fate != "killed":
             print(f"{number + 1:4d} {fate} {mutant}", flush=True)
     return fates
 
 
-def run(seed: int, count: int) -> Report:
-    """Draw mutants, try them, and print what became of them."""
-    print(f"seed {seed}", flush=True)
-    mutants = draw(seed, count)
+def run(seed: int, count: int, *, after: int = 0) -> Report:
+    """Draw mutants, try those after the first so many, and print what became of them and how many
+    of each room were killed."""
+    print(f"seed {seed}, {count} after {after}", flush=True)
+    mutants = draw(seed, after + count)[after:]
     with checkout() as tree:
         first = tree.fate(planted().module, planted().text)
         print(f"planted: {first}", flush=True)
         report = Report(try_all(mutants, tree), first)
+    for room in ROOMS:
+        fates = [fate for mutant, fate in report.fates if mutant.module.startswith(room)]
+        print(f"{room:31s}{sum(fate in DEAD for fate in fates):4d} of {len(fates)}")
     counts = Counter(fate for _, fate in report.fates)
     share = f"{100.0 * report.killed:.1f} ± {100.0 * report.error:.1f} %"
     print(f"{share} of {len(mutants)} mutants are killed: {dict(counts)}")
@@ -144,8 +149,10 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
     parser.add_argument("--count", type=int, default=150)
     parser.add_argument("--seed", type=int, default=0, help="0: a fresh one")
+    parser.add_argument("--after", type=int, default=0, help="go on after so many of this seed")
     asked = parser.parse_args(arguments)
-    report = run(asked.seed or random.SystemRandom().randrange(1, 10**6), asked.count)
+    seed = asked.seed or random.SystemRandom().randrange(1, 10**6)
+    report = run(seed, asked.count, after=asked.after)
     noticed = report.planted == "killed" and report.killed >= LEAST_KILLED
     return 0 if noticed else UNNOTICED
 
