@@ -66,6 +66,7 @@ def _tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
 def mirrored() -> set[str]:
     """Return the modules that have a test file of their own name at the same place."""
     return {name for name, path in modules().items() if mirror_of(path).is_file()}
@@ -77,6 +78,7 @@ def mirror_of(path: Path) -> Path:
     return ROOT / "tests" / relative.parent / f"test_{name.strip('_')}.py"
 
 
+@cache
 def covered() -> dict[str, list[Path]]:
     """Return the modules named in the COVERS of tests, and those tests."""
     found: dict[str, list[Path]] = {}
@@ -89,6 +91,7 @@ def covered() -> dict[str, list[Path]]:
     return found
 
 
+@cache
 def not_yet() -> set[str]:
     """Return the modules whose tests are still to be named."""
     files = (ROOT / "tests").glob(f"*/{NOT_YET}")

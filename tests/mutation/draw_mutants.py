@@ -16,6 +16,7 @@ import json
 import random
 import sys
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -79,9 +80,11 @@ def _mutated(text: str, place: Place, change: Change) -> str:
 
 def _places(root: Path, file: str) -> dict[Place, list[Change]]:
     text = _read(root, file)
-    tree, unrun, lines = get_ast(text), _unrun(ast.parse(text)), text.splitlines()
+    nodes, unrun, lines = list(ast_nodes(get_ast(text))), _unrun(ast.parse(text)), text.splitlines()
     named = _named_numbers(ast.parse(text))
     found = defaultdict(list)
+    starts: dict[str, list[tuple[int, int]]] = {}
+    runs: dict[tuple[int, int], bool] = {}
     for node in named.values():
         found[Place(file, node.lineno, node.col_offset)].append(
             Change(_TREBLED, node.end_col_offset)
@@ -89,23 +92,30 @@ def _places(root: Path, file: str) -> dict[Place, list[Change]]:
     for name in plugins.operator_names():
         if name in _LEFT_OUT or plugins.get_operator(name).arguments():
             continue
-        operator = _operator(name)
-        occurrences = (
-            start for node in ast_nodes(tree) for start, _ in operator.mutation_positions(node)
-        )
-        for occurrence, (line, column) in enumerate(occurrences):
-            if name == _NUMBERS and (line, column) in named:
-                continue
-            if lines[line - 1][column : column + 2] == "*,":
-                continue  # before arguments by name alone, no product
-            # Of a decorator the place is that of its `@`.
-            if not any(
-                first <= place < last
-                for first, last in unrun
-                for place in ((line, column), (line, column + 1))
-            ):
-                found[Place(file, line, column)].append(Change(name, occurrence))
+        # An arithmetic operator stands where it stands, whatever takes its place.
+        kind = name.rpartition("_")[0] if "ReplaceBinaryOperator" in name else name
+        if kind not in starts:
+            positions = _operator(name).mutation_positions
+            starts[kind] = [start for node in nodes for start, _ in positions(node)]
+        for occurrence, start in enumerate(starts[kind]):
+            if start not in runs:
+                runs[start] = _runs(start, lines, unrun)
+            if runs[start] and not (name == _NUMBERS and start in named):
+                found[Place(file, *start)].append(Change(name, occurrence))
     return found
+
+
+def _runs(
+    start: tuple[int, int],
+    lines: Sequence[str],
+    unrun: Sequence[tuple[tuple[int, int], tuple[int, int]]],
+) -> bool:
+    line, column = start
+    if lines[line - 1][column : column + 2] == "*,":
+        return False  # before arguments by name alone, no product
+    # Of a decorator the place is that of its `@`.
+    places = (start, (line, column + 1))
+    return not any(first <= place < last for first, last in unrun for place in places)
 
 
 def _named_numbers(tree: ast.Module) -> dict[tuple[int, int], Any]:

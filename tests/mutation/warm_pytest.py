@@ -60,7 +60,9 @@ def _run(tests: list[str]) -> None:
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
-        code = pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests])
+        # Of hypothesis, which is here already, pytest would rewrite the assertions otherwise.
+        calm = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+        code = pytest.main(["-x", "-q", "-p", "no:cacheprovider", *calm, *tests])
     finally:
         os._exit(int(code))
 
