@@ -104,8 +104,7 @@ def test_it_leaves_on_sigterm(run: Run) -> None:
 
 
 def test_it_leaves_when_the_orchestrator_is_gone(run: Run) -> None:
-    grace = "from foretwin.contracts import process\nprocess.ORCHESTRATOR_GRACE_S = 0.2\n"
-    with run.process(grace + WAITER) as process:
+    with run.process(WAITER) as process:
         take(run.alive)
         run.bus.close()
 
