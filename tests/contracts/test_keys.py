@@ -14,6 +14,8 @@ from foretwin.contracts.keys import (
     alive_key,
     key,
     process_of_alive_key,
+    run_of_alive_key,
+    vehicle_of_key,
 )
 
 IDS = {"vehicle": "ego", "run": "r1", "process": "w0"}
@@ -49,6 +51,43 @@ def test_what_a_vehicle_sends() -> None:
     )
 
 
+def test_how_often_each_is_said() -> None:
+    """What is kept for who missed it is as much as is said at these rates."""
+    by_rate: dict[float, set[str]] = {}
+    for name, channel in CHANNELS.items():
+        if channel.rate_hz is not None:
+            by_rate.setdefault(channel.rate_hz, set()).add(name)
+    assert by_rate == {
+        100: {"imu"},
+        50: {"speed", "steering", "control", "state", "other_vehicles", "vehicle_command"},
+        20: {"authority"},
+        10: {"gnss", "heading", "plan", "status", "objects", "mirror", "virtual_objects"},
+        8: {"comparison"},
+        5: {"progress"},
+        4: {"gap"},
+        2: {"job", "round", "plan_comparison", "worker_status"},
+        1: {"signals", "route"},
+        0.2: {"identification"},
+    }
+
+
+def test_only_questions_wait_and_what_a_car_says_is_kept_for_who_missed_it() -> None:
+    for name, channel in CHANNELS.items():
+        asked = channel.reply is not None
+        assert (channel.qos.block, channel.qos.express) == (asked, asked)
+        kept_s = 20.0 if name in (*TELEMETRY_CHANNELS, "state") else 0.0
+        assert channel.qos.kept_s == kept_s
+
+
+@pytest.mark.parametrize(
+    ("name", "server"),
+    [("job", "worker"), ("build", "worker"), ("info", "car"), ("set", "orchestrator"),
+     ("gnss", None), ("planner_scene", None)],
+)  # fmt: skip
+def test_a_question_is_answered_by_whom_its_key_names(name: str, server: str | None) -> None:
+    assert CHANNELS[name].server == server
+
+
 def test_keys_in_full() -> None:
     assert key("gnss", vehicle="ego") == "foretwin/v1/vehicle/ego/telemetry/gnss"
     assert key("job", run="r1", process="w0") == "foretwin/v1/run/r1/worker/w0/job"
@@ -58,7 +97,13 @@ def test_keys_in_full() -> None:
 
 @given(process=st.from_regex(r"[A-Za-z0-9_.-]{1,20}", fullmatch=True))
 def test_the_process_comes_back_out_of_its_liveliness_key(process: str) -> None:
-    assert process_of_alive_key(alive_key(run="r1", process=process)) == process
+    alive = alive_key(run="r1", process=process)
+    assert (run_of_alive_key(alive), process_of_alive_key(alive)) == ("r1", process)
+
+
+def test_the_vehicle_comes_back_out_of_its_keys() -> None:
+    for name in (*TELEMETRY_CHANNELS, "state", "info"):
+        assert vehicle_of_key(key(name, vehicle="ego")) == "ego"
 
 
 @given(
