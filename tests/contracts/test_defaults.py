@@ -95,7 +95,9 @@ KINDS = sorted(
         kind
         for module in (*FILES, *MESSAGES)
         for kind in vars(module).values()
-        if isinstance(kind, type) and issubclass(kind, msgspec.Struct) and kind is not msgspec.Struct
+        if isinstance(kind, type)
+        and issubclass(kind, msgspec.Struct)
+        and kind is not msgspec.Struct
     },
     key=lambda kind: kind.__name__,
 )

@@ -18,7 +18,7 @@ from foretwin.contracts.router import LISTENS
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from tests.contracts.bus_sides import DEADLINE_S, take_until
 
-COVERS = ("foretwin.contracts.process_setup", "foretwin.contracts.zenoh_config")
+COVERS = ("foretwin.contracts.process_setup",)
 
 
 def word_of(folder: Path) -> str:
