@@ -82,10 +82,15 @@ enabled = {enabled}
 
 
 def mapping_text(
-    *, enabled: bool, endpoint: str | None = None, dialect: str = "rmw_zenoh", more: str = ""
+    *,
+    enabled: bool,
+    endpoint: str | None = None,
+    dialect: str = "rmw_zenoh",
+    head: str = "",
+    more: str = "",
 ) -> str:
-    """Return a mapping of some topics, and of `more` after them."""
-    head = "" if endpoint is None else f'endpoint = "{endpoint}"'
+    """Return a mapping of some topics, of `head` before them and of `more` after them."""
+    head = head if endpoint is None else f'endpoint = "{endpoint}"\n{head}'
     on = "true" if enabled else "false"
     return MAPPING.format(head=head, enabled=on, dialect=dialect, more=more)
 

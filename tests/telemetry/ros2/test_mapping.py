@@ -4,9 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping, read_mapping
+from foretwin.telemetry.ros2.mapping import (
+    InRow,
+    Mapping,
+    MappingError,
+    MapPlace,
+    OutRow,
+    TowardsVehicle,
+    listening_only,
+    parse_mapping,
+    read_mapping,
+)
+from foretwin.telemetry.ros2.mirrored import Mirrored
+from foretwin.telemetry.ros2.virtual_objects import PlacedObject
 
 GOOD = """dialect = "rmw_zenoh"
 [[in]]
@@ -75,6 +88,97 @@ def test_errors_say_where_and_what_would_be_right(old: str, new: str, said: str)
     assert old in GOOD
     with pytest.raises(MappingError, match=said):
         parse_mapping(GOOD.replace(old, new), name="m.toml")
+
+
+MAP = "[map]\nlat_deg = {lat}\nlon_deg = {lon}\n"
+
+
+@pytest.mark.parametrize(
+    ("added", "said"),
+    [
+        ("domain = 0", None), ("domain = 232", None), ("domain = -1", "domain -1: 0 to 232"),
+        ("domain = 233", "domain 233: 0 to 232"),
+        ("antenna_m = [1.0, 0.0, inf]", "antenna_m .*three finite numbers"),
+        ('endpoint = "tcp/car"', "endpoint 'tcp/car': tcp/HOST:PORT"),
+        (MAP.format(lat=89.9, lon=-180.0), None), (MAP.format(lat=-89.9, lon=180.0), None),
+        (MAP.format(lat=90.0, lon=0.0), "map at 90.0, 0.0: degrees"),
+        (MAP.format(lat=0.0, lon=180.1), "map at 0.0, 180.1: degrees"),
+        (MAP.format(lat="nan", lon=0.0), "map at nan, 0.0: degrees"),
+    ],
+)  # fmt: skip
+def test_where_a_head_ends(added: str, said: str | None) -> None:
+    text = GOOD.replace("[[in]]", f"{added}\n[[in]]", 1)
+    if said is None:
+        assert parse_mapping(text, name="m.toml") != parse_mapping(GOOD, name="m.toml") or (
+            added == "domain = 0"
+        )
+        return
+    with pytest.raises(MappingError, match=f"m.toml: {said}"):
+        parse_mapping(text, name="m.toml")
+
+
+@pytest.mark.parametrize(
+    ("added", "fits", "others"),
+    [
+        ('angle_unit = "deg"', {"steering", "control"}, {"gnss", "imu", "speed"}),
+        ("left_positive = false", {"steering", "control"}, {"gnss", "imu", "speed"}),
+        ('speed_unit = "km/h"', {"speed"}, {"gnss", "imu", "steering", "control"}),
+        ('axes = "forward_right_down"', {"imu"}, {"gnss", "speed", "steering", "control"}),
+    ],
+)
+def test_units_and_axes_are_of_some_channels(added: str, fits: set[str], others: set[str]) -> None:
+    kinds = {row.channel: row.type for row in read_mapping(Path("autoware")).mapping.inwards}
+    for channel in fits | others:
+        text = (
+            f'dialect = "ros2dds"\n[[in]]\ntopic = "/a"\ntype = "{kinds[channel]}"\n'
+            f'channel = "{channel}"\n{added}\n'
+        )
+        if channel in fits:
+            assert parse_mapping(text, name="m.toml").inwards
+            continue
+        key = added.split(" ", 1)[0]
+        with pytest.raises(MappingError, match=rf"line 2, .*{key}.*: not of channel '{channel}'"):
+            parse_mapping(text, name="m.toml")
+
+
+@pytest.mark.parametrize(("unit", "known"), [("angle_unit", "rad, deg"), ("speed_unit", "m/s")])
+def test_an_unknown_unit_is_answered_by_those_known(unit: str, known: str) -> None:
+    text = GOOD.replace('channel = "gnss"', f'channel = "gnss"\n{unit} = "furlong"')
+    with pytest.raises(MappingError, match=f"{unit} 'furlong': one of {known}"):
+        parse_mapping(text, name="m.toml")
+
+
+def test_what_is_left_out_of_a_mapping() -> None:
+    mapping = parse_mapping(GOOD, name="m.toml")
+    assert msgspec.structs.asdict(
+        msgspec.structs.replace(mapping, inwards=(), outwards=(), towards_vehicle=TowardsVehicle())
+    ) == {
+        "dialect": "rmw_zenoh", "endpoint": None, "domain": 0, "namespace": "/", "antenna_m": None,
+        "map_place": None, "inwards": (), "outwards": (), "placed": (), "mirrored": Mirrored(),
+        "towards_vehicle": TowardsVehicle(),
+    }  # fmt: skip
+    assert (mapping.towards_vehicle.enabled, mapping.towards_vehicle.max_objects) == (False, 64)
+    assert (Mirrored().own_twin, Mirrored().vehicles) == (False, ())
+    assert MapPlace(lat_deg=1.0, lon_deg=2.0).alt_m == 0.0
+    (row,) = mapping.inwards
+    assert (row.stamp, row.angle_unit, row.left_positive) == ("header", "rad", True)
+    placed = PlacedObject(user_id="a", kind="car", lat_deg=1.0, lon_deg=2.0)
+    assert msgspec.structs.astuple(placed)[4:] == (0.0, 0.0, 0.0, 0.0, 4.5, 1.8)
+
+
+@pytest.mark.parametrize(
+    "kind", [InRow, OutRow, MapPlace, TowardsVehicle, Mapping, Mirrored, PlacedObject]
+)
+def test_a_word_that_nobody_knows_is_refused_wherever_it_stands(kind: type) -> None:
+    assert kind.__struct_config__.forbid_unknown_fields  # type: ignore[attr-defined]
+
+
+def test_of_a_vehicle_that_is_listened_to_nothing_goes_out() -> None:
+    mapping = parse_mapping(GOOD, name="m.toml")
+    quiet = listening_only(mapping)
+    assert quiet.inwards == mapping.inwards
+    assert (quiet.outwards, quiet.placed, bool(quiet.mirrored)) == ((), (), False)
+    assert not quiet.towards_vehicle.enabled
 
 
 def test_one_stream_comes_from_one_topic() -> None:

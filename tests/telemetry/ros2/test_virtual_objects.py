@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -83,6 +84,81 @@ def test_what_must_not_go_out_is_refused_and_changes_nothing(
     with pytest.raises(UnfitError, match=why):
         objects.take(said(S, *users), now_ns=0)
     assert objects.take(said(S, user("c")), now_ns=0).users == (user("c"),)
+
+
+@pytest.mark.parametrize(
+    ("changed", "fits"),
+    [
+        ({"speed_mps": 100.0}, True), ({"speed_mps": -100.0}, True), ({"speed_mps": 100.1}, False),
+        ({"length_m": 0.01}, True), ({"length_m": 0.0}, False), ({"length_m": 49.9}, True),
+        ({"length_m": 50.0}, False), ({"width_m": 0.0}, False), ({"width_m": 50.0}, False),
+    ],
+)  # fmt: skip
+def test_a_virtual_road_user_is_of_some_vehicles_size_and_speed(
+    changed: dict[str, float], fits: bool
+) -> None:
+    one = said(S, msgspec.structs.replace(user("a"), **changed))
+    if fits:
+        assert VirtualObjects(at_most=1).take(one, now_ns=0) == one
+        return
+    with pytest.raises(UnfitError, match="impossible size or speed"):
+        VirtualObjects(at_most=1).take(one, now_ns=0)
+
+
+@pytest.mark.parametrize(
+    ("later_ns", "stamp_ns", "east_m"),
+    [
+        (S // 10, S + S // 10, 1.0),
+        (-S // 10, S, 0.0),  # the list does not go back: this one is moved on to it
+        (S - 1, 2 * S - 1, 10.0),
+        (S, 2 * S, 0.0),  # told so long ago that nobody knows where it is now: as it was told
+        (-S, 0, 0.0),  # the vehicle's clock is set anew
+    ],
+)
+def test_all_are_told_as_they_are_at_one_stamp(later_ns: int, stamp_ns: int, east_m: float) -> None:
+    objects = VirtualObjects(at_most=2)
+    objects.take(said(S, user("a", speed_mps=10.0)), now_ns=0)
+    both = objects.take(said(S + later_ns, user("b", speed_mps=10.0)), now_ns=LIVES_NS)
+    assert both.stamp_ns == stamp_ns
+    assert xy_m(both.users[0])[0] == pytest.approx(east_m, abs=1e-3)
+    moved_on_m = 1.0 if stamp_ns > S + later_ns else 0.0
+    assert xy_m(both.users[1])[0] == pytest.approx(moved_on_m, abs=1e-3)
+
+
+def test_who_sets_out_does_so_with_the_first_state_and_anew_where_the_clock_goes_back() -> None:
+    placed = PlacedObject(
+        user_id="p", kind="car", lat_deg=52.5, lon_deg=13.4, speed_mps=5.0, way_m=10.0
+    )
+    objects = VirtualObjects(at_most=1, placed=(placed,))
+    assert objects.has_own
+    assert not VirtualObjects(at_most=1).has_own
+    east_m = [
+        float(xy_m(objects.own(stamp_ns).users[0])[0]) for stamp_ns in (5 * S, 6 * S, 3 * S, 4 * S)
+    ]
+    assert east_m == pytest.approx([0.0, 5.0, 0.0, 5.0], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("lat_deg = 89.9", None), ("lat_deg = 90.0", "degrees"), ("lon_deg = -180.0", None),
+        ("lon_deg = 180.1", "degrees"), ("alt_m = inf", "finite"), ("yaw_deg = nan", "finite"),
+        ("length_m = 50.0", "length_m 50.0: above 0 and below 50"), ("width_m = 49.9", None),
+        ("speed_mps = 50.0\nway_m = 1000.0", None),
+        ("speed_mps = 50.1\nway_m = 1.0", "0 to 50"), ("speed_mps = -0.1\nway_m = 1.0", "0 to 50"),
+        ("way_m = 1000.1", "0 to 1000"), ("way_m = -0.1", "0 to 1000"), ("way_m = 5.0", None),
+        ("speed = 5.0", "unknown field"),
+    ],
+)  # fmt: skip
+def test_what_a_mapping_may_place(line: str, said: str | None) -> None:
+    named = {word.split(" ", 1)[0] for word in line.split("\n")}
+    kept = [one for one in VIRTUAL.splitlines() if one.split(" ", 1)[0] not in named]
+    text = OUT + "\n".join([*kept, line])
+    if said is None:
+        assert parse_mapping(text, name="m.toml").placed
+        return
+    with pytest.raises(MappingError, match=said):
+        parse_mapping(text, name="m.toml")
 
 
 @given(
