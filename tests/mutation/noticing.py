@@ -33,7 +33,7 @@ def files_of(module: str, *, system: bool = False) -> list[str]:
     mirror = mirror_of(modules()[module])
     found = [mirror] if module in mirrored() else []
     found += [ROOT / path for path in covered().get(module, ())]
-    found += [path for path in sorted(mirror.parent.glob("test_*.py")) if _imports(path, module)]
+    found += [path for path in sorted(mirror.parent.glob("test_*.py")) if module in _imports(path)]
     names = dict.fromkeys(str(path.relative_to(ROOT)) for path in found)
     return [name for name in names if system or not _takes_long(name)]
 
@@ -43,17 +43,18 @@ def _takes_long(name: str) -> bool:
 
 
 @cache
-def _imports(test: Path, module: str) -> bool:
-    package, _, last = module.rpartition(".")
+def _imports(test: Path) -> frozenset[str]:
+    """Return what a test imports, and what the modules beside it do that it imports."""
+    found: set[str] = set()
     for node in ast.walk(ast.parse(test.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (
-            node.module == module
-            or (node.module == package and any(one.name == last for one in node.names))
-        ):
-            return True
-        if isinstance(node, ast.Import) and any(one.name == module for one in node.names):
-            return True
-    return False
+        if isinstance(node, ast.Import):
+            found |= {one.name for one in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{one.name}" for one in node.names)}
+            beside = ROOT / Path(*node.module.split(".")).with_suffix(".py")
+            if beside.parent == test.parent and beside.is_file():
+                found |= _imports(beside)
+    return frozenset(found)
 
 
 class Checkout:

@@ -1,0 +1,77 @@
+"""How often the gateway sends what, from where a command starts, and what it cannot send."""
+
+from __future__ import annotations
+
+import pytest
+
+from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
+from tests.telemetry.ros2.gateway_ground import STEERING_KEY, steering
+from tests.telemetry.ros2.test_gateway import Ground, S, state
+
+COVERS = ("foretwin.telemetry.ros2.outwards",)
+STATE_OUT = """
+[[out]]
+topic = "/foretwin/state"
+type = "nav_msgs/msg/Odometry"
+source = "state"
+"""
+OBJECTS_OUT = """
+[[out]]
+topic = "/foretwin/objects"
+type = "autoware_perception_msgs/msg/DetectedObjects"
+source = "virtual_objects"
+"""
+PARKED = """
+[[virtual]]
+id = "parked"
+kind = "car"
+lat_deg = 52.5
+lon_deg = 13.4
+"""
+
+
+@pytest.mark.parametrize(("ago_ms", "sent"), [(500.0, 1), (500.1, 0)])
+def test_the_first_command_starts_from_an_angle_that_was_measured_lately(
+    ago_ms: float, sent: int
+) -> None:
+    ground = Ground(enabled=True, flag=True)
+    ground.arrive(STEERING_KEY + "RIHS01_x", steering(5 * S, 0.1))
+    ground.step(ago_ms)
+    ground.orders.say(ground.bus, Authority(sent_mono_ns=ground.now_ns))
+    command = VehicleCommand(
+        stamp_ns=0, sent_mono_ns=ground.now_ns, tire_angle_rad=0.2, accel_mps2=1.0, speed_mps=1.0
+    )
+    ground.orders.say(ground.bus, command)
+    ground.step()
+    assert len(ground.foreign.on("/control/cmd")) == sent
+    report = ground.gateway.report()
+    assert report["held"].get("/control/cmd", 0) == 1 - sent
+    assert report["gate"].get("measured steering not known", 0) == 1 - sent
+
+
+def test_states_go_out_fifty_times_a_second_at_most_and_diagnostics_once() -> None:
+    ground = Ground(enabled=False, flag=False, more=STATE_OUT)
+    for _ in range(200):
+        ground.bus.publish("state", state(5 * S + ground.now_ns), vehicle="ego")
+        ground.step(5.0)
+    assert len(ground.foreign.on("/foretwin/state")) == 50
+    assert len(ground.foreign.on("/foretwin/diagnostics")) == 1
+
+
+def test_objects_of_the_mapping_go_out_ten_times_a_second() -> None:
+    ground = Ground(enabled=False, flag=False, more=OBJECTS_OUT + PARKED)
+    for _ in range(100):
+        ground.bus.publish("state", state(5 * S + ground.now_ns), vehicle="ego")
+        ground.step(10.0)
+    assert len(ground.foreign.on("/foretwin/objects")) == 10
+
+
+def test_a_stamp_that_no_ros_time_holds_is_counted_and_survived() -> None:
+    ground = Ground(enabled=False, flag=False, more=STATE_OUT)
+    ground.bus.publish("state", state(2**31 * S), vehicle="ego")
+    ground.step()
+    assert ground.foreign.on("/foretwin/state") == []
+    assert ground.gateway.report()["held"]["/foretwin/state: error"] == 1
+    ground.bus.publish("state", state(5 * S), vehicle="ego")
+    ground.step(20.0)
+    assert len(ground.foreign.on("/foretwin/state")) == 1
