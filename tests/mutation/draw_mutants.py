@@ -5,7 +5,7 @@ mutant with its file, line, operator and text. Each place in the files is as lik
 then each operator that can change it: of one `+` cosmic-ray makes a dozen mutants. A number that
 has a name is trebled: nobody promised 120 m rather than 121. Left out is what changes no result of
 any program that is right: annotations, protocols, that a type is frozen, what only a type checker
-reads or a trace tells.
+reads or a trace tells, that `zip` asserts equal lengths, and how much a cache keeps.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from cosmic_ray.mutating import mutate_code
 _LEFT_OUT = ("core/NoOp",)
 _NUMBERS, _TREBLED = "core/NumberReplacer", "trebled"
 _DECLARED = ("frozen", "slots", "kw_only")
+_TRACED_OR_KEPT = ("traced(", "cache", "lru_cache", "functools.cache", "functools.lru_cache")
+_ASSERTS_OR_KEEPS = ("zip", "lru_cache", "functools.lru_cache")
 
 
 class Place(NamedTuple):
@@ -136,10 +138,12 @@ def _unrun(tree: ast.Module) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     for node in ast.walk(tree):
         nodes += [getattr(node, name, None) for name in ("annotation", "returns")]
         declares = isinstance(node, ast.keyword) and node.arg in _DECLARED
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in _ASSERTS_OR_KEEPS:
+            nodes += node.keywords
         protocol = isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases)
         nodes += [node] if declares or protocol else []
         for decorator in getattr(node, "decorator_list", []):
-            nodes += [decorator] if ast.unparse(decorator).startswith("traced(") else []
+            nodes += [decorator] if ast.unparse(decorator).startswith(_TRACED_OR_KEPT) else []
         if isinstance(node, ast.If) and {"TYPE_CHECKING", "__name__"} & set(_names(node.test)):
             nodes.append(node.test)
     return [
