@@ -82,8 +82,9 @@ def forked(work: Callable[[], int]) -> ForkedProcess:
     trouble = trouble_with_forking()
     if trouble is not None:
         raise RuntimeError(f"this process cannot be forked: {trouble}")
-    sys.stdout.flush()
-    sys.stderr.flush()
+    with contextlib.suppress(OSError, ValueError):  # a terminal that is gone, a full disk
+        sys.stdout.flush()
+        sys.stderr.flush()
     gc.freeze()  # what is read already stays shared: the collector does not write to it
     pid = os.fork()
     if pid:

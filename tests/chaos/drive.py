@@ -80,7 +80,11 @@ def carry_out(
         finally:
             drive.close()
         wrong, done = drive.wrong, drive.consequences()
-        skipped = [str(one) for one in drive.injection.skipped] if drive.injection else []
+        skipped = (
+            [f"{one.what} {one.target}" for one in drive.injection.skipped]
+            if drive.injection
+            else []
+        )
         if wrong or keep:
             shutil.copytree(base / "disk", base / "kept", symlinks=True)
     if wrong or keep:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -78,6 +78,9 @@ def table_of(drives: Iterable[DriveLine]) -> str:
         back = _worst(one.back_s for one, _ in held)
         failed = sum(failed for _, failed in held)
         lines.append(f"{what:<11}{kind:<14}{len(held):>6}  {ends:<34}{failed:>9}{lost:>8}{back:>8}")
+    skipped = Counter(words for drive in drives for words in drive.skipped)
+    if skipped:
+        lines.append(f"not possible at the time: {dict(sorted(skipped.items()))}")
     faults = sum(len(drive.done) for drive in drives)
     failed = [drive.number for drive in drives if drive.wrong]
     taken_s = sum(drive.wall_s for drive in drives)

@@ -183,14 +183,20 @@ def test_how_soon_somebody_is_back() -> None:
     assert back_after_s(seen, "w1", 0) is None
 
 
-def drive_line(number: int, *wrong: str, lost_s: float = 0.0, back_s: float = 1.0) -> DriveLine:
+def drive_line(
+    number: int,
+    *wrong: str,
+    lost_s: float = 0.0,
+    back_s: float = 1.0,
+    skipped: tuple[str, ...] = (),
+) -> DriveLine:
     done = [
         Consequence("kill", "w", "kill w", 3, None, back_s),
         Consequence("kill", "recorder", "kill recorder", 3, lost_s, None),
     ]
     return DriveLine(
         number=number, kind="log socket", revision="abc", code=3, wall_s=30.0, done=done,
-        skipped=[], wrong=list(wrong),
+        skipped=list(skipped), wrong=list(wrong),
     )  # fmt: skip
 
 
@@ -203,10 +209,14 @@ def test_drives_are_kept_and_the_last_of_a_number_counts(tmp_path: Path) -> None
 
 
 def test_the_table_says_what_followed_and_what_was_worst() -> None:
-    drives = [drive_line(0, lost_s=0.25, back_s=2.5), drive_line(1, "hangs", back_s=0.5)]
+    drives = [
+        drive_line(0, lost_s=0.25, back_s=2.5, skipped=("full disk",)),
+        drive_line(1, "hangs", back_s=0.5),
+    ]
     table = table_of(drives).splitlines()
     assert [line.split() for line in table[1:3]] == [
         ["kill", "recorder", "2", "3:", "2", "1", "0.25", "-"],
         ["kill", "w", "2", "3:", "2", "1", "-", "2.50"],
     ]
+    assert table[-2] == "not possible at the time: {'full disk': 1}"
     assert table[-1] == "4 faults in 2 drives (abc), failed: [1]; 60 s"

@@ -58,6 +58,18 @@ def test_a_fork_is_waited_for_and_killed() -> None:
     assert said == ["still there None", "-9"]
 
 
+def test_a_screen_that_is_a_file_on_a_full_disk_keeps_nobody_from_forking() -> None:
+    said = run("""
+        import sys
+        before, sys.stdout = sys.stdout, open("/dev/full", "w")
+        print("what is not taken")
+        child = forked(lambda: 7)
+        os.write(before.fileno(), b"code %d\\n" % child.wait(60))
+        os._exit(0)
+    """)
+    assert said == ["code 7"]
+
+
 def test_a_process_with_threads_is_not_forked() -> None:
     said = run("""
         print(trouble_with_forking())
