@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import sys
 import time
 from pathlib import Path
@@ -237,4 +238,6 @@ def test_a_sync_in_the_middle_of_a_record_is_noticed(tmp_path: Path) -> None:
             log.write(json.dumps(line | {"bytes": torn}) + "\n")
     seeds = (str(number) for number in range(4))
     found = [power_cut.wrong_after(run, copies, 9, tmp_path / one, one) for one in seeds]
-    assert any("futures.arrows was synced up to" in "".join(one) for one in found), found
+    told = re.findall(r"(\w+).arrows was synced up to (\d+), and is whole up to (\d+)", str(found))
+    assert {name for name, _, _ in told} == {"futures"}, found
+    assert all(int(whole) < int(size) for _, size, whole in told)

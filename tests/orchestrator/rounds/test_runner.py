@@ -65,6 +65,7 @@ def test_parameters_that_a_full_disk_does_not_take_are_written_with_the_next_rou
     house.work()
     house.drive(40)
     assert house.conductor.start_round()
+    rounds.use_vehicle(house.plan.vehicle, 2)
     house.tables.close()
     kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.vehicle")}
     assert len(kept) == 2
