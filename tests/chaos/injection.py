@@ -186,7 +186,8 @@ class Injection:
         except UserError:
             return False
         chance = random.Random(fault.strength)
-        who = guise(drive, self.campaign, self.scratch, chance)
+        rather = "car" if fault.what == "burst" else ""
+        who = guise(drive, self.campaign, self.scratch, chance, rather=rather)
         done.words = who.name
 
         def speak() -> None:

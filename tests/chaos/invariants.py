@@ -107,16 +107,25 @@ def _wrong_ledger(left: Left, record: dict[str, Any]) -> Iterator[str]:
         yield f"{telemetry['recorded']} samples are said to be recorded, {held} messages are there"
 
 
-def _wrong_tables(results: Path) -> Iterator[str]:
-    tables = {
+def _tables_in(results: Path) -> dict[str, list[dict[str, Any]]]:
+    return {
         name: pq.read_table(results / f"{name}.parquet", columns=list(columns)).to_pylist()
         for name, columns in UNIQUE.items()
         if (results / f"{name}.parquet").exists()
     }
-    for name, rows in tables.items():
+
+
+def twice_in(results: Path) -> Iterator[str]:
+    """Say which tables of a run hold a result twice."""
+    for name, rows in _tables_in(results).items():
         counts = Counter(tuple(row.values()) for row in rows)
         if twice := [key for key, count in counts.items() if count > 1]:
             yield f"twice in {name}: {twice[:3]} of {len(twice)}"
+
+
+def _wrong_tables(results: Path) -> Iterator[str]:
+    yield from twice_in(results)
+    tables = _tables_in(results)
     if {"rounds", "futures", "jobs"} <= tables.keys():
         rounds = {row["round_id"] for row in tables["rounds"]}
         with_futures = {row["round_id"] for row in tables["futures"]}
@@ -154,4 +163,5 @@ def _wrong_power(left: Left) -> Iterator[str]:
         for cut, at_ns in enumerate([cut_ns, *chance.choices(of_run, k=CUTS)]):
             target = left.scratch / f"power-cut-{number}-{cut}"
             yield from wrong_after(left.run, left.syncs, at_ns, target, f"{seed}/{cut}")
+            yield from (f"power cut: {one}" for one in twice_in(target / "results"))
             shutil.rmtree(target)

@@ -49,14 +49,22 @@ class Guise(NamedTuple):
 
 
 def guise(
-    drive: RunningDrive, campaign: Path | None, scratch: Path, chance: random.Random
+    drive: RunningDrive,
+    campaign: Path | None,
+    scratch: Path,
+    chance: random.Random,
+    *,
+    rather: str = "",
 ) -> Guise:
-    """Draw as whom a stranger comes; what he makes himself lies in `scratch`."""
+    """Draw as whom a stranger comes; what he makes himself lies in `scratch`.
+
+    Where he comes as a member, in two of three cases as one of the role `rather`, if there is one.
+    """
     plain = BusSetup(endpoint=drive.endpoint)
     if campaign is not None:
         if chance.random() < 0.2:
             return Guise("without a certificate", plain)
-        role = chance.choice(_ROLES)
+        role = rather if rather and chance.random() < 0.67 else chance.choice(_ROLES)
         return Guise(role, BusSetup(endpoint=drive.endpoint, tls=role_files(campaign, role)))  # type: ignore[arg-type]
     if drive.credentials is None:
         return Guise("anybody", plain)
@@ -67,7 +75,8 @@ def guise(
         return Guise("without a password", plain)
     if chance.random() < 0.2:
         return Guise("with another run's password", _wrong(drive.endpoint, scratch))
-    file = chance.choice(stolen)
+    wanted = [file for file in stolen if rather and file.stem.startswith(rather)]
+    file = chance.choice(wanted if wanted and chance.random() < 0.67 else stolen)
     return Guise(file.stem, drive.bus(file.stem))
 
 

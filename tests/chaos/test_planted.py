@@ -20,8 +20,9 @@ from foretwin.telemetry.logs.write_mcap import DriveWriter
 from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.chaos import drive
 from tests.chaos.faults import Case, Fault
-from tests.chaos.invariants import wrong_with
+from tests.chaos.invariants import twice_in, wrong_with
 from tests.chaos.left import Left
+from tests.chaos.power_cut import read_syncs, wrong_after
 from tests.chaos.run_processes import MARK, marked
 from tests.telemetry.own_recordings import read_drive
 
@@ -132,3 +133,24 @@ def test_a_drive_that_does_not_end_is_noticed_and_ended(monkeypatch: pytest.Monk
     assert sum("still runs" in one for one in outcome.wrong) > 5
     assert marked(outcome.folder.name) == []
     shutil.rmtree(outcome.folder)
+
+
+def test_up_to_each_sync_of_a_drive_all_is_readable(tmp_path: Path) -> None:
+    """Its orchestrator and its recorder were killed in between: others went on with their files."""
+    wrong: list[str] = []
+    cuts: set[int] = set()
+
+    def cut_everywhere(left: Left) -> None:
+        cuts.update(one.ns for one in read_syncs(left.syncs) if left.run in one.path.parents)
+        for cut_ns in sorted(cuts):
+            target = tmp_path / "cut"
+            wrong.extend(wrong_after(left.run, left.syncs, cut_ns, target, str(cut_ns)))
+            wrong.extend(twice_in(target / "results"))
+            shutil.rmtree(target)
+
+    kills = (Fault(5.0, "kill", "orchestrator"), KILLED, Fault(15.0, "segv", "orchestrator"))
+    outcome = drive.carry_out(CASE._replace(faults=kills), look_at=cut_everywhere)
+    assert outcome.wrong == []
+    assert [one.kind for one in outcome.done] == ["orchestrator", "recorder", "orchestrator"]
+    assert len(cuts) > 100
+    assert wrong == []
