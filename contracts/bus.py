@@ -6,6 +6,7 @@ What arrives lands in a `foretwin.contracts.mailbox.Mailbox`.
 from __future__ import annotations
 
 import collections
+import functools
 import itertools
 import secrets
 import threading
@@ -19,7 +20,12 @@ import msgspec
 from foretwin.contracts.bus_calls import Bus, ask
 from foretwin.contracts.codec import MOST_SENDER, encode
 from foretwin.contracts.guard import Refused, kept, opened, reason_in
-from foretwin.contracts.kept import keeping_publisher, most_kept, recovering_subscriber
+from foretwin.contracts.kept import (
+    ask_for_kept,
+    keeping_publisher,
+    most_kept,
+    recovering_subscriber,
+)
 from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
@@ -144,6 +150,8 @@ class ZenohBus(ZenohSession):
         self._lossless = setup.lossless
         self._sent: dict[str, Iterator[int]] = collections.defaultdict(itertools.count)
         """The next sequence number of each key."""
+        self._recovering: dict[str, Callable[[], None]] = {}
+        """Asks for what is kept of a key, by key."""
         self._sender = 1 + secrets.randbelow(MOST_SENDER)
         self._lock = threading.Lock()
 
@@ -187,11 +195,20 @@ class ZenohBus(ZenohSession):
             data = kept(sample.payload, most)
             mailbox.put(Received(channel, str(sample.key_expr), data, kind))
 
-        self._declared.append(
-            recovering_subscriber(self._zenoh, self._session, full_key, land, samples=samples)
-            if samples
-            else self._session.declare_subscriber(full_key, land)
+        if not samples:
+            self._declared.append(self._session.declare_subscriber(full_key, land))
+            return
+        self._declared.append(recovering_subscriber(self._zenoh, self._session, full_key, land))
+        self._recovering[full_key] = functools.partial(
+            ask_for_kept, self._zenoh, self._session, full_key, land, samples=samples
         )
+        self._recovering[full_key]()
+
+    def recover(self, channel: str, **ids: str) -> None:
+        """Ask again for what is kept of a channel; see Bus."""
+        ask = self._recovering.get(channel_key(channel, **ids))
+        if ask is not None:
+            ask()
 
     def request(
         self,

@@ -25,6 +25,9 @@ class Bus(Protocol):
         and some twice.
         """
 
+    def recover(self, channel: str, **ids: str) -> None:
+        """Ask once more for what was missed of a channel that was subscribed to with `recover`."""
+
     def request(
         self,
         channel: str,

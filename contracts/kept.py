@@ -40,27 +40,31 @@ def keeping_publisher(zenoh: Any, session: Any, key: str, *, samples: int, **qos
     )
 
 
-def recovering_subscriber(
-    zenoh: Any, session: Any, key: str, land: Callable[[Any], None], *, samples: int
-) -> Any:
-    """Return a subscriber that asks for what it missed, and for the last `samples` before it.
+def recovering_subscriber(zenoh: Any, session: Any, key: str, land: Callable[[Any], None]) -> Any:
+    """Return a subscriber that asks for what it finds missing; `zenoh` is the module.
 
-    What was before it can come twice and out of order; `zenoh` is the module.
+    Its question may reach a publisher whose link is just coming back, and find nothing: it does not
+    ask again. Nor is its own way to ask for the past used (1.10): where a live sample comes before
+    the first kept one, it takes all that is kept for old, 7 times of 15 for a car that drives.
+    Both is what `ask_for_kept` is for.
     """
-    subscriber = zenoh.ext.declare_advanced_subscriber(
-        session, key, land, recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
-    )
+    recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+    return zenoh.ext.declare_advanced_subscriber(session, key, land, recovery=recovery)
+
+
+def ask_for_kept(
+    zenoh: Any, session: Any, key: str, land: Callable[[Any], None], *, samples: int
+) -> None:
+    """Let the last `samples` that each publisher of a key keeps land, in any order, and some that
+    have come before; `zenoh` is the module."""
 
     def land_kept(reply: Any) -> None:
         if reply.ok is not None:
             land(reply.ok)
 
-    # Not by the subscriber's own history (1.10): where a live sample comes before the first kept
-    # one, it takes all that is kept for old, 7 times of 15 for a car that drives.
     session.get(
         f"{key}/@adv/**?_max={samples}",
         land_kept,
         consolidation=zenoh.ConsolidationMode.NONE,
         accept_replies=zenoh.ReplyKeyExpr.ANY,
     )
-    return subscriber

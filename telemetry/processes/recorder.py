@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
-from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.drive import DriveEnd, InfoRequest
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.process import ProcessLife, run_process
@@ -23,6 +23,7 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.contracts.trace import traced
+from foretwin.telemetry.processes.missed import MissedSamples
 from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.ros_messages.parts import typestore
 
@@ -67,6 +68,7 @@ class RecorderProcess:
         self._messages = Mailbox(DEPTH, when_full="block" if lossless else "drop_oldest")
         # Apart, so that a flood of samples never drops an answer.
         self._answers = Mailbox(64)
+        self._missed = MissedSamples()
         self._reported_lost = 0
         self._refusals = Refusals()
         self._asked_s: float | None = None
@@ -95,6 +97,7 @@ class RecorderProcess:
         if now_s - self._flushed_s >= _FLUSH_EVERY_S:
             self._flushed_s = now_s
             self._publish(self._recording.flush())
+            self._ask_for_missed()
             self._report_losses()
         return not self._life.over
 
@@ -149,6 +152,14 @@ class RecorderProcess:
         self._stamp_ns = message.stamp_ns
         numbered = {"sender": item.sender, "seq": envelope.seq, "sent_ns": envelope.sent_ns}
         self._publish(self._recording.add(item.channel, message, **numbered))
+        if isinstance(message, DriveEnd):
+            self._ask_for_missed(at_once=True)
+
+    def _ask_for_missed(self, *, at_once: bool = False) -> None:
+        if not self._lossless:
+            missing = self._recording.tally.numbers.missing
+            for channel in self._missed.due(missing, self._mono_s(), at_once=at_once):
+                self._bus.recover(channel, vehicle=self._vehicle_id)
 
     def _take_answer(self, item: Any) -> None:
         if isinstance(item, Reply) and item.message is not None:

@@ -33,6 +33,8 @@ class MemoryBus:
         self._alive: set[str] = set()
         self._watchers: list[tuple[str, Mailbox]] = []
         self._seq: dict[str, int] = {}
+        self.recovered: list[str] = []
+        """Keys that were asked for once more."""
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; see Bus."""
@@ -53,6 +55,14 @@ class MemoryBus:
         """Receive into `mailbox`; see Bus."""
         with self._lock:
             self._subscribers.append((channel_key(channel, **ids), channel, mailbox))
+
+    def mailboxes(self, channel: str) -> list[Mailbox]:
+        """Return where messages of a channel land, for a message that is not the next one."""
+        return [box for _, name, box in self._subscribers if name == channel]
+
+    def recover(self, channel: str, **ids: str) -> None:
+        """Note who asks; nothing is lost here. See Bus."""
+        self.recovered.append(channel_key(channel, **ids))
 
     def request(
         self,

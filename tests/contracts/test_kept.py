@@ -51,6 +51,17 @@ def test_who_comes_late_hears_what_is_kept_while_more_comes() -> None:
     assert len({sender for sender, _ in found}) == 1
 
 
+def test_what_is_kept_can_be_asked_for_once_more() -> None:
+    setup, mailbox = BusSetup(endpoint=free_endpoint()), Mailbox(10_000)
+    with ZenohBus(setup, router=True), ZenohBus(setup) as sender, ZenohBus(setup) as late:
+        speeds(sender, 0, COUNT)
+        late.subscribe("speed", mailbox, recover=True, vehicle="car")
+        assert len(numbers(mailbox, COUNT)) == COUNT
+        late.recover("speed", vehicle="car")
+        assert len(numbers(mailbox, COUNT)) == COUNT
+        late.recover("imu", vehicle="car")  # nobody has subscribed to it: nothing to ask for
+
+
 def test_a_cut_of_the_senders_link_loses_nothing() -> None:
     setup, mailbox, plain = BusSetup(endpoint=free_endpoint()), Mailbox(10_000), Mailbox(10_000)
     with ExitStack() as stack:

@@ -14,7 +14,9 @@ from typing import Any
 import pytest
 
 from foretwin.contracts.bus import Mailbox, Received, ZenohBus
-from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.codec import encode
+from foretwin.contracts.drive import DriveEnd, SpeedSample
+from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
@@ -66,6 +68,25 @@ def recorder(
 def publish_all(bus: MemoryBus | ZenohBus) -> None:
     for channel, message in every_channel():
         bus.publish(channel, message, vehicle="car")
+
+
+def test_what_is_missing_is_asked_for_once_more(tmp_path: Path) -> None:
+    wall, bus = Wall(), MemoryBus()
+    process = recorder(bus, DriveRecording(tmp_path / "drive.mcap"), lossless=False, mono_s=wall)
+    for seq in (0, 5):
+        speed = SpeedSample(stamp_ns=START_NS + seq, speed_mps=1.0)
+        mailbox = bus.mailboxes("speed")[0]
+        data = encode(speed, seq=seq, sent_ns=seq)
+        mailbox.put(Received("speed", channel_key("speed", vehicle="car"), data, SpeedSample))
+    for _ in range(4):
+        assert process.step()
+        wall.now_s += 1.0
+    assert bus.recovered == [channel_key("speed", vehicle="car")]
+    end = DriveEnd(stamp_ns=START_NS + 9, published={"speed": 6, "imu": 1})
+    bus.publish("end", end, vehicle="car")
+    assert process.step()
+    assert set(bus.recovered[1:]) == {channel_key(one, vehicle="car") for one in ("speed", "imu")}
+    process.finish()
 
 
 def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
