@@ -121,7 +121,7 @@ def decode_content(
     return message
 
 
-def content_bytes(message: msgspec.Struct) -> bytes:
+def content_bytes(message: msgspec.Struct | tuple[Any, ...]) -> bytes:
     """Return the body alone: equal for equal messages, so it can be hashed."""
     return _encoder.encode(message)
 

@@ -1,12 +1,14 @@
 """The same seconds simulated and driven: collects both during a drive, and judges them at its end.
 
-Nothing is judged while the drive goes on: that would take time from the rounds.
+Nothing is judged while the drive goes on: that would take time from the rounds. Each window is
+handed on as soon as it is known, so that who goes on with the drive, or recovers it, judges it too.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict, deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
@@ -14,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import PathAhead
@@ -21,6 +24,7 @@ from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.orchestrator.agreement.known_windows import ThinnedWindows
 from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.analysis.agreement.criteria import CriteriaEvaluator, Heard, Users, Window
@@ -28,12 +32,9 @@ from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 
-MOST_WINDOWS = 120
-"""When there are as many, every second one goes, and they are taken half as often from then on."""
 MOST_KEPT = 32
 """Of a crowd the nearest: of 500, a window took 80 ms of the orchestrator's time each second. A
 simulation meets half as many (`foretwin.orchestrator.rounds.seen_users`)."""
-EVERY_NS = 1_000_000_000
 _HOLE_NS, _SEEN_HOLE_NS = 1_500_000_000, 1_000_000_000
 _SPARE_NS = 3_000_000_000
 
@@ -56,16 +57,21 @@ class _Simulated(NamedTuple):
 class OpenWindows:
     """Takes states, what is seen and heard, and rounds; gives verdicts at the end."""
 
-    def __init__(self, vehicle: VehicleParameters, *, horizon_s: float) -> None:
-        self._vehicle = vehicle
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        *,
+        horizon_s: float,
+        on_window: Callable[[Window], object] = lambda _: None,
+    ) -> None:
+        self._vehicle, self._on_window = vehicle, on_window
         self._keep_ns = round(horizon_s * 1e9) + _SPARE_NS
         self._states: deque[VehicleState] = deque()
         self._seen: deque[RoadUsers] = deque()
         self._heard: dict[str, deque[tuple[int, SignalColour]]] = defaultdict(deque)
         self._waiting: deque[_Simulated] = deque()
-        self._windows: list[Window] = []
+        self._windows = ThinnedWindows()
         self._worlds: dict[str, World] = {}
-        self._every_ns = EVERY_NS
         self._last_ns: int | None = None
         self.judged: list[Judged] = []
 
@@ -96,7 +102,7 @@ class OpenWindows:
         """Take a round's nominal future, the first of its first job."""
         result = done.results[0]
         stamp_ns = result.trajectory.stamp_ns
-        if self._last_ns is not None and stamp_ns - self._last_ns < self._every_ns:
+        if self._last_ns is not None and stamp_ns - self._last_ns < self._windows.every_ns:
             return
         self._last_ns = stamp_ns
         others = result.road_users
@@ -111,15 +117,19 @@ class OpenWindows:
         what = done.order.round_id, stamp_ns, done.order.junction_id, world
         self._waiting.append(_Simulated(*what, time_s, states, Users(*users), path))
 
+    def go_on(self, known: Iterable[Window], world_of: Callable[[str], World]) -> None:
+        """Begin with the windows that another orchestrator of this drive knew, in their order."""
+        for window in known:
+            self._windows.take(window)
+        for world_id in self._windows.world_ids:
+            with contextlib.suppress(OSError, SchemaMismatch):  # a World that is gone judges none
+                self._worlds[world_id] = world_of(world_id)
+
     def finish(self) -> list[Judged]:
         """Judge all windows, World by World."""
         self._waiting.clear()
-        for world_id, world in self._worlds.items():
-            mine = [window for window in self._windows if window.world_id == world_id]
-            if mine:
-                self.judged += judge_in(world, mine, self._vehicle)
-        self.judged.sort(key=lambda one: one.window.stamp_ns)
-        self._windows = []
+        self.judged = judge_all(self._windows.kept, self._worlds, self._vehicle)
+        self._windows = ThinnedWindows()
         return self.judged
 
     def record(self, start_stamp_ns: int) -> dict[str, Any] | None:
@@ -128,17 +138,16 @@ class OpenWindows:
 
     def _settle(self, one: _Simulated) -> None:
         # Negative where the vehicle's clock has been set back.
-        if self._windows and 0 <= one.stamp_ns - self._windows[-1].stamp_ns < self._every_ns:
+        last_ns = self._windows.last_ns
+        if last_ns is not None and 0 <= one.stamp_ns - last_ns < self._windows.every_ns:
             return
         window = self._window(one)
         if window is None:
             return
-        self._windows.append(window)
+        self._on_window(window)
         self._worlds[one.world.id] = one.world
-        if len(self._windows) >= MOST_WINDOWS:
-            self._windows = self._windows[::2]
-            self._every_ns *= 2
-            used = {window.world_id for window in self._windows}
+        if self._windows.take(window):
+            used = self._windows.world_ids
             self._worlds = {key: world for key, world in self._worlds.items() if key in used}
 
     def _window(self, one: _Simulated) -> Window | None:
@@ -179,6 +188,17 @@ class OpenWindows:
         for said in self._heard.values():
             while said and said[0][0] < oldest:
                 said.popleft()
+
+
+def judge_all(
+    windows: Iterable[Window], worlds: Mapping[str, World], vehicle: VehicleParameters
+) -> list[Judged]:
+    """Judge windows in the order of their stamps; those without a World are not judged."""
+    found: list[Judged] = []
+    for world_id, world in worlds.items():
+        mine = [window for window in windows if window.world_id == world_id]
+        found += judge_in(world, mine, vehicle)
+    return sorted(found, key=lambda one: one.window.stamp_ns)
 
 
 def judge_in(world: World, windows: list[Window], vehicle: VehicleParameters) -> list[Judged]:

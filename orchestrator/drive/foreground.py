@@ -126,8 +126,8 @@ class Foreground:
                     self._supervisor.kill(process_id)
                 case TakeWork(process_ids):
                     self._supervisor.let_give_way(process_ids, time.monotonic())
-                case HandOver(standing, deaths):
-                    self._standing = standing
+                case HandOver(deaths):
+                    self._standing = line.standing
                     del self._deaths[: max(0, deaths - self._first_death)]
                     self._first_death = max(self._first_death, deaths)
                 case Stop(grace_s, but):

@@ -15,6 +15,7 @@ from foretwin.orchestrator.drive.supervision import (
     Stopped,
     ToOrchestrator,
     ToSupervisor,
+    taken_over,
 )
 
 _decoder = msgspec.msgpack.Decoder(ToSupervisor)
@@ -28,16 +29,21 @@ class OrchestratorLink:
         self._end = end
         self._told: Running | None = None
         self._interrupted = False
+        self.standing = b""
+        """What the next orchestrator goes on from."""
 
     def fileno(self) -> int:
         """Return the descriptor to wait at."""
         return self._end.fileno()
 
     def hear(self) -> list[ToSupervisor]:
-        """Return what the orchestrator has said since."""
+        """Return what the orchestrator has said since; `standing` is then what came last."""
         said: list[ToSupervisor] = []
         with contextlib.suppress(OSError):  # nothing more, or it is gone: its end tells that
-            while data := self._end.recv(MOST_BYTES):
+            while (received := socket.recv_fds(self._end, MOST_BYTES, 1))[0]:
+                data, descriptors, _, _ = received
+                for descriptor in descriptors:
+                    self.standing = taken_over(descriptor)
                 said.append(_decoder.decode(data))
         return said
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -16,7 +16,7 @@ from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.instructions import Notice
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
-from foretwin.sim_worker.analysis.side_by_side.watch import SideBySide
+from foretwin.sim_worker.analysis.side_by_side.watch import SegmentsStanding, SideBySide
 
 WORDS: dict[DisagreementKind, str] = {
     "ads_turns_elsewhere": "the ADS would have turned elsewhere",
@@ -27,6 +27,14 @@ WORDS: dict[DisagreementKind, str] = {
     "ads_faster": "the ADS would have been faster",
     "ads_slower": "the ADS would have been slower",
 }
+
+
+class BesideStanding(NamedTuple):
+    """What a drive has found so far, for one that goes on with it."""
+
+    segments: SegmentsStanding
+    found: FirstOf[Disagreement]
+    ended: FirstOf[DrivenSegment]
 
 
 class SideBySideHandler:
@@ -42,6 +50,16 @@ class SideBySideHandler:
         self._status: VehicleStatus | None = None
         self._found: FirstOf[Disagreement] = FirstOf(MOST_LISTED)
         self._ended: FirstOf[DrivenSegment] = FirstOf(MOST_LISTED)
+
+    @property
+    def standing(self) -> BesideStanding:
+        """Where the comparison stands."""
+        return BesideStanding(self._watch.standing, self._found, self._ended)
+
+    def go_on(self, standing: BesideStanding) -> None:
+        """Begin where another one stood."""
+        self._watch.go_on(standing.segments)
+        self._found, self._ended = standing.found, standing.ended
 
     def take(self, state: VehicleState | None) -> None:
         """Take what the intake newly holds, and the state where there is a new one."""

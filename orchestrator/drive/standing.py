@@ -1,6 +1,6 @@
 """What of a live drive an orchestrator hands to the one after it, should it die.
 
-What a table holds is read from there. What tuning, agreement and side by side are at begins anew.
+What a table holds is read from there.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.roles import Correction, Role
 from foretwin.contracts.runner import TaskCount
 from foretwin.contracts.running import FirstOf
+from foretwin.orchestrator.agreement.known_windows import kept_windows
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.live_loop import RoundGrid
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR
+from foretwin.orchestrator.drive.side_by_side_handler import BesideStanding
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
 from foretwin.orchestrator.record.kept_parts import read_removed
 from foretwin.orchestrator.record.ledger import RoundTally
@@ -27,6 +29,7 @@ from foretwin.orchestrator.record.visited import visited_junctions
 from foretwin.orchestrator.routing.route_follower import PlaceOnRoute
 from foretwin.orchestrator.runner.sickness import Sickness
 from foretwin.orchestrator.runtime_configuration.handler import Change
+from foretwin.orchestrator.tuning.findings import FindingsStanding
 from foretwin.orchestrator.tuning.parameter_versions import ParametersStanding
 from foretwin.telemetry.estimator.estimator import StateEstimator
 
@@ -72,7 +75,12 @@ class DriveStanding:
     roles: dict[str, Role]
     correction: Correction
     parameters: ParametersStanding
+    findings: FindingsStanding
+    beside: BesideStanding
+    mirror_independent: bool | None
+    touches: int
     changes: FirstOf[Change]
+    dropped_rows: int
     troubles: list[str]
     given_up: set[str]
 
@@ -112,7 +120,12 @@ def standing_of(
             roles=conductor.roles.roles,
             correction=conductor.roles.correction,
             parameters=conductor.tuning.parameters.standing,
+            findings=conductor.tuning.findings.standing,
+            beside=conductor.ads.standing,
+            mirror_independent=conductor.mirror.independent,
+            touches=conductor.mirror.touches,
             changes=conductor.changes.made,
+            dropped_rows=conductor.tables.dropped,
             troubles=watch.troubles,
             given_up=watch.given_up,
         )
@@ -157,6 +170,11 @@ def go_on(
     if parameters.version:
         conductor.rounds.use_vehicle(parameters.in_force.vehicle, parameters.version)
         intake.use_vehicle(parameters.in_force.vehicle)
+    conductor.tuning.findings.go_on(standing.findings)
+    conductor.ads.go_on(standing.beside)
+    conductor.mirror.independent = standing.mirror_independent
+    conductor.mirror.touches = standing.touches
+    conductor.tables.lost_before = standing.dropped_rows
     watch.troubles[:] = standing.troubles
     watch.given_up |= standing.given_up
     for process_id in sorted(standing.given_up):
@@ -168,6 +186,7 @@ def _go_on_with_rounds(conductor: Conductor, standing: RoundsStanding, results: 
     rounds, counts = conductor.rounds, counted_in_tables(results)
     rounds.futures, rounds.comparisons, rounds.plans = counts[:3]
     rounds.futures.off_lanes_rounds = standing.off_lanes_rounds
+    rounds.windows.go_on(kept_windows(results).windows, conductor.worlds.world)
     rounds.next_round_id = max(standing.next_round_id, counts.last_round_id + 1)
     rounds.failed_jobs = standing.failed_jobs
     tally = rounds.tally = standing.tally

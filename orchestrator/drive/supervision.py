@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import contextlib
+import os
+from collections.abc import Collection, Iterator
 from typing import NamedTuple, Protocol
 
 import msgspec
@@ -81,9 +83,8 @@ class TakeWork(msgspec.Struct, frozen=True, tag=True):
 
 
 class HandOver(msgspec.Struct, frozen=True, tag=True):
-    """What the next orchestrator is to go on from, should this one die."""
+    """With it comes, as a file in memory, what the next orchestrator is to go on from."""
 
-    standing: bytes
     deaths: int
     """So many deaths of the run are told, and need not be told again."""
 
@@ -107,6 +108,27 @@ ToOrchestrator = Running | Interrupt | Stopped
 ToSupervisor = Kill | TakeWork | HandOver | Stop | Refusal
 
 ENCODER = msgspec.msgpack.Encoder()
+
+
+@contextlib.contextmanager
+def in_memory(data: bytes) -> Iterator[int]:
+    """Give the descriptor of a file in memory alone that holds these bytes."""
+    descriptor = os.memfd_create("standing", os.MFD_CLOEXEC)
+    try:
+        written = 0
+        while written < len(data):
+            written += os.write(descriptor, memoryview(data)[written:])
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def taken_over(descriptor: int) -> bytes:
+    """Return what a file in memory holds, and let go of it."""
+    try:
+        return os.pread(descriptor, os.fstat(descriptor).st_size, 0)
+    finally:
+        os.close(descriptor)
 
 
 class DriveProcesses(WatchedProcesses, Protocol):

@@ -7,6 +7,7 @@ what the supervisor does is told by it whenever it changes. Either knows at once
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import select
 import signal
@@ -33,6 +34,7 @@ from foretwin.orchestrator.drive.supervision import (
     ToldDeath,
     ToOrchestrator,
     ToSupervisor,
+    in_memory,
 )
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.supervisor import TERM_S, Death
@@ -40,6 +42,8 @@ from foretwin.orchestrator.runner.supervisor import TERM_S, Death
 _SLACK_S = 10.0
 """How much longer than it was given the supervisor may take to end all processes."""
 _LOOK_S = 0.05
+
+_GONE = frozenset({errno.EPIPE, errno.ECONNRESET, errno.ENOTCONN, errno.EBADF})
 
 _decoder = msgspec.msgpack.Decoder(ToOrchestrator)
 
@@ -99,8 +103,9 @@ class SupervisorLink:
             self._alive = now
 
     def keep(self, standing: bytes) -> None:
-        """Hand over what the next orchestrator is to go on from."""
-        self._say(HandOver(standing, self._told))
+        """Hand over what the next orchestrator is to go on from, however long it is."""
+        with in_memory(standing) as descriptor:
+            self._say(HandOver(self._told), descriptor)
 
     def refuse(self, text: str, *, by_user: bool) -> None:
         """Say by which error the drive has ended."""
@@ -133,13 +138,13 @@ class SupervisorLink:
         held = {name for name, file in setups.items() if file.exists() and is_held(file)}
         return {name: pid for name, pid in self._running.pids.items() if name in held}
 
-    def _say(self, message: ToSupervisor) -> bool:
+    def _say(self, message: ToSupervisor, *descriptors: int) -> bool:
         try:
-            self._end.send(ENCODER.encode(message))
-        except BlockingIOError:
-            return False  # the supervisor stands still
-        except OSError:
-            self.alone = self.over = True
+            socket.send_fds(self._end, [ENCODER.encode(message)], descriptors)
+        except OSError as error:
+            # Anything else is a supervisor that stands still: it is said again.
+            if error.errno in _GONE:
+                self.alone = self.over = True
             return False
         return True
 

@@ -69,6 +69,7 @@ _COLUMNS = {
         + " ".join(_FLIP.format(direction) for direction in ("along", "across", "both"))
         + " flip_along_fails:str flip_across_fails:str flip_both_fails:str"
     ),
+    "windows": columns("round_id:int stamp_ns:int world_id:str vehicle:str window:bytes"),
     "mirror": columns_of(MirrorSample, MIRROR),
     "mirrored": {"stamp_ns": int, **columns_of(MirroredVehicle, MIRRORED)},
     "touches": columns("stamp_ns:int one:str other:str"),
@@ -136,6 +137,8 @@ class ResultTables:
         self._kept = KeptParts(folder.parent, keep or Keep())
         self._left = False
         self._dropped = 0
+        self.lost_before = 0
+        """Rows that an orchestrator before this one could not write."""
         self.troubles: list[str] = []
         """What is lost or not in Parquet, and why; complete once closed."""
         self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
@@ -150,7 +153,7 @@ class ResultTables:
     @property
     def dropped(self) -> int:
         """Rows that are lost, whatever the reason."""
-        return self._dropped + self._streams.lost.total()
+        return self.lost_before + self._dropped + self._streams.lost.total()
 
     @traced("rows to a table")
     def add(self, table: str, rows: Rows) -> None:
@@ -179,6 +182,11 @@ class ResultTables:
         if self._thread.is_alive():
             self.troubles.append(
                 f"results are not in Parquet: nothing was written for {timeout_s:g} s; {self._how}"
+            )
+        if self.lost_before:
+            self.troubles.append(
+                f"{self.lost_before} rows are lost: not written in time for the "
+                "orchestrator that died"
             )
         if self._dropped:
             self.troubles.append(

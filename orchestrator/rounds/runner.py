@@ -15,6 +15,7 @@ from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.trace import since, traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.orchestrator.agreement.known_windows import into_table
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows
 from foretwin.orchestrator.context import DriveContext
@@ -75,7 +76,8 @@ class RoundRunner:
         self._tables, self._tell = context.tables, context.tell
         self._world_of, self._on_round = world_of, on_round
         self._open_comparisons = OpenComparisons(plan.drive_frame, plan.config.horizon_s)
-        self.windows = OpenWindows(plan.vehicle, horizon_s=plan.config.horizon_s)
+        keep = into_table(context.tables.add, plan.vehicle)
+        self.windows = OpenWindows(plan.vehicle, horizon_s=plan.config.horizon_s, on_window=keep)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
         self.draw_cases = self._planner.draw_cases
         self._vehicles = VehicleKeeper(plan.folder, plan.vehicle)

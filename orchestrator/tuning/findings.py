@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -26,6 +26,17 @@ HORIZON_S = 2.0
 _SQUARES = ("along_m", "across_m", "yaw_rad", "speed_mps")
 
 
+class FindingsStanding(NamedTuple):
+    """What the driving has said so far, for one that goes on with the drive."""
+
+    latest: dict[str, ParameterEstimate]
+    reported: dict[str, float]
+    gaps: dict[str, RunningMeans]
+    alarms: int
+    verdicts: FirstOf[Verdict]
+    independent: bool
+
+
 @dataclass(slots=True)
 class Findings:
     """Takes what the process `tuning` says, in the order in which it says it."""
@@ -41,6 +52,21 @@ class Findings:
     _alarms: int = 0
     _verdicts: FirstOf[Verdict] = field(default_factory=lambda: FirstOf(MOST_LISTED))
     _independent: bool = True
+
+    @property
+    def standing(self) -> FindingsStanding:
+        """What was said until now."""
+        gaps = dict(self._gaps)
+        return FindingsStanding(
+            self._latest, self._reported, gaps, self._alarms, self._verdicts, self._independent
+        )
+
+    def go_on(self, standing: FindingsStanding) -> None:
+        """Begin with what was said before."""
+        self._latest, self._reported = standing.latest, standing.reported
+        self._gaps.update(standing.gaps)
+        self._alarms, self._verdicts = standing.alarms, standing.verdicts
+        self._independent = standing.independent
 
     def take(self, found: Identification | GapSample | GapAlarm | Verdict) -> None:
         """Keep and tell one finding."""

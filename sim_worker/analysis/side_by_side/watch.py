@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +39,13 @@ _EVERY_NS = 200_000_000
 _LEAST_S = 1.0
 _KEEP_NS = round((HORIZON_S + 3.0) * 1e9)
 _LONGEST_HOLE_NS = round(MAX_GAP_S * 1e9)
+
+
+class SegmentsStanding(NamedTuple):
+    """How many segments have begun, and those that are not over."""
+
+    begun: int
+    open: tuple[Segment, ...]
 
 
 class SideBySide:
@@ -78,6 +87,22 @@ class SideBySide:
         """
         ended, self._ended = self._ended, []
         return ended
+
+    @property
+    def standing(self) -> SegmentsStanding:
+        """Where the comparison stands, for one that goes on with it.
+
+        Plans that wait count as too short: nobody sees what is driven until that one is there.
+        """
+        left = (
+            replace(one, waiting=deque(), too_short=one.too_short + len(one.waiting))
+            for one in self._open
+        )
+        return SegmentsStanding(self._begun, tuple(left))
+
+    def go_on(self, standing: SegmentsStanding) -> None:
+        """Begin where another one stood."""
+        self._begun, self._open = standing.begun, deque(standing.open)
 
     def take_status(self, status: VehicleStatus) -> None:
         """Take the control mode; another than before is a takeover."""

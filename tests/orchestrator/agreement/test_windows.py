@@ -102,7 +102,7 @@ def test_a_corrected_world_changes_the_verdict_of_a_recorded_drive() -> None:
 
 
 def test_a_long_drive_keeps_no_more_windows_than_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("foretwin.orchestrator.agreement.windows.MOST_WINDOWS", 8)
+    monkeypatch.setattr("foretwin.orchestrator.agreement.known_windows.MOST_WINDOWS", 8)
     stamps = [one.window.stamp_ns for one in driven().judged]
     assert 4 <= len(stamps) < 8
     assert set(np.diff(stamps)) == {2_000_000_000}

@@ -9,13 +9,16 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.drive import VehicleStatus
 from foretwin.orchestrator.drive.live_loop import RoundGrid
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.run_record import run_record
 from foretwin.orchestrator.drive.standing import go_on, read_standing, standing_of
 from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.runner.supervisor import Supervisor
+from tests.orchestrator.drive.test_side_by_side_handler import plan_of
 from tests.orchestrator.house import House
+from tests.orchestrator.tuning.test_findings import ALARM, FOUND, VERDICT, gap
 
 KILLED_AT = 40
 GRID = RoundGrid(12.5, wanted=True)
@@ -162,4 +165,40 @@ def test_changes_made_and_parameters_stay_in_force(tmp_path: Path) -> None:
     assert [one.name for one in counts.made] == ["mass_kg"]
     assert counts.tell("w0")  # who comes up is told
     assert again.conductor.roles.correction == "free"
+    again.tables.close()
+
+
+def test_what_was_found_until_then_stays_found(tmp_path: Path) -> None:
+    """Gap, verdicts, estimates, segments and windows: the record says what it said before."""
+    house = House(tmp_path)
+    status = VehicleStatus(stamp_ns=house.states[0].stamp_ns, control_mode="manual")
+    house.bus.publish("status", status, vehicle="ego")
+    house.bus.publish("plan", plan_of(house, 20, left_m=0.0), vehicle="ego")
+    house.drive(120, round_every=10)
+    findings = house.conductor.tuning.findings
+    for found in (FOUND, gap(3.0), gap(4.0), ALARM, VERDICT):
+        findings.take(found)
+    house.conductor.mirror.independent = False
+    house.tables.lost_before = 3
+    before = findings.record(), house.conductor.ads.record()
+    left = standing_of(house.conductor, watch(), grid=None)
+    house.tables.leave()
+
+    again = House(tmp_path, at_once=True, plan=house.plan)
+    standing = read_standing(left)
+    assert standing is not None
+    results = house.plan.folder / "results"
+    go_on(again.conductor, watch(), standing, results, crashed=False)
+    assert (again.conductor.tuning.findings.record(), again.conductor.ads.record()) == before
+    assert before[0]["gap"]["samples"] == 2
+    assert before[1] is not None
+    assert again.conductor.mirror.independent is False
+    assert again.tables.dropped == 3
+    # The windows are judged alike by who goes on, and by who would have gone on.
+    record = [one.rounds.windows for one in (house.conductor, again.conductor)]
+    start_ns = house.conductor.intake.start_stamp_ns
+    mine, others = (windows.finish() and windows.record(start_ns) for windows in record)
+    assert mine == others
+    assert mine is not None
+    assert mine["windows"] > 2  # type: ignore[index]
     again.tables.close()

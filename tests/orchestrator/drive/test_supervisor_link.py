@@ -68,7 +68,23 @@ def test_deaths_that_another_orchestrator_told_of_are_not_told_again(line: Line)
     line.supervisor.tell(Running({}, 1, 0, [DIED, ToldDeath("mirror", -11, True, 1.0)]))
     assert [one.process_id for one in line.orchestrator.poll(0.0)] == ["mirror"]
     line.orchestrator.keep(b"standing")
-    assert line.supervisor.hear() == [HandOver(b"standing", 2)]
+    assert line.supervisor.hear() == [HandOver(2)]
+    assert line.supervisor.standing == b"standing"
+
+
+def test_a_standing_of_any_length_is_handed_over_and_the_last_one_counts(line: Line) -> None:
+    line.there.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    long = bytes(range(256)) * 40_000
+    line.orchestrator.keep(b"short")
+    line.orchestrator.keep(long)
+    assert line.supervisor.hear() == [HandOver(0), HandOver(0)]
+    assert line.supervisor.standing == long
+    assert not line.orchestrator.alone
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    for number in range(50):
+        line.orchestrator.keep(b"%d" % number)
+        line.supervisor.hear()
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 def test_what_the_orchestrator_says_arrives_in_order_and_news_alone(line: Line) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -14,7 +15,11 @@ from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStat
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
-from foretwin.sim_worker.analysis.side_by_side.watch import HORIZON_S, SideBySide
+from foretwin.sim_worker.analysis.side_by_side.watch import (
+    HORIZON_S,
+    SegmentsStanding,
+    SideBySide,
+)
 
 COVERS = (
     "foretwin.sim_worker.analysis.side_by_side.departure",
@@ -71,8 +76,12 @@ def side_by_side(
     *,
     modes: dict[float, ControlMode] | None = None,
     until_s: float = 20.0,
+    killed_s: float | None = None,
 ) -> tuple[list[Disagreement], list[DrivenSegment]]:
-    """Drive a course at 10 Hz; `planned` gives the rows of the plan made at a time."""
+    """Drive a course at 10 Hz; `planned` gives the rows of the plan made at a time.
+
+    At `killed_s` another one goes on where the first stood.
+    """
     here = DrivePlace(GeoPoint(0.0, 0.0))
 
     def place() -> DrivePlace:
@@ -84,6 +93,11 @@ def side_by_side(
     found = []
     for tick in range(round(until_s * 10) + 1):
         at_s = tick / 10
+        if at_s == killed_s:
+            standing: SegmentsStanding = pickle.loads(pickle.dumps(watch.standing))
+            assert watch.take_ended() == []
+            watch = SideBySide(FRAME, vehicle_id="ego", place=place)
+            watch.go_on(standing)
         if at_s in modes:
             status = VehicleStatus(stamp_ns=START_NS + round(at_s * 1e9), control_mode=modes[at_s])
             watch.take_status(status)
@@ -259,3 +273,30 @@ def test_wherever_a_takeover_falls_both_sides_add_up(at_s: int, shift_m: float) 
     assert sum(s.plans + s.too_short for s in segments) in (50, 51)
     assert all(one.end_stamp_ns <= segments[1].from_stamp_ns for one in found)
     assert segments[1].disagreements == 0
+
+
+def test_another_one_goes_on_with_the_segment_and_what_it_found() -> None:
+    """What was planned in the last 4 s before the first one died is compared with nothing."""
+    modes: dict[float, ControlMode] = {0.0: "manual", 15.0: "autonomous"}
+
+    def beside(at_s: float, ahead: Array) -> Array:
+        rows = straight(at_s + ahead)
+        rows[:, 1] += 3.0 if 5.0 <= at_s < 15.0 else 0.0
+        return rows
+
+    whole, segments = side_by_side(straight, beside, modes=modes)
+    found, after = side_by_side(straight, beside, modes=modes, killed_s=10.0)
+
+    assert [(one.number, one.control_mode) for one in after] == [(0, "manual"), (1, "autonomous")]
+    ((kind, begin_s, end_s),) = (
+        (o.kind, drive_s(o.stamp_ns), drive_s(o.end_stamp_ns)) for o in whole
+    )
+    (one, other) = found  # it ends where plans are missing, and is found again
+    assert {one.kind, other.kind} == {kind}
+    assert (drive_s(one.stamp_ns), drive_s(other.end_stamp_ns)) == (begin_s, end_s)
+    assert drive_s(one.end_stamp_ns) < 10.0 <= drive_s(other.stamp_ns)
+    before_kill, compared = after[0], segments[0]
+    assert before_kill.plans + before_kill.too_short == compared.plans + compared.too_short
+    assert before_kill.too_short - compared.too_short == pytest.approx(20, abs=1)
+    assert before_kill.from_stamp_ns == START_NS
+    assert after[1] == segments[1]
