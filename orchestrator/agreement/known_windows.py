@@ -9,11 +9,13 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from foretwin.contracts.codec import SchemaMismatch, content_bytes, decode_content
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.record.kept_rows import kept_rows
-from foretwin.sim_worker.analysis.agreement.criteria import Window
+from foretwin.sim_worker.analysis.agreement.criteria import Users, Window
 
 MOST_WINDOWS = 120
 """When there are as many, every second one goes, and they are taken half as often from then on."""
@@ -78,6 +80,36 @@ def kept_windows(results: Path) -> KeptWindows:
 def _windows(rows: Iterable[dict[str, Any]]) -> Iterator[Window]:
     for row in rows:
         try:
-            yield decode_content(row["window"], Window, where=TABLE)
+            window = decode_content(row["window"], Window, where=TABLE)
         except SchemaMismatch:  # of another foretwin
             continue
+        if _is_one(window):
+            yield window
+
+
+def _is_one(window: Window) -> bool:
+    """Whether the arrays of a window fit each other, and hold numbers."""
+    count, path = len(window.time_s), window.path_xy_m
+    states = (window.simulated, window.driven)
+    everybody = (window.simulated_users, window.driven_users)
+    return (
+        count >= 2
+        and window.time_s.shape == (count,)
+        and bool((np.diff(window.time_s) > 0.0).all())
+        and path.ndim == 2
+        and path.shape[1] == 2
+        and len(path) >= 2
+        and all(one.shape == (count, 8) for one in states)
+        and all(bool(np.isfinite(one).all()) for one in (*states, path, window.time_s))
+        and all(_are_users(one, count) for one in everybody)
+        and all(one.stamps_ns.shape == (len(one.colours),) for one in window.heard.values())
+    )
+
+
+def _are_users(users: Users, count: int) -> bool:
+    there = users.size_m.shape[0]
+    return (
+        users.poses.shape == (count, there, 3)
+        and users.speed_mps.shape == (count, there)
+        and users.size_m.shape == (there, 2)
+    )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.record.recovery import recover
+from foretwin.orchestrator.agreement.recovered import recovered_agreement
+from foretwin.orchestrator.record.recovery import RECOVERED, recover
 
 SOME_LOST = 3
 
@@ -16,14 +19,32 @@ def recover_run(run: Path) -> int:
 
     Raises UserError in one line for what is no run, or goes on.
     """
-    done = recover(run)
+    done = recover(run, judge=recovered_agreement)
     if done.healthy:
         say(f"{run}: whole (exit: {done.exit_word}); nothing to recover")
         return 0
     for part in done.parts:
         say(part.text)
+    for line in ledger_lines(done.record):
+        say(line)
     if done.lost:
         say(f"{run}: {done.exit_word}; lost in part: {len(done.lost)} of {len(done.parts)}")
         return SOME_LOST
     say(f"{run}: {done.exit_word}; all that was written can be read")
     return 0
+
+
+def ledger_lines(record: Mapping[str, Any]) -> list[str]:
+    """Return what became of everything that was to be done, as far as anybody knows."""
+    ledger, words = record.get("ledger") or {}, record.get(RECOVERED) or {}
+    lines = []
+    for name, counts in ledger.items():
+        if counts is None:
+            continue
+        numbers = [f"{count} {of}" for of, count in counts.items() if isinstance(count, int)]
+        lines.append(f"{name}: {numbers[0]} = {' + '.join(numbers[1:])}")
+    if (until_s := words.get("told_until_s")) is not None:
+        lines.append(f"what no table tells is known up to {until_s:.1f} s of the drive")
+    if unknown := words.get("unknown"):
+        lines.append(f"unknown: {', '.join(unknown)}")
+    return [line.replace("_", " ") for line in lines]

@@ -21,13 +21,9 @@ from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.processes import BUILDER, ORCHESTRATOR, ROUTER
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
+from foretwin.orchestrator.drive.record_keeper import RecordKeeper
 from foretwin.orchestrator.drive.router_start import join_bus
-from foretwin.orchestrator.drive.run_record import (
-    lost_lines,
-    reserve_record,
-    restart_troubles,
-    run_record,
-)
+from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record
 from foretwin.orchestrator.drive.standing import go_on, read_standing, standing_of
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
@@ -35,7 +31,7 @@ from foretwin.orchestrator.drive.supervision import CRASH, DriveError, DriveProc
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, write_record
+from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.supervisor import fold_stderr
 
@@ -152,12 +148,15 @@ class Orchestrator:
         bus.declare_alive(alive_key(run=plan.run_id, process=ORCHESTRATOR))
         self._meter.ready()
 
+        keeper = self._keeper(conductor)
+
         def housekeeping(now_s: float) -> None:
             self._look_after(conductor, now_s)
             self._processes.let_give_way(conductor.alive, now_s)
             conductor.rounds.dispatcher.give_out()
             self._keep_junctions(conductor, now_s)
             self._meter.look()
+            keeper.look(now_s)
             line.update(now_s)
 
         loop: LockStepLoop | LiveLoop
@@ -232,6 +231,9 @@ class Orchestrator:
                 standing_of(conductor, self._watch, grid=grid, exit_word=exit_word)
             )
 
+    def _keeper(self, conductor: Conductor) -> RecordKeeper:
+        return RecordKeeper(conductor, self._processes, self._watch, self._life)
+
     def _keep_junctions(self, conductor: Conductor, now_s: float) -> None:
         news = self._mission.visits.take_news()
         conductor.tables.add("junctions", [visit.row(mono_s=now_s) for visit in news])
@@ -275,17 +277,7 @@ class Orchestrator:
         now_s = time.monotonic()
         self._keep_junctions(conductor, now_s)
         conductor.tables.close()
-        now_s = time.monotonic()
-        record = run_record(
-            conductor,
-            self._processes.restarted,
-            exit_word=exit_word,
-            ended_by=self._life.ended_by,
-            wall_s=now_s - self._life.began_s,
-            mono_s=now_s,
-            troubles=[*self._watch.troubles, *restart_troubles(plan, self._life.ended_by)],
-        )
-        write_record(record, plan.folder / RECORD)
+        record = self._keeper(conductor).write(exit_word)
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / LOG)

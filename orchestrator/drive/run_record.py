@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +37,12 @@ def run_record(
     """Return everything that run.json says; `restarted` counts processes started again.
 
     `troubles` are what is missing since processes died, `ended_by` how each orchestrator of this
-    drive before this one ended.
+    drive before this one ended. While the drive goes on rounds are open: no ledger need balance.
     """
     plan, mission, futures = conductor.plan, conductor.mission, conductor.rounds.futures
     tally, dispatch = conductor.rounds.tally, conductor.rounds.dispatcher.dispatch
     ledger = Ledger(rounds=tally.ledger(), jobs=jobs_ledger(dispatch.count))
+    unbalanced = () if exit_word == RUNNING else ledger.unbalanced()
     junctions = mission.visits.records(mono_s=mono_s)
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror.independent
@@ -87,7 +88,7 @@ def run_record(
         "troubles": [
             *troubles,
             *conductor.tables.troubles,
-            *(f"the ledger of {name} does not balance" for name in ledger.unbalanced()),
+            *(f"the ledger of {name} does not balance" for name in unbalanced),
         ],
         "off_road": [
             {
@@ -133,11 +134,15 @@ def telemetry_of(conductor: Conductor) -> dict[str, Any]:
 
     A car that is not ours may have begun to count before the run: what was heard of it counts.
     """
-    plan, intake = conductor.plan, conductor.intake
-    published = intake.counts.by_channel
-    if intake.end is not None and plan.config.resolved_source != "live":
-        published = intake.end.published
-    return telemetry_ledger(read_tally(tally_file(plan.recording)), published)
+    return telemetry_ledger(read_tally(tally_file(conductor.plan.recording)), heard_of(conductor))
+
+
+def heard_of(conductor: Conductor) -> Mapping[str, int]:
+    """Return what is known by channel of what the vehicle published."""
+    intake = conductor.intake
+    if intake.end is not None and conductor.plan.config.resolved_source != "live":
+        return intake.end.published
+    return intake.counts.by_channel
 
 
 def restart_troubles(plan: DrivePlan, ended_by: Sequence[str]) -> list[str]:

@@ -5,7 +5,14 @@ from __future__ import annotations
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.run_state import RESULTS
 
-_WRITTEN = f"{RESULTS}/*", "drive*.mcap*", "drive*.tally*", "monitor*.rrd*", "processes/*.stderr"
+_WRITTEN = (
+    f"{RESULTS}/*",
+    "drive*.mcap*",
+    "drive*.tally*",
+    "so_far.json*",
+    "monitor*.rrd*",
+    "processes/*.stderr",
+)
 """What processes and tables begin; Worlds and parameters are named by what they hold, and stay."""
 
 

@@ -29,8 +29,23 @@ class RoundsLedger(msgspec.Struct, frozen=True, kw_only=True):
 
     def balanced(self) -> bool:
         """Whether every round that was due ended in exactly one way."""
+        return self.open == 0
+
+    @property
+    def open(self) -> int:
+        """How many have not ended in any way."""
         ended = self.run + self.missed + self.spared + self.unseeded + self.given_up
-        return self.due == ended
+        return self.due - ended
+
+    def known_to_have_run(self, count: int) -> RoundsLedger:
+        """Return it for rounds of which at least so many have run."""
+        more = max(0, count - self.run)
+        due = self.due + max(0, more - max(0, self.open))
+        return msgspec.structs.replace(self, run=self.run + more, due=due)
+
+    def ended(self) -> RoundsLedger:
+        """Return it as it is once every round that is open is given up."""
+        return msgspec.structs.replace(self, given_up=self.given_up + max(0, self.open))
 
 
 class JobsLedger(msgspec.Struct, frozen=True, kw_only=True):
@@ -43,7 +58,22 @@ class JobsLedger(msgspec.Struct, frozen=True, kw_only=True):
 
     def balanced(self) -> bool:
         """Whether every job that was given ended in exactly one way."""
-        return self.given == self.results + self.refused + self.lost
+        return self.open == 0
+
+    @property
+    def open(self) -> int:
+        """How many have not ended in any way."""
+        return self.given - (self.results + self.refused + self.lost)
+
+    def known_to_have_results(self, count: int) -> JobsLedger:
+        """Return it for jobs of which at least so many have results."""
+        more = max(0, count - self.results)
+        given = self.given + max(0, more - max(0, self.open))
+        return msgspec.structs.replace(self, results=self.results + more, given=given)
+
+    def ended(self) -> JobsLedger:
+        """Return it as it is once every job that is open is lost."""
+        return msgspec.structs.replace(self, lost=self.lost + max(0, self.open))
 
     def since(self, before: JobsLedger) -> JobsLedger:
         """Return what was counted since an earlier count."""

@@ -4,9 +4,9 @@ and run.json."""
 from __future__ import annotations
 
 import time
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -17,8 +17,8 @@ from foretwin.contracts.process import is_held
 from foretwin.contracts.segments import segments_of
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import WRITING, sync_folder
-from foretwin.orchestrator.record.kept_parts import kept_record, read_removed
-from foretwin.orchestrator.record.recovered_record import told_by_tables
+from foretwin.orchestrator.record.kept_rows import kept_rows
+from foretwin.orchestrator.record.recovered_record import RECORDING, recovered_record
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_state import (
     LOG,
@@ -31,7 +31,9 @@ from foretwin.orchestrator.record.run_state import (
     run_lock,
     write_record,
 )
+from foretwin.orchestrator.record.so_far import forget_so_far
 from foretwin.orchestrator.record.table_parts import parts_of_table
+from foretwin.orchestrator.record.table_stream import SUFFIX, TableStream, record_bytes
 from foretwin.orchestrator.runner.supervisor import fold_stderr
 from foretwin.telemetry.logs.mend_mcap import look_through, mend
 
@@ -41,7 +43,6 @@ LEAVE_S = 20.0
 """How long the other processes of a drive may take to leave once its orchestrator is gone: their
 grace, and what they then still write."""
 _LOOK_S = 0.1
-_RECORDING = "drive.mcap"
 
 
 class Part(NamedTuple):
@@ -52,11 +53,15 @@ class Part(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """A run's `exit` and its parts; `healthy` where there was nothing to do."""
+    """A run's `exit` and its parts; `healthy` where there was nothing to do.
+
+    `record` is what run.json says now.
+    """
 
     exit_word: str
     parts: tuple[Part, ...]
     healthy: bool
+    record: Mapping[str, Any]
 
     @property
     def lost(self) -> list[str]:
@@ -64,8 +69,24 @@ class Recovery(NamedTuple):
         return [part.text for part in self.parts if part.lost]
 
 
-def recover(run: Path) -> Recovery:
+class JudgedWindows(Protocol):
+    """What the windows of a run were judged to."""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The `agreement` of run.json."""
+
+    @property
+    def rows(self) -> Sequence[Mapping[str, Any]]:
+        """The rows of the table `agreement`."""
+
+
+def recover(
+    run: Path, *, judge: Callable[[Path], JudgedWindows | None] = lambda _: None
+) -> Recovery:
     """Make readable what a run left; a healthy run is left as it is.
+
+    `judge` judges the windows of a run that was killed before it could.
 
     Can be done again after an interruption, with the same outcome. Raises UserError for a folder
     that is none of a run, for a drive that still runs, and where nothing can be written: then what
@@ -77,18 +98,23 @@ def recover(run: Path) -> Recovery:
     with run_lock(run):
         record = read_record(run)
         _let_leave(run)
-        torn = [file for file in segments_of(run / _RECORDING) if not look_through(file).ended]
+        torn = [file for file in segments_of(run / RECORDING) if not look_through(file).ended]
         if record and not is_unfinished(run) and not torn:
             parts = tuple(_in_parquet(results))
             healthy = not any(part.lost for part in parts)
-            return Recovery(str(record.get("exit")), parts, healthy=healthy)
+            return Recovery(str(record.get("exit")), parts, healthy, record)
         try:
+            judged = judge(run) if record.get("exit", RUNNING) == RUNNING else None
+            if judged is not None:
+                _keep_verdicts(results, judged.rows)
             streams = streams_in(results)
-            recordings = map(_mended, segments_of(run / _RECORDING))
+            recordings = map(_mended, segments_of(run / RECORDING))
             there = _in_parquet(results, but={stream.stem for stream in streams})
             parts = (*there, *_derived(results), *recordings)
-            record = _completed(run, record, parts)
+            agreement = None if judged is None else judged.record
+            record = _completed(run, record, parts, agreement, torn=bool(torn))
             write_record(record, run / RECORD)
+            forget_so_far(run)
             for stream in streams:
                 stream.unlink()
             fold_stderr(run / PROCESSES, run / LOG)
@@ -96,7 +122,7 @@ def recover(run: Path) -> Recovery:
                 trace.joined(run / trace.TRACE_PARTS, run / trace.TRACE)
         except OSError as error:
             raise UserError(f"{run}: cannot be recovered: {one_line(error)}") from error
-    return Recovery(str(record["exit"]), parts, healthy=False)
+    return Recovery(str(record["exit"]), parts, healthy=False, record=record)
 
 
 def _let_leave(run: Path) -> None:
@@ -144,18 +170,33 @@ def _mended(file: Path) -> Part:
     return Part(text)
 
 
-def _completed(run: Path, record: dict[str, Any], parts: tuple[Part, ...]) -> dict[str, Any]:
+def _keep_verdicts(results: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Append the rows of `agreement` to its stream, where it has none."""
+    stream = results / f"agreement{SUFFIX}"
+    if not stream.exists() or kept_rows(results, "agreement", "round_id"):
+        return
+    writer = TableStream(stream, TABLES["agreement"])
+    try:
+        batch = pa.RecordBatch.from_pylist(list(rows), schema=TABLES["agreement"])
+        writer.append(record_bytes(batch))
+        writer.sync()
+    finally:
+        writer.close()
+
+
+def _completed(
+    run: Path,
+    record: dict[str, Any],
+    parts: tuple[Part, ...],
+    agreement: dict[str, Any] | None,
+    *,
+    torn: bool,
+) -> dict[str, Any]:
     """Return the record of a run as far as it is known."""
     before = (record.get(RECOVERED) or {}).get("lost", ())
     lost = list(dict.fromkeys([*before, *(part.text for part in parts if part.lost)]))
     if record.get("exit", RUNNING) != RUNNING:
         return record | {RECOVERED: {"lost": lost}}
-    known = {name: value for name, value in record.items() if name != "endpoint"}
-    gone = read_removed(run)
-    return {
-        **({"run_id": run.resolve().name} | known),
-        "exit": RECOVERED,
-        **told_by_tables(run / RESULTS),
-        **({"kept": kept_record(run, (record.get("config") or {}).get("keep"))} if gone else {}),
-        RECOVERED: {"lost": lost},
-    }
+    known = recovered_record(run, record, agreement=agreement, torn=torn)
+    words = {"lost": lost, "unknown": list(known.unknown), "told_until_s": known.told_until_s}
+    return known.record | {"exit": RECOVERED, RECOVERED: words}

@@ -33,6 +33,7 @@ from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, pla
 from foretwin.orchestrator.record.kept_parts import KeptParts
 from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.run_streams import Rows, RunStreams
+from foretwin.orchestrator.record.so_far import write_so_far
 
 log = logging.getLogger("results")
 
@@ -141,6 +142,7 @@ class ResultTables:
         """Rows that an orchestrator before this one could not write."""
         self.troubles: list[str] = []
         """What is lost or not in Parquet, and why; complete once closed."""
+        self._so_far = b""
         self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._moved_s = time.monotonic()
         self._look_s = 0.0
@@ -162,6 +164,10 @@ class ResultTables:
             self._queue.put((table, rows), block=self._lossless and self._thread.is_alive())
         except queue.Full:
             self._dropped += len(rows)
+
+    def keep_so_far(self, data: bytes) -> None:
+        """Hand over what the run's record would say now; of several the last is written."""
+        self._so_far = data
 
     def take_news(self) -> list[str]:
         """Return what newly goes wrong while the run goes on, or is well again."""
@@ -235,11 +241,18 @@ class ResultTables:
                     streams.write(sync=sync)
                 self._tell(before, streams.failing)
                 if sync:
+                    self._write_so_far()
                     self._keep_small(streams)
                 write_s = _now_s() + WRITE_S
                 sync_s = _now_s() + SYNC_S - WRITE_S if sync else sync_s
         streams.close()
         self.troubles += [f"{rows} rows are lost: {why}" for why, rows in streams.lost.items()]
+
+    def _write_so_far(self) -> None:
+        data, self._so_far = self._so_far, b""
+        if data:
+            with contextlib.suppress(OSError):  # a disk that is full leaves what it said before
+                write_so_far(self._folder.parent, data)
 
     def _keep_small(self, streams: RunStreams) -> None:
         """Make Parquet of what is large enough, and remove what is more than is kept."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
 import time
 from collections import defaultdict, deque
@@ -14,13 +13,11 @@ from typing import Literal, NamedTuple, Protocol
 import msgspec
 
 from foretwin.contracts.drive import DriveEnd, VehicleInfo
-from foretwin.contracts.segments import Roll, next_number, number_of, segment_file, segments_of
+from foretwin.contracts.segments import Roll, next_number, segment_file
 from foretwin.contracts.simulation import Event
-from foretwin.contracts.tally import Tally, read_tally, tally_file, write_tally
-from foretwin.telemetry.logs.log import LogError
-from foretwin.telemetry.logs.mcap_records import in_file_order
+from foretwin.contracts.tally import Tally, tally_file, write_tally
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
-from foretwin.telemetry.ros_messages.table import channel_of
+from foretwin.telemetry.processes.tally_left import tally_left
 
 SOURCE = "recorder"
 MOST_WAITING = 20_000
@@ -67,7 +64,7 @@ class DriveRecording:
         self._begun_s = mono_s()
         self._part = next_number(path)
         begun = self._part > 1
-        self.tally = _left(path) if begun else Tally()
+        self.tally = tally_left(path) if begun else Tally()
         self._waiting: deque[_ToWrite] = deque()
         self._given = 0
         """So many of those that wait have been given to the file in progress."""
@@ -270,20 +267,3 @@ class DriveRecording:
 def _is_told(times: int) -> bool:
     """Whether what happens again and again is told this time: when it is twice as often."""
     return times & (times - 1) == 0
-
-
-def _left(path: Path) -> Tally:
-    """Return the tally that another recorder left, with what lies in its files since."""
-    tally = read_tally(tally_file(path)) or Tally()
-    for part in segments_of(path):
-        number = number_of(path, part) or 0
-        if number < tally.part:
-            continue
-        found = ((channel_of(one.topic), one.sequence) for one in in_file_order(part))
-        known = tally.in_part if number == tally.part else 0
-        with contextlib.suppress(LogError, OSError):  # then what it holds is taken again
-            samples = ((channel, seq) for channel, seq in found if channel is not None)
-            for channel, seq in itertools.islice(samples, known, None):
-                if tally.numbers.take_up(channel, seq):
-                    tally.settle("recorded", channel)
-    return tally

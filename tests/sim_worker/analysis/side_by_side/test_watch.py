@@ -288,12 +288,10 @@ def test_another_one_goes_on_with_the_segment_and_what_it_found() -> None:
     found, after = side_by_side(straight, beside, modes=modes, killed_s=10.0)
 
     assert [(one.number, one.control_mode) for one in after] == [(0, "manual"), (1, "autonomous")]
-    ((kind, begin_s, end_s),) = (
-        (o.kind, drive_s(o.stamp_ns), drive_s(o.end_stamp_ns)) for o in whole
-    )
+    (uncut,) = whole
     (one, other) = found  # it ends where plans are missing, and is found again
-    assert {one.kind, other.kind} == {kind}
-    assert (drive_s(one.stamp_ns), drive_s(other.end_stamp_ns)) == (begin_s, end_s)
+    assert {one.kind, other.kind} == {uncut.kind}
+    assert (one.stamp_ns, other.end_stamp_ns) == (uncut.stamp_ns, uncut.end_stamp_ns)
     assert drive_s(one.end_stamp_ns) < 10.0 <= drive_s(other.stamp_ns)
     before_kill, compared = after[0], segments[0]
     assert before_kill.plans + before_kill.too_short == compared.plans + compared.too_short

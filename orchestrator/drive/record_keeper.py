@@ -1,0 +1,61 @@
+"""Keeps the record of a drive: what run.json would say so far, and at the end run.json itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.process_watch import ProcessWatch
+from foretwin.orchestrator.drive.run_record import heard_of, restart_troubles, run_record
+from foretwin.orchestrator.drive.supervision import DriveProcesses, Life
+from foretwin.orchestrator.record.run_state import RECORD, RUNNING, write_record
+from foretwin.orchestrator.record.so_far import forget_so_far, so_far_bytes
+
+EVERY_S, SHARE = 2.0, 0.01
+"""How often it is told so far, and the most of the orchestrator's time that this may take."""
+
+
+@dataclass(slots=True)
+class RecordKeeper:
+    """Looks at one drive; the loop calls `look` often."""
+
+    conductor: Conductor
+    processes: DriveProcesses
+    watch: ProcessWatch
+    life: Life
+    mono_s: Callable[[], float] = time.monotonic
+    _next_s: float = 0.0
+
+    def look(self, now_s: float) -> None:
+        """Have it written what run.json would say now, where it is time to."""
+        if now_s < self._next_s:
+            return
+        began_s = self.mono_s()
+        record = self._record(RUNNING)
+        self.conductor.tables.keep_so_far(so_far_bytes(record, heard_of(self.conductor)))
+        took_s = self.mono_s() - began_s
+        self._next_s = now_s + max(EVERY_S, took_s / SHARE)
+
+    def write(self, exit_word: str) -> dict[str, Any]:
+        """Write run.json, complete; returns what it says. Raises OSError."""
+        folder = self.conductor.plan.folder
+        record = self._record(exit_word)
+        write_record(record, folder / RECORD)
+        forget_so_far(folder)
+        return record
+
+    def _record(self, exit_word: str) -> dict[str, Any]:
+        now_s, ended_by = time.monotonic(), self.life.ended_by
+        lost = restart_troubles(self.conductor.plan, ended_by)
+        return run_record(
+            self.conductor,
+            self.processes.restarted,
+            exit_word=exit_word,
+            ended_by=ended_by,
+            wall_s=now_s - self.life.began_s,
+            mono_s=now_s,
+            troubles=[*self.watch.troubles, *lost],
+        )

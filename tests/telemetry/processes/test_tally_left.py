@@ -1,0 +1,48 @@
+"""What a recorder left that is gone: counted once, and no more than its files hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.tally import Tally, read_tally, tally_file, write_tally
+from foretwin.telemetry.processes.recording import DriveRecording
+from foretwin.telemetry.processes.tally_left import tally_left
+
+
+def left(folder: Path, count: int) -> Path:
+    """Record so many positions and end, the tally with it."""
+    path = folder / "drive.mcap"
+    recording = DriveRecording(path)
+    for number in range(count):
+        fix = GnssFix(stamp_ns=number, position=GeoPoint(50.0, 8.0))
+        recording.add("gnss", fix, sender=1, seq=number)
+    recording.finish()
+    return path
+
+
+def test_a_recording_that_ended_is_counted_by_its_tally(tmp_path: Path) -> None:
+    path = left(tmp_path, 4)
+    for held in (False, True):
+        assert tally_left(path, no_more_than_held=held).recorded == {"gnss": 4}
+
+
+def test_what_came_into_the_file_after_the_tally_counts(tmp_path: Path) -> None:
+    path = left(tmp_path, 2)
+    told = tally_file(path).read_bytes()
+    path.unlink()
+    tally_file(path).unlink()
+    left(tmp_path, 4)
+    tally_file(path).write_bytes(told.replace(b'"part":2', b'"part":1'))
+    assert read_tally(tally_file(path)).recorded == {"gnss": 2}  # type: ignore[union-attr]
+    assert tally_left(path).recorded == {"gnss": 4}
+
+
+def test_what_never_came_to_the_disk_is_unwritten(tmp_path: Path) -> None:
+    path = left(tmp_path, 4)
+    write_tally(Tally(recorded={"gnss": 6, "imu": 2}, unwritten={"gnss": 1}), tally_file(path))
+    found = tally_left(path, no_more_than_held=True)
+    assert found.recorded["imu"] == 0
+    assert found.unwritten["imu"] == 2
+    assert found.recorded["gnss"] + found.unwritten["gnss"] >= 7
