@@ -46,7 +46,14 @@ DEATH_TOLD_S = 2.0
 """How long after a silence the supervisor's word of a death may take on a busy machine."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
-_CODES = {"completed": EXIT_DONE, "interrupted": EXIT_INTERRUPTED, "failed": EXIT_FAILED}
+VEHICLE_ENDED = "vehicle_ended"
+"""The `exit` of a drive whose vehicle's process died: what came before is kept."""
+_CODES = {
+    "completed": EXIT_DONE,
+    VEHICLE_ENDED: EXIT_PARTLY,
+    "interrupted": EXIT_INTERRUPTED,
+    "failed": EXIT_FAILED,
+}
 
 
 class CrashError(RuntimeError):
@@ -143,7 +150,7 @@ class Orchestrator:
                 line.say(waiting_text(plan))
             joining = Joining(bus, conductor, self._watch, self._look_after, self._stop)
             if not joining.all_there():
-                return "interrupted"
+                return self._stopped_by()
             prepare_start(plan, conductor, look_after=self._look_after, stop=self._stop)
         bus.declare_alive(alive_key(run=plan.run_id, process=ORCHESTRATOR))
         self._meter.ready()
@@ -185,27 +192,33 @@ class Orchestrator:
             # Who does not answer may have died: that is told next.
             if not self._hears_of_death(conductor):
                 raise
-        if self._watch.ended_by is not None and not self._asked_to_end:
-            raise DriveError(f"{self._watch.ended_by}; see log.jsonl")
-        if not ended:
+        word = "completed" if ended else self._stopped_by()
+        if word != "interrupted":
+            conductor.finish()
+        return word
+
+    def _stopped_by(self) -> str:
+        """Return how a drive ended that was stopped; raises DriveError for an error of ours."""
+        if self._asked_to_end:
             return "interrupted"
-        conductor.finish()
-        return "completed"
+        if self._watch.ended_by is not None:
+            raise DriveError(f"{self._watch.ended_by}; see log.jsonl")
+        return VEHICLE_ENDED
 
     def _hears_of_death(self, conductor: Conductor) -> bool:
         """Wait a moment for the supervisor's word that somebody has died who ends the drive."""
         deadline_s = time.monotonic() + DEATH_TOLD_S
-        while self._watch.ended_by is None and time.monotonic() < deadline_s:
+        while not self._watch.over and time.monotonic() < deadline_s:
             self._look_after(conductor, time.monotonic())
             conductor.handle(conductor.mailbox.take(LAST_WORDS_S))
-        return self._watch.ended_by is not None
+        return self._watch.over
 
     @property
     def _asked_to_end(self) -> bool:
         return self._interruption.asked or self._processes.over
 
     def _stop(self) -> bool:
-        return self._asked_to_end or self._watch.ended_by is not None
+        return self._asked_to_end or self._watch.over
 
     def _tell_of_restart(self, conductor: Conductor) -> None:
         how = self._life.ended_by[-1]
@@ -257,8 +270,8 @@ class Orchestrator:
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
-        quick = exit_word != "completed"
-        grace_s = INTERRUPT_GRACE_S if quick else to_write_s
+        in_order = exit_word in ("completed", VEHICLE_ENDED)
+        grace_s = to_write_s if in_order else INTERRUPT_GRACE_S
         if killed := self._processes.stop(grace_s=grace_s, but={ROUTER}):
             log.warning("had to kill %s", ", ".join(killed))
         try:

@@ -45,7 +45,9 @@ class ProcessWatch:
 
     supervisor: WatchedProcesses
     ended_by: str | None = None
-    """Whose death ends the drive, in words."""
+    """Whose death ends the drive as an error of ours, in words."""
+    vehicle_ended: bool = False
+    """Whether no telemetry will come any more: the drive ends with what there is."""
     given_up: set[str] = field(default_factory=set)
     """Processes that are not started any more."""
     troubles: list[str] = field(default_factory=list)
@@ -57,6 +59,11 @@ class ProcessWatch:
     _link_changed_s: float = -math.inf
     _router_was_there: bool = True
     """Whether there has been a link to the router since it was started last."""
+
+    @property
+    def over(self) -> bool:
+        """Whether a death ends the drive."""
+        return self.vehicle_ended or self.ended_by is not None
 
     def look_after(self, conductor: Conductor, now_s: float) -> None:
         """Take notice of deaths and of who hangs."""
@@ -77,13 +84,16 @@ class ProcessWatch:
                 continue
             self.given_up.add(death.process_id)
             conductor.rounds.never_again(death.process_id)
-            self._missing(f"{text} and was not started again")
-            if death.row.when_dead == "end_drive" or death.process_id == ROUTER:
+            if death.process_id == ROUTER:
+                self._missing(f"{text} and was not started again")
                 conductor.tell(Notice("error", text))
-                self.ended_by = _ended_by(
-                    death.process_id, lock_step=conductor.plan.config.lock_step
-                )
+                self.ended_by = _router_death(lock_step=conductor.plan.config.lock_step)
+            elif death.row.when_dead == "end_drive":
+                self._missing(f"{text}: no telemetry comes any more, and the drive ends here")
+                conductor.tell(Notice("error", f"{text}: no telemetry comes any more"))
+                self.vehicle_ended = True
             else:
+                self._missing(f"{text} and was not started again")
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
         for text in conductor.tables.take_news():
             conductor.tell(Notice("warning", text))
@@ -127,9 +137,7 @@ class ProcessWatch:
                     self._seen_alive.discard(process_id)
 
 
-def _ended_by(process_id: str, *, lock_step: bool) -> str:
-    if process_id != ROUTER:
-        return "the vehicle's process died"
+def _router_death(*, lock_step: bool) -> str:
     if lock_step:
         return "the router died, and with it what was on its way: in lock step nothing may be lost"
     return "the router died again and again"

@@ -55,8 +55,8 @@ def fitting_codes(left: Left) -> set[int]:
     if asked:
         codes = {130}
     if left.befell("vehicle", what=ENDERS):
-        codes = codes | {1, 130} if asked else {1}
-    if left.befell("vehicle", "supervisor", "orchestrator", what=("memory",)):
+        codes = codes | {3, 130} if asked else {3}
+    if left.befell("supervisor", "orchestrator", what=("memory",)):
         codes = codes | {1}
     for one in left.befell("supervisor", what=KILLED):
         codes = codes | {-9 if one.fault.what == "kill" else -11}
@@ -84,16 +84,17 @@ def _wrong_words(left: Left, record: dict[str, Any]) -> Iterator[str]:
         yield f"exit code 0, and something is lost: {last}"
     if left.code == 3 and not told:
         yield f"exit code 3, and the last line does not say of what: {last}"
-    words = {0: "completed", 3: "completed", 130: "interrupted", 1: "failed"}
-    if record["exit"] != words.get(left.code, record["exit"]):
+    partly = {"completed", "vehicle_ended"}
+    words = {0: {"completed"}, 3: partly, 130: {"interrupted"}, 1: {"failed"}}
+    if record["exit"] not in words.get(left.code, {record["exit"]}):
         yield f"exit code {left.code}, and run.json says {record['exit']!r}"
 
 
 def _wrong_ledger(left: Left, record: dict[str, Any]) -> Iterator[str]:
-    if left.recovered is not None and "ledger" not in record:
-        return
     ledger = record["ledger"]
     telemetry, rounds, jobs = ledger["telemetry"], ledger["rounds"], ledger["jobs"]
+    if left.recovered is not None and None in (telemetry, rounds, jobs):
+        return  # killed before it had said anything
     if telemetry["published"] != telemetry["recorded"] + telemetry["lost"]:
         yield f"the ledger of telemetry does not balance: {telemetry}"
     if rounds["due"] != sum(count for name, count in rounds.items() if name != "due"):

@@ -8,11 +8,13 @@ import time
 from pathlib import Path
 
 import pyarrow.parquet as pq
+import pytest
 from mcap.reader import make_reader
 
 from foretwin.orchestrator.commands.cli import run as command
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
+    Finished,
     child_pids,
     is_running,
     log_lines,
@@ -141,3 +143,26 @@ def test_a_killed_orchestrator_leaves_no_process(tmp_path: Path) -> None:
         pids = child_pids(run)
         assert len(pids) >= 6
         wait_for(lambda: not any(is_running(pid) for pid in pids.values()), "the end of all")
+
+
+@pytest.mark.parametrize("arguments", [(), ("--speed", "max")], ids=["live", "lock step"])
+def test_a_killed_vehicle_ends_the_drive_with_what_there_is(
+    tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    out = tmp_path / "runs"
+    with started(out, "--futures", "12", *arguments) as process:
+        wait_for(lambda: bool(list(out.glob("*/results/rounds.arrows"))), "the first rows")
+        run = run_folder(out)
+        assert run is not None
+        os.kill(child_pids(run)["vehicle"], signal.SIGKILL)
+        screen, _ = process.communicate(timeout=240.0)
+    left = Finished(process.returncode, screen, run)
+    assert left.code == 3, screen
+    ended = "vehicle ended with code -9: no telemetry comes any more, and the drive ends here"
+    said_last = [line for line in screen.splitlines() if line.startswith(("error: ", "lost: "))]
+    assert f"error: {ended}" in said_last
+    assert "internal error" not in screen
+    record = left.record()
+    assert (record["exit"], record["troubles"]) == ("vehicle_ended", [ended])
+    assert record["futures"]["rounds"] == len(left.rows("rounds"))
+    assert not any(map(is_running, child_pids(run).values()))

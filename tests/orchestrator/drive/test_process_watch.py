@@ -136,3 +136,18 @@ def test_a_router_that_dies_again_and_again_ends_the_drive(watched: Watched) -> 
             watched.look(EVERY_S)
     assert watched.watch.ended_by == "the router died again and again"
     assert watched.watch.troubles == ["router ended with code -9 and was not started again"]
+
+
+def test_a_vehicle_that_is_gone_ends_the_drive_and_is_no_error_of_ours(tmp_path: Path) -> None:
+    watched = Watched(tmp_path)
+    row = next(row for row in PROCESSES if row.name == "vehicle")
+    watched.watch.supervisor.start(row, setup("vehicle"))  # type: ignore[attr-defined]
+    watched.look(1.0)
+    assert not watched.watch.over
+    watched.children["vehicle"][0].exit_code = -9
+    watched.look(1.0)
+    assert (watched.watch.over, watched.watch.ended_by) == (True, None)
+    assert watched.started("vehicle") == 1
+    assert watched.watch.troubles == [
+        "vehicle ended with code -9: no telemetry comes any more, and the drive ends here"
+    ]
