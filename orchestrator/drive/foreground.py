@@ -103,7 +103,13 @@ class Foreground:
 
         def work() -> int:
             here.close()
-            link = SupervisorLink(there, self._plan, deaths_known=self._first_death)
+            # What comes before the orchestrator takes signals itself is for it as well.
+            link = SupervisorLink(
+                there,
+                self._plan,
+                deaths_known=self._first_death,
+                inherited=self._interruption,
+            )
             return self._orchestrate(self._plan, link, life)
 
         child = forked(work)

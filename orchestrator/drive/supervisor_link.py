@@ -19,6 +19,7 @@ import msgspec
 
 from foretwin.contracts.end_signals import leave_closed_terminal
 from foretwin.contracts.process import is_held
+from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.drive.processes import ProcessRow, rows_by_id
 from foretwin.orchestrator.drive.supervision import (
     ENCODER,
@@ -51,17 +52,32 @@ _decoder = msgspec.msgpack.Decoder(ToOrchestrator)
 class SupervisorLink:
     """The orchestrator's side; see DriveProcesses."""
 
-    def __init__(self, end: socket.socket, plan: DrivePlan, *, deaths_known: int = 0) -> None:
+    def __init__(
+        self,
+        end: socket.socket,
+        plan: DrivePlan,
+        *,
+        deaths_known: int = 0,
+        inherited: Interruption | None = None,
+    ) -> None:
+        """`inherited` takes the signals of a fork that takes none itself yet."""
         end.setblocking(False)
+        self._inherited = inherited
         self._end, self._rows = end, rows_by_id(plan)
         self._setups = plan.processes_dir
         self._running = Running({}, 0, 0, [])
         self._told = deaths_known
         self._alive: list[str] = []
         self._stopped: list[Stopped] = []
-        self.over = False
+        self._told_to_end = False
         self.alone = False
         """Whether the supervisor is gone: nobody starts anything again."""
+
+    @property
+    def over(self) -> bool:
+        """Whether the drive is to end."""
+        asked = self._inherited is not None and self._inherited.asked
+        return asked or self.alone or self._told_to_end
 
     @property
     def start_again(self) -> bool:
@@ -144,7 +160,7 @@ class SupervisorLink:
         except OSError as error:
             # Anything else is a supervisor that stands still: it is said again.
             if error.errno in _GONE:
-                self.alone = self.over = True
+                self.alone = True
             return False
         return True
 
@@ -159,7 +175,7 @@ class SupervisorLink:
             except OSError:
                 data = b""
             if not data:
-                self.alone = self.over = True
+                self.alone = True
                 return
             self._take(_decoder.decode(data))
 
@@ -169,6 +185,6 @@ class SupervisorLink:
                 self._running = message
             case Interrupt():
                 leave_closed_terminal()  # its signal need not reach us
-                self.over = True
+                self._told_to_end = True
             case Stopped():
                 self._stopped.append(message)

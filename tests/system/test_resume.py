@@ -177,6 +177,24 @@ def test_in_lock_step_a_kill_changes_no_bit(tmp_path: Path) -> None:
     assert len(shas[0]) > 0
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_an_orchestrator_that_alone_is_told_to_leave_ends_the_drive_in_order(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    out = tmp_path / "runs"
+    with started(out, *LIVE) as process:
+        run = begun(out)
+        wait_for(lambda: says(run, "on the map"), "the car on its way")
+        os.kill(orchestrator_pid(run), number)
+        screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
+    assert process.returncode == 130, screen
+    record = Finished(process.returncode, screen, run).record()
+    assert (record["exit"], record["orchestrator"]["restarts"]) == ("interrupted", 0)
+    assert record["troubles"] == []
+    assert {path.suffix for path in (run / "results").iterdir()} == {".parquet"}
+    assert not any(map(is_running, child_pids(run).values()))
+
+
 def test_a_drive_whose_supervisor_is_killed_ends_in_order(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE) as process:

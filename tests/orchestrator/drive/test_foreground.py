@@ -122,6 +122,21 @@ def test_what_ends_a_drive_reaches_the_orchestrator(tmp_path: Path, number: str)
     """) == ["130"]  # fmt: skip
 
 
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_what_comes_before_an_orchestrator_takes_signals_is_not_lost(
+    tmp_path: Path, number: str
+) -> None:
+    assert run(tmp_path, f"""
+        from foretwin.orchestrator.drive.interrupt import Interruption
+        def orchestrate(plan, link, life):
+            die(signal.{number})
+            own = Interruption()
+            print(own.asked, link.over)
+            return 130
+        print(supervise(orchestrate))
+    """) == ["False True", "130"]  # fmt: skip
+
+
 def test_who_is_alone_is_told_and_ends(tmp_path: Path) -> None:
     run(
         tmp_path,
