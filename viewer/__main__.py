@@ -6,7 +6,6 @@ import argparse
 import logging
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import NamedTuple
 from foretwin.contracts.bus import Bus, Mailbox, Received, ask
 from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.guard import Refused
+from foretwin.contracts.owned_folder import make_temporary
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.segments import (
@@ -241,7 +241,9 @@ def _complete(recording: Path) -> Path:
     """Return a recording with its layout, in a copy where a killed viewer left it without."""
     if is_complete(recording):
         return recording
-    copy = Path(tempfile.mkdtemp(prefix="foretwin-")) / recording.name
+    owned = make_temporary("foretwin-shown-")
+    owned.keep_over_exec()  # the next one to be shown finds whether this one still is
+    copy = owned.path / recording.name
     copy_with_blueprint(recording, copy, drive_blueprint())
     return copy
 

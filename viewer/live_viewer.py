@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from foretwin.contracts.ends_with_parent import ends_with_parent
 from foretwin.contracts.ports import LOOPBACK, free_port
 
 HOST = LOOPBACK
@@ -88,10 +89,14 @@ def offline_environment() -> dict[str, str]:
     }
 
 
-def start_program(*arguments: str, port: int) -> subprocess.Popen[bytes]:
-    """Start Rerun listening on `port` of this machine alone, in a session of its own."""
+def start_program(*arguments: str, port: int, outlives: bool = False) -> subprocess.Popen[bytes]:
+    """Start Rerun listening on `port` of this machine alone, in a session of its own.
+
+    Unless it `outlives` the thread that has started it, it ends with that, whatever ends it.
+    """
+    command = [str(rerun_program()), "--bind", HOST, "--port", str(port), *arguments]
     return subprocess.Popen(
-        [str(rerun_program()), "--bind", HOST, "--port", str(port), *arguments],
+        command if outlives else ends_with_parent(command, parent=os.getpid()),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -131,7 +136,9 @@ def live_viewer(live: str) -> LiveViewer | None:
         if not has_display():
             raise NoViewerError("there is no display for the native viewer")
         if not answers(PORT):
-            process = start_program("--hide-welcome-screen", "--expect-data-soon", port=PORT)
+            process = start_program(
+                "--hide-welcome-screen", "--expect-data-soon", port=PORT, outlives=True
+            )
             started.append(process)
             wait_until_it_answers(process, PORT)
         return address(PORT)

@@ -6,7 +6,6 @@ import argparse
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from rerun.experimental import ViewerClient
 
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.ports import free_port
 from foretwin.contracts.terminal import say
 from foretwin.viewer import blueprint
@@ -62,9 +62,9 @@ def take_picture(
         raise FileNotFoundError(f"no recording {recording}")
     if sys.platform.startswith("linux") and not has_vulkan():
         raise NoViewerError("no Vulkan driver to render with; on Debian: mesa-vulkan-drivers")
-    with tempfile.TemporaryDirectory(prefix="foretwin-") as folder:
+    with temporary_folder("foretwin-picture-") as folder:
         # The viewer renames what it opens, so a layout sent apart would never meet it.
-        copy = Path(folder) / "recording.rrd"
+        copy = folder / "recording.rrd"
         copy_with_blueprint(recording, copy, blueprint.drive_blueprint(main=main, detail=detail))
         port = free_port()
         window = f"{size[0]}x{size[1]}"

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.credentials import runtime_folder
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.owned_folder import remove_left
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.agreement.recovered import recovered_agreement
 from foretwin.orchestrator.record.recovery import RECOVERED, recover
@@ -20,6 +24,8 @@ def recover_run(run: Path) -> int:
     Raises UserError in one line for what is no run, or goes on.
     """
     done = recover(run, judge=recovered_agreement)
+    with contextlib.suppress(UserError):
+        remove_left(runtime_folder())  # with the passwords of drives that were killed
     if done.healthy:
         say(f"{run}: whole (exit: {done.exit_word}); nothing to recover")
         return 0

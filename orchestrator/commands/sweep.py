@@ -6,7 +6,6 @@ import contextlib
 import functools
 import hashlib
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
@@ -71,12 +71,12 @@ def sweep(
 def workers_for(loaded: Loaded, out: Path, workers: int) -> Iterator[WorkerProcesses]:
     """Give the processes that play a sweep into the folder `out`, and end them."""
     with (
-        tempfile.TemporaryDirectory(prefix="foretwin-sweep-") as folder,
+        temporary_folder("foretwin-sweep-") as folder,
         WorkerProcesses(
             workers,
             worker_setup(loaded, out),
             task_timeout_s=loaded.spec.job_timeout_s,
-            folder=Path(folder),
+            folder=folder,
         ) as runner,
     ):
         yield runner

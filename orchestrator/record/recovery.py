@@ -3,6 +3,7 @@ and run.json."""
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -34,6 +35,7 @@ from foretwin.orchestrator.record.run_state import (
 from foretwin.orchestrator.record.so_far import forget_so_far
 from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.record.table_stream import SUFFIX, TableStream, record_bytes
+from foretwin.orchestrator.runner.local_bus import BUS
 from foretwin.orchestrator.runner.supervisor import fold_stderr
 from foretwin.telemetry.logs.mend_mcap import look_through, mend
 
@@ -118,6 +120,7 @@ def recover(
             for stream in streams:
                 stream.unlink()
             fold_stderr(run / PROCESSES, run / LOG)
+            shutil.rmtree(run / PROCESSES / BUS, ignore_errors=True)
             if (run / trace.TRACE_PARTS).is_dir():
                 trace.joined(run / trace.TRACE_PARTS, run / trace.TRACE)
         except OSError as error:

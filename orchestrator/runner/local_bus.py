@@ -20,12 +20,16 @@ from foretwin.contracts.credentials import (
     bus_folder,
     credentials_file,
     make_credentials,
+    runtime_folder,
 )
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import BusRole
+from foretwin.contracts.owned_folder import OwnedFolder, own, remove_left
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process_setup import Admission, BusSetup
 
+BUS = "bus"
+"""The folder of names and passwords where there can be no socket."""
 OUTSIDERS = BusMember("operator", "operator"), BusMember("planner", "planner")
 """Who may join the bus of a drive without having been started by it."""
 
@@ -37,6 +41,7 @@ class LocalBus(NamedTuple):
     folder: Path
     trouble: str = ""
     """Why it is no socket."""
+    owned: OwnedFolder | None = None
 
     def setup_of(self, user: str) -> BusSetup:
         """Return how somebody joins."""
@@ -49,6 +54,8 @@ class LocalBus(NamedTuple):
     def remove(self) -> None:
         """Leave nothing."""
         shutil.rmtree(self.folder, ignore_errors=True)
+        if self.owned is not None:
+            self.owned.remove()
 
 
 @contextlib.contextmanager
@@ -72,20 +79,23 @@ def member_of(
 def make_local_bus(
     name: str, members: Iterable[BusMember], *, run_id: str, lossless: bool, instead: Path
 ) -> LocalBus:
-    """Make the folder `name` of a bus with a password for each member.
+    """Make the folder `name` of a bus with a password for each member, this process's and its
+    forks'; the folders of those that were killed go.
 
     Where there can be no socket, they lie below `instead`, and the bus is on the loopback.
     """
     members = tuple(members)
     trouble = ""
     try:
+        remove_left(runtime_folder())
         folder = bus_folder(name)
         endpoint = f"unixsock-stream/{folder / SOCKET}"
     except UserError as error:
         trouble, endpoint = str(error), free_endpoint()
-        folder = instead / "bus"
+        folder = instead / BUS
         folder.mkdir(mode=0o700, parents=True)
     make_credentials(folder, [one.name for one in members])
     access = access_control(members, subject="usernames", run_id=run_id)
     admits = Admission(users_file=str(folder / USERS), access=json.dumps(access))
-    return LocalBus(BusSetup(endpoint=endpoint, lossless=lossless, admits=admits), folder, trouble)
+    router = BusSetup(endpoint=endpoint, lossless=lossless, admits=admits)
+    return LocalBus(router, folder, trouble, own(folder))

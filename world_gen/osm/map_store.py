@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import hashlib
 import os
-import shutil
 import sqlite3
-import tempfile
-import time
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,6 +16,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import METRES_PER_DEG, GeoPoint, LocalFrame
 from foretwin.contracts.new_folder import new_folder
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.world_gen.osm.build_map_store import build_map_store
 from foretwin.world_gen.osm.clip import clip_map, find_node
 from foretwin.world_gen.osm.map_file import file_fault
@@ -31,7 +28,6 @@ DAMAGED = (sqlite3.DatabaseError, msgspec.MsgspecError, zlib.error, TypeError)
 FRAME_GRID_DEG = 0.5
 """Maps too wide for one frame have one at each point of this grid."""
 STRETCH_M = 1000.0
-LEFTOVER_AGE_S = 24.0 * 3600.0
 
 
 class MapStore:
@@ -65,9 +61,7 @@ class MapStore:
                     return cls(map_file, path)
                 except DAMAGED:
                     path.unlink(missing_ok=True)  # damaged on disk: build it anew
-        _remove_leftovers(folder)
-        with tempfile.TemporaryDirectory(prefix="building-", dir=folder) as name:
-            part = Path(name)
+        with temporary_folder("building-", within=folder) as part:
             built = part / "index.sqlite"
             try:
                 digest = build_map_store(map_file, part, built, progress)
@@ -205,13 +199,3 @@ def _remember_digest(map_file: Path, folder: Path, digest: str) -> None:
     partial = note.with_suffix(f".{os.getpid()}.part")
     partial.write_text(digest, encoding="ascii")
     partial.replace(note)
-
-
-def _remove_leftovers(folder: Path) -> None:
-    """Remove what builds left behind that were ended by force, at least a day ago."""
-    limit_s = time.time() - LEFTOVER_AGE_S
-    for part in folder.glob("building-*"):
-        # Another process may finish, or clear away, its folder at any moment.
-        with contextlib.suppress(FileNotFoundError):
-            if max(path.stat().st_mtime for path in (part, *part.iterdir())) < limit_s:
-                shutil.rmtree(part, ignore_errors=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Mapping
 from functools import cache
 from itertools import compress
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import osmium
 
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import MapObjects, assemble_map, sorted_positions
 from foretwin.world_gen.osm.map_file import (
@@ -70,8 +70,8 @@ def read_map(path: Path) -> OsmMap:
 
 
 def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
-    with tempfile.TemporaryDirectory(prefix="foretwin-map-") as folder:
-        path = Path(folder) / "map.opl"
+    with temporary_folder("foretwin-map-") as folder:
+        path = folder / "map.opl"
         header = decode(osmium.io.FileBuffer(data, form), osmium.io.File(path, opl.OPL_OPTIONS))
         return MapHeader.of(**header), path.read_bytes()
 

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -189,7 +190,7 @@ def test_a_changed_planner_does_not_get_the_rows_of_the_old_one(
 
 def _ended_by(sig: signal.Signals, spec: Path, out: Path) -> None:
     """Start a sweep with one worker and end it by a signal after its first job: it ends soon, says
-    so, and leaves no other files behind."""
+    so, and leaves no other files behind; by SIGKILL it says nothing, and all is left."""
     temporary = spec.parent / "temporary"
     temporary.mkdir()
     process = subprocess.Popen(
@@ -198,7 +199,7 @@ def _ended_by(sig: signal.Signals, spec: Path, out: Path) -> None:
         cwd=Path(__file__).parents[3], stderr=subprocess.PIPE, text=True,
         env=os.environ | {"TMPDIR": str(temporary)},
         # A shell's background jobs, and all they start, ignore Ctrl-C.
-        preexec_fn=lambda: signal.signal(sig, signal.SIG_DFL),
+        preexec_fn=lambda: sig == signal.SIGKILL or signal.signal(sig, signal.SIG_DFL),
     )  # fmt: skip
     try:
         deadline = time.monotonic() + STARTS_WITHIN_S
@@ -215,6 +216,9 @@ def _ended_by(sig: signal.Signals, spec: Path, out: Path) -> None:
         if process.poll() is None:
             process.kill()
             process.wait()
+    if sig == signal.SIGKILL:
+        assert list(temporary.iterdir())
+        return
     assert process.returncode == 130
     assert said.endswith("foretwin: interrupted\n")
     assert "Traceback" not in said
@@ -255,6 +259,22 @@ def test_workers_that_cannot_be_started_are_told_in_one_line(
     log = tmp_path / "out" / "log.jsonl"
     assert said == f"foretwin: no worker can be started; see {log}; what is done is kept\n"
     assert "no_such_package" in log.read_text()
+
+
+def test_what_a_killed_sweep_left_goes_as_the_next_one_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    spec, out = _long_sweep(tmp_path), tmp_path / "out"
+    _ended_by(signal.SIGKILL, spec, out)
+    buses = tmp_path / "foretwin"
+    (left,), (bus,) = (tmp_path / "temporary").iterdir(), buses.iterdir()
+    with workers_for(load_spec(spec), out, 1):
+        assert not left.exists()
+        assert not bus.exists()
+        assert len(list(buses.iterdir())) == 1
+    assert [*(tmp_path / "temporary").iterdir(), *buses.iterdir()] == []
 
 
 @pytest.mark.judge

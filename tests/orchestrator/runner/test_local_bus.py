@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -45,3 +47,29 @@ def test_where_there_can_be_no_socket_it_says_why_and_is_on_the_loopback(
     ):
         assert bus.connected
     assert local.folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_the_passwords_of_a_killed_run_go_with_the_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+    def made(name: str) -> Path:
+        return make_local_bus(
+            name, MEMBERS, run_id="r1", lossless=True, instead=tmp_path / name
+        ).folder
+
+    process = os.fork()
+    if not process:
+        made("killed")
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(process, 0)
+    killed = tmp_path / "foretwin" / "killed"
+    assert (killed / "users").exists()
+    first = make_local_bus("first", MEMBERS, run_id="r1", lossless=True, instead=tmp_path / "a")
+    assert not killed.exists()
+    second = make_local_bus("second", MEMBERS, run_id="r1", lossless=True, instead=tmp_path / "b")
+    assert first.folder.exists()  # its owner lives
+    for one in (first, second):
+        one.remove()
+    assert list((tmp_path / "foretwin").iterdir()) == []

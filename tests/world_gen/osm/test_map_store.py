@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import os
 import sqlite3
 import subprocess
 import sys
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.frames import METRES_PER_DEG, GeoPoint, geo_from_local
+from foretwin.contracts.owned_folder import LOCK, own
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
@@ -147,17 +147,19 @@ def test_a_cell_that_is_damaged_is_named(tmp_path: Path) -> None:
         MapStore.open(path, folder).clip(EVERYWHERE)
 
 
-def test_what_a_killed_build_left_behind_goes_after_a_day(tmp_path: Path) -> None:
+def test_what_a_killed_build_left_behind_goes_with_the_next_one(tmp_path: Path) -> None:
     folder = tmp_path / "index"
-    old, fresh = folder / "building-old", folder / "building-fresh"
-    for part in (old, fresh):
+    left, at_work = folder / "building-left", folder / "building-at-work"
+    for part in (left, at_work):
         part.mkdir(parents=True)
         (part / "nodes.bin").write_bytes(b"x")
-    for path in (old, old / "nodes.bin"):
-        os.utime(path, (0.0, 0.0))
+        (part / LOCK).write_bytes(b"")
+    owned = own(at_work)
+    assert owned is not None
     MapStore.open(town(tmp_path), folder)
-    assert not old.exists()
-    assert fresh.exists()
+    assert not left.exists()
+    assert at_work.exists()
+    owned.remove()
 
 
 def test_what_cannot_be_read_leaves_no_index(tmp_path: Path) -> None:
