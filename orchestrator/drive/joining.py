@@ -32,9 +32,9 @@ class Joining:
         expected = conductor.strangers.expected
         deadline = time.monotonic() + START_TIMEOUT_S
         while not expected <= conductor.alive:
+            self.look_after(conductor, time.monotonic())
             if self.stop():
                 return False
-            self.look_after(conductor, time.monotonic())
             missing = ", ".join(sorted(expected - conductor.alive))
             if self.watch.given_up & expected:
                 dead = ", ".join(sorted(self.watch.given_up & expected))

@@ -151,9 +151,7 @@ def test_a_killed_vehicle_ends_the_drive_with_what_there_is(
 ) -> None:
     out = tmp_path / "runs"
     with started(out, "--futures", "12", *arguments) as process:
-        wait_for(lambda: bool(list(out.glob("*/results/rounds.arrows"))), "the first rows")
-        run = run_folder(out)
-        assert run is not None
+        run = under_way(out)
         os.kill(child_pids(run)["vehicle"], signal.SIGKILL)
         screen, _ = process.communicate(timeout=240.0)
     left = Finished(process.returncode, screen, run)

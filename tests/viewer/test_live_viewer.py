@@ -10,8 +10,6 @@ import pytest
 
 from tests.system.foretwin_command import is_running, wait_for
 
-COVERS = ("foretwin.viewer.live_viewer",)
-
 VIEWER = """
 import threading, time
 from foretwin.viewer import live_viewer

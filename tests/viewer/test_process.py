@@ -27,10 +27,7 @@ from tests.viewer import scene
 from tests.viewer.conftest import RUN, ViewerRun, wait_until
 from tests.viewer.readback import Recorded
 
-COVERS = (
-    "foretwin.viewer.__main__",
-    "foretwin.viewer.live_viewer",
-)
+COVERS = ("foretwin.viewer.__main__",)
 
 StartViewer = Callable[..., ViewerRun]
 

@@ -269,11 +269,9 @@ def test_what_a_killed_sweep_left_goes_as_the_next_one_begins(
     spec, out = _long_sweep(tmp_path), tmp_path / "out"
     _ended_by(signal.SIGKILL, spec, out)
     buses = tmp_path / "foretwin"
-    (left,), (bus,) = (tmp_path / "temporary").iterdir(), buses.iterdir()
+    left = {*(tmp_path / "temporary").iterdir(), *buses.iterdir()}
     with workers_for(load_spec(spec), out, 1):
-        assert not left.exists()
-        assert not bus.exists()
-        assert len(list(buses.iterdir())) == 1
+        assert not any(folder.exists() for folder in left)
     assert [*(tmp_path / "temporary").iterdir(), *buses.iterdir()] == []
 
 
