@@ -83,7 +83,8 @@ def test_a_drive_that_ended_well_is_well(tmp_path: Path) -> None:
         ([("kill", "w")], 0, "completed", True), ([("kill", "w")], 130, "interrupted", False),
         ([("term", "orchestrator")], 130, "interrupted", True),
         ([("hup", "orchestrator")], 0, "completed", False),
-        ([("kill", "vehicle")], 1, "failed", True), ([("stop", "vehicle")], 1, "failed", False),
+        ([("kill", "vehicle")], 3, "vehicle_ended", True),
+        ([("kill", "vehicle")], 1, "failed", False), ([("stop", "vehicle")], 1, "failed", False),
         ([("stop", "orchestrator")], 1, "failed", False), ([], 1, "completed", False),
         ([("memory", "orchestrator")], 2, "failed", False), ([], 0, "running", False),
     ],
@@ -92,7 +93,8 @@ def test_the_exit_code_fits_what_befell(
     tmp_path: Path, done: list[tuple[str, str]], code: int, exit_word: str, well: bool
 ) -> None:
     run = whole_run(tmp_path / "run", exit=exit_word)
-    found = wrong_with(left(run, *(befell(*one) for one in done), code=code))
+    said = "error: why" if code == 3 else "done"
+    found = wrong_with(left(run, *(befell(*one) for one in done), code=code, screen=said))
     assert (found == []) is well, found
 
 
