@@ -192,7 +192,7 @@ def target_from_source(
     """Move poses, (N, 2) metres and (N,) radians, from frame `source` into frame `target`."""
     if target == source:
         return LocalPoses(np.asarray(xy_m, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64))
-    lat, lon = np.moveaxis(geo_from_local(source, xy_m), -1, 0)
+    lat, lon = geo_from_local(source, xy_m).T
     true_yaw = wrap_angle(np.asarray(yaw_rad) - grid_convergence(source, lat, lon))
     return LocalPoses(
         local_from_geo(target, lat, lon), local_from_geo_yaw(target, true_yaw, lat, lon)
@@ -203,7 +203,7 @@ def target_from_source_m(target: LocalFrame, source: LocalFrame, xy_m: Array) ->
     """Move positions, (N, 2) metres, from frame `source` into frame `target`."""
     if target == source:
         return np.asarray(xy_m, dtype=np.float64)
-    lat, lon = np.moveaxis(geo_from_local(source, xy_m), -1, 0)
+    lat, lon = geo_from_local(source, xy_m).T
     return local_from_geo(target, lat, lon)
 
 

@@ -121,7 +121,7 @@ def hold(setup_file: Path) -> int:
 
     So that whoever finds a run without its orchestrator sees who of it still writes; see `is_held`.
     """
-    descriptor = os.open(setup_file, os.O_RDONLY | os.O_CLOEXEC)
+    descriptor = os.open(setup_file, os.O_RDONLY)
     with contextlib.suppress(OSError):  # not every file system can
         fcntl.flock(descriptor, fcntl.LOCK_SH)
     return descriptor
@@ -129,7 +129,7 @@ def hold(setup_file: Path) -> int:
 
 def is_held(setup_file: Path) -> bool:
     """Whether the process that was started with a file still lives."""
-    descriptor = os.open(setup_file, os.O_RDONLY | os.O_CLOEXEC)
+    descriptor = os.open(setup_file, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -69,7 +69,7 @@ class OrderSigner:
 
     def keep(self, file: Path) -> None:
         """Write the private key to a new file that its owner alone may read."""
-        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(descriptor, "wb") as opened:
             opened.write(self._key.private_bytes_raw())
 

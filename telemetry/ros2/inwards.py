@@ -174,7 +174,7 @@ def _in_our_units(message: msgspec.Struct, row: InRow) -> msgspec.Struct:
         case drive.SteeringSample() | drive.ControlCommand():
             factor = ANGLE[row.angle_unit] * (1.0 if row.left_positive else -1.0)
             angle = message.tire_angle_rad
-            if factor == 1.0 or angle is None:
+            if angle is None:
                 return message
             return msgspec.structs.replace(message, tire_angle_rad=factor * angle)
         case drive.SpeedSample():

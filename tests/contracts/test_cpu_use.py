@@ -60,18 +60,20 @@ def test_each_process_is_known_with_all_its_lives(tmp_path: Path) -> None:
 
 
 def test_the_share_is_that_since_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = {"wall_s": 100.0, "cpu_s": 3.0}
+    clock = {"wall_s": 100.0, "cpu_s": 3.004}
     monkeypatch.setattr(cpu_use.time, "monotonic", lambda: clock["wall_s"])
     monkeypatch.setattr(cpu_use.time, "process_time", lambda: clock["cpu_s"])
     meter = CpuMeter(tmp_path, "viewer")
     meter.write()
     assert cpu_uses(tmp_path)["viewer"].share_of_core is None
     meter.ready()
-    clock.update(wall_s=110.0, cpu_s=4.0)
+    clock.update(wall_s=110.0, cpu_s=4.12741)
     meter.write()
 
     use = cpu_uses(tmp_path)["viewer"]
-    assert (use.cpu_s, use.starting_cpu_s, use.share_of_core, use.lives) == (4.0, 3.0, 0.1, 1)
+    assert (use.cpu_s, use.starting_cpu_s, use.share_of_core, use.lives) == (
+        4.13, 3.0, 0.1123, 1,
+    )  # fmt: skip
 
 
 def test_it_is_written_now_and_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,10 +18,13 @@ from foretwin.contracts.frames import (
     geo_from_ecef,
     geo_from_local,
     geo_from_local_yaw,
+    geo_pose,
     grid_convergence,
     local_from_geo,
     local_from_geo_yaw,
+    local_pose,
     target_from_source,
+    target_from_source_m,
     wrap_angle,
 )
 
@@ -214,6 +217,33 @@ def test_one_position_gives_what_an_array_of_it_gives(
             local_from_geo_yaw(frame, yaws, lats, lons)[0],
             atol=1e-12,
         )
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
+def test_positions_of_any_shape_keep_it(shape: tuple[int, ...]) -> None:
+    xy_m = np.arange(2.0 * np.prod(shape)).reshape(*shape, 2) * 100.0
+    geo = geo_from_local(BERLIN, xy_m)
+    back = local_from_geo(BERLIN, geo[..., 0], geo[..., 1])
+    assert geo.shape == back.shape == (*shape, 2)
+    assert back == pytest.approx(xy_m, abs=1e-6)
+    yaw_rad = np.full(shape, 0.5)
+    assert geo_from_local_yaw(BERLIN, yaw_rad, xy_m).shape == shape
+    ahead = base_from_sensor(xy_m, yaw_rad, (2.0, 0.0, 1.0)) + 2.0 * np.array(
+        [math.cos(0.5), math.sin(0.5)]
+    )
+    assert ahead == pytest.approx(xy_m)
+
+
+def test_one_pose_there_and_back() -> None:
+    at = geo_pose(BERLIN, 300.0, -400.0, 0.5, alt_m=35.0)
+    assert at.position.alt_m == 35.0
+    assert geo_pose(BERLIN, 0.0, 0.0, 0.0).position == GeoPoint(52.51, 13.39, 0.0)
+    assert local_pose(BERLIN, at.position, at.yaw_rad) == pytest.approx((300.0, -400.0, 0.5))
+    other = LocalFrame(GeoPoint(52.6, 13.5))
+    xy_m = np.array([[300.0, -400.0], [1.0, 2.0]])
+    moved = target_from_source_m(other, BERLIN, xy_m)
+    assert moved == pytest.approx(target_from_source(other, BERLIN, xy_m, np.zeros(2)).xy_m)
+    assert target_from_source_m(BERLIN, BERLIN, xy_m) == pytest.approx(xy_m)
 
 
 def test_threads_project_side_by_side() -> None:

@@ -18,6 +18,8 @@ from foretwin.contracts.keys import (
     vehicle_of_key,
 )
 
+COVERS = ("foretwin.contracts.bounds",)
+
 IDS = {"vehicle": "ego", "run": "r1", "process": "w0"}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
 from foretwin.contracts.keys import alive_key, key
 from foretwin.contracts.mailbox import Received
 from foretwin.contracts.ports import free_endpoint
-from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.process import ProcessLife, hold, is_held
 from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, take
@@ -148,6 +149,36 @@ def test_it_waits_out_the_grace_once_the_orchestrator_is_gone() -> None:
     assert not life.over
     now_s += 0.1
     assert life.over
+
+
+def test_it_has_begun_once_the_orchestrator_was_there_and_none_that_never_was_is_gone() -> None:
+    orchestrator = alive_key(process="orchestrator", **RUN)
+    setup = ProcessSetup(
+        run_id="r1", process_id="p0", vehicle_id="ego", bus=BusSetup(endpoint=""), log_file=""
+    )
+    bus, now_s = MemoryBus(), 100.0
+    life = ProcessLife(setup, bus, mono_s=lambda: now_s)
+    bus.lose(orchestrator)
+    now_s += 1000.0
+    assert (life.begun, life.over, life.run_ended) == (False, False, False)
+    bus.declare_alive(orchestrator)
+    assert (life.begun, life.over) == (True, False)
+    bus.lose(orchestrator)
+    assert not life.over
+    bus.declare_alive(orchestrator)  # there again in time
+    now_s += 1000.0
+    assert not life.over
+
+
+def test_a_process_holds_its_setup_as_long_as_it_lives(tmp_path: Path) -> None:
+    file = tmp_path / "p0.json"
+    file.touch()
+    assert not is_held(file)
+    holds = hold(file)
+    assert is_held(file)
+    assert is_held(file), "asking changes nothing"
+    os.close(holds)
+    assert not is_held(file)
 
 
 def test_bytes_that_are_no_end_of_a_run_end_nothing(tmp_path: Path) -> None:

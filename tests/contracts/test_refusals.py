@@ -28,6 +28,7 @@ def test_the_first_of_a_kind_is_told_and_all_are_counted() -> None:
 
 
 def test_who_makes_up_new_keys_fills_no_memory() -> None:
+    assert MOST_KINDS == 200
     refusals = Refusals()
     told = [refusals.take(Refused(f"key{n}", "no message")) for n in range(MOST_KINDS + 50)]
 

@@ -15,11 +15,16 @@ def test_the_words_for_roles_and_corrections() -> None:
     assert CORRECTIONS == ("free", "follow")
 
 
+def test_a_limit_may_be_as_good_as_none() -> None:
+    most = dict.fromkeys(FollowLimits.__struct_fields__, 999_999.5)
+    assert FollowLimits(**most).trouble() is None
+
+
 def test_the_limits_that_count_without_a_word_are_sound() -> None:
     assert FollowLimits().trouble() is None
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e6, math.nan, math.inf])
 @pytest.mark.parametrize("name", FollowLimits.__struct_fields__)
 def test_a_limit_is_above_zero_and_finite(name: str, value: float) -> None:
     assert FollowLimits(**{name: value}).trouble() == f"{name} {value}: above 0"

@@ -15,6 +15,8 @@ from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along
 
+COVERS = ("foretwin.contracts.simulation",)
+
 DRIVE = LocalFrame(GeoPoint(52.5, 13.4))
 WORLD = LocalFrame(GeoPoint(52.503, 13.405))
 

@@ -96,6 +96,19 @@ def test_all_still_come_within_some_rounds_where_the_same_are_always_worst() -> 
     assert seen == {future.index for future in ALL}
 
 
+def test_who_names_no_speed_is_among_those_of_the_usual_one() -> None:
+    """Cut into three strata by speed: the slow, the usual and the fast."""
+    speeds = [None, 0.7, 1.3, None, 0.8, 1.2, None]
+    some = [
+        Future(index=k, name=str(k), numbers={} if s is None else {"target_speed_factor": s})
+        for k, s in enumerate(speeds)
+    ]
+    turns = [[f.index for f in some_of(some, 4, turn=turn)] for turn in range(2)]
+    by_stratum = [{1, 4}, {3, 6}, {2, 5}]
+    for turn in turns:
+        assert [len(set(turn) & stratum) for stratum in by_stratum] == [1, 1, 1]
+
+
 def test_a_future_of_another_junction_is_not_taken_for_one_of_this() -> None:
     other = plan_futures(count=64, seed=1, planners=["pure_pursuit_idm"])
     assert some_of(ALL, 16, turn=3, first=other[1:]) == some_of(ALL, 16, turn=3)

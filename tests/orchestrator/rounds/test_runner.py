@@ -1,8 +1,7 @@
-"""A round is cut into jobs that together hold every future once."""
+"""Rounds differ by their state alone, fit the machine, and say what became of them."""
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 
 import msgspec
@@ -10,39 +9,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from foretwin.contracts.drive import SignalState, VehicleState
-from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.record import job_tables
 from foretwin.orchestrator.rounds import runner
-from foretwin.orchestrator.rounds.jobs import _signals, planners_of
 from foretwin.orchestrator.rounds.pace import Pace
-from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 from tests.orchestrator.house import House
-
-COVERS = ("foretwin.orchestrator.rounds.jobs",)
-
-
-@pytest.mark.parametrize(("futures", "size"), [(6, 3), (7, 3), (1, 32), (64, 32)])
-def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) -> None:
-    house = House(tmp_path, futures=futures, futures_per_job=size)
-    house.drive(20)
-    assert house.conductor.start_round()
-    jobs = []
-    while requests := house.workers[0].take() + house.workers[1].take():
-        for request in requests:
-            jobs.append(request.message().decoded())
-            house.workers[0].answer_one(request)
-        house.settle()
-    house.tables.close()
-
-    indices = sorted(v.index for job in jobs for v in job.futures)
-    assert indices == list(range(futures))
-    assert max(len(job.futures) for job in jobs) <= size
-    (first,) = (job for job in jobs if job.job_index == 0)
-    assert first.futures[0].name == "nominal"
-    assert len({(job.state.stamp_ns, job.cruise_speed_mps, job.seed) for job in jobs}) == 1
-    assert house.conductor.rounds.futures.count == futures
 
 
 def test_parameters_that_a_full_disk_does_not_take_are_written_with_the_next_round(
@@ -91,13 +62,6 @@ def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) 
     assert np.hypot(*moved) == pytest.approx(20.0, abs=2.0)
 
 
-def test_one_future_in_eight_is_driven_by_somebody_heedless() -> None:
-    assert Counter(planners_of("pure_pursuit_idm")) == {
-        "pure_pursuit_idm": 7, "constant_speed": 1,
-    }  # fmt: skip
-    assert set(planners_of("constant_speed")) == {"constant_speed"}
-
-
 def test_speed_of_simulation_is_known_of_each_worker(tmp_path: Path) -> None:
     house = House(tmp_path)
     house.drive(20)
@@ -106,20 +70,6 @@ def test_speed_of_simulation_is_known_of_each_worker(tmp_path: Path) -> None:
     house.tables.close()
 
     assert house.conductor.rounds.rtf == {"w0": pytest.approx(80.0), "w1": pytest.approx(80.0)}
-
-
-@pytest.mark.parametrize(("count", "jobs"), [(64, 2), (48, 2), (32, 2), (16, 1)])
-def test_a_smaller_round_is_cut_into_jobs_of_one_size(
-    count: int, jobs: int, tmp_path: Path
-) -> None:
-    house = House(tmp_path, futures=64, futures_per_job=32)
-    house.conductor.rounds.pace.now = Pace(count)
-    house.drive(20)
-    assert house.conductor.start_round()
-    asked = [r.message().decoded() for worker in house.workers for r in worker.take()]
-    house.tables.close()
-
-    assert [len(job.futures) for job in asked] == [count // jobs] * jobs
 
 
 def test_where_a_round_runs_fewer_those_found_worst_are_among_them(
@@ -212,6 +162,45 @@ def test_a_round_that_is_complete_after_its_deadline_is_told_as_late(
     assert row["late"] is late
 
 
+def test_when_the_machine_keeps_up_again_that_is_said_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = [10**9]
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns[0])
+    house = House(tmp_path, futures=8, futures_per_job=4, least_futures=4, rate_hz=2.0)
+    house.drive(20)
+    told: list[Event] = []
+    house.conductor.events.on_event = told.append
+    for seconds in (3.0, 9.0, 9.0, *[0.01] * 90):
+        assert house.conductor.start_round()
+        now_ns[0] += round(seconds * 1e9)
+        house.work()
+    house.end()
+
+    assert [(event.level, event.text.split(" futures")[0]) for event in told[:2]] == [
+        ("warning", "4 of 8"), ("info", "4 of 8"),
+    ]  # fmt: skip
+    assert told[0].text.startswith("4 of 8 futures in 1 of 4 rounds from now on: ")
+    assert (told[-1].level, told[-1].text) == (
+        "info", "the machine keeps up: all futures in every round again",
+    )  # fmt: skip
+    assert house.conductor.rounds.short_of == ""
+
+
+def test_at_the_drives_end_what_it_has_covered_is_compared(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.work()
+    house.drive(65)
+    assert house.watched("comparison") == []
+    house.end()
+
+    assert {one.horizon_s for one in house.watched("comparison")} == {1.0, 2.0, 4.0}
+    rows = pq.read_table(house.plan.folder / "results" / "comparisons.parquet").to_pylist()
+    assert {row["horizon_s"] for row in rows} == {1.0, 2.0, 4.0}
+
+
 def test_in_lock_step_late_rounds_change_nothing(tmp_path: Path) -> None:
     house = House(tmp_path, speed=None, rate_hz=50.0, least_futures=1)
     house.drive(40, round_every=1)
@@ -237,22 +226,6 @@ def test_who_acts_for_a_planner_is_said_once_for_each(tmp_path: Path) -> None:
         ("warning", "a future driven by remote: fallback 'pur"),
         ("warning", "a future driven by constant_speed: fallb"),
     ]
-
-
-def light(stamp_ns: int) -> SignalState:
-    return SignalState(stamp_ns=stamp_ns, group_id="g", colour="red")
-
-
-@pytest.mark.parametrize(("age_s", "fresh"), [(0.0, True), (-0.1, True), (0.1, False)])
-def test_signals_count_as_long_as_they_are_fresh(age_s: float, fresh: bool) -> None:
-    now_ns = round(1e9 * (100.0 + LIVE_FOR_S + age_s))
-    state = VehicleState(
-        vehicle_id="ego", stamp_ns=now_ns, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
-        speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0,
-    )  # fmt: skip
-    of_now = light(now_ns)
-    old = light(round(100e9) if age_s else now_ns)
-    assert _signals((of_now, old), state) == ((of_now, old) if fresh else (of_now,))
 
 
 def test_a_way_on_the_lanes_is_not_counted_as_off_them(tmp_path: Path) -> None:

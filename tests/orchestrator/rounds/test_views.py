@@ -53,6 +53,26 @@ def test_the_nearest_road_user_of_critical_futures_is_shown_and_where_it_is_touc
     assert view.touch_names == ("scp",)
 
 
+@pytest.mark.parametrize(("time_s", "at_m"), [(4.0, 20.0), (0.0, 0.0), (9.0, 40.0)])
+def test_who_moves_is_touched_where_it_is_then(time_s: float, at_m: float) -> None:
+    """Both drive on: at 5 m/s to the north where the cars go east. After its end nobody moves."""
+    done = meeting((40.0, 2.0), (30.0, 60.0))
+    result = done.results[0]
+    result.road_users.poses[..., 1] = 5.0 * TIME_S[:, None]
+    result.outcome.collision_time_s[2] = time_s
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert view.touch_xy_m[0, 1] == pytest.approx(at_m, abs=1e-3)
+    assert view.user_xy_m[0, -1, 1] == pytest.approx(40.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("clearance_m", "shown"), [(6.9, 1), (7.1, 0)])
+def test_whom_a_future_passes_far_away_is_not_shown(clearance_m: float, shown: int) -> None:
+    done = meeting((40.0, 2.0))
+    done.results[0].outcome.min_clearance_m[1] = clearance_m
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert len(view.user_xy_m) == 1 + shown
+
+
 def test_without_road_users_there_is_nobody_to_show() -> None:
     done = meeting()
     view = round_view(done, round_futures(done).futures, FRAME, FRAME)

@@ -11,6 +11,7 @@ from foretwin.contracts.drive import InfoRequest, VehicleInfo
 from tests.telemetry.ros2.gateway_ground import FIX_KEY, TF_KEY, antenna_at, fix
 from tests.telemetry.ros2.test_gateway import Ground
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
 S = 10**9
 
 
