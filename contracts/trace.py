@@ -76,9 +76,10 @@ class _Recorded:
         event = {
             "tts": self._began_cpu_ns / 1e3,
             "tdur": (cpu_ns - self._began_cpu_ns) / 1e3,
+            "dur": (ended_ns - self._began_ns) / 1e3,
             "args": self._args,
         }
-        self._recorder.add("X", self._name, self._began_ns, ended_ns, event)
+        self._recorder.add("X", self._name, self._began_ns, event)
 
 
 class _Thread(threading.local):
@@ -111,15 +112,12 @@ class _Recorder:
         self._written, self._left_out = 0, 0
         self._meta("process_name", {"name": process_id})
 
-    def add(self, kind: str, name: str, began_ns: int, ended_ns: int, more: dict[str, Any]) -> None:
+    def add(self, kind: str, name: str, began_ns: int, more: dict[str, Any]) -> None:
         if self._written > MOST_BYTES:
             self._left_out += 1
             return
         event = {"ph": kind, "name": name, "pid": self._pid, "tid": threading.get_native_id()}
-        event |= {"ts": began_ns / 1e3, **more}
-        if kind == "X":
-            event["dur"] = (ended_ns - began_ns) / 1e3
-        self._events.append(event)
+        self._events.append(event | {"ts": began_ns / 1e3} | more)
         if len(self._events) >= _AT_ONCE:
             self.write()
 
@@ -193,21 +191,21 @@ def since(name: str, began_mono_ns: int, **args: Any) -> None:
     if _recorder is not None:
         number = f"{name} {began_mono_ns}"
         more = {"cat": "waiting", "id2": {"local": number}, "args": args}
-        _recorder.add("b", name, began_mono_ns, 0, more)
-        _recorder.add("e", name, time.monotonic_ns(), 0, more)
+        _recorder.add("b", name, began_mono_ns, more)
+        _recorder.add("e", name, time.monotonic_ns(), more)
 
 
 def sent(name: str, key: str) -> None:
     """Begin an arrow to where another process calls `came` with the same name and key."""
     if _recorder is not None:
-        _recorder.add("s", name, time.monotonic_ns(), 0, {"cat": "bus", "id": f"{name} {key}"})
+        _recorder.add("s", name, time.monotonic_ns(), {"cat": "bus", "id": f"{name} {key}"})
 
 
 def came(name: str, key: str) -> None:
     """End the arrow that `sent` began; call it within the span that it shall point to."""
     if _recorder is not None:
         more = {"cat": "bus", "id": f"{name} {key}", "bp": "e"}
-        _recorder.add("f", name, time.monotonic_ns(), 0, more)
+        _recorder.add("f", name, time.monotonic_ns(), more)
 
 
 @contextlib.contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from foretwin.contracts.future_numbers import numbers_of
+from foretwin.contracts.future_numbers import check_futures, numbers_of
 from foretwin.contracts.futures import Future
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 
@@ -36,3 +36,12 @@ def test_what_no_scenario_draws_does_not_count() -> None:
 def test_an_unknown_number_is_named_with_those_that_are_known() -> None:
     with pytest.raises(ValueError, match="'grip'; known: target_speed_factor"):
         numbers_of(Future(index=1, name="x", numbers={"grip": 1.0}))
+
+
+def test_of_several_futures_each_has_an_index_of_its_own_and_numbers_that_there_are() -> None:
+    plain = [Future(index=index, name=str(index)) for index in (0, 1, 2)]
+    check_futures(plain)
+    with pytest.raises(ValueError, match="two of index 1; each needs one of its own"):
+        check_futures([*plain, Future(index=1, name="again")])
+    with pytest.raises(ValueError, match="future 'late': brake_gain reaches -1"):
+        check_futures([*plain, Future(index=3, name="late", numbers={"brake_gain": -1.0})])

@@ -81,6 +81,31 @@ def test_a_span_has_its_time_its_cpu_time_and_its_place_within_others(tmp_path: 
     assert by_name(events, "process_name")["args"] == {"name": "orchestrator"}
 
 
+def test_where_the_kernel_does_not_say_what_a_thread_waited_for_it_waited_for_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as without_proc:
+        without_proc.setattr(os, "open", refuse)
+        thread = trace._Thread()
+    monkeypatch.setattr(trace, "_thread", thread)
+    trace.begin(tmp_path / "parts", "orchestrator")
+    with trace.span("works"):
+        burn(0.001)
+    assert by_name(recorded(tmp_path), "works")["args"] == {trace.READY_MS: 0.0}
+
+
+def refuse(*_: object) -> int:
+    raise FileNotFoundError("no /proc here")
+
+
+def test_a_short_span_does_not_tell_what_it_waited_for(tmp_path: Path) -> None:
+    trace.begin(tmp_path / "parts", "orchestrator")
+    with trace.span("nothing"):
+        pass
+    assert trace._TOLD_FROM_NS == 500_000
+    assert by_name(recorded(tmp_path), "nothing")["args"] == {}
+
+
 def test_what_is_off_records_nothing(tmp_path: Path) -> None:
     with trace.span("before"):
         trace.since("waited", 0)

@@ -21,7 +21,7 @@ from tests.test_layout import ROOT
 from tests.test_mirrored import covered, mirror_of, mirrored, modules
 
 Fate = Literal["killed", "timed out", "survived", "untested"]
-_PATIENCE, _LEAST_S = 5.0, 20.0
+_PATIENCE, _LEAST_S = 4.0, 20.0
 """Times what the tests take unchanged, and at least: a mutant that waits for ever is noticed."""
 
 
@@ -58,7 +58,7 @@ def _imports(test: Path) -> frozenset[str]:
 
 
 class Checkout:
-    """A tree whose modules can be changed; what the tests take unchanged is measured once.
+    """A tree whose modules can be changed; what each test file takes unchanged is measured once.
 
     One process serves all (`warm_pytest.py`). Each changed file gets a time of its own, so that no
     bytecode of another is taken for its.
@@ -66,7 +66,7 @@ class Checkout:
 
     def __init__(self, tree: Path) -> None:
         self.tree = tree
-        self._taken_s: dict[tuple[str, ...], float] = {}
+        self._taken_s: dict[str, float] = {}
         self._times_s = itertools.count(1_000_000)
         without = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST_")}
         self._pytest = subprocess.Popen(
@@ -87,16 +87,18 @@ class Checkout:
         tests = tuple(files_of(module, system=system))
         if not tests:
             return "untested"
-        if tests not in self._taken_s:
-            self._taken_s[tests] = self._unchanged_s(tests)
-        while True:
-            within_s = max(_LEAST_S, _PATIENCE * self._taken_s[tests])
-            told = self._changed(module, text, tests, within_s)
-            if told != "timed out":
-                return "survived" if told == "passed" else "killed"
-            self._taken_s[tests] = self._unchanged_s(tests)
-            if _PATIENCE * self._taken_s[tests] <= within_s:
-                return "timed out"  # and not for a machine that has become slow meanwhile
+        for test in tests:
+            if test not in self._taken_s:
+                self._measure(test)
+        within_s = self._within_s(tests)
+        told = self._changed(module, text, tests, within_s)
+        if told == "timed out":
+            for test in tests:
+                self._measure(test)
+            if self._within_s(tests) > within_s:  # the machine has become slow meanwhile
+                told = self._changed(module, text, tests, self._within_s(tests))
+        fates: dict[str, Fate] = {"passed": "survived", "failed": "killed"}
+        return fates.get(told, "timed out")
 
     def _changed(self, module: str, text: str, tests: tuple[str, ...], within_s: float) -> str:
         target = self.tree / modules()[module].relative_to(ROOT)
@@ -108,11 +110,14 @@ class Checkout:
         finally:
             subprocess.run(["git", "checkout", "-q", "--", "."], cwd=self.tree, check=True)
 
-    def _unchanged_s(self, tests: tuple[str, ...]) -> float:
+    def _within_s(self, tests: tuple[str, ...]) -> float:
+        return max(_LEAST_S, _PATIENCE * sum(self._taken_s[test] for test in tests))
+
+    def _measure(self, test: str) -> None:
         begun_s = time.monotonic()
-        if self._told(tests, None) != "passed":
-            raise RuntimeError(f"{' '.join(tests)}: fail with nothing changed")
-        return time.monotonic() - begun_s
+        if self._told((test,), None) != "passed":
+            raise RuntimeError(f"{test}: fails with nothing changed")
+        self._taken_s[test] = time.monotonic() - begun_s
 
     def _told(self, tests: tuple[str, ...], within_s: float | None) -> str:
         asked, answers = self._pytest.stdin, self._pytest.stdout

@@ -142,14 +142,17 @@ def test_late_rounds_make_the_next_ones_smaller_and_say_so(
     assert (record["smaller_rounds"], record["rounds_by_futures"]) == (2, {"32": 2, "64": 4})
 
 
-@pytest.mark.parametrize(("seconds", "late"), [(0.4, False), (0.6, True)])
+@pytest.mark.parametrize(
+    ("seconds", "one_of", "late"), [(0.4, 1, False), (0.6, 1, True), (0.9, 2, False)]
+)
 def test_a_round_that_is_complete_after_its_deadline_is_told_as_late(
-    seconds: float, late: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    seconds: float, one_of: int, late: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now_ns = [10**9]
     monkeypatch.setattr("time.monotonic_ns", lambda: now_ns[0])
     house = House(tmp_path, rate_hz=2.0)
     house.drive(20)
+    house.conductor.rounds.pace.now = Pace(6, one_of)
     assert house.conductor.start_round()
     now_ns[0] += round(seconds * 1e9)
     house.work()
