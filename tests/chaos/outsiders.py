@@ -39,7 +39,7 @@ class Outsider:
             return
         if self._died_s is None:
             self._died_s = time.monotonic()
-        elif time.monotonic() - self._died_s > AGAIN_AFTER_S and self.process.returncode:
+        elif time.monotonic() - self._died_s > AGAIN_AFTER_S:
             self._died_s, self.process = None, self._start()
 
     def close(self) -> None:
