@@ -138,6 +138,9 @@ def _wrong_files(left: Left) -> Iterator[str]:
     temporary = [path.name for name in _TEMPORARY for path in left.run.rglob(name)]
     if temporary and not (left.code == 3 and left.befell("disk")):
         yield f"temporary files in the run's folder: {sorted(temporary)}"
+    cached = [path.name for name in _TEMPORARY for path in (left.scratch / "cache").rglob(name)]
+    if cached and not left.befell("disk"):
+        yield f"temporary files in the cache: {sorted(cached)}"
     for folder in left.temporary:
         files = (path for path in folder.rglob("*") if not path.is_dir())
         found = [path for path in files if str(path) not in left.screen]

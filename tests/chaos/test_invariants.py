@@ -113,9 +113,12 @@ def test_what_is_doubled_lost_untold_or_left_behind_is_noticed(tmp_path: Path) -
     (run / "results" / "rounds.parquet.writing").touch()
     (tmp_path / "tmp").mkdir()
     (tmp_path / "tmp" / "socket").touch()
+    (tmp_path / "cache" / "foretwin").mkdir(parents=True)
+    (tmp_path / "cache" / "foretwin" / "a.world.partial").touch()
     found = "\n".join(wrong_with(left(run)))
     for word in ("twice in futures", "rounds without futures: [1]", "something is lost",
-                 "rounds.parquet.writing", "stays in tmp: ['socket']"):  # fmt: skip
+                 "rounds.parquet.writing", "stays in tmp: ['socket']",
+                 "in the cache: ['a.world.partial']"):  # fmt: skip
         assert word in found
     assert "does not say of what" in "\n".join(wrong_with(left(run, code=3)))
     assert "traceback" in "\n".join(wrong_with(left(run, screen="Traceback (most")))
