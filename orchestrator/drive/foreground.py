@@ -8,6 +8,7 @@ disk does can end it.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import select
 import shutil
@@ -39,11 +40,12 @@ from foretwin.orchestrator.drive.supervision import (
 from foretwin.orchestrator.drive.supervisor_link import SupervisorLink
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Launcher, Supervisor
-from foretwin.orchestrator.runner.warm_fork import forked
+from foretwin.orchestrator.runner.warm_fork import ForkedProcess, forked
 
 log = logging.getLogger(ORCHESTRATOR)
 
 LOOK_S = 0.05
+FORK_AGAIN_S, WITHOUT_MEMORY_S = 0.5, 30.0
 EXIT_FAILED = 1
 
 
@@ -112,16 +114,32 @@ class Foreground:
             )
             return self._orchestrate(self._plan, link, life)
 
-        child = forked(work)
+        child = self._forked(work)
         log.info("forked the orchestrator as process %d", child.pid)
         there.close()
         line = OrchestratorLink(here)
         while (code := child.poll()) is None:
             select.select([line.fileno(), child.ended], [], [], LOOK_S)
-            self._serve(line)
+            with contextlib.suppress(MemoryError):  # it passes, and what was not heard waits
+                self._serve(line)
         self._serve(line)  # what it said last
         line.close()
         return code
+
+    def _forked(self, work: Callable[[], int]) -> ForkedProcess:
+        """Fork, where there is no memory for it now as soon as there is some.
+
+        Raises what forking does after a while, and where the drive shall end.
+        """
+        until_s = time.monotonic() + WITHOUT_MEMORY_S
+        while True:
+            try:
+                return forked(work)
+            except (OSError, MemoryError) as error:
+                log.warning("the orchestrator cannot be forked now: %s", error)
+                if self._interruption.asked or time.monotonic() > until_s:
+                    raise
+            select.select([], [], [], FORK_AGAIN_S)
 
     def _serve(self, line: OrchestratorLink) -> None:
         if self._interruption.asked:

@@ -97,6 +97,44 @@ def test_where_even_the_last_one_dies_it_is_said_what_to_do(tmp_path: Path) -> N
     )
 
 
+def test_a_machine_without_memory_for_a_moment_ends_no_drive(tmp_path: Path) -> None:
+    assert run(tmp_path, """
+        foreground.FORK_AGAIN_S = 0.01
+        really, hears = foreground.forked, foreground.OrchestratorLink.hear
+        no_fork, no_word = [MemoryError(), OSError(12, "no memory")], [MemoryError()] * 3
+        def forked(work):
+            if no_fork:
+                raise no_fork.pop()
+            return really(work)
+        def hear(self):
+            if no_word:
+                raise no_word.pop()
+            return hears(self)
+        foreground.forked, foreground.OrchestratorLink.hear = forked, hear
+        def orchestrate(plan, link, life):
+            if life.ended_by:
+                print(life.standing)
+                return 3
+            link.keep(b"far")
+            time.sleep(0.5)
+            die()
+        print(supervise(orchestrate), no_fork, no_word)
+    """) == ["b'far'", "3 [] []"]  # fmt: skip
+
+
+def test_where_there_is_no_memory_for_long_the_drive_ends_with_that(tmp_path: Path) -> None:
+    assert run(tmp_path, """
+        foreground.FORK_AGAIN_S, foreground.WITHOUT_MEMORY_S = 0.01, 0.05
+        def forked(work):
+            raise OSError(12, "no memory")
+        foreground.forked = forked
+        try:
+            supervise(lambda plan, link, life: 0)
+        except OSError as error:
+            print(error)
+    """) == ["[Errno 12] no memory"]  # fmt: skip
+
+
 def test_in_lock_step_all_is_played_again(tmp_path: Path) -> None:
     assert run(tmp_path, """
         config.lock_step = True
