@@ -21,7 +21,7 @@ from tests.chaos.faults import ENDERS, OUTSIDE, Fault
 from tests.chaos.host_clock import HostClock
 from tests.chaos.link import Link
 from tests.chaos.outsiders import Outsider
-from tests.chaos.run_processes import Member, members
+from tests.chaos.run_processes import Member, marked, members
 from tests.chaos.stranger import burst, guise, say_anything
 from tests.system.foretwin_command import is_running
 
@@ -94,7 +94,7 @@ class Injection:
                     if done.fault.what == "stop":
                         os.kill(done.member.pid, signal.SIGCONT)
                     else:
-                        resource.prlimit(done.member.pid, resource.RLIMIT_AS, (_FREE, _FREE))
+                        self._lift_limits()
             case "full":
                 self.disk.free()
             case "read_only":
@@ -172,6 +172,13 @@ class Injection:
             resource.prlimit(member.pid, resource.RLIMIT_AS, (most, _FREE))
             return True
         return False
+
+    def _lift_limits(self) -> None:
+        """Let all have memory again: who was started by one that had little has as little."""
+        pids = [*marked(self.mark), *(one.pid for one in self.outsiders if one.pid is not None)]
+        for pid in pids:
+            with contextlib.suppress(OSError, ValueError):
+                resource.prlimit(pid, resource.RLIMIT_AS, (_FREE, _FREE))
 
     def _tell_car(self, number: signal.Signals) -> bool:
         car = next((one for one in self.outsiders if one.name == "car"), None)
