@@ -115,7 +115,9 @@ class RecorderProcess:
         left = len(self._messages)
         self._messages.close()
         self._report_losses(at_the_end=True)
-        self._publish(self._recording.finish())
+        # Told to end by itself, another one goes on: in lock step nobody does.
+        last = self._lossless or self._life.run_ended
+        self._publish(self._recording.finish(last=last))
         log.info(
             "recorded %s; unwritten %s, refused %s, missing %d, dropped %d, unreadable %d, left %d",
             self._recording.tally.recorded,

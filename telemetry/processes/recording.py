@@ -131,12 +131,15 @@ class DriveRecording:
             events += self._open()
         return events
 
-    def finish(self) -> list[Event]:
-        """End the file; what could not be written by now is lost."""
+    def finish(self, *, last: bool = True) -> list[Event]:
+        """End the file; what could not be written by now is lost.
+
+        Where this recorder is not the `last`, it has not come: the next one asks for it.
+        """
         self._retry_s = 0.0
         events = self.flush()
         self._end_part()
-        while self._waiting:
+        while last and self._waiting:
             self._give_up(self._waiting.popleft())
         self._write_tally()
         return events

@@ -23,6 +23,11 @@ FOUND = {
         Fault(3.0, "stop", "vehicle", 2.6), Fault(5.7, "hup", "router"),
         Fault(9.0, "stop", "vehicle", 2.6), Fault(11.7, "kill", "router"),
     ),
+    # What waited for room in its memory was given up as unwritten.
+    "the recorder is ended while the disk is full": (
+        Fault(3.0, "full", "disk", 6.0), Fault(5.0, "term", "recorder"),
+        Fault(7.5, "term", "recorder"),
+    ),
     "everybody dies while the supervisor stands still": (
         Fault(2.0, "stop", "supervisor", 8.0), Fault(4.0, "kill", "router"),
         Fault(4.5, "kill", "orchestrator"), Fault(5.0, "segv", "recorder"),

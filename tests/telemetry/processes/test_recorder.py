@@ -89,6 +89,22 @@ def test_what_is_missing_is_asked_for_once_more(tmp_path: Path) -> None:
     process.finish()
 
 
+@pytest.mark.parametrize(("run_ended", "lossless"), [(True, False), (False, False), (False, True)])
+def test_who_is_ended_alone_leaves_what_waits_to_the_next_one(
+    tmp_path: Path, run_ended: bool, lossless: bool
+) -> None:
+    bus, disk = MemoryBus(), Disk(0)
+    recording = DriveRecording(tmp_path / "drive.mcap", open_part=disk.open_part)
+    process = recorder(bus, recording, lossless=lossless)
+    bus.publish("speed", SpeedSample(stamp_ns=START_NS, speed_mps=1.0), vehicle="car")
+    if run_ended:
+        bus.publish("run_end", RunEnd(stamp_ns=1), run="r1")
+    process.step()
+    process.finish()
+    lost = {"speed": 1} if run_ended or lossless else {}
+    assert recording.tally.unwritten == lost
+
+
 def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
     bus, path, questions = MemoryBus(), tmp_path / "drive.mcap", Mailbox(4)
     bus.serve("info", questions, vehicle="car")

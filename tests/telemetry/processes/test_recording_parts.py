@@ -65,3 +65,24 @@ def test_an_old_part_is_ended_however_small_it_is(tmp_path: Path) -> None:
         recording.flush()
     recording.finish()
     assert len(segments_of(path)) == 3
+
+
+def test_what_still_waits_when_another_one_goes_on_is_not_lost(tmp_path: Path) -> None:
+    path, disk = tmp_path / "drive.mcap", Disk(10**6)
+    recording = DriveRecording(path, open_part=disk.open_part)
+    for number in range(5):
+        recording.add("imu", imu(number), sender=7, seq=number)
+    recording.flush()
+    disk.room = 0
+    for number in range(5, 9):
+        recording.add("imu", imu(number), sender=7, seq=number)
+    recording.finish(last=False)
+    disk.room = 10**6
+    again = DriveRecording(path, open_part=disk.open_part)
+    assert (again.missing, again.tally.unwritten) == (4, {})
+    for number in range(9):  # it asks for all that is kept
+        again.add("imu", imu(number), sender=7, seq=number)
+    again.finish()
+    assert (again.missing, again.tally.recorded) == (0, {"imu": 9})
+    found = [message for part in segments_of(path) for _, message in read_drive(part)]
+    assert found == [imu(number) for number in range(9)]
