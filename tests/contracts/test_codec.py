@@ -13,12 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.codec import (
+    MOST_SENDER,
     SCHEMA_VERSION,
     SchemaMismatch,
     content_bytes,
     decode,
     encode,
+    header_of,
     read_message,
+    sender_of,
     write_message,
 )
 from foretwin.contracts.drive import GnssFix, PlannedTrajectory, SpeedSample
@@ -40,7 +43,6 @@ COVERS = (
     "foretwin.contracts.simulation",
     "foretwin.contracts.towards_vehicle",
     "foretwin.contracts.tuning",
-    "foretwin.contracts.world",
 )
 
 KINDS = {channel.kind for channel in CHANNELS.values()}
@@ -67,6 +69,17 @@ def test_every_message_survives_the_wire(kind: type, data: st.DataObject) -> Non
 
     assert same(envelope.message, message)
     assert (envelope.seq, envelope.sent_ns) == (7, -3)
+
+
+def test_a_sender_is_told_by_two_bytes_and_may_stay_untold() -> None:
+    fix = GnssFix(stamp_ns=1, position=GeoPoint(52.0, 13.0))
+    assert MOST_SENDER == 65_535
+    assert sender_of(encode(fix, sender=MOST_SENDER)) == MOST_SENDER
+    assert sender_of(encode(fix)) == 0
+    assert header_of(encode(fix), where="") == (0, 0)
+    with pytest.raises(struct.error):
+        encode(fix, sender=MOST_SENDER + 1)
+    assert sender_of(b"FTw1") == 0, "no header at all"
 
 
 def test_equal_messages_have_equal_content_whatever_their_header() -> None:

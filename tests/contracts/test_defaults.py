@@ -38,7 +38,6 @@ COVERS = (
     "foretwin.contracts.simulation",
     "foretwin.contracts.towards_vehicle",
     "foretwin.contracts.tuning",
-    "foretwin.contracts.world",
 )
 
 OSM = "© OpenStreetMap contributors"

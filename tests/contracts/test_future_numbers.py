@@ -42,6 +42,6 @@ def test_of_several_futures_each_has_an_index_of_its_own_and_numbers_that_there_
     plain = [Future(index=index, name=str(index)) for index in (0, 1, 2)]
     check_futures(plain)
     with pytest.raises(ValueError, match="two of index 1; each needs one of its own"):
-        check_futures([*plain, Future(index=1, name="again")])
+        check_futures([*plain, Future(index=2, name="c"), Future(index=1, name="b")])
     with pytest.raises(ValueError, match="future 'late': brake_gain reaches -1"):
         check_futures([*plain, Future(index=3, name="late", numbers={"brake_gain": -1.0})])

@@ -6,12 +6,14 @@ from collections import Counter
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 from foretwin.contracts.drive import SignalState, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint
 from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.rounds import runner
 from foretwin.orchestrator.rounds.jobs import _signals, planners_of, scenarios_of
 from foretwin.orchestrator.rounds.pace import Pace
 from foretwin.sim_worker.metrics.table import ROW_METRICS
@@ -110,3 +112,42 @@ def test_signals_count_as_long_as_they_are_fresh(age_s: float, fresh: bool) -> N
     of_now = light(now_ns)
     old = light(round(100e9) if age_s else now_ns)
     assert _signals((of_now, old), state) == ((of_now, old) if fresh else (of_now,))
+
+
+def test_where_a_round_runs_fewer_those_found_worst_are_among_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    house = House(tmp_path, futures=64, futures_per_job=32, least_futures=16)
+    house.drive(20)
+    assert house.conductor.start_round()
+    asked = [(worker, r) for worker in house.workers for r in worker.take()]
+    found = np.zeros(64, dtype=np.float32)
+    found[[50, 33, 41]] = 1.0, 0.31, 0.9
+    found[60] = 0.29
+    real = runner.round_view
+    monkeypatch.setattr(
+        runner,
+        "round_view",
+        lambda *given: msgspec.structs.replace(real(*given), criticality=found),
+    )
+    for worker, request in asked:
+        worker.answer_one(request)
+    house.settle()
+    played = [future for _, r in asked for future in r.message().decoded().futures]
+    turns = []
+    for _ in range(4):
+        monkeypatch.setattr(house.conductor.rounds.pace, "now", Pace(16))
+        assert house.conductor.start_round()
+        some = [(worker, r) for worker in house.workers for r in worker.take()]
+        turns.append([f.index for _, r in some for f in r.message().decoded().futures])
+        found = np.zeros(16, dtype=np.float32)
+        for place, index in enumerate(turns[-1]):
+            found[place] = {50: 1.0, 33: 0.31, 41: 0.9, 60: 0.29}.get(index, 0.0)
+        for worker, request in some:
+            worker.answer_one(request)
+        house.settle()
+    house.tables.close()
+
+    assert [future.index for future in played] == list(range(64))
+    assert all({0, 33, 41, 50} <= set(turn) for turn in turns)
+    assert not all(60 in turn for turn in turns)

@@ -108,6 +108,7 @@ def test_what_a_future_costs_is_measured_where_the_pace_has_changed() -> None:
     assert future_s(took(ALL, 0.3, 0.4)) == math.inf
     assert future_s(took(ALL, 0.5, 0.6) + took(HALF, 0.45, 0.44)) == pytest.approx(0.16 / 32)
     assert future_s(took(HALF, 0.3) + took(ALL, 0.4, 0.46)) == pytest.approx(0.16 / 32)
+    assert MEASURED_ROUNDS == 4
     old = took(ALL, 9.0) + took(ALL, *[0.6] * MEASURED_ROUNDS)
     later = took(HALF, *[0.5] * MEASURED_ROUNDS) + took(HALF, 0.1)
     assert future_s(old + later) == pytest.approx(0.1 / 32)

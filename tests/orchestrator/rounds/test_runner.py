@@ -11,7 +11,6 @@ import pytest
 
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.record import job_tables
-from foretwin.orchestrator.rounds import runner
 from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
@@ -70,45 +69,6 @@ def test_speed_of_simulation_is_known_of_each_worker(tmp_path: Path) -> None:
     house.tables.close()
 
     assert house.conductor.rounds.rtf == {"w0": pytest.approx(80.0), "w1": pytest.approx(80.0)}
-
-
-def test_where_a_round_runs_fewer_those_found_worst_are_among_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    house = House(tmp_path, futures=64, futures_per_job=32, least_futures=16)
-    house.drive(20)
-    assert house.conductor.start_round()
-    asked = [(worker, r) for worker in house.workers for r in worker.take()]
-    found = np.zeros(64, dtype=np.float32)
-    found[[50, 33, 41]] = 1.0, 0.31, 0.9
-    found[60] = 0.29
-    real = runner.round_view
-    monkeypatch.setattr(
-        runner,
-        "round_view",
-        lambda *given: msgspec.structs.replace(real(*given), criticality=found),
-    )
-    for worker, request in asked:
-        worker.answer_one(request)
-    house.settle()
-    played = [future for _, r in asked for future in r.message().decoded().futures]
-    turns = []
-    for _ in range(4):
-        monkeypatch.setattr(house.conductor.rounds.pace, "now", Pace(16))
-        assert house.conductor.start_round()
-        some = [(worker, r) for worker in house.workers for r in worker.take()]
-        turns.append([f.index for _, r in some for f in r.message().decoded().futures])
-        found = np.zeros(16, dtype=np.float32)
-        for place, index in enumerate(turns[-1]):
-            found[place] = {50: 1.0, 33: 0.31, 41: 0.9, 60: 0.29}.get(index, 0.0)
-        for worker, request in some:
-            worker.answer_one(request)
-        house.settle()
-    house.tables.close()
-
-    assert [future.index for future in played] == list(range(64))
-    assert all({0, 33, 41, 50} <= set(turn) for turn in turns)
-    assert not all(60 in turn for turn in turns)
 
 
 def test_late_rounds_make_the_next_ones_smaller_and_say_so(
@@ -190,13 +150,25 @@ def test_when_the_machine_keeps_up_again_that_is_said_too(
     assert house.conductor.rounds.short_of == ""
 
 
+def test_after_its_longest_horizon_a_round_is_compared(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.work()
+    house.drive(95)
+    assert house.watched("comparison") == []
+    house.drive(105)
+    assert {one.horizon_s for one in house.watched("comparison")} == {1.0, 2.0, 4.0, 8.0}
+    house.end()
+    assert house.watched("comparison") == [], "each once"
+
+
 def test_at_the_drives_end_what_it_has_covered_is_compared(tmp_path: Path) -> None:
     house = House(tmp_path)
     house.drive(20)
     assert house.conductor.start_round()
     house.work()
     house.drive(65)
-    assert house.watched("comparison") == []
     house.end()
 
     assert {one.horizon_s for one in house.watched("comparison")} == {1.0, 2.0, 4.0}

@@ -29,6 +29,7 @@ from tests.contracts.mirror_samples import mirror_sample
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
 from tests.telemetry.ros2.order_side import OrderSide
 
+COVERS = ("foretwin.telemetry.ros2.outwards",)
 S = 10**9
 CAR = load_vehicle(None)
 TEXT = """

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
+from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
-from tests.telemetry.ros2.gateway_ground import STEERING_KEY, steering
+from foretwin.telemetry.ros2.mapping import parse_mapping
+from foretwin.telemetry.ros2.outwards import Outwards
+from foretwin.telemetry.ros_messages.parts import ACKERMANN, CONTROL, ODOMETRY, typestore
+from tests.telemetry.ros2.gateway_ground import FRAME, STEERING_KEY, mapping_text, steering
 from tests.telemetry.ros2.test_gateway import Ground, S, state
 
-COVERS = ("foretwin.telemetry.ros2.outwards",)
 STATE_OUT = """
 [[out]]
 topic = "/foretwin/state"
@@ -75,3 +79,43 @@ def test_a_stamp_that_no_ros_time_holds_is_counted_and_survived() -> None:
     ground.bus.publish("state", state(5 * S), vehicle="ego")
     ground.step(20.0)
     assert len(ground.foreign.on("/foretwin/state")) == 1
+
+
+@pytest.mark.parametrize(
+    ("placed", "frame_id", "north_m"), [(True, "map", 0.0), (False, "foretwin_drive", -111.26)]
+)
+def test_a_state_lies_in_the_map_where_the_mapping_places_it_else_in_the_drives_plane(
+    placed: bool, frame_id: str, north_m: float
+) -> None:
+    """The drive's plane begins a thousandth of a degree north of the map."""
+    text = mapping_text(enabled=False)
+    mapping = parse_mapping(text, name="m.toml")
+    if not placed:
+        mapping = msgspec.structs.replace(mapping, map_place=None)
+    drive_frame = LocalFrame(GeoPoint(52.501, 13.4))
+    out = Outwards(mapping, drive_frame=drive_frame, vehicle_id="ego")
+    odometry = typestore().deserialize_cdr(out.state(state(5 * S)), ODOMETRY)
+    assert odometry.header.frame_id == frame_id
+    assert odometry.pose.pose.position.y == pytest.approx(north_m, abs=0.1)
+    clock = typestore().deserialize_cdr(out.clock(5 * S + 7), "rosgraph_msgs/msg/Clock")
+    assert (clock.clock.sec, clock.clock.nanosec) == (5, 7)
+
+
+@pytest.mark.parametrize("kind", [CONTROL, ACKERMANN])
+def test_a_command_goes_out_in_either_form(kind: str) -> None:
+    mapping = parse_mapping(mapping_text(enabled=True), name="m.toml")
+    out = Outwards(mapping, drive_frame=FRAME, vehicle_id="ego")
+    command = VehicleCommand(
+        stamp_ns=0, sent_mono_ns=1, tire_angle_rad=0.25, accel_mps2=-1.5, speed_mps=4.0
+    )
+    ros = typestore().deserialize_cdr(out.command(command, kind, stamp_ns=6 * S), kind)
+    if kind == CONTROL:
+        told = (
+            ros.lateral.steering_tire_angle, ros.longitudinal.acceleration,
+            ros.longitudinal.velocity, ros.stamp.sec,
+        )  # fmt: skip
+    else:
+        told = (
+            ros.drive.steering_angle, ros.drive.acceleration, ros.drive.speed, ros.header.stamp.sec,
+        )  # fmt: skip
+    assert told == (0.25, -1.5, 4.0, 6)
