@@ -35,7 +35,6 @@ from tests.contracts.messages import messages, same
 COVERS = (
     "foretwin.contracts.arrays",
     "foretwin.contracts.drive",
-    "foretwin.contracts.gap",
     "foretwin.contracts.planner_link",
     "foretwin.contracts.provenance",
     "foretwin.contracts.side_by_side",

@@ -33,7 +33,6 @@ from foretwin.contracts import (
 
 COVERS = (
     "foretwin.contracts.drive",
-    "foretwin.contracts.gap",
     "foretwin.contracts.process_setup",
     "foretwin.contracts.simulation",
     "foretwin.contracts.towards_vehicle",
