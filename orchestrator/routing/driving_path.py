@@ -35,7 +35,6 @@ from foretwin.orchestrator.routing.rounding import (
 )
 from foretwin.orchestrator.routing.route import Route, turn_angle
 from foretwin.world_gen.lanes.cross_section import cross_section
-from foretwin.world_gen.roads.road_graph import RoadGraph
 
 KERB_TURN_RADIUS_M = 10.5
 FAR_TURN_RADIUS_M = 9.5
@@ -68,7 +67,6 @@ class PathGeometry(NamedTuple):
 
 
 def driving_path(
-    graph: RoadGraph,
     route: Route,
     *,
     s_from_m: float,
@@ -89,14 +87,15 @@ def driving_path(
         )
     first, last = route.index_at(begin - _MARGIN_M), route.index_at(end + _MARGIN_M)
     line, s = clip(*_centre_line(route, first, last), (begin - _MARGIN_M, end + _MARGIN_M))
-    lanes = _LaneOffsets(graph, route, first, last)
-    centre, place = evenly_spaced(*fillet(line, s, _turn_radii(graph, line, lanes.at(s))))
+    radii_m = turn_radii(route.edges[first].edge.driving_side)
+    lanes = _LaneOffsets(route, first, last)
+    centre, place = evenly_spaced(*fillet(line, s, _turn_radii(radii_m, line, lanes.at(s))))
     centre = smoothed(centre, SMOOTHING_M)
     offset = _held_in_curves(lanes.smooth_at(place), centre)
     xy = drivable(smoothed(centre + offset[:, None] * normals(centre), 0.5 * SMOOTHING_M))
     if onto_lanes is not None:
         xy, place = evenly_spaced(onto_lanes(xy, place), place)
-        xy, place = with_driven_turns(xy, place, turn_radii(graph.driving_side))
+        xy, place = with_driven_turns(xy, place, radii_m)
         xy = drivable(smoothed(xy, 0.5 * SMOOTHING_M))
     return _resampled(route, xy, place, begin, end)
 
@@ -107,10 +106,10 @@ def turn_radii(driving_side: DrivingSide) -> tuple[float, float]:
     return radii if driving_side == "left" else radii[::-1]
 
 
-def _turn_radii(graph: RoadGraph, line: Array, offset: Array) -> Array:
+def _turn_radii(radii_m: tuple[float, float], line: Array, offset: Array) -> Array:
     """Return the radius of the road's line at each inner vertex, from that of the driven lane."""
     turn = turns(line)
-    lane_radius = np.where(turn > 0.0, *turn_radii(graph.driving_side))
+    lane_radius = np.where(turn > 0.0, *radii_m)
     radius = np.maximum(lane_radius + np.sign(turn) * offset[1:-1], 5.0)
     return np.asarray(np.where(np.abs(turn) < TURN_RAD, BEND_RADIUS_M, radius))
 
@@ -134,8 +133,8 @@ def _centre_line(route: Route, first: int, last: int) -> tuple[Array, Array]:
 class _LaneOffsets:
     """How far left of the road's line the driven lane lies along a stretch of route."""
 
-    def __init__(self, graph: RoadGraph, route: Route, first: int, last: int) -> None:
-        self._offset = np.array([_lane_offset(graph, route, n) for n in range(first, last + 1)])
+    def __init__(self, route: Route, first: int, last: int) -> None:
+        self._offset = np.array([_lane_offset(route, n) for n in range(first, last + 1)])
         self._start_m = route.start_m[first : last + 1]
 
     def at(self, s: Array) -> Array:
@@ -156,7 +155,7 @@ def _held_in_curves(offset: Array, centre: Array) -> Array:
     return np.asarray(np.where(inside > room, np.sign(curvature) * room, offset))
 
 
-def _lane_offset(graph: RoadGraph, route: Route, number: int) -> float:
+def _lane_offset(route: Route, number: int) -> float:
     """Return the driven lane's offset from the way's line, positive to the left.
 
     The lane is the middle one (of two, that nearer to the kerb), before a turn the one on the
@@ -166,11 +165,11 @@ def _lane_offset(graph: RoadGraph, route: Route, number: int) -> float:
     used = msgspec.structs.replace(
         edge, forward=edge.forward or not reverse, backward=edge.backward or reverse
     )
-    driven = cross_section(used, graph.driving_side).along(reverse=reverse).driven
+    driven = cross_section(used).along(reverse=reverse).driven
     own = [lane for lane in driven if lane.kind == "driving"] or driven
     turn = _next_turn(route, number)
     if turn == 0.0:
-        lane = own[(len(own) if graph.driving_side == "right" else len(own) - 1) // 2]
+        lane = own[(len(own) if edge.driving_side == "right" else len(own) - 1) // 2]
     else:
         lane = own[0 if turn > 0.0 else -1]
     return -lane.left_m if reverse else lane.left_m

@@ -108,7 +108,7 @@ class RoadLines:
         if key not in self._sides:
             while len(self._sides) >= _MOST_KNOWN:
                 del self._sides[next(iter(self._sides))]
-            self._sides[key] = _side_of(self._graph, directed)
+            self._sides[key] = _side_of(directed)
         return self._sides[key]
 
     def _another_road(self, others: Sequence[NearEdge], std_m: float, course_rad: float) -> bool:
@@ -142,9 +142,9 @@ def _straight(route: Route, place: int, s_m: float) -> float | None:
     return None if bend.size == 0 or bend.max() > _MOST_BEND_RAD else at
 
 
-def _side_of(graph: RoadGraph, directed: DirectedEdge) -> _LateralPosition:
+def _side_of(directed: DirectedEdge) -> _LateralPosition:
     """Return the middle of the lanes driven this way, any of which the car may be in."""
-    section = cross_section(directed.edge, graph.driving_side)
+    section = cross_section(directed.edge)
     lanes = section.along(reverse=directed.reverse).abreast
     lefts = np.array([lane.left_m for lane in lanes]) if lanes else np.zeros(1)
     if directed.reverse:

@@ -160,7 +160,6 @@ class WayAhead:
         route = self._follower.route
         guide = LaneGuide(self._lanes, route, car_s_m=self.s_m, car_xy_m=self._xy_m)
         geometry = driving_path(
-            self._graph,
             route,
             s_from_m=self.s_m - PATH_BEHIND_M,
             s_to_m=self.s_m + reach_m,

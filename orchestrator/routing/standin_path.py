@@ -44,7 +44,7 @@ class StandinPath:
 def standin_path(osm: OsmMap, graph: RoadGraph, route: Route) -> StandinPath:
     """Return the path along a route: limits, slow in bends, a halt at the stop signs on its way."""
     start_m, end_m = float(route.start_m[0]) + LEAD_M, route.end_m - LEAD_M
-    geometry = driving_path(graph, route, s_from_m=start_m, s_to_m=end_m)
+    geometry = driving_path(route, s_from_m=start_m, s_to_m=end_m)
     stops = [int(np.searchsorted(geometry.s_m, s_m)) for s_m in stop_signs(osm, route)]
     speed = speed_profile(
         geometry.xy_m,

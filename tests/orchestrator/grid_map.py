@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
@@ -49,6 +50,7 @@ def road(
         lanes_forward=Quantity(lanes[0], "tagged"),
         lanes_backward=Quantity(lanes[1], "tagged"),
         layer=0,
+        driving_side="right",
         tags={},
     )
 
@@ -56,6 +58,7 @@ def road(
 def graph_of(edges: list[RoadEdge], *, driving_side: DrivingSide = "right") -> RoadGraph:
     places: dict[int, tuple[float, float]] = {}
     leaving: dict[int, list[DirectedEdge]] = {}
+    edges = [msgspec.structs.replace(edge, driving_side=driving_side) for edge in edges]
     for edge in edges:
         places[edge.start_node] = (float(edge.xy_m[0, 0]), float(edge.xy_m[0, 1]))
         places[edge.end_node] = (float(edge.xy_m[-1, 0]), float(edge.xy_m[-1, 1]))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 
@@ -16,6 +17,7 @@ def road(
     forward: int = 1,
     backward: int = 1,
     road_class: str = "residential",
+    side: DrivingSide = "right",
 ) -> RoadEdge:
     """Return an edge of way 7 with so many lanes each way."""
     return RoadEdge(
@@ -35,5 +37,6 @@ def road(
         lanes_forward=Quantity(forward, "tagged"),
         lanes_backward=Quantity(backward, "tagged"),
         layer=0,
+        driving_side=side,
         tags=tags or {},
     )

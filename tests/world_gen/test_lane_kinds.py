@@ -15,7 +15,7 @@ COVERS = ("foretwin.world_gen.lanes.tram_tracks",)
 
 def _kinds(tags, *, forward=1, backward=1, side="right") -> list[str]:
     """Return kind and direction of lanes from left to right along the way."""
-    section = cross_section(road(tags, forward=forward, backward=backward), side)
+    section = cross_section(road(tags, forward=forward, backward=backward, side=side))
     return [f"{lane.kind}{'-' if lane.reverse else '+'}" for lane in section.lanes]
 
 
@@ -80,7 +80,7 @@ def test_kinds_of_lanes_where_traffic_keeps_left():
 
 
 def test_a_road_of_bus_lanes_alone_keeps_lanes_for_all():
-    section = cross_section(road({"bus:lanes": "designated"}, forward=1, backward=0), "right")
+    section = cross_section(road({"bus:lanes": "designated"}, forward=1, backward=0))
     assert [lane.kind for lane in section.lanes] == ["driving"]
     assert section.notes == ("way 7: no lane is left for cars; taken as for all",)
 
@@ -98,7 +98,7 @@ def test_a_road_of_bus_lanes_alone_keeps_lanes_for_all():
     ],
 )
 def test_widths_of_lanes_at_the_kerb(tags, width):
-    section = cross_section(road(tags), "right")
+    section = cross_section(road(tags))
     assert section.lanes[-1].width_m == width
     # Those for cars stay where they were.
     assert [lane.left_m for lane in section.lanes[:2]] == [1.5, -1.5]
@@ -106,10 +106,10 @@ def test_widths_of_lanes_at_the_kerb(tags, width):
 
 def test_changing_lanes():
     tags = {"change:lanes": "not_left|yes|only_left|no"}
-    lanes = cross_section(road(tags, forward=4, backward=0), "right").lanes
+    lanes = cross_section(road(tags, forward=4, backward=0)).lanes
     assert [lane.change for lane in lanes] == ["right", "both", "left", "none"]
     assert {lane.change_source for lane in lanes} == {"tagged"}
-    (plain,) = cross_section(road(forward=1, backward=0), "right").lanes
+    (plain,) = cross_section(road(forward=1, backward=0)).lanes
     assert (plain.change, plain.change_source) == ("both", "default")
 
 

@@ -17,7 +17,7 @@ from foretwin.world_gen.junctions.junction_arms import ArmChains, ClusterRoads, 
 from foretwin.world_gen.junctions.junction_clusters import cluster_branchings
 from foretwin.world_gen.junctions.junction_control import control_of
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.road_graph import RoadGraph, side_of
 
 STAGGER_M = 8.0
 """Opposite arms whose axes lie farther apart make a junction staggered."""
@@ -99,7 +99,7 @@ def _junction(
             lon=round(lon_deg, 7),
             arms=len(arms),
             control=control,
-            driving_side=graph.driving_side,
+            driving_side=side_of(leg.edge for item in arms for leg in item.arm.outward),
             osm_nodes=tuple(sorted(nodes)),
             name=_name(cluster, arms, around),
         ),

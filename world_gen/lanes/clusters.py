@@ -23,7 +23,7 @@ from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, side_of
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
@@ -97,11 +97,12 @@ def surroundings(
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
     shifts = transition_shifts(clusters, edges, sections)
     heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
+    side = made_for[0].summary.driving_side if made_for else side_of(edges.values())
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),
         extent=extent,
-        driving_side=graph.driving_side,
+        driving_side=side,
         edges=edges,
         sections=sections,
         clusters=clusters,
@@ -109,8 +110,19 @@ def surroundings(
         heads=heads,
         shifts_m=shifts,
         ring_edges=ring_edges,
-        notes=restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
+        notes=(
+            *restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
+            *_side_notes(edges, side),
+        ),
     )
+
+
+def _side_notes(edges: Mapping[int, RoadEdge], side: DrivingSide) -> list[str]:
+    """Name the ways that are driven on the other side than the World's junctions."""
+    others = {
+        edge.way_id: edge.driving_side for edge in edges.values() if edge.driving_side != side
+    }
+    return [f"way {way}: traffic keeps {its}, around it {side}" for way, its in others.items()]
 
 
 _WITHOUT_EFFECT_ON_LANES = frozenset(
@@ -129,15 +141,13 @@ def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, Cross
             and edge.start_node in index.junction_of_node
             and edge.end_node not in index.junction_of_node
         )
-        driven = (edge.forward, edge.backward, centre_reverse)
+        driven = (edge.forward, edge.backward, edge.driving_side, centre_reverse)
         way = (edge.way_id, *driven)
         if way not in known:
             tags = (kv for kv in edge.tags.items() if kv[0] not in _WITHOUT_EFFECT_ON_LANES)
             lanes = (edge.lanes_forward, edge.lanes_backward)
             alike = (edge.road_class, *driven, *lanes, frozenset(tags))
-            known[way] = known.get(alike) or cross_section(
-                edge, index.graph.driving_side, centre_reverse=centre_reverse
-            )
+            known[way] = known.get(alike) or cross_section(edge, centre_reverse=centre_reverse)
             if not known[way].notes:  # these name the way
                 known[alike] = known[way]
         found[i] = known[way]

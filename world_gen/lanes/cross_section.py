@@ -7,7 +7,6 @@ import re
 import msgspec
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import DrivingSide
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan, metres
 from foretwin.world_gen.lanes.lane_tags import (
     BUS_WIDTH_M,
@@ -25,9 +24,7 @@ TRANSITION = "transition"
 _PLACEMENT = re.compile(r"^(left_of|right_of|middle_of):(\d+)$")
 
 
-def cross_section(
-    edge: RoadEdge, driving_side: DrivingSide, *, centre_reverse: bool = False
-) -> CrossSection:
+def cross_section(edge: RoadEdge, *, centre_reverse: bool = False) -> CrossSection:
     """Return the lanes of a road by its tags, by its class where tags are missing.
 
     The way lies in the middle of the lanes that the map counts, unless `placement` is
@@ -37,17 +34,13 @@ def cross_section(
     notes: list[str] = []
     forward = _lane_count(edge.lanes_forward) if edge.forward else 0
     backward = _lane_count(edge.lanes_backward) if edge.backward else 0
-    ahead = lanes_of_direction(
-        edge, forward, driving_side, reverse=False, both=backward > 0, notes=notes
-    )
-    against = lanes_of_direction(
-        edge, backward, driving_side, reverse=True, both=forward > 0, notes=notes
-    )
-    centre = _centre(edge, driving_side, centre_reverse, notes) if ahead and against else []
+    ahead = lanes_of_direction(edge, forward, reverse=False, both=backward > 0, notes=notes)
+    against = lanes_of_direction(edge, backward, reverse=True, both=forward > 0, notes=notes)
+    centre = _centre(edge, centre_reverse, notes) if ahead and against else []
     with_bicycles = frozenset(p.reverse for p in (*ahead, *against) if p.kind == "bicycle")
-    beside = side_lanes(edge, driving_side, with_bicycles, BUS_WIDTH_M)
+    beside = side_lanes(edge, with_bicycles, BUS_WIDTH_M)
     first, last = against[::-1], ahead
-    if driving_side == "left":
+    if edge.driving_side == "left":
         first, last = last, first
     ordered = [*first, *centre, *last]
     ordered = _fit_total_width(edge, ordered)
@@ -70,9 +63,7 @@ def _width(lanes: list[LanePlan] | tuple[LanePlan, ...]) -> float:
     return sum(lane.width_m.value for lane in lanes)
 
 
-def _centre(
-    edge: RoadEdge, driving_side: DrivingSide, reverse: bool, notes: list[str]
-) -> list[LanePlan]:
+def _centre(edge: RoadEdge, reverse: bool, notes: list[str]) -> list[LanePlan]:
     """Return the lane in the middle from which both directions turn, where there is one."""
     if edge.tags.get("lanes:both_ways", "0") in ("0", "no"):
         return []
@@ -88,7 +79,7 @@ def _centre(
             number=-1,
             kind="driving",
             width_m=Quantity(known, "inferred"),
-            turns=("left",) if driving_side == "right" else ("right",),
+            turns=("left",) if edge.driving_side == "right" else ("right",),
             turns_source="tagged" if tagged else "inferred",
             counted=False,
         )

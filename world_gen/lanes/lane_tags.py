@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from foretwin.contracts.provenance import Provenance, Quantity
-from foretwin.contracts.world import DrivingSide, LaneChange, LaneKind, Turn
+from foretwin.contracts.world import LaneChange, LaneKind, Turn
 from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
 from foretwin.world_gen.roads.road_classes import road_class
@@ -84,7 +84,6 @@ class Direction:
 def lanes_of_direction(
     edge: RoadEdge,
     count: int,
-    driving_side: DrivingSide,
     *,
     reverse: bool,
     both: bool,
@@ -102,7 +101,7 @@ def lanes_of_direction(
     turns = tags.fitted("turn:lanes", default=tags.text("turn"))
     widths = tags.fitted("width:lanes")
     changes = tags.fitted("change:lanes", default=tags.text("change"))
-    kinds = _kinds(tags, driving_side)
+    kinds = _kinds(tags)
     tagged = "oneway" in edge.tags or "junction" in edge.tags
     source: Provenance = "tagged" if tagged else "inferred"
     letter = "b" if reverse else "f"
@@ -142,7 +141,7 @@ def lanes_of_direction(
     return lanes
 
 
-def _kinds(tags: Direction, driving_side: DrivingSide) -> list[LaneKind]:
+def _kinds(tags: Direction) -> list[LaneKind]:
     """Return what each counted lane is for."""
     count, bicycle = tags.count, tags.bicycle
     kinds: list[LaneKind] = ["driving"] * count
@@ -154,22 +153,24 @@ def _kinds(tags: Direction, driving_side: DrivingSide) -> list[LaneKind]:
         elif barred[i] == "no" and len(bicycle) == count and bicycle[i] in _ALLOWED:
             kinds[i] = "bicycle"
     if "bus" not in kinds and not any(bus):
-        outermost = min(_outer_bus_lanes(tags, driving_side), count - 1)
+        outermost = min(_outer_bus_lanes(tags), count - 1)
         for k in range(outermost):
-            kinds[count - 1 - k if driving_side == "right" else k] = "bus"
+            kinds[count - 1 - k if tags.edge.driving_side == "right" else k] = "bus"
     if "driving" not in kinds and "busway" not in tags.edge.road_class:
         tags.notes.append(f"way {tags.edge.way_id}: no lane is left for cars; taken as for all")
         return ["driving"] * count
     return kinds
 
 
-def _outer_bus_lanes(tags: Direction, driving_side: DrivingSide) -> int:
+def _outer_bus_lanes(tags: Direction) -> int:
     """Return how many lanes at the kerb are for buses, from tags that only count them."""
     for key in ("lanes:bus", "lanes:psv"):
         text = tags.text(key)
         if text and text.isdigit():
             return int(text)
-    kerb = driving_side if not tags.reverse else ("left" if driving_side == "right" else "right")
+    kerb: str = tags.edge.driving_side
+    if tags.reverse:
+        kerb = "left" if kerb == "right" else "right"
     return int(of_side(tags.edge.tags, "busway", kerb) == "lane")
 
 

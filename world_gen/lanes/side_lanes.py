@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import DrivingSide, LaneKind
+from foretwin.contracts.world import LaneKind
 from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
@@ -36,26 +36,20 @@ _NUMBERS: Mapping[tuple[LaneKind, str], int] = {
 _KEYS = ("cycleway", "parking:", "busway")
 
 
-def side_lanes(
-    edge: RoadEdge, driving_side: DrivingSide, with_bicycles: frozenset[bool], bus_width_m: float
-) -> SideLanes:
+def side_lanes(edge: RoadEdge, with_bicycles: frozenset[bool], bus_width_m: float) -> SideLanes:
     """Return the lanes at the kerbs; `with_bicycles` names directions that have theirs already."""
     if not any(key.startswith(_KEYS) for key in edge.tags):
         return SideLanes((), ())
-    given = (driving_side, with_bicycles, bus_width_m)
-    return SideLanes(*(tuple(_of_side(edge, side, *given)) for side in ("left", "right")))
+    left, right = (_of_side(edge, side, with_bicycles, bus_width_m) for side in ("left", "right"))
+    return SideLanes(tuple(left), tuple(right))
 
 
 def _of_side(
-    edge: RoadEdge,
-    side: str,
-    driving_side: DrivingSide,
-    with_bicycles: frozenset[bool],
-    bus_width_m: float,
+    edge: RoadEdge, side: str, with_bicycles: frozenset[bool], bus_width_m: float
 ) -> list[LanePlan]:
     tags = edge.tags
     one_way = edge.one_way
-    kerb_of_forward = side == driving_side
+    kerb_of_forward = side == edge.driving_side
     # Along a one-way street both kerbs belong to its direction.
     reverse = edge.backward if one_way else not kerb_of_forward
     found: list[LanePlan] = []

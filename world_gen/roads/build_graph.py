@@ -13,9 +13,10 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.osm.driving_side import driving_side
+from foretwin.contracts.world import DrivingSide
+from foretwin.world_gen.osm.driving_side import driving_sides
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph, side_of
 from foretwin.world_gen.roads.road_tags import (
     Directions,
     LaneCounts,
@@ -48,7 +49,8 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     ids, row, uses = np.unique(flat, return_inverse=True, return_counts=True)
     lat_lon = osm.locations.of(ids)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
-    edges = _edges(kept, flat.tolist(), xy_m[row], uses[row] > 1)
+    sides = _sides(kept, lat_lon[row], xy_m[row])
+    edges = _edges(kept, sides, flat.tolist(), xy_m[row], uses[row] > 1)
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
     nodes = {node for edge in edges for node in (edge.start_node, edge.end_node)}
     leaving: dict[int, list[DirectedEdge]] = {node: [] for node in sorted(nodes)}
@@ -57,7 +59,7 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
         leaving[edge.end_node].append(DirectedEdge(edge, True))
     return RoadGraph(
         frame=osm.frame,
-        driving_side=driving_side(osm),
+        driving_side=side_of(edge for edge in edges if edge.car),
         edges=tuple(edges),
         node_xy_m={node: (at[node][0], at[node][1]) for node in leaving},
         leaving={node: tuple(directed) for node, directed in leaving.items()},
@@ -68,6 +70,18 @@ def _without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
     if not any(map(operator.eq, nodes, nodes[1:])):
         return nodes
     return nodes[:1] + tuple(b for a, b in pairwise(nodes) if a != b)
+
+
+def _sides(
+    ways: list[tuple[OsmWay, tuple[int, ...]]], lat_lon_deg: Array, points: Array
+) -> tuple[DrivingSide, ...]:
+    """Return on which side each way is driven; its points stand one after the other."""
+    if not ways:
+        return ()
+    first = np.cumsum([0, *(len(path) for _, path in ways)])
+    arc_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    begin, length_m = first[:-1], arc_m[first[1:] - 1] - arc_m[first[:-1]]
+    return driving_sides([way.tags for way, _ in ways], lat_lon_deg[begin], length_m)
 
 
 class _Meaning(NamedTuple):
@@ -89,6 +103,7 @@ def _meaning(items: frozenset[tuple[str, str]]) -> _Meaning:
 
 def _edges(
     ways: list[tuple[OsmWay, tuple[int, ...]]],
+    sides: tuple[DrivingSide, ...],
     nodes: list[int],
     points: Array,
     shared: npt.NDArray[np.bool_],
@@ -130,6 +145,7 @@ def _edges(
                     lanes_forward=means.lanes.forward,
                     lanes_backward=means.lanes.backward,
                     layer=means.layer,
+                    driving_side=sides[i],
                     tags=tags,
                 )
             )

@@ -37,6 +37,7 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     lanes_forward: Quantity
     lanes_backward: Quantity
     layer: int
+    driving_side: DrivingSide
     tags: Mapping[str, str]
 
     @property
@@ -102,6 +103,7 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
 
     frame: LocalFrame
     driving_side: DrivingSide
+    """That of most roads for cars; each road has its own."""
     edges: tuple[RoadEdge, ...]
     node_xy_m: Mapping[int, tuple[float, float]]
     leaving: Mapping[int, tuple[DirectedEdge, ...]]
@@ -116,3 +118,9 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     def at_node(self, node: int) -> tuple[DirectedEdge, ...]:
         """Return the directed edges that start at `node`, allowed or not."""
         return self.leaving.get(node, ())
+
+
+def side_of(edges: Iterable[RoadEdge]) -> DrivingSide:
+    """Return the side on which most metres of some roads are driven; right where none are."""
+    right_m = sum([edge.length_m * (1 if edge.driving_side == "right" else -1) for edge in edges])
+    return "right" if right_m >= 0.0 else "left"

@@ -39,7 +39,7 @@ def scene(data_dir: Path) -> Scene:
     drive = berlin(data_dir)
     (route,) = match_line(drive.graph, drive.lat_lon_deg[: drive.until(262.0)]).routes
     route = extend_most_probable(drive.graph, route, until_m=route.end_m + 200.0)
-    geometry = driving_path(drive.graph, route, s_from_m=0.0, s_to_m=route.end_m)
+    geometry = driving_path(route, s_from_m=0.0, s_to_m=route.end_m)
     path = FrenetPath(geometry.xy_m, geometry.speed_limit_mps)
     count = drive.until(263.0)
     arc, offset = np.zeros(count), np.zeros(count)

@@ -32,7 +32,7 @@ def curvature(path: PathGeometry) -> np.ndarray:
 
 def whole(graph: RoadGraph, route: Route | None = None) -> PathGeometry:
     route = route or route_over(graph)
-    return driving_path(graph, route, s_from_m=0.0, s_to_m=route.end_m)
+    return driving_path(route, s_from_m=0.0, s_to_m=route.end_m)
 
 
 def straight(lanes: tuple[float, float], *, two_way: bool = True) -> RoadEdge:
@@ -59,7 +59,7 @@ def test_on_a_straight_road_the_path_lies_in_its_lane(lanes, two_way, side, offs
 
 def test_points_are_a_metre_apart_and_begin_where_asked() -> None:
     graph = graph_of([straight((1, 1))])
-    path = driving_path(graph, route_over(graph), s_from_m=40.0, s_to_m=120.0)
+    path = driving_path(route_over(graph), s_from_m=40.0, s_to_m=120.0)
 
     assert path.xy_m[0] == pytest.approx([40.0, -1.5])
     assert path.xy_m[-1] == pytest.approx([120.0, -1.5])
@@ -138,8 +138,8 @@ def test_the_same_place_is_the_same_whatever_window_it_is_asked_in() -> None:
     town = grid(4, 3)
     edges = tuple(DirectedEdge(town.edges[index], False) for index in (0, 1, 13, 14))
     route = Route(edges)
-    wide = driving_path(town, route, s_from_m=0.0, s_to_m=400.0)
-    narrow = driving_path(town, route, s_from_m=150.0, s_to_m=260.0)
+    wide = driving_path(route, s_from_m=0.0, s_to_m=400.0)
+    narrow = driving_path(route, s_from_m=150.0, s_to_m=260.0)
     again = np.stack([np.interp(narrow.s_m, wide.s_m, wide.xy_m[:, k]) for k in (0, 1)], axis=-1)
 
     assert np.abs(again - narrow.xy_m).max() < 0.1
@@ -177,4 +177,4 @@ def test_a_stretch_off_the_route_is_refused() -> None:
     graph = graph_of([straight((1, 1))])
 
     with pytest.raises(ValueError, match=r"route runs from 0.0 m to 300.0 m"):
-        driving_path(graph, route_over(graph), s_from_m=400.0, s_to_m=500.0)
+        driving_path(route_over(graph), s_from_m=400.0, s_to_m=500.0)

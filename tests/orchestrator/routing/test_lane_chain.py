@@ -58,7 +58,6 @@ class Town:
         lanes = WorldLanes(self.world, self.graph.frame)
         guide = LaneGuide(lanes, self.route, car_s_m=s_m, car_xy_m=xy)
         self.path = driving_path(
-            self.graph,
             self.route,
             s_from_m=s_m - 10.0,
             s_to_m=self.route.end_m,
@@ -182,8 +181,8 @@ def test_a_route_that_no_lane_follows_keeps_its_path() -> None:
     guide = LaneGuide(
         WorldLanes(world, graph.frame), route, car_s_m=50.0, car_xy_m=np.array([50.0, 0.0])
     )
-    led = driving_path(graph, route, s_from_m=40.0, s_to_m=200.0, onto_lanes=guide.onto_lanes)
-    plain = driving_path(graph, route, s_from_m=40.0, s_to_m=200.0)
+    led = driving_path(route, s_from_m=40.0, s_to_m=200.0, onto_lanes=guide.onto_lanes)
+    plain = driving_path(route, s_from_m=40.0, s_to_m=200.0)
 
     assert guide.runs == ()
     assert guide.without_lanes(led.s_m).all()

@@ -19,38 +19,38 @@ COVERS = (
 
 
 def test_two_way_road_keeps_right_around_its_way():
-    section = cross_section(_road(), "right")
+    section = cross_section(_road())
     assert [(lane.reverse, lane.left_m) for lane in section.lanes] == [(True, 1.5), (False, -1.5)]
     assert (section.left_m, section.right_m) == (3.0, -3.0)
 
 
 def test_two_way_road_keeps_left_around_its_way():
-    section = cross_section(_road(), "left")
+    section = cross_section(_road(side="left"))
     assert [(lane.reverse, lane.left_m) for lane in section.lanes] == [(False, 1.5), (True, -1.5)]
 
 
 def test_lanes_are_numbered_from_the_left_as_their_driver_sees_them():
-    section = cross_section(_road(forward=2, backward=2), "right")
+    section = cross_section(_road(forward=2, backward=2))
     assert [lane.left_m for lane in section.along(reverse=False).driven] == [-1.5, -4.5]
     assert [lane.left_m for lane in section.along(reverse=True).driven] == [1.5, 4.5]
-    section = cross_section(_road(forward=2, backward=2), "left")
+    section = cross_section(_road(forward=2, backward=2, side="left"))
     assert [lane.left_m for lane in section.along(reverse=False).driven] == [4.5, 1.5]
     assert [lane.left_m for lane in section.along(reverse=True).driven] == [-4.5, -1.5]
 
 
 def test_widths_are_tagged_or_inferred_or_default():
-    lanes = cross_section(_road({"width:lanes": "3.1|2.7"}, forward=2, backward=0), "right").lanes
+    lanes = cross_section(_road({"width:lanes": "3.1|2.7"}, forward=2, backward=0)).lanes
     assert [lane.width_m for lane in lanes] == [Quantity(3.1, "tagged"), Quantity(2.7, "tagged")]
-    assert cross_section(_road(), "right").lanes[0].width_m == Quantity(3.0, "inferred")
-    odd = cross_section(_road(road_class="corridor"), "right")
+    assert cross_section(_road()).lanes[0].width_m == Quantity(3.0, "inferred")
+    odd = cross_section(_road(road_class="corridor"))
     assert odd.lanes[0].width_m.source == "default"
-    narrow = cross_section(_road({"width": "5 m"}), "right")
+    narrow = cross_section(_road({"width": "5 m"}))
     assert [lane.width_m for lane in narrow.lanes] == [Quantity(2.5, "inferred")] * 2
 
 
 def test_turn_lanes_of_one_direction():
     tags = {"turn:lanes:forward": "left|through;right|none", "turn:backward": "slight_right"}
-    section = cross_section(_road(tags, forward=3, backward=1), "right")
+    section = cross_section(_road(tags, forward=3, backward=1))
     ahead = section.along(reverse=False).driven
     assert [lane.turns for lane in ahead] == [("left",), ("straight", "right"), ()]
     assert [lane.turns_source for lane in ahead] == ["tagged", "tagged", "inferred"]
@@ -59,19 +59,19 @@ def test_turn_lanes_of_one_direction():
 
 def test_bicycle_lanes_take_no_part_in_the_count():
     tags = {"bicycle:lanes": "|designated|", "turn:lanes": "left|through|right"}
-    lanes = cross_section(_road(tags, forward=2, backward=0), "right").along(reverse=False).driven
+    lanes = cross_section(_road(tags, forward=2, backward=0)).along(reverse=False).driven
     assert [lane.turns for lane in lanes] == [("left",), ("right",)]
 
 
 def test_turn_lanes_that_do_not_fit_are_named_and_ignored():
-    section = cross_section(_road({"turn:lanes": "left|right"}, forward=3, backward=0), "right")
+    section = cross_section(_road({"turn:lanes": "left|right"}, forward=3, backward=0))
     assert section.notes == ("way 7: turn:lanes has 2 entries for 3 lanes",)
     assert all(lane.turns_source == "inferred" for lane in section.lanes)
 
 
 def test_bus_lane():
     lanes = (
-        cross_section(_road({"bus:lanes": "yes|designated"}, forward=2, backward=0), "right")
+        cross_section(_road({"bus:lanes": "yes|designated"}, forward=2, backward=0))
         .along(reverse=False)
         .driven
     )
@@ -82,12 +82,12 @@ def test_bus_lane():
     ("placement", "left_edge_m"), [("middle_of:1", 1.5), ("right_of:1", 3.0), ("left_of:1", 0.0)]
 )
 def test_placement_moves_the_carriageway(placement, left_edge_m):
-    section = cross_section(_road({"placement": placement}, forward=2, backward=0), "right")
+    section = cross_section(_road({"placement": placement}, forward=2, backward=0))
     assert section.left_m == pytest.approx(left_edge_m)
 
 
 def test_placement_against_the_way():
-    section = cross_section(_road({"placement:backward": "right_of:1"}, backward=2), "right")
+    section = cross_section(_road({"placement:backward": "right_of:1"}, backward=2))
     # From the left: backward 2, backward 1, forward. The way lies right of backward 1 as its
     # driver sees it, which is left of it along the way.
     assert section.left_m == pytest.approx(3.0)
@@ -103,7 +103,7 @@ def test_lanes_lie_side_by_side_and_fill_the_carriageway(forward, backward, side
     if forward + backward == 0:
         return
     tags = {"width": width} if width else {}
-    section = cross_section(_road(tags, forward=forward, backward=backward), side)
+    section = cross_section(_road(tags, forward=forward, backward=backward, side=side))
     assert len(section.lanes) == forward + backward
     edge = section.left_m
     for lane in section.lanes:
@@ -126,5 +126,5 @@ def test_metres(text, value):
 )
 def test_a_cycle_track_against_a_one_way_street_is_no_lane_of_it(word, kinds):
     tags = {"oneway": "yes", "cycleway:left": word, "cycleway:left:oneway": "-1"}
-    lanes = cross_section(_road(tags, backward=0), "right").lanes
+    lanes = cross_section(_road(tags, backward=0)).lanes
     assert sorted(lane.kind for lane in lanes) == kinds

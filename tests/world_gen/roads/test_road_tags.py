@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.osm.driving_side import side_at
 from foretwin.world_gen.roads.road_tags import (
     directions,
     lane_counts,
@@ -13,8 +12,6 @@ from foretwin.world_gen.roads.road_tags import (
     road_layer,
     speed_limit,
 )
-
-COVERS = ("foretwin.world_gen.osm.driving_side",)
 
 
 @pytest.mark.parametrize(
@@ -97,57 +94,3 @@ def test_layers() -> None:
     assert road_layer({"bridge": "yes"}) == 1
     assert road_layer({"tunnel": "yes"}) == -1
     assert road_layer({"tunnel": "building_passage", "layer": "ground"}) == 0
-
-
-@pytest.mark.parametrize(
-    ("place", "lat", "lon", "side"),
-    [
-        ("Manchester", 53.45, -2.3, "left"),
-        ("Dublin", 53.35, -6.26, "left"),
-        ("Dover", 51.13, 1.31, "left"),
-        ("Calais", 50.95, 1.86, "right"),
-        ("Jersey", 49.2, -2.1, "left"),
-        ("Cherbourg", 49.63, -1.6, "right"),
-        ("Tokyo", 35.7, 139.7, "left"),
-        ("Naha", 26.2, 127.7, "left"),
-        ("Seoul", 37.6, 127.0, "right"),
-        ("Busan", 35.1, 129.0, "right"),
-        ("Sydney", -33.9, 151.2, "left"),
-        ("Auckland", -36.8, 174.8, "left"),
-        ("Delhi", 28.6, 77.2, "left"),
-        ("Karachi", 24.9, 67.0, "left"),
-        ("Kabul", 34.5, 69.2, "right"),
-        ("Dhaka", 23.8, 90.4, "left"),
-        ("Kathmandu", 27.7, 85.3, "left"),
-        ("Colombo", 6.9, 79.9, "left"),
-        ("Bangkok", 13.75, 100.5, "left"),
-        ("Phnom Penh", 11.6, 104.9, "right"),
-        ("Yangon", 16.8, 96.2, "right"),
-        ("Singapore", 1.35, 103.8, "left"),
-        ("Jakarta", -6.2, 106.8, "left"),
-        ("Manila", 14.6, 121.0, "right"),
-        ("Hong Kong", 22.3, 114.2, "left"),
-        ("Shenzhen", 22.6, 114.1, "right"),
-        ("Johannesburg", -26.2, 28.0, "left"),
-        ("Windhoek", -22.6, 17.1, "left"),
-        ("Nairobi", -1.3, 36.8, "left"),
-        ("Kampala", 0.3, 32.6, "left"),
-        ("Addis Ababa", 9.0, 38.7, "right"),
-        ("Kinshasa", -4.3, 15.3, "right"),
-        ("Luanda", -8.8, 13.2, "right"),
-        ("Antananarivo", -18.9, 47.5, "right"),
-        ("Kingston", 18.0, -76.8, "left"),
-        ("Havana", 23.1, -82.4, "right"),
-        ("Port-au-Prince", 18.5, -72.3, "right"),
-        ("Valletta", 35.9, 14.5, "left"),
-        ("Nicosia", 35.2, 33.4, "left"),
-        ("Berlin", 52.5, 13.4, "right"),
-        ("Paris", 48.9, 2.35, "right"),
-        ("San Francisco", 37.8, -122.4, "right"),
-        ("Toronto", 43.7, -79.4, "right"),
-        ("Oslo", 59.9, 10.7, "right"),
-        ("Brest", 48.4, -4.5, "right"),
-    ],
-)
-def test_side_of_the_road(place: str, lat: float, lon: float, side: str) -> None:
-    assert side_at(lat, lon) == side, place
