@@ -12,6 +12,7 @@ from foretwin.contracts.keys import alive_key
 from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.simulation import RunEnd
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.handing_over import HandingOver
 from foretwin.orchestrator.drive.in_charge import InCharge
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.drive.joining import Joining
@@ -24,7 +25,7 @@ from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
 from foretwin.orchestrator.drive.record_keeper import RecordKeeper
 from foretwin.orchestrator.drive.router_start import join_bus
 from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record
-from foretwin.orchestrator.drive.standing import go_on, read_standing, standing_of
+from foretwin.orchestrator.drive.standing import go_on, read_standing
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.drive.supervision import CRASH, DriveError, DriveProcesses, Life
@@ -78,8 +79,7 @@ class Orchestrator:
         self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
         self._failed_at_end = False
         self._before = read_standing(life.standing)
-        self._loop: LiveLoop | None = None
-        self._handed_over: object = None
+        self._standing: HandingOver
         self._mission = Mission(
             WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
             MissionSettings(
@@ -101,6 +101,7 @@ class Orchestrator:
                 plan.folder / RESULTS, plan.origin, lossless=plan.config.lock_step, keep=plan.keep
             )
             conductor = Conductor(plan, bus, self._mission, tables)
+            self._standing = HandingOver(conductor, self._watch, keep=self._processes.keep)
             exit_word = "failed"
             with ProgressLine(conductor, self._mission) as line:
                 conductor.events.on_event = line.tell
@@ -122,10 +123,12 @@ class Orchestrator:
     def _may_be_followed(self, error: Exception) -> bool:
         """Whether another orchestrator may do better; what is true for each ends the drive."""
         told = isinstance(error, (DriveError, LockStepError))
-        return not (told or self._life.last or self._loop is None) and self._processes.start_again
+        return not (told or self._life.last or self._standing.loop is None) and (
+            self._processes.start_again
+        )
 
     def _leave_to_next(self, conductor: Conductor) -> None:
-        self._hand_over(conductor)
+        self._standing.all()
         conductor.route.close()
         conductor.beside.close()
         conductor.tables.leave()
@@ -176,9 +179,9 @@ class Orchestrator:
 
             def each_turn() -> None:
                 say_in_charge()
-                self._hand_over_news(conductor)
+                self._standing.news()
 
-            loop = self._loop = LiveLoop(
+            loop = self._standing.loop = LiveLoop(
                 conductor,
                 housekeeping=housekeeping,
                 stop=self._stop,
@@ -227,23 +230,6 @@ class Orchestrator:
             stays = "nothing goes towards the vehicle any more: that does not resume by itself"
             conductor.tell(Notice("warning", stays))
 
-    def _hand_over_news(self, conductor: Conductor) -> None:
-        """Hand over where the drive stands, where a round or job has begun or ended since."""
-        rounds = conductor.rounds
-        jobs, tally = rounds.dispatcher.dispatch.count, rounds.tally
-        news = tally.due, tally.ended, jobs.given, jobs.results, jobs.refused, jobs.lost
-        if news != self._handed_over:
-            self._handed_over = news
-            self._hand_over(conductor)
-
-    def _hand_over(self, conductor: Conductor, *, exit_word: str = "") -> None:
-        """Let the supervisor have what the next one goes on from; lock step begins anew."""
-        if not self._plan.config.lock_step:
-            grid = None if self._loop is None else self._loop.grid
-            self._processes.keep(
-                standing_of(conductor, self._watch, grid=grid, exit_word=exit_word)
-            )
-
     def _keeper(self, conductor: Conductor) -> RecordKeeper:
         return RecordKeeper(conductor, self._processes, self._watch, self._life)
 
@@ -265,7 +251,7 @@ class Orchestrator:
     ) -> bool:
         """End everything and say how it went; returns whether nothing of the run is lost."""
         plan = self._plan
-        self._hand_over(conductor, exit_word=exit_word)
+        self._standing.all(exit_word=exit_word)
         self._meter.write()  # what follows is no part of the drive
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)

@@ -71,7 +71,8 @@ class DriveStanding:
     info: VehicleInfo
     place: PlaceOnRoute
     rounds: RoundsStanding
-    heard: HeardStanding
+    heard: bytes
+    """A HeardStanding, of this moment or of one a little before."""
     roles: dict[str, Role]
     correction: Correction
     parameters: ParametersStanding
@@ -85,8 +86,28 @@ class DriveStanding:
     given_up: set[str]
 
 
+def heard_of(conductor: Conductor) -> bytes:
+    """Return what a drive has heard, for `standing_of`: the estimator is by far the most of it."""
+    intake = conductor.intake
+    return pickle.dumps(
+        HeardStanding(
+            samples=intake.counts,
+            skipped=intake.refused,
+            estimator=intake.estimator,
+            refusals=conductor.refusals.counted,
+            strangers=conductor.strangers.count,
+            mailbox_dropped=conductor.mailbox.dropped,
+        )
+    )
+
+
 def standing_of(
-    conductor: Conductor, watch: ProcessWatch, *, grid: RoundGrid | None, exit_word: str = ""
+    conductor: Conductor,
+    watch: ProcessWatch,
+    *,
+    grid: RoundGrid | None,
+    heard: bytes,
+    exit_word: str = "",
 ) -> bytes:
     """Return where a drive stands; empty before the vehicle has said what it is."""
     intake, rounds = conductor.intake, conductor.rounds
@@ -109,14 +130,7 @@ def standing_of(
                 failed_jobs=rounds.failed_jobs,
                 off_lanes_rounds=rounds.futures.off_lanes_rounds,
             ),
-            heard=HeardStanding(
-                samples=intake.counts,
-                skipped=intake.refused,
-                estimator=intake.estimator,
-                refusals=conductor.refusals.counted,
-                strangers=conductor.strangers.count,
-                mailbox_dropped=conductor.mailbox.dropped,
-            ),
+            heard=heard,
             roles=conductor.roles.roles,
             correction=conductor.roles.correction,
             parameters=conductor.tuning.parameters.standing,
@@ -140,6 +154,12 @@ def read_standing(data: bytes) -> DriveStanding | None:
     return standing
 
 
+def heard_in(standing: DriveStanding) -> HeardStanding:
+    """Return what an orchestrator had heard of this drive."""
+    heard: HeardStanding = pickle.loads(standing.heard)  # written as the rest
+    return heard
+
+
 def go_on(
     conductor: Conductor,
     watch: ProcessWatch,
@@ -156,7 +176,7 @@ def go_on(
     _go_on_with_rounds(conductor, standing.rounds, results)
     conductor.mission.visits.go_on(visited_junctions(results))
     conductor.mission.way.go_on(standing.place)
-    heard, intake = standing.heard, conductor.intake
+    heard, intake = heard_in(standing), conductor.intake
     intake.counts, intake.refused = heard.samples, heard.skipped
     if heard.estimator is not None and not crashed:
         intake.go_on(heard.estimator)

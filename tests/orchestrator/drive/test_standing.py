@@ -13,7 +13,7 @@ from foretwin.contracts.drive import VehicleStatus
 from foretwin.orchestrator.drive.live_loop import RoundGrid
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.run_record import run_record
-from foretwin.orchestrator.drive.standing import go_on, read_standing, standing_of
+from foretwin.orchestrator.drive.standing import go_on, heard_of, read_standing, standing_of
 from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.runner.supervisor import Supervisor
 from tests.orchestrator.drive.test_side_by_side_handler import plan_of
@@ -50,7 +50,7 @@ def killed(folder: Path, *, open_round: bool = True, crashed: bool = False) -> T
     watched = watch()
     watched.troubles.append("w1 ended")
     watched.given_up.add("w1")
-    left = standing_of(first.conductor, watched, grid=GRID)
+    left = standing_of(first.conductor, watched, grid=GRID, heard=heard_of(first.conductor))
     first.tables.leave()
     second = House(folder, at_once=True, plan=first.plan)
     standing = read_standing(left)
@@ -69,7 +69,7 @@ def twice(tmp_path: Path) -> Twice:
 def test_nothing_is_handed_over_before_the_vehicle_has_said_what_it_is(tmp_path: Path) -> None:
     house = House(tmp_path, at_once=True)
     house.conductor.intake.info = None
-    assert standing_of(house.conductor, watch(), grid=None) == b""
+    assert standing_of(house.conductor, watch(), grid=None, heard=b"") == b""
     assert read_standing(b"") is None
     house.tables.close()
 
@@ -152,7 +152,7 @@ def test_changes_made_and_parameters_stay_in_force(tmp_path: Path) -> None:
     parameters.note([parameters.in_force.set("mass_kg", 1300.0, stamp_ns=1)])
     house.conductor.tuning.hand_over()
     house.conductor.roles.correction = "free"
-    left = standing_of(house.conductor, watch(), grid=None)
+    left = standing_of(house.conductor, watch(), grid=None, heard=heard_of(house.conductor))
     house.tables.leave()
     again = House(tmp_path, at_once=True, plan=house.plan)
     standing = read_standing(left)

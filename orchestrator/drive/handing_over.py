@@ -1,0 +1,54 @@
+"""Hands over where a live drive stands whenever that changes, to who keeps it for the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.live_loop import LiveLoop
+from foretwin.orchestrator.drive.process_watch import ProcessWatch
+from foretwin.orchestrator.drive.standing import heard_of, standing_of
+
+
+class HandingOver:
+    """Says where a drive stands: in short as rounds and jobs begin and end, all of it at its end.
+
+    What was heard changes with each sample, and takes most of the time, for the estimator is part
+    of it: between two rounds it counts as of the one that fell due last.
+    """
+
+    def __init__(
+        self, conductor: Conductor, watch: ProcessWatch, *, keep: Callable[[bytes], None]
+    ) -> None:
+        """`keep` takes each standing; lock step begins anew, and keeps none."""
+        self._conductor, self._watch, self._keep = conductor, watch, keep
+        self._counted: object = None
+        self._heard, self._heard_by_round = b"", -1
+        self.loop: LiveLoop | None = None
+        """What knows when the next round is due."""
+
+    def news(self) -> None:
+        """Hand over where a round or job has begun or ended since."""
+        rounds = self._conductor.rounds
+        jobs, tally = rounds.dispatcher.dispatch.count, rounds.tally
+        counted = tally.due, tally.ended, jobs.given, jobs.results, jobs.refused, jobs.lost
+        if counted == self._counted:
+            return
+        self._counted = counted
+        if self._heard_by_round != tally.due:
+            self._heard, self._heard_by_round = heard_of(self._conductor), tally.due
+        self._hand_over("")
+
+    def all(self, *, exit_word: str = "") -> None:
+        """Hand over everything as it is now; `exit_word` where this is the drive's end."""
+        if not self._conductor.plan.config.lock_step:
+            self._heard = heard_of(self._conductor)
+            self._hand_over(exit_word)
+
+    def _hand_over(self, exit_word: str) -> None:
+        grid = None if self.loop is None else self.loop.grid
+        self._keep(
+            standing_of(
+                self._conductor, self._watch, grid=grid, heard=self._heard, exit_word=exit_word
+            )
+        )

@@ -1,0 +1,68 @@
+"""Where a drive stands is handed over as it changes, and what was heard no oftener than rounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from foretwin.orchestrator.drive.handing_over import HandingOver
+from foretwin.orchestrator.drive.standing import HeardStanding, heard_in, read_standing
+from tests.orchestrator.drive.test_standing import watch
+from tests.orchestrator.house import House
+
+
+class Keeper:
+    """Keeps what it is given, as the supervisor does."""
+
+    def __init__(self) -> None:
+        self.kept: list[bytes] = []
+
+    def __call__(self, standing: bytes) -> None:
+        self.kept.append(standing)
+
+    def heard(self, at: int) -> HeardStanding:
+        standing = read_standing(self.kept[at])
+        assert standing is not None
+        return heard_in(standing)
+
+
+def test_only_what_changed_is_handed_over(tmp_path: Path) -> None:
+    house, keeper = House(tmp_path), Keeper()
+    standing = HandingOver(house.conductor, watch(), keep=keeper)
+    standing.news()
+    standing.news()
+    assert len(keeper.kept) == 1
+    house.conductor.rounds.dispatcher.dispatch.count.refused += 1
+    standing.news()
+    assert len(keeper.kept) == 2
+    house.tables.close()
+
+
+def test_what_was_heard_is_as_of_the_round_that_fell_due_last(tmp_path: Path) -> None:
+    house, keeper = House(tmp_path), Keeper()
+    standing = HandingOver(house.conductor, watch(), keep=keeper)
+    rounds = house.conductor.rounds
+    house.drive(5)
+    rounds.tally.due += 1
+    standing.news()
+    house.send(house.states[5])
+    house.settle()
+    rounds.dispatcher.dispatch.count.given += 1
+    standing.news()
+    rounds.tally.due += 1
+    standing.news()
+    counts = [keeper.heard(at).samples.received for at in range(3)]
+    assert counts[0] == counts[1] < counts[2]
+    house.tables.close()
+
+
+def test_at_the_end_everything_is_handed_over(tmp_path: Path) -> None:
+    house, keeper = House(tmp_path), Keeper()
+    standing = HandingOver(house.conductor, watch(), keep=keeper)
+    standing.news()
+    house.drive(5)
+    standing.all(exit_word="completed")
+    last = read_standing(keeper.kept[-1])
+    assert last is not None
+    assert last.exit_word == "completed"
+    assert keeper.heard(-1).samples.received == house.conductor.intake.counts.received
+    house.tables.close()
