@@ -128,7 +128,10 @@ class Mailbox:
         self._items: collections.deque[Item] = collections.deque()
         self._depth = depth
         self._block = when_full == "block"
-        self._changed = threading.Condition()
+        lock = threading.RLock()
+        self._changed = threading.Condition(lock)
+        self._pressing = threading.Condition(lock)
+        self._pressing_items = 0
         self._closed = False
         self.dropped = 0
 
@@ -140,10 +143,13 @@ class Mailbox:
             if self._closed:
                 return
             if len(self._items) >= self._depth:
-                self._items.popleft()
+                self._popped()
                 self.dropped += 1
             self._items.append(item)
             self._changed.notify_all()
+            if not isinstance(item, Received):
+                self._pressing_items += 1
+                self._pressing.notify_all()
 
     def take(self, timeout_s: float | None = 0.0) -> Item | None:
         """Return the oldest item, or None after `timeout_s` (None waits for ever) or `close`."""
@@ -152,9 +158,21 @@ class Mailbox:
                 self._changed.wait_for(lambda: bool(self._items) or self._closed, timeout_s)
             if not self._items:
                 return None
-            item = self._items.popleft()
+            item = self._popped()
             self._changed.notify_all()
             return item
+
+    def _popped(self) -> Item:
+        item = self._items.popleft()
+        self._pressing_items -= not isinstance(item, Received)
+        return item
+
+    def gather(self, most_s: float) -> None:
+        """Let messages come for a while, to be taken in a portion: waking up for each one costs
+        more than what most of them are about. An answer or a question ends it, and `close`.
+        """
+        with self._changed:
+            self._pressing.wait_for(lambda: self._closed or self._pressing_items > 0, most_s)
 
     def take_last(self, quiet_s: float) -> Item | None:
         """Return the oldest item, or None once nothing has come for `quiet_s`.
@@ -172,6 +190,7 @@ class Mailbox:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+            self._pressing.notify_all()
 
     def __len__(self) -> int:
         return len(self._items)

@@ -17,9 +17,9 @@ HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
 """So long may nothing come before it is asked whether something should have."""
 LAST_ROUND_GRACE_S = 1.0
-GATHER_S = 0.01
-"""Messages are taken in portions: waking up for each of 330 a second costs more than what most of
-them are about. Never where a round is due."""
+GATHER_S = 0.04
+"""Samples are taken in portions: waking up for each of 330 a second costs more than what most of
+them are about. Neither an answer nor a round that is due waits."""
 UNPLACED_S = 5.0
 """So long after a restart nothing falls due before it is known where the car is; then it does where
 it did before."""
@@ -39,9 +39,10 @@ class LiveLoop:
     """Runs a conductor until the vehicle's drive ends or `stop` says so.
 
     A round falls due `rate_hz` times a wall second where the mission wants rounds. It starts with
-    the first state received from then on, so that a slow GNSS does not make results older than
-    need be, and at the latest half a period later. A round that is not complete when the next one
-    should start has passed its deadline: it is let finish, is late, and the next one is missed.
+    the newest state as soon as one comes from then on, so that a slow GNSS does not make results
+    older than need be, and at the latest half a period later. A round that is not complete when
+    the next one should start has passed its deadline: it is let finish, is late, and the next one
+    is missed.
     `pace` then makes the rounds after it smaller or rarer, so that a slow machine gives less, not
     late. What fell due while nothing of this ran (the machine slept, we were behind) is missed.
     """
@@ -72,6 +73,7 @@ class LiveLoop:
         """Return True where the drive ended by itself, False where it was stopped."""
         conductor = self.conductor
         next_housekeeping_s = self._next_due_s = time.monotonic()
+        fresh = False
         if self.before is not None:
             self._next_due_s = self.before.next_due_s
             self._unplaced_until_s = next_housekeeping_s + UNPLACED_S
@@ -84,7 +86,8 @@ class LiveLoop:
                     self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             if not self._telemetry_waits():
-                time.sleep(max(0.0, min(GATHER_S, self._next_due_s - now_s)))
+                until_s = min(now_s + GATHER_S, self._next_due_s, next_housekeeping_s)
+                conductor.mailbox.gather(max(0.0, until_s - now_s))
             seen = conductor.intake.states
             wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
             item = conductor.mailbox.take(max(0.0, wake_s - time.monotonic()))
@@ -95,15 +98,19 @@ class LiveLoop:
                 now_s = time.monotonic()
             else:
                 conductor.watch_telemetry(round(now_s * 1e9))
-            fresh = conductor.intake.states > seen
             due = now_s >= self._next_due_s and not self._is_unplaced(now_s)
-            if due and (fresh or now_s >= self._at_the_latest_s):
+            fresh = due and (fresh or conductor.intake.states > seen)
+            ended = conductor.intake.end is not None and not self._telemetry_waits()
+            # Of a portion the newest state counts.
+            begins = fresh and not self._telemetry_waits()
+            if due and not ended and (begins or now_s >= self._at_the_latest_s):
+                fresh = False
                 # Where the machine is too slow, one round follows the other without a turn between.
                 conductor.make_changes()
                 # New parameters take workers a few milliseconds; no round may be half of one kind.
                 if conductor.tuning.parameters.settled and self._fall_due(now_s):
                     self._start_round(now_s)
-            if conductor.intake.end is not None and not self._telemetry_waits():
+            if ended:
                 self._leave_out(now_s)
                 self._let_finish()
                 return True

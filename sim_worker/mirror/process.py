@@ -24,6 +24,8 @@ from foretwin.sim_worker.world_file import load_world
 
 _DEPTH = 4096
 _IDLE_S = 0.2
+_GATHER_S = 0.05
+"""States are taken in portions: a sample of the mirror is made of several."""
 _LAST_WORDS_S = 0.5
 """How long the messages that are here may take once the run is over; in lock step none is left."""
 _QUIET_S = 0.1
@@ -133,7 +135,11 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()
     while not life.over:
+        if not setup.bus.lossless:
+            mailbox.gather(_GATHER_S)
         _take(worker, mailbox.take(_IDLE_S))
+        for _ in range(len(mailbox)):
+            _take(worker, mailbox.take())
     deadline = time.monotonic() + _LAST_WORDS_S
     while setup.bus.lossless or time.monotonic() < deadline:
         item = mailbox.take_last(_QUIET_S if setup.bus.lossless else 0.0)

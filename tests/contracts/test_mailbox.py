@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.mailbox import Mailbox, Received, Reply
 from tests.contracts.bus_sides import DEADLINE_S
 
 
@@ -53,6 +55,43 @@ def test_many_writers_lose_nothing_while_there_is_room() -> None:
     for n in range(4):
         assert [i for writer, i in taken if writer == n] == list(range(1000))
     assert mailbox.dropped == 0
+
+
+def received(channel: str = "speed") -> Received:
+    return Received(channel, f"foretwin/v1/vehicle/ego/telemetry/{channel}", b"", SpeedSample)
+
+
+def test_messages_gather_until_an_answer_or_a_question_comes() -> None:
+    mailbox = Mailbox(8)
+    gathered = threading.Event()
+
+    def gather() -> None:
+        mailbox.gather(DEADLINE_S)
+        gathered.set()
+
+    reader = threading.Thread(target=gather)
+    reader.start()
+    mailbox.put(received())
+    assert not gathered.wait(0.05)
+    mailbox.put(Reply("job", None, None, "no answer", 0))
+    assert gathered.wait(DEADLINE_S)
+    reader.join(DEADLINE_S)
+    assert len(mailbox) == 2
+
+
+def test_nothing_gathers_while_an_answer_waits_and_samples_do_for_so_long_alone() -> None:
+    mailbox = Mailbox(2)
+    mailbox.put(Reply("job", None, None, "no answer", 0))
+    began_s = time.monotonic()
+    mailbox.gather(DEADLINE_S)
+    assert time.monotonic() - began_s < DEADLINE_S
+    mailbox.put(received())
+    mailbox.put(received())  # the answer is the oldest, and forgotten
+    mailbox.gather(0.01)
+    assert time.monotonic() - began_s > 0.01
+    mailbox.close()
+    mailbox.gather(DEADLINE_S)
+    assert time.monotonic() - began_s < DEADLINE_S
 
 
 def test_take_waits_for_the_next_item() -> None:

@@ -21,14 +21,9 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_s = 100.0
-        self.sleeps_s: list[float] = []
 
     def monotonic(self) -> float:
         return self.now_s
-
-    def sleep(self, seconds: float) -> None:
-        self.sleeps_s.append(seconds)
-        self.now_s += seconds
 
 
 class Mailbox:
@@ -37,9 +32,14 @@ class Mailbox:
     def __init__(self, clock: Clock, items: list[tuple[float, str]]) -> None:
         self._clock = clock
         self._items = deque(sorted(items))
+        self.gathered_s: list[float] = []
 
     def __len__(self) -> int:
         return sum(at_s <= self._clock.now_s for at_s, _ in self._items)
+
+    def gather(self, most_s: float) -> None:
+        self.gathered_s.append(most_s)
+        self._clock.now_s += most_s
 
     def take(self, timeout_s: float) -> str | None:
         until_s = self._clock.now_s + max(timeout_s, 1e-4)
@@ -71,7 +71,7 @@ class Conductor:
     ) -> None:
         self._received = received
         """Whether a state counts as received when it came, not when it is handled."""
-        self.clock = self._clock = clock
+        self._clock = clock
         self._round_s = round_s
         self._handling = handling
         self._open_until_s: float | None = None
@@ -85,6 +85,8 @@ class Conductor:
         self.mission = SimpleNamespace(wants_rounds=wants_rounds)
         self.tally = RoundTally()
         self.started_s: list[float] = []
+        self.seeds_s: list[float] = []
+        """When the states came from which rounds were started."""
         self.dropped_s: list[float] = []
         self.watched_s: list[float] = []
         self.changes_made_s: list[float] = []
@@ -119,6 +121,7 @@ class Conductor:
 
     def start_round(self) -> bool:
         self.started_s.append(self._clock.now_s - 100)
+        self.seeds_s.append(self.intake.latest.receipt_mono_ns / 1e9 - 100)
         self._open_until_s = self._clock.now_s + self._round_s
         self.tally.run += 1
         return True
@@ -260,7 +263,7 @@ def test_a_loop_that_is_stopped_says_so(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_silence_is_looked_into_every_50_ms(driven: Any) -> None:
     conductor = driven(states_s=[0.0, 0.01, 0.02], end_s=1.0)
-    gaps_s = np.diff([0.02, *conductor.watched_s, 1.0])
+    gaps_s = np.diff([GATHER_S, *conductor.watched_s, 1.0])
     assert gaps_s.max() < 0.051
 
 
@@ -272,10 +275,16 @@ def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(dri
     assert conductor.tally.spared == 10
 
 
+def test_a_round_starts_from_the_newest_state_of_a_portion(driven: Any) -> None:
+    conductor = driven(states_s=every(0.007, 10.0), end_s=10.0, received=True)
+    for started_s, state_s in zip(conductor.started_s[1:], conductor.seeds_s[1:], strict=True):
+        assert 0.0 <= started_s - state_s < 0.0071
+
+
 def test_messages_are_gathered_and_no_round_waits_for_it(driven: Any) -> None:
     conductor = driven(states_s=every(0.003, 10.0), end_s=10.0)
-    slept_s = [length_s for length_s in conductor.clock.sleeps_s if length_s]
-    assert 800 < len(slept_s) <= 1000 and max(slept_s) <= GATHER_S  # noqa: PT018
+    gathered_s = [length_s for length_s in conductor.mailbox.gathered_s if length_s]
+    assert 200 < len(gathered_s) <= 330 and max(gathered_s) <= GATHER_S + 1e-9  # noqa: PT018
     assert conductor.started_s[:20] == pytest.approx([k / 2 for k in range(20)], abs=0.0031)
 
 
