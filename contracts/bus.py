@@ -196,7 +196,10 @@ class ZenohBus(ZenohSession):
             mailbox.put(Received(channel, str(sample.key_expr), data, kind))
 
         if not samples:
-            self._declared.append(self._session.declare_subscriber(full_key, land))
+            # To wake up a thread of its own, Zenoh's usual way, costs more than to put a sample into
+            # the mailbox. Not so below: there Zenoh holds a lock while it calls.
+            at_once = self._zenoh.handlers.Callback(land, indirect=False)
+            self._declared.append(self._session.declare_subscriber(full_key, at_once))
             return
         self._declared.append(recovering_subscriber(self._zenoh, self._session, full_key, land))
         self._recovering[full_key] = functools.partial(
