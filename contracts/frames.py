@@ -81,7 +81,13 @@ class _Projections(threading.local):
 
     def __init__(self) -> None:
         self.local = lru_cache(maxsize=256)(_new_projection)
+        self.place = lru_cache(maxsize=4)(self._place)
+        """One state's place is asked for by several, one after the other."""
         self.geodetic_from_ecef = lru_cache(maxsize=1)(_new_geodetic_from_ecef)
+
+    def _place(self, frame: LocalFrame, lat_deg: float, lon_deg: float) -> tuple[float, float]:
+        x_m, y_m = self.local(frame.origin.lat_deg, frame.origin.lon_deg)(lon_deg, lat_deg)
+        return x_m, y_m
 
 
 def _new_projection(lat_deg: float, lon_deg: float) -> pyproj.Proj:
@@ -105,7 +111,7 @@ def local_from_geo(frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | f
     """Project positions in degrees, shape (N,) or scalar, to (N, 2) or (2,) metres in `frame`."""
     if isinstance(lat_deg, float) and isinstance(lon_deg, float):
         # One position is asked for at every sample: as an array it would cost five times as much.
-        return np.array(_projection_of(frame)(lon_deg, lat_deg))
+        return np.array(_projections.place(frame, lat_deg, lon_deg))
     x_m, y_m = _projection_of(frame)(
         np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64)
     )

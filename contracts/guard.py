@@ -6,7 +6,9 @@ decodes them before. Nothing but `Refused` is raised for what others sent.
 
 from __future__ import annotations
 
+import functools
 import math
+import sys
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
@@ -172,11 +174,15 @@ def _check(value: Any, name: str, *, finite: bool) -> None:
         case msgspec.Struct():
             kind = type(value)
             finite = finite and kind not in MAY_BE_UNKNOWN
-            for field in value.__struct_fields__:
-                _check(getattr(value, field), field, finite=finite)
-                if words := ONE_OF.get((kind, field)):
-                    _check_word(getattr(value, field), field, words)
-            _check_together(value, kind)
+            for field, far, words in _fields(kind):
+                one = getattr(value, field)
+                if type(one) is float and -far <= one <= far:
+                    continue  # most are; NaN is not
+                _check(one, field, finite=finite)
+                if words:
+                    _check_word(one, field, words)
+            if kind in ALL_OR_NONE or kind in SHAPES:
+                _check_together(value, kind)
         case tuple() | list():
             for one in value:
                 _check(one, name, finite=finite)
@@ -184,6 +190,15 @@ def _check(value: Any, name: str, *, finite: bool) -> None:
             for key, one in value.items():
                 _check(key, name, finite=finite)
                 _check(one, name, finite=finite)
+
+
+@functools.cache
+def _fields(kind: type[msgspec.Struct]) -> tuple[tuple[str, float, frozenset[str] | None], ...]:
+    """Return each field of a message with its bound, finite in any case, and its words."""
+    return tuple(
+        (name, min(_far(name), sys.float_info.max), ONE_OF.get((kind, name)))
+        for name in kind.__struct_fields__
+    )
 
 
 def _far(name: str) -> float:

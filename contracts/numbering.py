@@ -6,6 +6,7 @@ of others. Who begins anew has another id; where none is told, the sender's cloc
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
@@ -91,6 +92,12 @@ class Numbering(msgspec.Struct):
         self.holes.sort()
 
 
+@functools.lru_cache(maxsize=1024)
+def _names(channel: str, sender: int | str) -> tuple[str, ...]:
+    """Return what the numberings of one sender on one channel are called."""
+    return tuple(f"{channel} {sender}.{life}" for life in range(_LIVES))
+
+
 class Numberings(msgspec.Struct):
     """The numberings of all senders on all channels."""
 
@@ -112,6 +119,12 @@ class Numberings(msgspec.Struct):
         if sender:
             sent_ns = 0
         lives = dict(self._lives(channel, sender))
+        if len(lives) == 1:  # nearly all there are: the next one of its only numbering
+            ((name, one),) = lives.items()
+            if seq == one.next:
+                self.streams[name] = self.streams.pop(name)
+                one.go_on(seq, sent_ns)
+                return name
         for name, one in lives.items():
             if one.fill(seq, sent_ns):
                 return name
@@ -148,8 +161,7 @@ class Numberings(msgspec.Struct):
         self.streams[name].reach(count)
 
     def _lives(self, channel: str, sender: int | str) -> Iterator[tuple[str, Numbering]]:
-        for life in range(_LIVES):
-            name = f"{channel} {sender}.{life}"
+        for name in _names(channel, sender):
             if (found := self.streams.get(name)) is not None:
                 yield name, found
 
@@ -157,7 +169,7 @@ class Numberings(msgspec.Struct):
         """Begin a numbering in the place of a sender's oldest one; returns its name."""
         anew = channel in self.past or any(one.channel == channel for one in self.streams.values())
         first = 0 if anew and 0 <= seq <= _BEGINS_BELOW else seq
-        names = [f"{channel} {sender}.{life}" for life in range(_LIVES)]
+        names = _names(channel, sender)
         name = next((one for one in names if one not in self.streams), None)
         if name is None:
             name = next(one for one in self.streams if one in names)

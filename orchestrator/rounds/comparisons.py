@@ -37,7 +37,7 @@ class OpenComparisons:
     frame: LocalFrame
     horizon_s: float
     _stamps_ns: deque[int] = field(default_factory=deque)
-    _poses: deque[Array] = field(default_factory=deque)
+    _poses: deque[tuple[float, float, float]] = field(default_factory=deque)
     _waiting: deque[tuple[NominalTrack, RoundOrder]] = field(default_factory=deque)
 
     @property
@@ -56,10 +56,10 @@ class OpenComparisons:
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
         # What the map moves the position by is no motion that a future could have foreseen.
-        xy = local_from_geo(self.frame, lat, lon) - _shift_m(state)
+        x, y = (local_from_geo(self.frame, lat, lon) - _shift_m(state)).tolist()
         yaw = float(local_from_geo_yaw(self.frame, state.yaw_rad, lat, lon))
         self._stamps_ns.append(state.stamp_ns)
-        self._poses.append(np.array([xy[0], xy[1], yaw]))
+        self._poses.append((x, y, yaw))
         due_ns = state.stamp_ns - round(max(self.horizons_s) * 1e9)
         done = []
         while self._waiting and self._waiting[0][0].stamp_ns <= due_ns:

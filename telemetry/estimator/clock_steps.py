@@ -77,7 +77,9 @@ class ClockSteps:
         With `received_ns` None is returned for one that is in doubt; without, such a stamp is
         returned as it is and lies before the last one.
         """
-        known = self._channels.setdefault(channel, _ChannelTime())
+        known = self._channels.get(channel)
+        if known is None:
+            known = self._channels[channel] = _ChannelTime()
         placed_ns = stamp_ns + known.shift_ns
         if known.last_ns is None and received_ns is None:
             known.last_ns = placed_ns

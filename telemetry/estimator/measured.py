@@ -142,7 +142,10 @@ def _fault(message: Any) -> str | None:
     """Return why a sample cannot be a road vehicle's, or None."""
     for name in message.__struct_fields__:
         value = getattr(message, name)
-        for number in value if type(value) is tuple else (value,):
+        kind = type(value)
+        if kind is not float and kind is not tuple:
+            continue
+        for number in value if kind is tuple else (value,):
             if type(number) is not float:
                 continue
             if not math.isfinite(number):

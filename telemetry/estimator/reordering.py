@@ -75,7 +75,9 @@ class Reordering:
         self._number += 1
         rank = _ORDER.index(channel) if channel in _ORDER else len(_ORDER)
         sample = Sample(stamp_ns, rank, self._number, channel, message)
-        place = bisect.bisect(self._samples, sample[:3], key=_place)
+        place = len(self._samples)
+        if place and sample[:3] < self._samples[-1][:3]:
+            place = bisect.bisect(self._samples, sample[:3], key=_place)
         self._samples.insert(place, sample)
         if place < self._taken or stamp_ns <= self._checkpoints[-1].stamp_ns:
             self._go_back(place)
@@ -123,6 +125,8 @@ class Reordering:
             self._checkpoints.clear()
             self._keep(self._samples[-1].stamp_ns)
         first_ns = self._checkpoints[0].stamp_ns
+        if self._samples and self._samples[0].stamp_ns > first_ns:
+            return
         gone = bisect.bisect(self._samples, first_ns, key=lambda sample: sample.stamp_ns)
         for sample in self._samples[:gone]:
             self._seen.discard((sample.channel, sample.stamp_ns))

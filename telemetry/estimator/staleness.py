@@ -79,7 +79,10 @@ class Staleness:
         """Note a sample that came at `now_ns`, in the time of its stamp."""
         if channel not in self._watched:
             return
-        self._channels.setdefault(channel, _ChannelRate()).take(stamp_ns, now_ns)
+        rate = self._channels.get(channel)
+        if rate is None:
+            rate = self._channels[channel] = _ChannelRate()
+        rate.take(stamp_ns, now_ns)
 
     def overdue(self, now_ns: int) -> tuple[str, ...]:
         """Return the channels that have been seen and are overdue at `now_ns`."""

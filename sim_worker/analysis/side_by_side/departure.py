@@ -116,6 +116,9 @@ def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
 
 def _moved(track: Array) -> Array:
     """Return the rows of a track (N, 4) that lie apart from those before."""
+    steps = np.diff(track[:, :2], axis=0)
+    if (np.hypot(steps[:, 0], steps[:, 1]) >= _MOVED_M).all():
+        return track
     kept = [0]
     for row in range(1, len(track)):
         if np.hypot(*(track[row, :2] - track[kept[-1], :2])) >= _MOVED_M:

@@ -69,7 +69,7 @@ class SideBySide:
         self._place = place
         self._limits = limits or Limits()
         self._lowered = self._limits.lowered()
-        self._driven: deque[tuple[int, Array]] = deque()
+        self._driven: deque[tuple[int, tuple[float, float, float, float]]] = deque()
         self._last_plan_ns: int | None = None
         self._open: deque[Segment] = deque()
         self._ended: list[DrivenSegment] = []
@@ -158,7 +158,8 @@ class SideBySide:
         lat, lon = state.position.lat_deg, state.position.lon_deg
         xy = local_from_geo(self._frame, lat, lon)
         yaw = float(local_from_geo_yaw(self._frame, state.yaw_rad, lat, lon))
-        self._driven.append((state.stamp_ns, np.array([*xy, yaw, state.speed_mps])))
+        x, y = xy.tolist()
+        self._driven.append((state.stamp_ns, (x, y, yaw, state.speed_mps)))
         while self._driven[0][0] < state.stamp_ns - _KEEP_NS:
             self._driven.popleft()
         if self._open:
