@@ -196,7 +196,7 @@ class ZenohBus(ZenohSession):
             mailbox.put(Received(channel, str(sample.key_expr), data, kind))
 
         if not samples:
-            # To wake up a thread of its own, Zenoh's usual way, costs more than to put a sample into
+            # To wake a thread of its own, Zenoh's usual way, costs more than to put a sample into
             # the mailbox. Not so below: there Zenoh holds a lock while it calls.
             at_once = self._zenoh.handlers.Callback(land, indirect=False)
             self._declared.append(self._session.declare_subscriber(full_key, at_once))
