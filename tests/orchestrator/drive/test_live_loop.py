@@ -147,7 +147,6 @@ def every(period_s: float, until_s: float, *, start_s: float = 0.0) -> list[floa
 
 def test_rounds_start_on_the_grid(driven: Any) -> None:
     conductor = driven(states_s=every(0.02, 10.0), end_s=10.0)
-
     assert len(conductor.started_s) == 20
     for number, started_s in enumerate(conductor.started_s):
         assert started_s == pytest.approx(0.5 * number, abs=0.021)
@@ -156,7 +155,6 @@ def test_rounds_start_on_the_grid(driven: Any) -> None:
 
 def test_no_round_starts_while_workers_take_new_parameters(driven: Any) -> None:
     conductor = driven(states_s=every(0.02, 5.0), end_s=5.0, settled_s=1.3)
-
     assert conductor.started_s[0] == pytest.approx(1.3, abs=0.03)
     assert conductor.started_s[1] == pytest.approx(1.5, abs=0.03)
 
@@ -166,7 +164,6 @@ def test_a_round_waits_for_a_fresh_state_but_not_for_long(driven: Any) -> None:
     for started_s in often.started_s[1:]:
         since_state_s = (started_s - 0.13) % 0.2
         assert min(since_state_s, 0.2 - since_state_s) < 1e-3
-
     seldom = driven(states_s=every(0.8, 6.0, start_s=0.1), end_s=6.0)
     for number, started_s in enumerate(seldom.started_s[1:], start=1):
         assert 0.5 * number - 1e-3 <= started_s <= 0.5 * number + 0.251
@@ -174,16 +171,13 @@ def test_a_round_waits_for_a_fresh_state_but_not_for_long(driven: Any) -> None:
 
 def test_a_late_round_counts_as_missed_and_the_next_is_left_out(driven: Any) -> None:
     conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
-
-    assert len(conductor.started_s) == 10
-    assert conductor.tally.missed == 10
+    assert (len(conductor.started_s), conductor.tally.missed) == (10, 10)
     assert conductor.started_s[:3] == pytest.approx([0.0, 1.0, 2.0], abs=0.03)
     assert conductor.dropped_s == []
 
 
 def test_a_round_that_never_ends_is_given_up(driven: Any) -> None:
     conductor = driven(states_s=every(0.02, 25.0), end_s=25.0, round_s=1e6)
-
     assert conductor.dropped_s == pytest.approx([10.5, 21.5], abs=0.6)
     assert len(conductor.started_s) == 3
     assert conductor.tally.missed > 40
@@ -195,7 +189,6 @@ def test_a_machine_that_slept_does_not_catch_up_and_owns_up(driven: Any) -> None
             live_loop.time.now_s += 4.3  # type: ignore[attr-defined]
 
     conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, handling=sleep_once)
-
     around = [started_s for started_s in conductor.started_s if 2.9 < started_s < 8.1]
     assert around == pytest.approx([7.3, 7.5, 8.0], abs=0.03)
     assert conductor.tally.missed == 8  # those due at 3.5, 4.0 and so on until 7.0
@@ -227,11 +220,10 @@ def test_rounds_due_while_messages_wait_and_the_state_is_old_are_missed(driven: 
         if at_s >= 3.0:
             live_loop.time.now_s += 0.5  # type: ignore[attr-defined]
 
-    conductor = driven(states_s=every(0.02, 4.0), end_s=4.0, handling=slowly, received=True)
-
-    assert conductor.tally.due > 40
-    assert conductor.tally.missed > 30
-    assert conductor.tally.unseeded == 0
+    tally = driven(states_s=every(0.02, 4.0), end_s=4.0, handling=slowly, received=True).tally
+    assert tally.due > 40
+    assert tally.missed > 30
+    assert tally.unseeded == 0
 
 
 def test_no_round_is_due_where_the_mission_wants_none(driven: Any) -> None:
@@ -269,10 +261,8 @@ def test_silence_is_looked_into_every_50_ms(driven: Any) -> None:
 
 def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(driven: Any) -> None:
     conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7, one_of=2)
-
     assert conductor.started_s == pytest.approx([*range(10)], abs=0.03)
-    assert conductor.tally.missed == 0
-    assert conductor.tally.spared == 10
+    assert (conductor.tally.missed, conductor.tally.spared) == (0, 10)
 
 
 def test_a_round_starts_from_the_newest_state_of_a_portion(driven: Any) -> None:

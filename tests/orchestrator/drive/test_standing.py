@@ -181,7 +181,7 @@ def test_what_was_found_until_then_stays_found(tmp_path: Path) -> None:
     house.conductor.mirror.independent = False
     house.tables.lost_before = 3
     before = findings.record(), house.conductor.ads.record()
-    left = standing_of(house.conductor, watch(), grid=None)
+    left = standing_of(house.conductor, watch(), grid=None, heard=heard_of(house.conductor))
     house.tables.leave()
 
     again = House(tmp_path, at_once=True, plan=house.plan)
