@@ -8,7 +8,7 @@ way out.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 from foretwin.contracts.keys import ALIVE_KEY, CHANNELS, PREFIX, BusRole, Channel, Writer
 
@@ -63,6 +63,12 @@ def access_control(
         "subjects": subjects,
         "policies": policies,
     }
+
+
+def role_of(name: str) -> BusRole | None:
+    """Return the role of a member by its name, which begins with it; None where it has none."""
+    roles: tuple[BusRole, ...] = get_args(BusRole)
+    return next((role for role in roles if name == role or name.startswith(f"{role}-")), None)
 
 
 def may_say(member: BusMember, channel: Channel) -> bool:

@@ -2,7 +2,7 @@
 
 It passes on what the others say and decodes none of it: no message can end it, and an orchestrator
 that stands still or dies takes nobody's bus along. It ends when it is told to, or with the process
-that started it.
+that started it. What it turns away it counts, by its own log, in a file beside its setup.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ import zenoh
 
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
+from foretwin.contracts.own_log import OwnLog
 from foretwin.contracts.process_setup import RouterSetup, setup_given
+from foretwin.contracts.refusal_counts import RefusalFile
+from foretwin.contracts.router_log import FILTER, RouterLog
 from foretwin.contracts.terminal import say
 from foretwin.contracts.zenoh_config import zenoh_config
 
@@ -36,8 +39,12 @@ def run_router(argv: list[str] | None = None) -> None:
     ended = threading.Event()
     on_end_signals(ended.set)
     file, setup = setup_given(RouterSetup, argv)
-    zenoh.init_log_from_env_or("warn")  # whom TLS turns away is told nowhere else
+    log = RouterLog()
+    own_log = OwnLog(log.take, log.gap)
+    os.environ |= {"RUST_LOG": FILTER, "NO_COLOR": "1"}
+    zenoh.init_log_from_env_or(FILTER)
     word_file, meter = Path(setup.word_file), CpuMeter(file.parent, file.stem)
+    refusals = RefusalFile(file.parent, file.stem)
     try:
         session = zenoh.open(zenoh_config(setup.bus, router=True))
     except zenoh.ZError as error:
@@ -49,11 +56,20 @@ def run_router(argv: list[str] | None = None) -> None:
         meter.ready()
         while not ended.wait(_LOOK_S) and os.getppid() == parent:
             meter.look()
+            _tell(log, refusals)
+    own_log.close()
+    _tell(log, refusals)
     meter.write()
     if os.getppid() != parent and setup.folder is not None:
         shutil.rmtree(setup.folder, ignore_errors=True)
     sys.stderr.flush()
     os._exit(0)
+
+
+def _tell(log: RouterLog, refusals: RefusalFile) -> None:
+    for line in log.others():
+        say(line, error=True)
+    refusals.write(log.counted())
 
 
 def _say(word_file: Path, word: str) -> None:

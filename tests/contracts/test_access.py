@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from foretwin.contracts.access import BusMember, access_control, may_say
+from foretwin.contracts.access import BusMember, access_control, may_say, role_of
 from foretwin.contracts.bus import Bus, BusUnreachable, Mailbox, ZenohBus
 from foretwin.contracts.credentials import (
     USERS,
@@ -171,3 +171,12 @@ def test_passwords_differ_and_lie_where_nobody_else_reads(tmp_path: Path) -> Non
     assert len({one.password for one in shown}) == 2
     assert all(len(one.password) >= 32 for one in shown)
     assert {file.stat().st_mode & 0o777 for file in tmp_path.iterdir()} == {0o600}
+
+
+def test_a_name_tells_the_role() -> None:
+    assert {one.name: role_of(one.name) for one in MEMBERS} == {
+        one.name: one.role for one in MEMBERS
+    }
+    assert role_of("car-of-ego") == "car"
+    assert role_of("carpenter") is None
+    assert role_of("") is None

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from foretwin.contracts.guard import Refused
-from foretwin.contracts.refusals import MOST_KINDS, Refusals
+from foretwin.contracts.refusal_counts import MOST_KINDS
+from foretwin.contracts.refusals import Refusals
 
 KEY = "foretwin/v1/run/r/mirror"
 
