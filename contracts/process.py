@@ -28,6 +28,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.log_file import JsonLines, LogFile
 from foretwin.contracts.process_setup import setup_given
+from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.contracts.terminal import say
@@ -53,14 +54,16 @@ class ProcessLife:
         *,
         mono_s: Callable[[], float] = time.monotonic,
         meter: CpuMeter | None = None,
+        refusal_file: RefusalFile | None = None,
     ) -> None:
         self._setup = setup
-        self._meter = meter
+        self._meter, self._refusal_file = meter, refusal_file
         self._bus = bus
         self._mono_s = mono_s
         self._parent = os.getppid()
         self._mailbox = Mailbox(16)
-        self._refusals = Refusals()
+        self.refusals = Refusals()
+        """What of what came to this process it cannot use, for the run's record."""
         self._orchestrator_seen = False
         self._gone_since_s: float | None = None
         self.run_ended = False
@@ -95,6 +98,8 @@ class ProcessLife:
     def _look(self) -> None:
         if self._meter is not None:
             self._meter.look()
+        if self._refusal_file is not None:
+            self._refusal_file.look(self.refusals)
         while (item := self._mailbox.take()) is not None:
             if isinstance(item, Received):
                 self._take_end(item)
@@ -108,7 +113,7 @@ class ProcessLife:
         try:
             item.message()
         except Refused as refused:
-            if text := self._refusals.take(refused):
+            if text := self.refusals.take(refused):
                 logging.getLogger(self._setup.process_id).warning("%s", text)
             return
         self.run_ended = True
@@ -158,11 +163,13 @@ def run_process(
     if setup.trace_dir is not None:
         trace.begin(Path(setup.trace_dir), setup.process_id)
     meter, code = CpuMeter(file.parent, setup.process_id), 0
+    refusal_file = RefusalFile(file.parent, setup.process_id)
     try:
         with ZenohBus(setup.bus) as bus:
-            life = ProcessLife(setup, bus, meter=meter)
+            life = ProcessLife(setup, bus, meter=meter, refusal_file=refusal_file)
             on_end_signals(life.terminated.set)
             serve(setup, bus, life)
+            refusal_file.write(OwnRefusals(kinds=life.refusals.kinds()))
     except (UserError, OSError) as problem:
         logging.getLogger(setup.process_id).exception("%s", problem)
         say(f"{setup.process_id}: {problem}", error=True)

@@ -91,9 +91,9 @@ class SimulationCache:
 class FuturesWorker:
     """Answers `prepare`, `use_vehicle`, `job`, `place`: in a process of its own, or in any."""
 
-    def __init__(self, setup: WorkerSetup) -> None:
+    def __init__(self, setup: WorkerSetup, *, refusals: Refusals | None = None) -> None:
         self._id = setup.process_id
-        self._refusals = Refusals()
+        self._refusals = Refusals() if refusals is None else refusals
         self._worlds_dir = Path(setup.worlds_dir)
         self._stages = SimulationCache(setup, setup.vehicle)
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
@@ -181,7 +181,7 @@ def warm_up(stage: BatchSimulation) -> None:
 
 def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Answer until the run is over; alive only once it can take work."""
-    worker = FuturesWorker(setup)
+    worker = FuturesWorker(setup, refusals=life.refusals)
     mailbox = Mailbox(64)
     ids = {"run": setup.run_id, "process": setup.process_id}
     for channel in ("prepare", "use_vehicle", "job", "place"):

@@ -73,11 +73,15 @@ class Recorder:
     """Takes messages from a mailbox and writes their rows to the file and the live stream."""
 
     def __init__(
-        self, setup: ViewerSetup, messages: Mailbox, find_start: Callable[[int], int]
+        self,
+        setup: ViewerSetup,
+        messages: Mailbox,
+        find_start: Callable[[int], int],
+        refusals: Refusals,
     ) -> None:
         self._messages = messages
         self._reported_dropped = 0
-        self._refusals = Refusals()
+        self._refusals = refusals
         self._reported_window = False
         self._flushed_s = time.monotonic()
         self._setup = setup
@@ -203,7 +207,7 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
             return first_stamp_ns
         return int(info.start_stamp_ns)
 
-    recorder = Recorder(setup, messages, find_start)
+    recorder = Recorder(setup, messages, find_start, life.refusals)
     for channel in recorder.channels:
         bus.subscribe(channel, messages, vehicle=setup.vehicle_id, run=setup.run_id)
     life.ready()

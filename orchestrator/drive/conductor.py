@@ -59,7 +59,7 @@ class Conductor:
             bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
         )
         self.tell = self.events.tell
-        self.refusals = RefusalHandler(self.tell)
+        self.refusals = RefusalHandler(self.tell, plan.processes_dir)
         self.context = context = DriveContext(plan, bus, self.mailbox, tables, self.tell)
         self.worlds = WorldHandler(
             context, on_ready=self._world_ready, on_failed=self._world_failed

@@ -239,6 +239,7 @@ class Orchestrator:
 
     def _look_after(self, conductor: Conductor, now_s: float) -> None:
         self._watch.look_after(conductor, now_s)
+        conductor.refusals.look(now_s)
         if BUILDER in conductor.alive:
             conductor.worlds.ask_again(now_s)
 
@@ -269,6 +270,7 @@ class Orchestrator:
             exit_word = "failed"
             self._failed_at_end = True
         self._processes.stop(grace_s=0.0)  # the router: nobody has anything to say any more
+        conductor.refusals.look_now()
         conductor.rounds.close()
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()

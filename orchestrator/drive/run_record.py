@@ -84,7 +84,7 @@ def run_record(
             "given_up_rounds": tally.failed,
             "last_given_up": tally.last_failure,
         },
-        "refused": conductor.refusals.record(),
+        **conductor.refusals.record(),
         "troubles": [
             *troubles,
             *conductor.tables.troubles,

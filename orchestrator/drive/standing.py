@@ -58,6 +58,7 @@ class HeardStanding:
     skipped: int
     estimator: StateEstimator | None
     refusals: Refusals
+    refusals_told: set[tuple[bool, str, str]]
     strangers: int
     mailbox_dropped: int
 
@@ -95,6 +96,7 @@ def heard_of(conductor: Conductor) -> bytes:
             skipped=intake.refused,
             estimator=intake.estimator,
             refusals=conductor.refusals.counted,
+            refusals_told=conductor.refusals.told,
             strangers=conductor.strangers.count,
             mailbox_dropped=conductor.mailbox.dropped,
         )
@@ -181,6 +183,7 @@ def go_on(
     if heard.estimator is not None and not crashed:
         intake.go_on(heard.estimator)
     conductor.refusals.counted = heard.refusals
+    conductor.refusals.told = heard.refusals_told
     conductor.strangers.count = heard.strangers
     conductor.mailbox.dropped = heard.mailbox_dropped
     conductor.roles.roles, conductor.roles.correction = standing.roles, standing.correction

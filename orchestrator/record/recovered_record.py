@@ -21,6 +21,7 @@ from foretwin.orchestrator.record.bookkeeping import (
 from foretwin.orchestrator.record.kept_parts import kept_record, read_removed
 from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.ledger import JobsLedger, RoundsLedger
+from foretwin.orchestrator.record.refused_elsewhere import refused_elsewhere
 from foretwin.orchestrator.record.run_state import PROCESSES, RESULTS
 from foretwin.orchestrator.record.so_far import read_so_far
 from foretwin.orchestrator.record.telemetry_ledger import telemetry_ledger
@@ -90,6 +91,7 @@ def recovered_record(
     told |= _told_by_tables(run, told)
     told |= {"agreement": agreement} if agreement is not None else {}
     told["processor"] = msgspec.to_builtins(cpu_uses(run / PROCESSES))
+    told |= refused_elsewhere(run / PROCESSES)
     if so_far is not None or read_removed(run):
         told["kept"] = kept_record(run, (told.get("config") or {}).get("keep"))
     heard = {} if so_far is None else so_far.heard

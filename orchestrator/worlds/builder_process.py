@@ -12,7 +12,6 @@ from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
-from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import BuilderSetup
 from foretwin.contracts.simulation import BuildReply
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
@@ -34,7 +33,7 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
     folder = setup.given_worlds
     given = {} if folder is None else read_given_worlds(Path(folder))
-    mailbox, refusals = Mailbox(256), Refusals()
+    mailbox = Mailbox(256)
     bus.serve("build", mailbox, run=setup.run_id, process=setup.process_id)
     life.ready()
     while not life.over:
@@ -44,7 +43,7 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
         try:
             wanted = request.message()
         except Refused as refused:
-            if text := refusals.take(refused):
+            if text := life.refusals.take(refused):
                 log.warning("%s", text)
             request.refuse(one_line(refused))
             continue

@@ -49,9 +49,11 @@ class TuningWorker:
     in the order of their stamps: the answer must not depend on which came first.
     """
 
-    def __init__(self, setup: TuningSetup, bus: Bus, mailbox: Mailbox) -> None:
+    def __init__(
+        self, setup: TuningSetup, bus: Bus, mailbox: Mailbox, *, refusals: Refusals | None = None
+    ) -> None:
         self._setup = setup
-        self._refusals = Refusals()
+        self._refusals = Refusals() if refusals is None else refusals
         self._bus = bus
         self._mailbox = mailbox
         self._lock_step = setup.bus.lossless
@@ -167,7 +169,7 @@ class TuningWorker:
 def serve_tuning(setup: TuningSetup, bus: Bus, life: ProcessLife) -> None:
     """Watch the vehicle until the run is over."""
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
-    worker = TuningWorker(setup, bus, mailbox)
+    worker = TuningWorker(setup, bus, mailbox, refusals=life.refusals)
     for channel in ("use_vehicle", "tune"):
         bus.serve(channel, mailbox, run=setup.run_id, process=setup.process_id)
     for channel in _CHANNELS:

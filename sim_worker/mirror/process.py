@@ -41,9 +41,9 @@ class MirrorWorker:
     vehicles: the bus keeps no order between keys.
     """
 
-    def __init__(self, setup: WorkerSetup, bus: Bus) -> None:
+    def __init__(self, setup: WorkerSetup, bus: Bus, *, refusals: Refusals | None = None) -> None:
         self._run_id = setup.run_id
-        self._refusals = Refusals()
+        self._refusals = Refusals() if refusals is None else refusals
         self._worlds_dir = Path(setup.worlds_dir)
         self._bus = bus
         self._waits = setup.bus.lossless and setup.commands_recorded
@@ -127,7 +127,7 @@ class MirrorWorker:
 def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Mirror the car until the run is over, then finish what has arrived."""
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
-    worker = MirrorWorker(setup, bus)
+    worker = MirrorWorker(setup, bus, refusals=life.refusals)
     for channel in ("use_world", "use_vehicle", "use_roles"):
         bus.serve(channel, mailbox, run=setup.run_id, process=setup.process_id)
     bus.subscribe("other_vehicles", mailbox, run=setup.run_id)

@@ -19,7 +19,6 @@ from foretwin.contracts.drive import DriveEnd, InfoRequest
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.process import ProcessLife, run_process
-from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.contracts.trace import traced
@@ -70,7 +69,6 @@ class RecorderProcess:
         self._answers = Mailbox(64)
         self._missed = MissedSamples()
         self._reported_lost = 0
-        self._refusals = Refusals()
         self._asked_s: float | None = None
         self._informed = False
         self._flushed_s = mono_s()
@@ -125,7 +123,7 @@ class RecorderProcess:
             self._recording.tally.refused,
             self._recording.missing,
             self._messages.dropped,
-            len(self._refusals),
+            len(self._life.refusals),
             left,
         )
 
@@ -147,7 +145,7 @@ class RecorderProcess:
             if refused.header is not None:
                 numbered = {"sender": item.sender, **refused.header._asdict()}
                 self._recording.refuse(item.channel, **numbered)
-            if text := self._refusals.take(refused):
+            if text := self._life.refusals.take(refused):
                 log.warning("%s", text)
             return
         message = envelope.message

@@ -60,6 +60,7 @@ class Gateway:
         flag_on: bool,
         order_keys: OrderKeys | None = None,
         car: VehicleParameters | None = None,
+        refusals: Refusals | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
@@ -85,7 +86,7 @@ class Gateway:
         )
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self._last_ns: dict[str, int] = {}
-        self.refusals = Refusals()
+        self.refusals = Refusals() if refusals is None else refusals
         """Of what came from the run's side."""
         self._mirrored = MirroredObjects(
             mapping.mirrored,

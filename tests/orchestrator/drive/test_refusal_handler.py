@@ -17,6 +17,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS, alive_key, key
 from foretwin.contracts.mailbox import Alive, Received, Request
+from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile, RefusedKind
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.instructions import Notice
 from tests.contracts.hostile_messages import HOSTILE, hostile_bytes
@@ -40,19 +41,56 @@ def put(house: House, channel: str, data: bytes, *, on: str | None = None) -> No
 
 
 def refused(house: House) -> dict[tuple[str, str], int]:
-    rows = house.conductor.refusals.record()["by_sender"]
+    rows = house.conductor.refusals.record()["refused"]["by_sender"]
     return {(row["sender"].rsplit("/", 1)[-1], row["reason"]): row["count"] for row in rows}
 
 
-def test_a_kind_of_refusal_is_told_once() -> None:
+def test_a_kind_of_refusal_is_told_once(tmp_path: Path) -> None:
     told: list[Notice] = []
-    handler = RefusalHandler(told.append)
+    handler = RefusalHandler(told.append, tmp_path)
     for _ in range(3):
         handler.take(Refused("run/r/mirror", "no message"))
         handler.leave_out("objects", 2)
 
     assert [notice.level for notice in told] == ["error", "warning"]
-    assert handler.record()["count"] == 3 + 6
+    assert handler.record()["refused"]["count"] == 3 + 6
+
+
+def test_what_other_processes_refuse_is_told_once_of_each_kind(tmp_path: Path) -> None:
+    told: list[Notice] = []
+    handler = RefusalHandler(told.append, tmp_path)
+    handler.take(Refused("run/r/mirror", "no message"))
+    router, viewer = RefusalFile(tmp_path, "router"), RefusalFile(tmp_path, "viewer")
+
+    def said(key: str, count: int) -> RefusedKind:
+        return RefusedKind(sender="worker-w0", reason="say", key=key, count=count)
+
+    router.write(OwnRefusals(kinds=(said("a", 1),)))
+    known = RefusedKind(sender="run/r/mirror", reason="no message", count=1)
+    viewer.write(OwnRefusals(kinds=(known,)))
+    handler.look(0.0)
+    router.write(OwnRefusals(kinds=(said("a", 2), said("b", 1))))
+    handler.look(5.0)
+
+    assert [notice.text.split(";")[0] for notice in told] == [
+        "refused: run/r/mirror: no message",
+        "refused: worker-w0 may not say a",
+    ]
+    record = handler.record()
+    assert (record["refused"]["count"], record["refused_by_router"]["count"]) == (1, 3)
+    assert record["refused_by_processes"]["count"] == 1
+
+
+def test_the_folder_is_not_read_more_often_than_each_second(tmp_path: Path) -> None:
+    told: list[Notice] = []
+    handler = RefusalHandler(told.append, tmp_path)
+    handler.look(10.0)
+    kinds = (RefusedKind(sender="", reason="no password", count=1),)
+    RefusalFile(tmp_path, "router").write(OwnRefusals(kinds=kinds))
+    handler.look(10.5)
+    assert told == []
+    handler.look(11.0)
+    assert len(told) == 1
 
 
 def test_bytes_that_are_no_message_change_nothing(house: House) -> None:
@@ -163,5 +201,5 @@ def test_whatever_strangers_send_the_drive_goes_on(tmp_path: Path, seed: int) ->
     house.end()
 
     assert not house.tables.troubles
-    assert house.conductor.refusals.record()["count"] > 500
+    assert house.conductor.refusals.record()["refused"]["count"] > 500
     assert house.conductor.intake.counts.received > 60
