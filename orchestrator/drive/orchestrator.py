@@ -239,7 +239,6 @@ class Orchestrator:
 
     def _look_after(self, conductor: Conductor, now_s: float) -> None:
         self._watch.look_after(conductor, now_s)
-        conductor.refusals.look(now_s)
         if BUILDER in conductor.alive:
             conductor.worlds.ask_again(now_s)
 

@@ -95,6 +95,7 @@ class ProcessWatch:
             else:
                 self._missing(f"{text} and was not started again")
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
+        conductor.refusals.look(now_s)
         for text in conductor.tables.take_news():
             conductor.tell(Notice("warning", text))
         self._watch_router(now_s, linked=conductor.bus.connected)

@@ -73,6 +73,8 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
         "intersections": [],
         "drive_time_s": 1.0,
         "processor": {},
+        "refused_by_router": {"count": 0, "counted_all": True, "by_role": []},
+        "refused_by_processes": {"count": 0, "by_process": []},
         "ledger": {"telemetry": None, "rounds": None, "jobs": None},
     }  # fmt: skip
 
