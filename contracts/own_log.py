@@ -19,7 +19,9 @@ _STDOUT = 1
 _HOLDS_BYTES = 1 << 20
 """What may wait to be looked at; the system may give less."""
 _MOST_AT_ONCE = 1000
-"""So many records within a look are a flood."""
+_BURST = 20
+"""So many looks in a row that find more than they can take are a flood; within one, a single look
+is. Who was started again and asks for what it missed makes thousands of records at once."""
 _LOOK_S = 0.02
 _LET_GO_S = 0.5
 _MOST_BYTES = 1024
@@ -48,8 +50,11 @@ class OwnLog:
     def _hear(self) -> None:
         fault = ""
         try:
-            while not self._closed.wait(_LOOK_S):
-                if not self._look():
+            looks_left = _BURST
+            while not self._closed.wait(_LOOK_S if looks_left == _BURST else 0.0):
+                if self._look():
+                    looks_left = _BURST
+                elif (looks_left := looks_left - 1) <= 0:
                     self._let_go()
             self._look()
         except Exception:

@@ -11,6 +11,8 @@ from foretwin.contracts.mailbox import Request
 from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.tuning import SetReply, SetRequest
 
+NOT_TO_BE_SET = "a change that cannot be made"
+
 
 class RefusedError(UserError):
     """A change that cannot be made; the message says in one line what could be."""
@@ -83,7 +85,8 @@ class RuntimeConfiguration:
     def take(self, request: Request, *, stamp_ns: int) -> None:
         """Let a question wait for `make`, or answer at once that it cannot be done.
 
-        Raises Refused, once it has been answered, for what the guard does not let in.
+        Raises Refused, once it has been answered, for what the guard does not let in, and for what
+        cannot be set.
         """
         try:
             asked: SetRequest = request.message()
@@ -95,7 +98,7 @@ class RuntimeConfiguration:
             self._handlers[prefix].check(name, asked.value)
         except RefusedError as refused:
             request.reply(SetReply(done=False, text=str(refused)))
-            return
+            raise Refused(request.key, NOT_TO_BE_SET, str(refused)) from refused
         self._waiting.append(_Waiting(request, asked, stamp_ns))
 
     def make(self, *, stamp_ns: int, start_stamp_ns: int) -> list[Change]:

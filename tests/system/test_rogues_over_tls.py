@@ -6,17 +6,15 @@ from __future__ import annotations
 import datetime
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-import zenoh
 
 from foretwin.contracts.bus import BusUnreachable, Mailbox, ZenohBus
 from foretwin.contracts.campaign import TlsFiles, role_files
 from foretwin.contracts.drive import SpeedSample
-from foretwin.contracts.keys import TELEMETRY_CHANNELS, key
+from foretwin.contracts.keys import key
 from foretwin.contracts.ports import free_port
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.zenoh_config import zenoh_config
@@ -24,18 +22,10 @@ from foretwin.orchestrator.campaign.issuing import issue
 from foretwin.orchestrator.campaign.joining import admission
 from tests.contracts.bus_sides import publish_until_received
 from tests.orchestrator.campaign.campaigns import campaign, expired, now
-from tests.system.foretwin_command import Finished, log_lines, run_folder, started, wait_for
-from tests.system.rogues import OF_A_WORKER, ROGUE, ROGUES
+from tests.system.foretwin_command import Finished, run_folder, started, wait_for
+from tests.system.rogue_drives import Bus, assert_all_were_refused, begun, play
 
 LIVE = ("--end", "40", "--futures", "6", "--workers", "1", "--rate", "1")
-LET_NOBODY_IN: dict[str, str] = {
-    "no certificate": "no certificate",
-    "another campaign's certificate": "another campaign's certificate",
-    "an expired certificate": "an expired certificate",
-    "plain TCP": "no TLS",
-    "the router's own certificate": "a certificate that is no client's",
-}
-"""Who is not let in at all, and as what the router counts it."""
 
 
 @pytest.fixture(scope="module")
@@ -70,56 +60,21 @@ def strangers(campaigns: Path, endpoint: str) -> dict[str, Any]:
     }
 
 
-def begun(out: Path) -> Callable[[], bool]:
-    def look() -> bool:
-        folder = run_folder(out)
-        return folder is not None and any(
-            line["text"].startswith("world ") for line in log_lines(folder)
-        )
-
-    return look
-
-
 def test_a_drive_over_tls_is_untouched_by_every_rogue(tmp_path: Path, campaigns: Path) -> None:
     out, endpoint = tmp_path / "runs", f"tls/localhost:{free_port()}"
     secured = ("--endpoint", endpoint, "--secure", str(campaigns / "ours"))
-    heard: dict[str, Any] = {}
+    bus = Bus(
+        "tls",
+        as_member=lambda rogue: config_of(endpoint, role_files(campaigns / "ours", rogue.role)),
+        as_stranger=strangers(campaigns, endpoint).__getitem__,
+    )
     with started(out, *LIVE, *secured) as process:
-        wait_for(begun(out), "the first World")
-        folder = run_folder(out)
-        assert folder is not None
-        for name, config in strangers(campaigns, endpoint).items():
-            with pytest.raises(zenoh.ZError):
-                zenoh.open(config)
-            assert name in LET_NOBODY_IN
-        for rogue in ROGUES:
-            with zenoh.open(config_of(endpoint, role_files(campaigns / "ours", rogue.role))) as one:
-                heard[rogue.name] = rogue.act(one, folder.name)
+        wait_for(lambda: begun(out), "the first World")
+        run = run_folder(out)
+        assert run is not None
+        heard = play(bus, run.name)
         screen, _ = process.communicate(timeout=240.0)
-    done = Finished(process.returncode, screen, run_folder(out))
-    record = done.record()
-    assert record["exit"] == "completed", screen
-    not_let_in = {one["kind"] for one in record["refused_by_router"]["by_role"] if not one["name"]}
-    assert not_let_in >= set(LET_NOBODY_IN.values())
-    reasons = {(one["sender"], one["reason"]) for one in record["refused"]["by_sender"]}
-    own = f"run/{folder.name}"
-    wanted = {(f"{own}/{channel}", "no message") for channel in OF_A_WORKER}
-    wanted |= {(f"vehicle/ego/telemetry/{one}", "no message") for one in TELEMETRY_CHANNELS}
-    wanted |= {(f"{own}/mirror", "too large"), ("vehicle/ego/telemetry/gnss", "too large")}
-    assert wanted - reasons == set()
-    assert reasons - wanted == set()
-    # What a role may not say came nowhere: no sample of it, no token, no word, no change.
-    assert record["telemetry"]["lost"] < 100
-    assert record["ledger"]["telemetry"]["lost_by"]["never_came"] == 0
-    assert record["workers"]["strangers"] == 0
-    assert record["workers"]["restarted"] == 0
-    assert record["changes"] == []
-    assert heard["a viewer changes the drive"] == []
-    (answer,) = heard["an operator names a path"]
-    assert "etc/passwd" in bytes((answer.ok or answer.err).payload).decode(errors="replace")
-    assert not [line for line in log_lines(folder) if ROGUE in line["text"]]
-    assert not [line for line in log_lines(folder) if "traceback" in line]
-    assert done.rows("rounds")
+    assert_all_were_refused(Finished(process.returncode, screen, run), "tls", heard)
 
 
 def router_of(campaigns: Path, endpoint: str) -> BusSetup:
