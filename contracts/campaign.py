@@ -36,6 +36,9 @@ class TlsFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 def role_files(campaign: Path, role: CampaignRole) -> TlsFiles:
     """Return a role's files in the folder of a campaign; raises UserError, see `certificate_in`."""
+    if not (campaign / AUTHORITY).is_file() and not (campaign / role).is_dir():
+        how = f"`foretwin secure init --folder {campaign}` begins one"
+        raise UserError(f"{campaign}: no folder of a campaign; {how}")
     return certificate_in(campaign / role, f"foretwin secure add {role} --folder {campaign}")
 
 

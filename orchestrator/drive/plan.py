@@ -59,7 +59,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         read_parameters(Path(config.standin_parameters))
     ros2 = read_ros2(config)
     if config.secure is not None and config.endpoint is not None:
-        check_campaign(Path(config.secure), config.endpoint, car=_starts_a_car(config))
+        check_campaign(Path(config.secure), config.endpoint, car=starts_a_car(config))
     map_file = Path(config.map) if config.map else MAP_FILE
     source = config.resolved_source
     info, positions, log_file = None, None, None
@@ -115,7 +115,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     )
 
 
-def _starts_a_car(config: DriveConfig) -> bool:
+def starts_a_car(config: DriveConfig) -> bool:
     """Whether a process of the drive speaks as a vehicle: a stand-in, a replay or a gateway."""
     gateways = [config.ros2, *(other.ros2 for other in config.vehicles)]
     return config.resolved_source != "live" or any(one is not None for one in gateways)

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import datetime
 import logging
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol
 
+from foretwin.contracts.certificates import UTC
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.campaign.ending import CertificateEnd
+from foretwin.orchestrator.campaign.joining import ends
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.plan import starts_a_car
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, ROUTER, VIEWER
 from foretwin.orchestrator.instructions import Notice
+from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.supervisor import Death, SupervisedRow
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -53,6 +62,7 @@ class ProcessWatch:
     troubles: list[str] = field(default_factory=list)
     """Deaths after which something is missing. Of a recorder that is there again the ledger of the
     telemetry tells what."""
+    _certificates: CertificateEnd | None = None
     _seen_alive: set[str] = field(default_factory=set)
     _silent_since_s: dict[str, float] = field(default_factory=dict)
     _linked: bool = False
@@ -96,10 +106,21 @@ class ProcessWatch:
                 self._missing(f"{text} and was not started again")
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
         conductor.refusals.look(now_s)
+        for text in self._certificates_of(conductor.plan).news(datetime.datetime.now(UTC)):
+            conductor.tell(Notice("warning", text))
         for text in conductor.tables.take_news():
             conductor.tell(Notice("warning", text))
         self._watch_router(now_s, linked=conductor.bus.connected)
         self._end_the_hung(conductor, now_s)
+
+    def _certificates_of(self, plan: DrivePlan) -> CertificateEnd:
+        if self._certificates is None:
+            secure, last = plan.config.secure, None
+            with contextlib.suppress(UserError):  # gone since: no reason to end a drive
+                if secure is not None:
+                    last = ends(Path(secure), car=starts_a_car(plan.config))
+            self._certificates = CertificateEnd(last)
+        return self._certificates
 
     def _missing(self, text: str) -> None:
         if text not in self.troubles:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -105,12 +106,10 @@ def assert_all_were_refused(done: Finished, transport: Transport, heard: dict[st
     assert others == set()
     assert record["refused_by_router"]["counted_all"]
     texts = [line["text"] for line in lines if line["process"] == "orchestrator"]
-    reasons = {row.who: 0 for row in wanted if row.part == "refused"}
-    for row in counted:
-        reasons[row.who] = reasons.get(row.who, 0) + (row.part == "refused")
+    reasons = Counter(row.who for row in counted if row.part == "refused")
     for row, name in wanted.items():
-        most = reasons[row.who] if row.part == "refused" else 1
-        assert told(row, texts) == most, (name, row)
+        times = reasons[row.who] if row.part == "refused" else 1
+        assert told(row, texts) == times, (name, row)
 
     # What a role may not say came nowhere: no sample of it, no token, no word, no change.
     telemetry, rounds, jobs = (record["ledger"][name] for name in ("telemetry", "rounds", "jobs"))
@@ -124,6 +123,7 @@ def assert_all_were_refused(done: Finished, transport: Transport, heard: dict[st
         assert heard[unheard] == []
     (answer,) = heard["an operator names a path"]
     assert "etc/passwd" in bytes((answer.ok or answer.err).payload).decode(errors="replace")
-    assert not [line for line in lines if ROGUE in line["text"]]
+    told_of = [line["text"] for line in lines if ROGUE in line["text"]]
+    assert [text for text in told_of if "refused: " not in text] == []
     assert not [line for line in lines if "traceback" in line]
     assert done.rows("rounds")

@@ -9,16 +9,19 @@ import msgspec
 import pytest
 
 from foretwin.contracts.campaign import certificate_in, role_files
+from foretwin.contracts.certificates import read_certificate
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.setup import BusSetup
+from foretwin.orchestrator.campaign.issuing import issue
 from foretwin.orchestrator.campaign.joining import (
     LOCAL_ROLES,
     check_campaign,
+    ends,
     own_certificate,
 )
 from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, member, process_ids
-from tests.orchestrator.campaign.campaigns import campaign, expired
+from tests.orchestrator.campaign.campaigns import campaign, expired, now
 from tests.orchestrator.trip import town_plan
 
 ENDPOINT = "tls/localhost:7447"
@@ -33,9 +36,19 @@ def test_a_campaign_is_looked_through_before_anything_begins(tmp_path: Path) -> 
     check_campaign(folder, ENDPOINT, car=False)
     with pytest.raises(UserError, match=r"car/certificate\.pem: expired"):
         check_campaign(folder, ENDPOINT, car=True)
+    with pytest.raises(UserError, match=r"empty: no folder of a campaign; `foretwin secure init"):
+        check_campaign(tmp_path / "empty", ENDPOINT, car=True)
     (folder / "viewer" / "key.pem").unlink()
     with pytest.raises(UserError, match=r"viewer/key\.pem: missing; `foretwin secure add viewer"):
         check_campaign(folder, ENDPOINT, car=False)
+
+
+def test_the_first_certificate_that_ends_ends_the_links(tmp_path: Path) -> None:
+    folder = campaign(tmp_path / "c")
+    assert ends(folder, car=False) == ends(folder, car=True)
+    first = issue(folder, "car", days=2, now=now())
+    assert ends(folder, car=True) == read_certificate(first / "certificate.pem").last
+    assert ends(folder, car=False) > ends(folder, car=True)
 
 
 def test_every_process_has_a_role_and_shows_its_own_certificate(tmp_path: Path) -> None:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import datetime
+import shutil
 import signal
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
+from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile, RefusedKind
+from foretwin.orchestrator.campaign.issuing import issue
 from foretwin.orchestrator.drive.process_watch import (
     HUNG_AFTER_S,
     RECONNECT_S,
@@ -16,6 +22,7 @@ from foretwin.orchestrator.drive.process_watch import (
 )
 from foretwin.orchestrator.drive.processes import PROCESSES
 from foretwin.orchestrator.runner.supervisor import MAX_RESTARTS, Supervisor
+from tests.orchestrator.campaign.campaigns import campaign, now
 from tests.orchestrator.house import House
 from tests.orchestrator.runner.test_supervisor import FakeChild, setup
 
@@ -151,3 +158,30 @@ def test_a_vehicle_that_is_gone_ends_the_drive_and_is_no_error_of_ours(tmp_path:
     assert watched.watch.troubles == [
         "vehicle ended with code -9: no telemetry comes any more, and the drive ends here"
     ]
+
+
+def told(watched: Watched, text: str) -> int:
+    return sum(text in event.text for event in watched.house.watched("event"))
+
+
+def test_what_the_router_refuses_is_told_while_the_drive_goes_on(tmp_path: Path) -> None:
+    watched = Watched(tmp_path)
+    kind = RefusedKind(sender="viewer", reason="say", key="foretwin/v1/run/r/event", count=1)
+    RefusalFile(watched.house.plan.processes_dir, "router").write(OwnRefusals(kinds=(kind,)))
+    watched.look(3.0)
+    assert told(watched, "refused: viewer may not say run/r/event") == 1
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_certificate_that_ends_soon_is_told_once(tmp_path: Path, there: bool) -> None:
+    folder = campaign(tmp_path / "campaign", age_days=3.0)
+    issue(folder, "worker", days=1, now=now() - datetime.timedelta(hours=23, minutes=55))
+    if not there:
+        shutil.rmtree(folder)
+    watched = Watched(tmp_path / "drive")
+    conductor = watched.house.conductor
+    config = msgspec.structs.replace(conductor.plan.config, secure=str(folder))
+    conductor.plan = dataclasses.replace(conductor.plan, config=config)
+    watched.watch = ProcessWatch(watched.watch.supervisor)
+    watched.look(3.0)
+    assert told(watched, "a certificate of this drive ends") == there
