@@ -86,7 +86,7 @@ def test_a_drive_on_its_own_socket_is_untouched_by_every_rogue(tmp_path: Path) -
             other = [sys.executable, "-S", "-c", CONNECTS, str(NOBODY), at]
             said = subprocess.run(other, cwd="/", capture_output=True, text=True, check=False)
             assert said.stdout == "refused\n", said.stderr
-        heard = play(bus_of(drive, tmp_path), run.name)
+        heard = play(bus_of(drive, tmp_path), run)
         passwords = passwords_of(drive)
         screen, _ = process.communicate(timeout=240.0)
     assert_all_were_refused(Finished(process.returncode, screen, run), "socket", heard)

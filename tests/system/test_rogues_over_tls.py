@@ -72,7 +72,7 @@ def test_a_drive_over_tls_is_untouched_by_every_rogue(tmp_path: Path, campaigns:
         wait_for(lambda: begun(out), "the first World")
         run = run_folder(out)
         assert run is not None
-        heard = play(bus, run.name)
+        heard = play(bus, run)
         screen, _ = process.communicate(timeout=240.0)
     assert_all_were_refused(Finished(process.returncode, screen, run), "tls", heard)
 
