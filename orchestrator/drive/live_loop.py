@@ -12,6 +12,7 @@ from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.trace import item_name, span
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.missed_end import MissedEnd
 
 HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
@@ -72,6 +73,8 @@ class LiveLoop:
     def run(self) -> bool:
         """Return True where the drive ended by itself, False where it was stopped."""
         conductor = self.conductor
+        vehicle_id, begun = conductor.plan.config.vehicle_id, self.before is not None
+        missed_end = MissedEnd(conductor.bus, conductor.mailbox, vehicle_id, begun=begun)
         next_housekeeping_s = self._next_due_s = time.monotonic()
         fresh = False
         if self.before is not None:
@@ -100,6 +103,7 @@ class LiveLoop:
                 conductor.watch_telemetry(round(now_s * 1e9))
             due = now_s >= self._next_due_s and not self._is_unplaced(now_s)
             fresh = due and (fresh or conductor.intake.states > seen)
+            missed_end.look(conductor.intake, now_s)
             ended = conductor.intake.end is not None and not self._telemetry_waits()
             # Of a portion the newest state counts.
             begins = fresh and not self._telemetry_waits()

@@ -28,6 +28,8 @@ FOUND = {
         Fault(3.0, "full", "disk", 6.0), Fault(5.0, "term", "recorder"),
         Fault(7.5, "term", "recorder"),
     ),
+    # Its last word was said while the orchestrator had no link, and the drive went on for ever.
+    "the car ends while the orchestrator stands still": (Fault(19.0, "stop", "orchestrator", 9.9),),
     "everybody dies while the supervisor stands still": (
         Fault(2.0, "stop", "supervisor", 8.0), Fault(4.0, "kill", "router"),
         Fault(4.5, "kill", "orchestrator"), Fault(5.0, "segv", "recorder"),

@@ -14,6 +14,7 @@ from foretwin.orchestrator.drive import live_loop
 from foretwin.orchestrator.drive.live_loop import GATHER_S, LiveLoop
 from foretwin.orchestrator.record.ledger import RoundTally
 from foretwin.orchestrator.rounds.pace import Pace
+from tests.contracts.memory_bus import MemoryBus
 
 
 class Clock:
@@ -75,21 +76,19 @@ class Conductor:
         self._round_s = round_s
         self._handling = handling
         self._open_until_s: float | None = None
-        self.plan = SimpleNamespace(config=SimpleNamespace(rate_hz=rate_hz, speed=1.0))
+        config = SimpleNamespace(rate_hz=rate_hz, speed=1.0, vehicle_id="car")
+        self.plan, self.bus = SimpleNamespace(config=config), MemoryBus()
         self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
         self.intake = SimpleNamespace(states=0, latest=None, end=None)
         self._settled_s = settled_s
         self.tuning = SimpleNamespace(parameters=self)
-        pace = SimpleNamespace(now=Pace(64, one_of))
-        self.rounds, self.pace = self, pace
+        self.rounds, self.pace = self, SimpleNamespace(now=Pace(64, one_of))
         self.mission = SimpleNamespace(wants_rounds=wants_rounds)
         self.tally = RoundTally()
         self.started_s: list[float] = []
         self.seeds_s: list[float] = []
         """When the states came from which rounds were started."""
-        self.dropped_s: list[float] = []
-        self.watched_s: list[float] = []
-        self.changes_made_s: list[float] = []
+        self.dropped_s, self.watched_s, self.changes_made_s = (list[float]() for _ in range(3))
 
     @property
     def open(self) -> bool:
@@ -109,9 +108,10 @@ class Conductor:
         if item == "state":
             self.intake.states += 1
             at_s = self.mailbox.arrived_s if self._received else self._clock.now_s
-            self.intake.latest = SimpleNamespace(receipt_mono_ns=at_s * 1e9)
+            state = SimpleNamespace(stamp_ns=0)
+            self.intake.latest = SimpleNamespace(receipt_mono_ns=at_s * 1e9, state=state)
         else:
-            self.intake.end = True
+            self.intake.end = SimpleNamespace(stamp_ns=0)
 
     def make_changes(self) -> None:
         self.changes_made_s.append(self._clock.now_s - 100)
@@ -254,9 +254,10 @@ def test_a_loop_that_is_stopped_says_so(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_silence_is_looked_into_every_50_ms(driven: Any) -> None:
-    conductor = driven(states_s=[0.0, 0.01, 0.02], end_s=1.0)
-    gaps_s = np.diff([GATHER_S, *conductor.watched_s, 1.0])
+    conductor = driven(states_s=[0.0, 0.01, 0.02], end_s=5.0)
+    gaps_s = np.diff([GATHER_S, *conductor.watched_s, 5.0])
     assert gaps_s.max() < 0.051
+    assert len(conductor.bus.recovered) == 1, "the car's end is asked for, and once more"
 
 
 def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(driven: Any) -> None:
