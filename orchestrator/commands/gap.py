@@ -13,7 +13,7 @@ from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
-from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
@@ -120,10 +120,10 @@ def report_gap(
     if out is not None:
         from foretwin.orchestrator.commands.gap_plots import write_plots
 
-        out.mkdir(parents=True, exist_ok=True)
-        plots = write_plots(
-            report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
-        )
+        with named_in_errors(f"--out {out}"), new_files(out):
+            plots = write_plots(
+                report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
+            )
     if as_json:
         say(json.dumps(as_object(report), indent=2))
         return

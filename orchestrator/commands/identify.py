@@ -14,7 +14,7 @@ import numpy as np
 from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.contracts.tuning import Identification
 from foretwin.orchestrator.commands.output import print_json
@@ -61,15 +61,15 @@ def identify_log(
     record, vehicle_id = read_record(log_file)
     told = identify(record, vehicle, vehicle_id=vehicle_id)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         changed, _ = accepted(told, vehicle, source=f"identified from {log_file.name}")
-        (out / "vehicle.toml").write_text(vehicle_toml(changed), encoding="utf-8")
         body = msgspec.json.encode(told)
-        (out / "identification.json").write_bytes(msgspec.json.format(body, indent=1) + b"\n")
-        draw_estimates(told, out / "estimates.png")
-        # A drive without steering, yaw rate or speed has no such picture, and the table says so.
-        with contextlib.suppress(ValueError):
-            draw_steering(record, vehicle, out / "steering.png")
+        with named_in_errors(f"--out {out}"), new_files(out):
+            (out / "vehicle.toml").write_text(vehicle_toml(changed), encoding="utf-8")
+            (out / "identification.json").write_bytes(msgspec.json.format(body, indent=1) + b"\n")
+            draw_estimates(told, out / "estimates.png")
+            # A drive without steering, yaw rate or speed has no such picture: the table says so.
+            with contextlib.suppress(ValueError):
+                draw_steering(record, vehicle, out / "steering.png")
     if as_json:
         print_json(as_object(told))
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,7 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
+from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
 from foretwin.contracts.terminal import say
@@ -25,6 +27,7 @@ from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
+    SUMMARY,
     FoundPlaces,
     SweepFolder,
     fingerprint_of,
@@ -53,9 +56,16 @@ def sweep(
         raise UserError(trouble)
     loaded = load_spec(spec)
     out = out or Path("sweeps") / spec.stem
+    if not out.is_file() and (trouble := trouble_with_folder(out)) is not None:
+        raise UserError(f"--out {out}: {trouble}")
+    new = not out.exists()
     try:
-        with workers_for(loaded, out, workers) as runner:
+        with named_in_errors(f"--out {out}"), workers_for(loaded, out, workers) as runner:
             summary = run_sweep(loaded, out, runner, fresh=fresh)
+    except OSError:
+        if new and not (out / SUMMARY).is_file():  # else it goes on from there
+            shutil.rmtree(out, ignore_errors=True)
+        raise
     except NoWorkerError as error:
         say(f"foretwin: {error}; what is done is kept", error=True)
         return SOME_FAILED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -78,7 +79,18 @@ def _summary(
         say(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
     if not failures:
         return 0
-    listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
+    try:
+        listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
+    except OSError as error:  # a full disk: the first of them is told here
+        listed.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        say(
+            f"{len(failures)} failed, and {listed} cannot be written: {error.strerror}; the first: "
+            f"{failures[0]}",
+            error=True,
+        )
+        return SOME_FAILED
     say(f"{len(failures)} failed: {listed}", error=True)
     return SOME_FAILED
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import datetime
 import functools
 import logging
+import shutil
 import time
 from pathlib import Path
 
 from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
-from foretwin.contracts.new_folder import new_folder
+from foretwin.contracts.new_folder import named_in_errors, new_folder
 from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.contracts.signing import OrderSigner
@@ -24,7 +25,7 @@ from foretwin.orchestrator.drive.router_start import on_local_bus
 from foretwin.orchestrator.drive.supervision import CRASHED, DriveError, Life, OwnProcesses
 from foretwin.orchestrator.drive.supervisor_link import SupervisorLink
 from foretwin.orchestrator.plan import DrivePlan
-from foretwin.orchestrator.record.run_state import LOG, run_lock
+from foretwin.orchestrator.record.run_state import LOG, RECORD, run_lock
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor
@@ -38,7 +39,7 @@ EXIT_FAILED = 1
 def drive(config: DriveConfig) -> int:
     """Run one drive; returns its exit code. Raises UserError before anything is written."""
     inputs = read_inputs(config)
-    with new_folder(Path(config.out)):
+    with named_in_errors(f"--out {config.out}"), new_folder(Path(config.out)):
         return carry_out(make_plan(inputs, datetime.datetime.now()))
 
 
@@ -46,8 +47,18 @@ def carry_out(plan: DrivePlan) -> int:
     """Run a drive whose folder is made; returns its exit code.
 
     This process becomes the supervisor, and forks the orchestrator. Where it cannot be forked,
-    since threads run in it, it is both, and nobody starts the orchestrator again.
+    since threads run in it, it is both, and nobody starts the orchestrator again. What cannot even
+    begin, as on a full disk, leaves no folder.
     """
+    try:
+        return _carry_out(plan)
+    except OSError:
+        if not (plan.folder / RECORD).exists():
+            shutil.rmtree(plan.folder, ignore_errors=True)
+        raise
+
+
+def _carry_out(plan: DrivePlan) -> int:
     with run_lock(plan.folder), sworn_in(plan) as sworn:
         _log_as(SUPERVISOR, plan)
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from foretwin.contracts.bus import Bus, Mailbox, Reply
 from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.intake import unannounced
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.supervision import DriveError
 
 START_TIMEOUT_S = 120.0
+LEAST_FREE_BYTES = 1_000_000
+"""With less than this left on the disk it is the disk that kept a process from starting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +33,10 @@ class Joining:
     stop: Callable[[], bool]
 
     def all_there(self) -> bool:
-        """Wait for all; False where it was stopped. Raises DriveError where one stays away."""
+        """Wait for all; False where it was stopped.
+
+        Raises DriveError where one stays away, UserError where that is since the disk is full.
+        """
         conductor = self.conductor
         expected = conductor.strangers.expected
         deadline = time.monotonic() + START_TIMEOUT_S
@@ -38,11 +47,19 @@ class Joining:
             missing = ", ".join(sorted(expected - conductor.alive))
             if self.watch.given_up & expected:
                 dead = ", ".join(sorted(self.watch.given_up & expected))
-                raise DriveError(f"cannot be started: {dead}; see log.jsonl")
+                raise self._no_start(f"cannot be started: {dead}; see log.jsonl")
             if time.monotonic() > deadline:
-                raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
+                text = f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl"
+                raise self._no_start(text)
             conductor.handle(conductor.mailbox.take(0.1))
         return self._ask_info(deadline)
+
+    def _no_start(self, text: str) -> Exception:
+        """Return what to say of processes that stay away: of a full disk, that it is full."""
+        plan = self.conductor.plan
+        if shutil.disk_usage(plan.folder).free >= LEAST_FREE_BYTES:
+            return DriveError(text)
+        return UserError(f"--out {plan.config.out}: {os.strerror(errno.ENOSPC).lower()}")
 
     def _ask_info(self, deadline: float) -> bool:
         conductor, config = self.conductor, self.conductor.plan.config

@@ -8,10 +8,12 @@ import time
 
 from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.cpu_use import CpuMeter
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.simulation import RunEnd
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.exit_words import EXIT_FAILED, IN_ORDER, VEHICLE_ENDED, exit_code
 from foretwin.orchestrator.drive.handing_over import HandingOver
 from foretwin.orchestrator.drive.in_charge import InCharge
 from foretwin.orchestrator.drive.interrupt import Interruption
@@ -46,16 +48,6 @@ INTERRUPT_GRACE_S = 1.2
 DEATH_TOLD_S = 2.0
 """How long after a silence the supervisor's word of a death may take on a busy machine."""
 
-EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
-VEHICLE_ENDED = "vehicle_ended"
-"""The `exit` of a drive whose vehicle's process died: what came before is kept."""
-_CODES = {
-    "completed": EXIT_DONE,
-    VEHICLE_ENDED: EXIT_PARTLY,
-    "interrupted": EXIT_INTERRUPTED,
-    "failed": EXIT_FAILED,
-}
-
 
 class CrashError(RuntimeError):
     """An error of ours has ended an orchestrator; the next one goes on with the drive."""
@@ -77,7 +69,7 @@ class Orchestrator:
         self._interruption = Interruption()
         self._watch = ProcessWatch(processes)
         self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
-        self._failed_at_end = False
+        self._failed_at_end = self._refused = False
         self._before = read_standing(life.standing)
         self._standing: HandingOver
         self._mission = Mission(
@@ -109,6 +101,7 @@ class Orchestrator:
                     exit_word = self._go(bus, conductor, line)
                 except Exception as error:
                     log.exception("the orchestrator ended by an error")
+                    self._refused = isinstance(error, UserError)  # its one line says all
                     if self._may_be_followed(error):
                         self._leave_to_next(conductor)
                         raise CrashError(str(error)) from error
@@ -117,8 +110,7 @@ class Orchestrator:
                 whole = self._end(bus, conductor, line, exit_word)
         if self._failed_at_end:
             return EXIT_FAILED
-        code = _CODES[exit_word]
-        return EXIT_PARTLY if code == EXIT_DONE and not whole else code
+        return exit_code(exit_word, whole=whole)
 
     def _may_be_followed(self, error: Exception) -> bool:
         """Whether another orchestrator may do better; what is true for each ends the drive."""
@@ -256,8 +248,7 @@ class Orchestrator:
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
-        in_order = exit_word in ("completed", VEHICLE_ENDED)
-        grace_s = to_write_s if in_order else INTERRUPT_GRACE_S
+        grace_s = to_write_s if exit_word in IN_ORDER else INTERRUPT_GRACE_S
         if killed := self._processes.stop(grace_s=grace_s, but={ROUTER}):
             log.warning("had to kill %s", ", ".join(killed))
         try:
@@ -282,5 +273,6 @@ class Orchestrator:
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / LOG)
         lost = lost_lines(record)
-        line.say("\n".join([summary_text(record), *lost]))
+        if not self._refused:
+            line.say("\n".join([summary_text(record), *lost]))
         return not lost

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import secrets
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -51,8 +52,9 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     except ValueError as error:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins
-    for name, folder in (("--out", config.out), ("cache_dir", config.cache_dir)):
-        if folder is not None and (trouble := trouble_with_folder(Path(folder))) is not None:
+    cache = "the cache" if config.cache_dir is None else "cache_dir"
+    for name, folder in (("--out", Path(config.out)), (cache, config.worlds_cache)):
+        if (trouble := trouble_with_folder(folder)) is not None:
             raise ConfigError(f"{name} {folder}: {trouble}")
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     if config.standin_parameters is not None:
@@ -215,5 +217,9 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
         live_view=live,
     )
     if plan.standin is not None:
-        plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
+        try:
+            plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
+        except OSError:
+            shutil.rmtree(folder)
+            raise
     return plan

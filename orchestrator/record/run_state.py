@@ -27,9 +27,13 @@ def run_lock(folder: Path) -> Iterator[None]:
     """Hold a run's folder as the one who writes there; ends with the process, whatever ends that.
 
     What is locked is the log: there from the first moment on, and never replaced. Raises
-    RunGoesOnError where another process holds it.
+    RunGoesOnError where another process holds it, UserError where nothing can be written there.
     """
-    descriptor = os.open(folder / LOG, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        descriptor = os.open(folder / LOG, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise UserError(f"{folder}: nothing can be written there: {why}") from error
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

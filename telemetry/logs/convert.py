@@ -11,6 +11,7 @@ from typing import Literal, get_args
 
 import msgspec
 
+from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.telemetry.logs import Log, LogError, open_log
 
 Target = Literal["mcap", "ros2", "ros1", "csv"]
@@ -63,7 +64,10 @@ def convert(
         raise LogError(f"{target}: is a folder; name a file")
     if kind == "csv":
         _check_own(_declaration_of(target))
-    counts, left_out = _WRITERS[kind](source, log, target)
+    if (trouble := trouble_with_folder(target.parent)) is not None:
+        raise LogError(f"{target}: {trouble}")
+    with named_in_errors(str(target)):
+        counts, left_out = _WRITERS[kind](source, log, target)
     return ConvertReport(counts=dict(counts), skipped=dict(left_out + log.skipped))
 
 

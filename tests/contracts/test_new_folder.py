@@ -6,7 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.contracts.new_folder import new_folder, trouble_with_folder
+from foretwin.contracts.new_folder import (
+    named_in_errors,
+    new_files,
+    new_folder,
+    trouble_with_folder,
+)
 
 
 def half_made(folder: Path, *, file: str = "") -> None:
@@ -44,3 +49,43 @@ def test_what_stands_in_a_folders_way_is_told(tmp_path: Path) -> None:
     assert trouble_with_folder(tmp_path / "a" / "b") is None
     assert trouble_with_folder(file) == "is no folder"
     assert trouble_with_folder(file / "a" / "b") == f"{file} is no folder"
+
+
+def test_it_is_tried_and_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    for folder in (tmp_path / "there", tmp_path / "a" / "b"):
+        assert trouble_with_folder(folder) is None
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+
+
+def test_folders_of_the_system_take_nothing(tmp_path: Path) -> None:
+    """Their permissions say otherwise to root."""
+    for name in ("/proc/x", "/proc/x/y"):
+        assert trouble_with_folder(Path(name)) == "folder /proc cannot be written to"
+    long = trouble_with_folder(tmp_path / ("x" * 300))
+    assert long == f"folder {tmp_path} cannot be written to: file name too long"
+
+
+def test_new_files_are_all_there_or_none(tmp_path: Path) -> None:
+    def half_written(folder: Path) -> None:
+        with new_files(folder):
+            (folder / "half").touch()
+            raise OSError("no room")
+
+    (tmp_path / "old").touch()
+    for folder in (tmp_path, tmp_path / "a" / "b"):
+        with pytest.raises(OSError, match="no room"):
+            half_written(folder)
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+    with new_files(tmp_path):
+        (tmp_path / "whole").touch()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["old", "whole"]
+
+
+def test_an_error_that_names_nothing_names_what_was_written() -> None:
+    with pytest.raises(OSError, match="space") as full, named_in_errors("--out x"):
+        raise OSError(28, "full")
+    assert (full.value.errno, full.value.filename) == (28, "--out x")
+    with pytest.raises(OSError, match="full") as other, named_in_errors("--out x"):
+        raise OSError(28, "full", "y")
+    assert other.value.filename == "y"
