@@ -34,10 +34,8 @@ def near_car(
     for user, away_m in zip(users.users, apart_m.tolist(), strict=True):
         if away_m <= WITHIN_M:
             near[user.user_id] = (away_m, user)
-    if len(near) > MOST_SEEN:
-        kept = set(sorted(near, key=lambda name: near[name][0])[:MOST_SEEN])
-        near = {name: found for name, found in near.items() if name in kept}
-    return tuple(_seen(user, frame) for _, user in near.values())
+    nearest = set(sorted(near, key=lambda name: near[name][0])[:MOST_SEEN])
+    return tuple(_seen(user, frame) for name, (_, user) in near.items() if name in nearest)
 
 
 def _seen(user: RoadUser, frame: LocalFrame) -> SeenRoadUser:

@@ -76,6 +76,15 @@ def test_the_share_is_that_since_the_start(tmp_path: Path, monkeypatch: pytest.M
     )  # fmt: skip
 
 
+def test_the_most_come_first_and_equals_by_their_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, took_s in (("w1", 2.0), ("viewer", 1.0), ("w0", 2.0)):
+        monkeypatch.setattr(cpu_use.time, "process_time", lambda took_s=took_s: took_s)
+        CpuMeter(tmp_path, name).write()
+    assert list(cpu_uses(tmp_path)) == ["w0", "w1", "viewer"]
+
+
 def test_it_is_written_now_and_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = time.monotonic()
     monkeypatch.setattr(cpu_use.time, "monotonic", lambda: now_s)

@@ -60,6 +60,13 @@ def test_a_path_that_no_socket_can_have_is_refused(
     assert not (tmp_path / "foretwin" / ("r" * 100)).exists()
 
 
+def test_who_has_laid_a_file_in_the_place_of_a_password_learns_none(tmp_path: Path) -> None:
+    (tmp_path / "a.json").touch(0o666)
+    with pytest.raises(FileExistsError):
+        make_credentials(tmp_path, ["a"])
+    assert (tmp_path / "a.json").read_bytes() == b""
+
+
 def test_a_password_that_others_can_read_is_refused(tmp_path: Path) -> None:
     make_credentials(tmp_path, ["a"])
     (tmp_path / "a.json").chmod(0o644)

@@ -155,6 +155,20 @@ def test_what_a_sender_says_it_sent_is_missing_until_it_comes() -> None:
     assert (numbers.published["imu"], numbers.missing["imu"]) == (5, 4)
 
 
+def test_a_number_whose_sender_is_not_told_is_of_who_was_heard_last() -> None:
+    numbers = Numberings()
+    for channel, sender in (("imu", 7), ("imu", 8), ("gnss", 9)):
+        for seq in (0, 1, 4):
+            numbers.take(channel, seq, sender=sender)
+    assert numbers.take_up("imu", 5), "it goes on with the last one"
+    assert numbers.take_up("imu", 2), "it was missing"
+    assert numbers.take_up("imu", 2), "of the one before it was too"
+    assert not numbers.take_up("imu", 2)
+    assert not numbers.take_up("imu", 0), "it had come"
+    assert not numbers.take_up("speed", 0), "nobody was heard there"
+    assert numbers.missing == {"imu": 2, "gnss": 2}
+
+
 def test_more_holes_than_are_kept_still_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_HOLES", 10)
     numbering = Numbering("imu", 0, 0)
