@@ -133,8 +133,11 @@ def test_of_road_users_those_that_cannot_be_are_left_out(changed: dict[str, Any]
 
 @pytest.mark.parametrize(
     ("name", "low", "high"),
-    [("length_m", 0.05, 100.0), ("width_m", 0.05, 30.0), ("speed_mps", -120.0, 120.0)],
-)
+    [
+        ("length_m", 0.05, 100.0), ("width_m", 0.05, 30.0), ("speed_mps", -120.0, 120.0),
+        ("yaw_rad", -100.0, 100.0),
+    ],
+)  # fmt: skip
 def test_a_road_user_is_between_a_childs_arm_and_the_longest_tram(
     name: str, low: float, high: float
 ) -> None:

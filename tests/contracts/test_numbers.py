@@ -13,6 +13,7 @@ from foretwin.contracts.futures import Future
 from foretwin.contracts.numbers import (
     FUTURE_NUMBERS,
     MAX_EXTRA_DELAY_S,
+    MAX_SEED,
     SCENARIO_NUMBERS,
     out_of_range,
 )
@@ -60,6 +61,7 @@ def test_a_futures_own_numbers_join_those_of_its_scenario() -> None:
 
 
 def test_every_range_is_finite() -> None:
+    assert MAX_SEED == 2**63 - 1, "as messages and tables hold it"
     for row in (*FUTURE_NUMBERS.values(), *SCENARIO_NUMBERS.values()):
         assert -math.inf < row.range.low < row.range.high < math.inf
 

@@ -68,6 +68,7 @@ def test_where_nothing_may_go_to_the_vehicle_others_hear_of_it_all_the_same() ->
         ground.say_everything()
         ground.step(100.0)
     assert ground.towards()["/clock"] == 0
+    assert ground.gateway.report()["held"]["/clock"] == 3
     assert ground.foreign.on("/foretwin/clock")
 
 
