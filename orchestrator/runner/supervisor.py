@@ -33,6 +33,7 @@ TERM_S = 5.0
 """What a process that was told to leave has for its last words: on a busy machine one that writes a
 file is slow, not stuck."""
 _REAP_S = 30.0
+MOST_STDERR_BYTES = 1_000_000  # of each process: what it said last
 MAX_RESTARTS = 5
 """More deaths than this within RESTARTS_WITHIN_S and a process is given up."""
 FIRST_PAUSE_S = 1.0
@@ -95,17 +96,11 @@ class FreshInterpreter:
     def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
         """Start a fresh interpreter running `module` with `setup`."""
         setup_file = self._folder / f"{setup.process_id}.json"
+        name = f"{self._package}.{module}"
         write_setup(setup, setup_file)
         with (self._folder / f"{setup.process_id}.stderr").open("ab") as stderr:
             return subprocess.Popen(
-                [
-                    sys.executable,
-                    "-P",
-                    "-m",
-                    f"{self._package}.{module}",
-                    "--setup",
-                    str(setup_file),
-                ],
+                [sys.executable, "-P", "-m", name, "--setup", str(setup_file)],
                 stdin=subprocess.DEVNULL,
                 stdout=stderr,
                 stderr=stderr,
@@ -291,9 +286,10 @@ def fold_stderr(folder: Path, log_file: Path) -> None:
     """Append what the processes wrote to standard error to the run's log, one JSON line each."""
     with log_file.open("a", encoding="utf-8") as log:
         for path in sorted(folder.glob("*.stderr")):
-            for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-                if line.strip():
-                    log.write(
-                        json.dumps({"process": path.stem, "level": "stderr", "text": line}) + "\n"
-                    )
+            with path.open("rb") as said:
+                said.seek(max(0, path.stat().st_size - MOST_STDERR_BYTES))
+                text = said.read().decode(errors="replace")
+            for line in filter(str.strip, text.splitlines()):
+                told = {"process": path.stem, "level": "stderr", "text": line}
+                log.write(json.dumps(told) + "\n")
             path.unlink()

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.contracts.log_file import JsonLines, LogFile
+from foretwin.contracts import log_file
+from foretwin.contracts.log_file import JsonLines, LogFile, read_log
 
 
 @pytest.fixture
@@ -78,6 +79,39 @@ def test_a_full_disk_loses_its_lines_alone(
     lines = file.read_text(encoding="utf-8").splitlines()
     assert [json.loads(lines[number])["text"] for number in (0, 2)] == ["before", "after"]
     assert len(lines) == 3
+
+
+def test_another_process_begins_a_new_line_after_a_torn_one(
+    file: Path, log: logging.Logger
+) -> None:
+    file.write_bytes(b'{"text": "whole"}\n{"text": "to')
+    log.info("after")
+    found = read_log(file)
+    assert [line["text"] for line in found.lines] == ["whole", "after"]
+    assert found.torn == 1
+    file.write_bytes(b'{"text": "whole"}\n7\n\n\xff\n{"text": "no end"}')
+    assert read_log(file) == ([{"text": "whole"}], 3)
+
+
+def test_no_process_fills_a_log_and_the_worst_has_room_longest(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_file, "MOST_BYTES", 3000)
+    monkeypatch.setattr(log_file, "MOST_URGENT_BYTES", 4000)
+    log, handler = logging.Logger("here", logging.INFO), LogFile(file)
+    handler.setFormatter(JsonLines("p0"))
+    log.addHandler(handler)
+    for number in range(100):
+        log.info("%d", number)
+    size = file.stat().st_size
+    assert 2800 < size <= 3000
+    log.error("bad")
+    handler.close()
+    handler.close()
+    lines = read_log(file).lines
+    assert [line["level"] for line in lines[-2:]] == ["error", "warning"]
+    assert lines[-1]["text"].startswith(f"{100 - (len(lines) - 2)} lines are left out")
+    assert [line["text"] for line in lines[:-2]] == [str(n) for n in range(len(lines) - 2)]
 
 
 def test_a_file_that_cannot_be_opened_ends_nothing(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import pyarrow.parquet as pq
 
+from foretwin.contracts.log_file import read_log
 from tests.contracts.bus_sides import DEADLINE_S
 
 REPOSITORY = Path(__file__).parents[2]
@@ -91,8 +92,8 @@ def run_folder(out: Path) -> Path | None:
 
 def log_lines(run: Path) -> list[dict[str, Any]]:
     """Return the lines of the run's log that are there so far."""
-    text = (run / "log.jsonl").read_text(encoding="utf-8") if (run / "log.jsonl").exists() else ""
-    return [json.loads(line) for line in text.splitlines(keepends=True) if line.endswith("\n")]
+    file = run / "log.jsonl"
+    return read_log(file).lines if file.exists() else []
 
 
 def child_pids(run: Path) -> dict[str, int]:

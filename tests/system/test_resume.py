@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.bus import Mailbox, Received, ZenohBus
+from foretwin.orchestrator.commands.cli import run as command
 from foretwin.orchestrator.commands.set import running_drive
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
@@ -125,6 +126,8 @@ def assert_one_run(one: Resumed) -> None:
     assert len(set(numbers)) == len(numbers) == rounds["run"] == record["futures"]["rounds"]
     futures = [(row["round_id"], row["index"]) for row in one.finished.rows("futures")]
     assert len(futures) == len(set(futures)) >= record["futures"]["count"]
+    for row in (one.finished.rows("futures")[0], one.finished.rows("futures")[-1]):
+        assert command(["repeat", str(one.finished.run), row["future_id"]]) == 0
     for table, stamps_ns in one.told_ns.items():
         assert stamps_ns <= {row["stamp_ns"] for row in one.finished.rows(table)}, table
 

@@ -15,6 +15,7 @@ import pytest
 
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.orchestrator.drive.processes import PROCESSES, ProcessRow, row_of
+from foretwin.orchestrator.runner import supervisor
 from foretwin.orchestrator.runner.supervisor import (
     MAX_RESTARTS,
     FreshInterpreter,
@@ -195,3 +196,13 @@ def test_what_a_process_said_last_lands_in_the_log(tmp_path: Path) -> None:
     lines = [json.loads(line) for line in log_file.read_text().splitlines()]
     assert [line["text"] for line in lines] == ["Traceback", "KeyError: 3"]
     assert not list(tmp_path.glob("*.stderr"))
+
+
+def test_of_a_process_that_says_too_much_the_end_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "MOST_STDERR_BYTES", 9)
+    (tmp_path / "w0.stderr").write_text("too much\nat last\n")
+    fold_stderr(tmp_path, tmp_path / "log.jsonl")
+    (line,) = map(json.loads, (tmp_path / "log.jsonl").read_text().splitlines())
+    assert line["text"] == "at last"
