@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import socket
 import threading
+import time
 import traceback
 from collections.abc import Callable
 
@@ -19,9 +20,11 @@ _STDOUT = 1
 _HOLDS_BYTES = 1 << 20
 """What may wait to be looked at; the system may give less."""
 _MOST_AT_ONCE = 1000
-_BURST = 20
-"""So many looks in a row that find more than they can take are a flood; within one, a single look
-is. Who was started again and asks for what it missed makes thousands of records at once."""
+_BURST, _PER_S, _AFTER_FLOOD = 20_000, 10_000, 1000
+"""So many records at a stretch, and each second, are looked at; more are a flood. A process that
+was started again and asks for what it missed makes thousands at once."""
+_BEHIND_S = 0.5
+"""Who writes waits no longer for looks that do not catch up."""
 _LOOK_S = 0.02
 _LET_GO_S = 0.5
 _MOST_BYTES = 1024
@@ -50,12 +53,19 @@ class OwnLog:
     def _hear(self) -> None:
         fault = ""
         try:
-            looks_left = _BURST
-            while not self._closed.wait(_LOOK_S if looks_left == _BURST else 0.0):
-                if self._look():
-                    looks_left = _BURST
-                elif (looks_left := looks_left - 1) <= 0:
+            left, taken = float(_BURST), 0
+            looked_s = caught_up_s = time.monotonic()
+            while not self._closed.wait(_LOOK_S if taken < _MOST_AT_ONCE else 0.0):
+                now_s = time.monotonic()
+                left, looked_s = min(_BURST, left + _PER_S * (now_s - looked_s)), now_s
+                taken = self._look()
+                left -= taken
+                if taken < _MOST_AT_ONCE:
+                    caught_up_s = time.monotonic()
+                if left < 0 or time.monotonic() - caught_up_s > _BEHIND_S:
                     self._let_go()
+                    left, taken = float(_AFTER_FLOOD), 0
+                    looked_s = caught_up_s = time.monotonic()
             self._look()
         except Exception:
             fault = traceback.format_exc()
@@ -64,15 +74,15 @@ class OwnLog:
         if fault:
             say(f"hears its own log no more: {fault}", error=True)
 
-    def _look(self) -> bool:
-        """Take what is there; returns whether that was all of it."""
-        for _ in range(_MOST_AT_ONCE):
+    def _look(self) -> int:
+        """Take what is there, of much a part; returns how many records that were."""
+        for taken in range(_MOST_AT_ONCE):
             try:
                 record = self._heard.recv(_MOST_BYTES, socket.MSG_DONTWAIT)
             except BlockingIOError:
-                return True
+                return taken
             self._take(record)
-        return False
+        return _MOST_AT_ONCE
 
     def _let_go(self) -> None:
         os.dup2(self._nowhere, _STDOUT)
