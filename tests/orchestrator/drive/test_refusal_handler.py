@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import random
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,14 +13,18 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import PlannedTrajectory, RoadUser, RoadUsers
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS, alive_key, key
 from foretwin.contracts.mailbox import Alive, Received, Request
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile, RefusedKind
+from foretwin.contracts.tuning import SetRequest
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
+from foretwin.orchestrator.drive.standing import heard_of
 from foretwin.orchestrator.instructions import Notice
+from foretwin.orchestrator.runtime_configuration.handler import NOT_TO_BE_SET
 from tests.contracts.hostile_messages import HOSTILE, hostile_bytes
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS
@@ -203,3 +208,23 @@ def test_whatever_strangers_send_the_drive_goes_on(tmp_path: Path, seed: int) ->
     assert not house.tables.troubles
     assert house.conductor.refusals.record()["refused"]["count"] > 500
     assert house.conductor.intake.counts.received > 60
+
+
+def test_what_cannot_be_set_is_answered_and_counted(house: House) -> None:
+    said: list[bytes | None] = []
+    asked = encode(SetRequest(key="vehicle.../../etc/passwd", value="rogue"))
+    question = Request("set", key("set", run="r"), asked, lambda data, _: said.append(data))
+    house.conductor.handle(question)
+
+    assert said[0] is not None
+    assert b"etc/passwd" in said[0]
+    assert refused(house) == {("set", NOT_TO_BE_SET): 1}
+
+
+def test_an_orchestrator_that_goes_on_knows_what_was_told(house: House) -> None:
+    house.drive(20)
+    kinds = (RefusedKind(sender="viewer", reason="say", key="a", count=1),)
+    RefusalFile(house.plan.processes_dir, "router").write(OwnRefusals(kinds=kinds))
+    house.conductor.refusals.look(1.0)
+    heard = pickle.loads(heard_of(house.conductor))
+    assert heard.refusals_told == {(True, "viewer", "say")}
