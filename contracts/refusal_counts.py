@@ -105,9 +105,12 @@ class RefusalFile:
             return
         partial = self._file.with_suffix(".partial")
         with contextlib.suppress(OSError):
-            partial.write_bytes(msgspec.json.encode(now))
-            partial.replace(self._file)
-            self._written = now
+            try:
+                partial.write_bytes(msgspec.json.encode(now))
+                partial.replace(self._file)
+                self._written = now
+            finally:
+                partial.unlink(missing_ok=True)
 
 
 def refused_by(folder: Path) -> dict[str, OwnRefusals]:

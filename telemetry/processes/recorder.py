@@ -35,8 +35,9 @@ _NICENESS = 10
 _AT_ONCE = 500
 _FLUSH_EVERY_S = 1.0
 _ASK_EVERY_S = 1.0
-_LAST_WORDS_S = 0.5
-"""How long messages are still taken after the end of the run; in lock step as long as some come."""
+_LAST_WORDS_S, _BACKLOG_S = 0.5, 4.0
+"""How long messages are still taken after the end of the run, and then what has come by then is
+written; in lock step as long as some come."""
 
 log = logging.getLogger("foretwin.telemetry.processes.recorder")
 
@@ -102,7 +103,8 @@ class RecorderProcess:
     def finish(self) -> None:
         """Write what still waits or is on its way, and end the file.
 
-        Live for half a second at most; in lock step nothing may be missing.
+        Live for half a second at most, and what has come by then; in lock step nothing may be
+        missing.
         """
         until_s = self._mono_s() + _LAST_WORDS_S
         while self._lossless or self._mono_s() < until_s:
@@ -110,6 +112,10 @@ class RecorderProcess:
             if item is None:
                 break
             self._take_messages(item)
+        until_s, behind = self._mono_s() + _BACKLOG_S, len(self._messages)
+        while behind > 0 and self._mono_s() < until_s:
+            self._take_messages(self._messages.take())
+            behind -= _AT_ONCE + 1
         left = len(self._messages)
         self._messages.close()
         self._report_losses(at_the_end=True)

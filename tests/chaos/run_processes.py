@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import signal
 from pathlib import Path
 from typing import NamedTuple
@@ -31,17 +30,17 @@ def members(run: Path, mark: str, command_pid: int) -> list[Member]:
     """Return the processes of a run that live, sorted by name.
 
     Who was started with a setup is named by it. The command is the supervisor; the orchestrator is
-    who was forked from it last. What else carries the mark is `other`, a command that looks at
-    something for a moment.
+    who was forked from it: the same command line, another process. What else carries the mark is
+    `other`. The run's log is not asked: on a full disk it tells nothing.
     """
     found = []
-    orchestrator = _forked_last(run / "log.jsonl")
+    command = _words(command_pid)
     for pid in marked(mark):
         if (name := _setup_name(pid, run)) is None:
             name = "other"
             if pid == command_pid:
                 name = "supervisor"
-            if pid == orchestrator:
+            elif command and _words(pid) == command:
                 name = "orchestrator"
         found.append(Member(name, pid))
     return sorted(found)
@@ -79,9 +78,8 @@ def _setup_name(pid: int, run: Path) -> str | None:
     return None
 
 
-def _forked_last(log: Path) -> int | None:
-    """Return the newest orchestrator by a run's log."""
-    forked = re.findall(
-        r"forked the orchestrator as process (\d+)", log.read_text(encoding="utf-8")
-    )
-    return int(forked[-1]) if forked else None
+def _words(pid: int) -> bytes:
+    """Return the command line of a process, empty where it is gone."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    return b""

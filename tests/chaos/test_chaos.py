@@ -99,8 +99,6 @@ def test_processes_of_a_drive_are_found_by_what_it_tells(tmp_path: Path) -> None
         subprocess.Popen(sleep, env=environment) as command,
         subprocess.Popen(sleep, env=environment) as fork,
     ):
-        said = f'{{"text": "forked the orchestrator as process {fork.pid}"}}\n'
-        (folder.parent / "log.jsonl").write_text(said)
         try:
             wait_for(lambda: len(marked(mark)) == 3, "all of them")
             found = members(folder.parent, mark, command.pid)

@@ -36,9 +36,10 @@ class Wall:
     """A clock that is moved by hand."""
 
     def __init__(self) -> None:
-        self.now_s = 0.0
+        self.now_s, self.each_look_s = 0.0, 0.0
 
     def __call__(self) -> float:
+        self.now_s += self.each_look_s
         return self.now_s
 
 
@@ -87,6 +88,16 @@ def test_what_is_missing_is_asked_for_once_more(tmp_path: Path) -> None:
     assert process.step()
     assert set(bus.recovered[1:]) == {channel_key(one, vehicle="car") for one in ("speed", "imu")}
     process.finish()
+
+
+def test_who_is_behind_at_the_end_writes_what_has_come_by_then(tmp_path: Path) -> None:
+    wall, bus, recording = Wall(), MemoryBus(), DriveRecording(tmp_path / "drive.mcap")
+    process = recorder(bus, recording, lossless=False, mono_s=wall)
+    for number in range(1200):
+        bus.publish("speed", SpeedSample(stamp_ns=START_NS + number, speed_mps=1.0), vehicle="car")
+    wall.each_look_s = 0.3
+    process.finish()
+    assert recording.tally.recorded == {"speed": 1200}
 
 
 @pytest.mark.parametrize(("run_ended", "lossless"), [(True, False), (False, False), (False, True)])
