@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pyarrow.parquet as pq
+import pytest
 
 from foretwin.contracts.codec import write_message
 from foretwin.orchestrator.agreement.known_windows import into_table
 from foretwin.orchestrator.agreement.recovered import recovered_agreement
+from foretwin.orchestrator.record import recovery
 from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.record.recovery import recover
 from foretwin.orchestrator.record.results import TABLES
@@ -49,7 +51,23 @@ def test_the_record_and_the_table_are_those_of_a_drive_that_ended(tmp_path: Path
     assert "agreement" not in done.record["recovered"]["unknown"]
 
 
-def test_an_interrupted_recovery_keeps_each_verdict_once(tmp_path: Path) -> None:
+def test_an_interrupted_recovery_keeps_each_verdict_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dies(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    run = killed(tmp_path / "run")
+    with monkeypatch.context() as patched:
+        patched.setattr(recovery, "write_record", dies)
+        with pytest.raises(KeyboardInterrupt):
+            recover(run, judge=recovered_agreement)
+    recover(run, judge=recovered_agreement)
+    kept = pq.read_table(run / "results" / "agreement.parquet")
+    assert kept.num_rows == len(HANDLER.judged)
+
+
+def test_recovering_from_the_beginning_again_comes_to_the_same(tmp_path: Path) -> None:
     run = killed(tmp_path / "run")
     begun = (run / "run.json").read_bytes()
     streams = {path: path.read_bytes() for path in (run / "results").iterdir()}

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.drive import VehicleStatus
+from foretwin.contracts.side_by_side import DrivenSegment
 from foretwin.orchestrator.drive.live_loop import RoundGrid
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.run_record import run_record
@@ -178,6 +179,11 @@ def test_what_was_found_until_then_stays_found(tmp_path: Path) -> None:
     findings = house.conductor.tuning.findings
     for found in (FOUND, gap(3.0), gap(4.0), ALARM, VERDICT):
         findings.take(found)
+    segment = DrivenSegment(
+        number=0, control_mode="manual", from_stamp_ns=1, to_stamp_ns=2, plans=3, cut=0,
+        too_short=0, lateral_m=0.1, along_m=0.1, speed_mps=0.1, disagreements=0,
+    )  # fmt: skip
+    house.conductor.ads.standing.ended.append(segment)
     house.conductor.mirror.independent = False
     house.tables.lost_before = 3
     before = findings.record(), house.conductor.ads.record()
