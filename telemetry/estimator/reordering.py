@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 from collections import Counter, deque
 from typing import Any, NamedTuple
 
@@ -50,6 +51,10 @@ class Reordering:
         """The first lies before all samples that may yet come."""
         self._seen: set[tuple[str, int]] = set()
         self._number = 0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what can be computed again: from the first checkpoint all samples are."""
+        return self.__dict__ | {"_checkpoints": deque(itertools.islice(self._checkpoints, 1))}
 
     @property
     def waiting(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import pickle
 
 import numpy as np
 from hypothesis import example, given, settings
@@ -78,3 +79,21 @@ def test_a_flood_between_two_states_stays_bounded() -> None:
         reordering.add("speed", SpeedSample(stamp_ns=1 + k, speed_mps=1.0))
     assert reordering.waiting < flood / 2
     assert reordering.track().state(flood).stamp_ns == flood
+
+
+@given(st.integers(20, 60), st.integers(1, 5))
+@settings(max_examples=20)
+def test_who_goes_on_from_its_bytes_takes_late_samples_as_well(cut: int, late_by: int) -> None:
+    """What is left out of the bytes is computed again."""
+    first = Reordering(MotionTrack(info()))
+    order = samples()
+    order = [*order[: cut - late_by], *order[cut - late_by + 1 :]]
+    for channel, message in order[: cut - 1]:
+        first.add(channel, message)
+        first.track()
+    again = pickle.loads(pickle.dumps(first))
+    assert len(pickle.dumps(first)) < 0.7 * len(pickle.dumps(first.__dict__))
+    for reordering in (first, again):
+        for channel, message in [samples()[cut - late_by], *order[cut - 1 :]]:
+            reordering.add(channel, message)
+    assert again.track().state(end_ns(4.0)) == first.track().state(end_ns(4.0)) == in_order()
