@@ -28,6 +28,7 @@ _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 class CpuLook(NamedTuple):
     """What the processes of a drive had taken at an instant, and the whole machine."""
 
+    mono_s: float
     lives: dict[str, tuple[float, float]]
     """By process: seconds since it could take work, and processor seconds."""
     machine_s: float
@@ -97,7 +98,7 @@ def _look(runs: Path) -> CpuLook:
             continue  # it is being written
         lives[file.stem.rsplit("-", 1)[0]] = life["ready_s"], life["cpu_s"]
     ticks = [int(n) for n in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
-    return CpuLook(lives, (sum(ticks) - ticks[3] - ticks[4]) / _TICKS_PER_S)
+    return CpuLook(time.monotonic(), lives, (sum(ticks) - ticks[3] - ticks[4]) / _TICKS_PER_S)
 
 
 def read_live_drive(run: Path, looks: Sequence[CpuLook], *, end_s: float = END_S) -> LiveDrive:
@@ -136,7 +137,7 @@ def shares_between(
     """
     aged = [look for look in looks if from_s <= look.lives.get("orchestrator", (0.0, 0.0))[0]]
     within = [look for look in aged if look.lives["orchestrator"][0] <= to_s]
-    if len(within) < 2 or within[0].lives["orchestrator"] == within[-1].lives["orchestrator"]:
+    if not within or within[0].lives["orchestrator"] == within[-1].lives["orchestrator"]:
         raise UnavailableError(f"no processor time is known from {from_s:g} s to {to_s:g} s")
     first, last = within[0].lives, within[-1].lives
     shares = {
@@ -144,7 +145,7 @@ def shares_between(
         for name in last
         if name in first and last[name][0] > first[name][0]
     }
-    passed_s = last["orchestrator"][0] - first["orchestrator"][0]
+    passed_s = within[-1].mono_s - within[0].mono_s
     machine = (within[-1].machine_s - within[0].machine_s) / passed_s
     return shares, max(machine - sum(shares.values()), 0.0)
 

@@ -114,7 +114,7 @@ def test_a_live_drive_is_read_from_its_trace_and_its_record(tmp_path: Path) -> N
     (tmp_path / "results").mkdir()
     pq.write_table(pa.Table.from_pylist(rows), tmp_path / "results" / "rounds.parquet")
     looks = [
-        CpuLook({"orchestrator": (age_s, 3.0 + 0.1 * age_s), "w0": (age_s, age_s)}, 10.0 + age_s)
+        look(age_s, machine_s=10.0 + age_s, orchestrator=3.0 + 0.1 * age_s, w0=age_s)
         for age_s in (9.0, 11.0, 13.0)
     ]
     found = read_live_drive(tmp_path, looks)
@@ -127,12 +127,13 @@ def test_a_live_drive_is_read_from_its_trace_and_its_record(tmp_path: Path) -> N
 
 
 def look(age_s: float, *, machine_s: float, **cpu_s: float) -> CpuLook:
-    return CpuLook({name: (age_s, taken_s) for name, taken_s in cpu_s.items()}, machine_s)
+    lives = {name: (age_s, taken_s) for name, taken_s in cpu_s.items()}
+    return CpuLook(100.0 + age_s, lives, machine_s)
 
 
 def test_shares_count_between_the_beginning_and_the_last_word() -> None:
     looks = [
-        CpuLook({}, 0.0),
+        CpuLook(100.0, {}, 0.0),
         look(4.0, machine_s=20.0, orchestrator=9.0, w0=1.0),
         look(10.0, machine_s=30.0, orchestrator=10.0, w0=2.0),
         look(20.0, machine_s=38.0, orchestrator=11.0, w0=6.0, late=1.0),
