@@ -40,7 +40,7 @@ class Mailbox:
 
     def gather(self, most_s: float) -> None:
         self.gathered_s.append(most_s)
-        self._clock.now_s += most_s
+        self._clock.now_s += most_s + 1e-6  # nobody wakes up too early
 
     def take(self, timeout_s: float) -> str | None:
         until_s = self._clock.now_s + max(timeout_s, 1e-4)
@@ -178,7 +178,7 @@ def test_a_late_round_counts_as_missed_and_the_next_is_left_out(driven: Any) -> 
 
 def test_a_round_that_never_ends_is_given_up(driven: Any) -> None:
     conductor = driven(states_s=every(0.02, 25.0), end_s=25.0, round_s=1e6)
-    assert conductor.dropped_s == pytest.approx([10.5, 21.5], abs=0.6)
+    assert conductor.dropped_s == pytest.approx([10.0, 20.5], abs=0.6)
     assert len(conductor.started_s) == 3
     assert conductor.tally.missed > 40
 

@@ -21,10 +21,7 @@ from foretwin.sim_worker.analysis.side_by_side.watch import (
     SideBySide,
 )
 
-COVERS = (
-    "foretwin.sim_worker.analysis.side_by_side.departure",
-    "foretwin.sim_worker.analysis.side_by_side.segment",
-)
+COVERS = ("foretwin.sim_worker.analysis.side_by_side.segment",)
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 START_NS = 7_000_000_000
