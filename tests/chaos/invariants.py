@@ -136,7 +136,7 @@ def _wrong_tables(results: Path) -> Iterator[str]:
 
 def _wrong_files(left: Left) -> Iterator[str]:
     temporary = [path.name for name in _TEMPORARY for path in left.run.rglob(name)]
-    if temporary and not (left.code == 3 and left.befell("disk")):
+    if temporary and not (left.code in (3, 130) and left.befell("disk")):
         yield f"temporary files in the run's folder: {sorted(temporary)}"
     cached = [path.name for name in _TEMPORARY for path in (left.scratch / "cache").rglob(name)]
     if cached and not left.befell("disk"):
