@@ -27,6 +27,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.log_file import JsonLines, LogFile
+from foretwin.contracts.one_heap import share_one_heap
 from foretwin.contracts.process_setup import setup_given
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile
 from foretwin.contracts.refusals import Refusals
@@ -157,6 +158,7 @@ def run_process(
     codes: 0 done, 2 something wrong with setup or input, in one line, 1 any other error.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    share_one_heap()
     file, setup = setup_given(kind, argv)
     hold(file)
     log_to_file(setup)

@@ -18,6 +18,7 @@ from collections.abc import Callable
 
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.one_heap import share_one_heap
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.drive.orchestrator_link import OrchestratorLink, linked
@@ -105,6 +106,7 @@ class Foreground:
 
         def work() -> int:
             here.close()
+            share_one_heap()
             # What comes before the orchestrator takes signals itself is for it as well.
             link = SupervisorLink(
                 there,
