@@ -14,8 +14,9 @@ from foretwin.orchestrator.drive.processes import ProcessRow, rows_by_id
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.supervisor import Death, Supervisor
 
-MOST_BYTES = 4 * 1024 * 1024
-"""Of one message; what the system lets a socket hold bounds it too."""
+MOST_BYTES = 64 * 1024
+"""Of one message. A buffer of this size is made for each that is waited for, ten times a second and
+more: one of megabytes comes from the heap in the end, and lets it grow."""
 
 
 CRASH, CRASHED = "an error of its own", 70
