@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from foretwin.contracts.codec import write_message
+from foretwin.contracts.codec import encode, write_message
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
@@ -118,12 +118,12 @@ def played_with() -> dict[str, str]:
 def keep_vehicles(folder: Path, vehicles: Iterable[VehicleParameters]) -> None:
     """Write parameters into a run's or sweep's folder, under the digests that jobs name.
 
-    Those that are there stay as they are. Raises OSError.
+    Those that are there and whole stay as they are. Raises OSError.
     """
     (folder / VEHICLES).mkdir(parents=True, exist_ok=True)
     for vehicle in vehicles:
         file = folder / VEHICLES / f"{vehicle_digest(vehicle)}.vehicle"
-        if not file.exists():
+        if not file.exists() or file.read_bytes() != encode(vehicle):
             write_message(vehicle, file)
 
 

@@ -18,7 +18,7 @@ def test_each_part_has_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert command(["recover", str(run)]) == 0
     lines = capsys.readouterr().out.splitlines()
 
-    assert {line.split(":")[0] for line in lines[:-1]} == {*TABLES, "drive.mcap"}
+    assert {line.split(":")[0] for line in lines[:-1]} == {*TABLES, "drive.mcap", "unknown"}
     assert lines[-1] == f"{run}: recovered; all that was written can be read"
     assert command(["recover", str(run)]) == 0
     assert capsys.readouterr().out == f"{run}: whole (exit: recovered); nothing to recover\n"
