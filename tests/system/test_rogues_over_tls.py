@@ -60,6 +60,7 @@ def strangers(campaigns: Path, endpoint: str) -> dict[str, Any]:
     }
 
 
+@pytest.mark.judge  # the same table is played on the socket in the fast suite
 def test_a_drive_over_tls_is_untouched_by_every_rogue(tmp_path: Path, campaigns: Path) -> None:
     out, endpoint = tmp_path / "runs", f"tls/localhost:{free_port()}"
     secured = ("--endpoint", endpoint, "--secure", str(campaigns / "ours"))
