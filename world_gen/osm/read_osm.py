@@ -37,7 +37,6 @@ NODE_KEYS = (
     "stop",
     "give_way",
     "kerb",
-    "driving_side",
 )
 WANTED_WAYS, WANTED_NODES = opl.any_key(WAY_KEYS), opl.any_key(NODE_KEYS)
 DECODE_ERRORS = (RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError)
