@@ -9,7 +9,7 @@ from typing import Any
 
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
-from foretwin.orchestrator.drive.run_record import heard_of, restart_troubles, run_record
+from foretwin.orchestrator.drive.run_record import restart_troubles, run_record, samples_heard
 from foretwin.orchestrator.drive.supervision import DriveProcesses, Life
 from foretwin.orchestrator.record.run_state import RECORD, RUNNING, write_record
 from foretwin.orchestrator.record.so_far import forget_so_far, so_far_bytes
@@ -35,7 +35,7 @@ class RecordKeeper:
             return
         began_s = self.mono_s()
         record = self._record(RUNNING)
-        self.conductor.tables.keep_so_far(so_far_bytes(record, heard_of(self.conductor)))
+        self.conductor.tables.keep_so_far(so_far_bytes(record, samples_heard(self.conductor)))
         took_s = self.mono_s() - began_s
         self._next_s = now_s + max(EVERY_S, took_s / SHARE)
 

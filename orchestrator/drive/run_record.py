@@ -134,10 +134,12 @@ def telemetry_of(conductor: Conductor) -> dict[str, Any]:
 
     A car that is not ours may have begun to count before the run: what was heard of it counts.
     """
-    return telemetry_ledger(read_tally(tally_file(conductor.plan.recording)), heard_of(conductor))
+    return telemetry_ledger(
+        read_tally(tally_file(conductor.plan.recording)), samples_heard(conductor)
+    )
 
 
-def heard_of(conductor: Conductor) -> Mapping[str, int]:
+def samples_heard(conductor: Conductor) -> Mapping[str, int]:
     """Return what is known by channel of what the vehicle published."""
     intake = conductor.intake
     if intake.end is not None and conductor.plan.config.resolved_source != "live":
