@@ -27,8 +27,6 @@ from foretwin.contracts.process_setup import Admission
 
 LOCAL_ROLES: tuple[CampaignRole, ...] = ("router", "orchestrator", "worker", "viewer", "recorder")
 """Of the processes that every drive starts itself."""
-
-
 _ONE_PROCESS = "orchestrator", "viewer", "recorder"
 """Roles of a single process, named like them: they can hold no other one's token."""
 
@@ -41,8 +39,7 @@ def check_campaign(
     Said before anything is started: a process that is refused hears nothing but a time-out.
     """
     now = now or datetime.datetime.now(UTC)
-    roles = (*LOCAL_ROLES, "car") if car else LOCAL_ROLES
-    for role in roles:
+    for role in _roles(car=car):
         for line in troubles(role_files(folder, role), now=now):
             raise UserError(line)
     place = tls_place(endpoint)
@@ -64,8 +61,12 @@ def admission(run_id: str) -> Admission:
 
 def ends(folder: Path, *, car: bool) -> datetime.datetime:
     """Return when the first link of a drive closes since a certificate has expired."""
-    roles = (*LOCAL_ROLES, "car") if car else LOCAL_ROLES
-    return min(read_certificate(Path(role_files(folder, role).certificate)).last for role in roles)
+    files = (role_files(folder, role) for role in _roles(car=car))
+    return min(read_certificate(Path(one.certificate)).last for one in files)
+
+
+def _roles(*, car: bool) -> tuple[CampaignRole, ...]:
+    return (*LOCAL_ROLES, "car") if car else LOCAL_ROLES
 
 
 def own_certificate(folder: Path, role: CampaignRole) -> TlsFiles:

@@ -10,17 +10,14 @@ from foretwin.contracts.campaign import (
     AUTHORITY,
     CAMPAIGN_ROLES,
     CERTIFICATE,
-    CampaignRole,
     certificate_in,
 )
 from foretwin.contracts.certificates import UTC, read_certificate, time_trouble, troubles
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.campaign.issuing import check_days, issue, make_authority
-
-HERE: tuple[CampaignRole, ...] = ("router", "orchestrator", "worker", "viewer", "recorder")
-"""Roles of the processes that a drive starts itself."""
-EXIT_DONE, EXIT_PARTLY = 0, 3
+from foretwin.orchestrator.campaign.joining import LOCAL_ROLES
+from foretwin.orchestrator.drive.exit_words import EXIT_DONE, EXIT_PARTLY
 
 
 def begin(folder: Path, *, hosts: Sequence[str], days: int, role_days: int) -> int:
@@ -29,9 +26,9 @@ def begin(folder: Path, *, hosts: Sequence[str], days: int, role_days: int) -> i
     check_days(role_days)
     name = f"foretwin {folder.resolve().name}"
     make_authority(folder, name=name, days=days, now=now)
-    for role in HERE:
+    for role in LOCAL_ROLES:
         issue(folder, role, days=role_days, now=now, hosts=hosts if role == "router" else ())
-    say(f"campaign {folder}: {', '.join(HERE)}; ends {_day(folder / AUTHORITY)}")
+    say(f"campaign {folder}: {', '.join(LOCAL_ROLES)}; ends {_day(folder / AUTHORITY)}")
     say(f"others join with foretwin secure add ROLE --folder {folder}: car, planner, operator")
     return EXIT_DONE
 

@@ -16,6 +16,7 @@ from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.contracts.signing import OrderSigner
 from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.foreground import Foreground, start_all
 from foretwin.orchestrator.drive.in_charge import SwornIn, sworn_in
 from foretwin.orchestrator.drive.orchestrator import CrashError, Orchestrator
@@ -32,8 +33,6 @@ from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor
 from foretwin.orchestrator.runner.warm_fork import trouble_with_forking
 
 log = logging.getLogger(ORCHESTRATOR)
-
-EXIT_FAILED = 1
 
 
 def drive(config: DriveConfig) -> int:

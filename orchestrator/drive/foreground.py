@@ -20,6 +20,7 @@ from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.one_heap import share_one_heap
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.drive.orchestrator_link import OrchestratorLink, linked
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, ROUTER, SUPERVISOR, rows_by_id
@@ -47,7 +48,6 @@ log = logging.getLogger(ORCHESTRATOR)
 
 LOOK_S = 0.05
 FORK_AGAIN_S, WITHOUT_MEMORY_S = 0.5, 30.0
-EXIT_FAILED = 1
 
 
 Orchestrate = Callable[[DrivePlan, SupervisorLink, Life], int]

@@ -10,8 +10,8 @@ import pytest
 from foretwin.contracts.campaign import CAMPAIGN_ROLES, role_files
 from foretwin.contracts.certificates import troubles
 from foretwin.orchestrator.campaign.issuing import issue
+from foretwin.orchestrator.campaign.joining import LOCAL_ROLES
 from foretwin.orchestrator.commands.cli import run
-from foretwin.orchestrator.commands.secure import HERE
 from tests.orchestrator.campaign.campaigns import campaign, expired, now
 
 COVERS = ("foretwin.orchestrator.commands.cli_secure",)
@@ -24,7 +24,7 @@ def secure(*words: str) -> int:
 def test_a_campaign_from_its_beginning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = str(tmp_path / "c")
     assert secure("init", "--folder", folder, "--host", "car-pc") == 0
-    for role in set(CAMPAIGN_ROLES) - set(HERE):
+    for role in set(CAMPAIGN_ROLES) - set(LOCAL_ROLES):
         assert not (tmp_path / "c" / role).exists()
         assert secure("add", role, "--folder", folder, "--days", "2") == 0
     capsys.readouterr()
