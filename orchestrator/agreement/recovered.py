@@ -6,16 +6,16 @@ import contextlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from foretwin.contracts.codec import SchemaMismatch, read_message
-from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.contracts.world import World
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.agreement.known_windows import ThinnedWindows, kept_windows
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import judge_all
-from foretwin.orchestrator.record.job_tables import VEHICLES
 from foretwin.orchestrator.record.kept_rows import kept_rows
+from foretwin.orchestrator.record.recorded_jobs import kept_vehicle
 from foretwin.orchestrator.record.run_state import RESULTS
 from foretwin.sim_worker.analysis.agreement.tally import tally
+from foretwin.sim_worker.world_file import load_world
 
 
 class RecoveredAgreement(NamedTuple):
@@ -40,12 +40,11 @@ def recovered_agreement(run: Path) -> RecoveredAgreement | None:
     worlds = {}
     for world_id in thinned.world_ids:
         with contextlib.suppress(OSError, SchemaMismatch):
-            worlds[world_id] = read_message(run / "worlds" / f"{world_id}.world", World)
+            worlds[world_id] = load_world(run / "worlds", world_id)
     start_ns = rounds[0]["stamp_ns"] - round(1e9 * rounds[0]["drive_time_s"])
     try:
-        file = run / VEHICLES / f"{known.vehicle}.vehicle"
-        judged = judge_all(thinned.kept, worlds, read_message(file, VehicleParameters))
-    except (OSError, SchemaMismatch):
+        judged = judge_all(thinned.kept, worlds, kept_vehicle(run, known.vehicle))
+    except (OSError, SchemaMismatch, UserError):
         return None
     if not judged:
         return None

@@ -88,7 +88,10 @@ def recorded_future(folder: Path, wanted: str) -> RecordedFuture:
         held = wanted == future_id(row.job_sha256, row.index)
         if not held or all(future.index != row.index for future in job.futures):
             raise UserError(f"{file}: index {row.index} is not that of {wanted} in its job")
-        world, vehicle = kept_world(folder / "worlds", job.world_id), _vehicle(folder, job.vehicle)
+        world, vehicle = (
+            kept_world(folder / "worlds", job.world_id),
+            kept_vehicle(folder, job.vehicle),
+        )
     except SchemaMismatch as error:
         raise UserError(str(error)) from error
     return RecordedFuture(row, job, world, vehicle)
@@ -105,7 +108,11 @@ def kept_world(folder: Path, world_id: str) -> World:
     return world
 
 
-def _vehicle(folder: Path, digest: str) -> VehicleParameters:
+def kept_vehicle(folder: Path, digest: str) -> VehicleParameters:
+    """Return the parameters of a digest; UserError where their file holds others.
+
+    Raises FileNotFoundError or SchemaMismatch.
+    """
     file = folder / VEHICLES / f"{digest}.vehicle"
     vehicle = read_message(file, VehicleParameters)
     if vehicle_digest(vehicle) != digest:
