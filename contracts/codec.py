@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import array_from_wire, array_to_wire
+from foretwin.contracts.partial_file import partial_file
 
 SCHEMA_VERSION = 2
 MAGIC = b"FTw1"
@@ -128,13 +129,8 @@ def content_bytes(message: msgspec.Struct | tuple[Any, ...]) -> bytes:
 
 def write_message(message: msgspec.Struct, path: Path) -> None:
     """Write one message to a file, complete or not at all; raises OSError, and leaves nothing."""
-    partial = path.with_name(path.name + ".partial")
-    try:
+    with partial_file(path) as partial:
         partial.write_bytes(encode(message))
-        partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
 
 
 def read_message(path: Path, kind: type[Message]) -> Message:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import msgspec
 
+from foretwin.contracts.partial_file import partial_file
+
 MOST_KINDS = 200
 """Of sender, reason and key together: who makes up new ones fills no memory; the rest is one."""
 MOST_KEYS = 8
@@ -103,14 +105,10 @@ class RefusalFile:
         """Say it; who reads meanwhile sees all of it, and a full disk ends no process."""
         if now == self._written:
             return
-        partial = self._file.with_suffix(".partial")
         with contextlib.suppress(OSError):
-            try:
+            with partial_file(self._file) as partial:
                 partial.write_bytes(msgspec.json.encode(now))
-                partial.replace(self._file)
-                self._written = now
-            finally:
-                partial.unlink(missing_ok=True)
+            self._written = now
 
 
 def refused_by(folder: Path) -> dict[str, OwnRefusals]:

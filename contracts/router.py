@@ -20,6 +20,7 @@ import zenoh
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.own_log import OwnLog
+from foretwin.contracts.partial_file import partial_file
 from foretwin.contracts.process_setup import RouterSetup, setup_given
 from foretwin.contracts.refusal_counts import RefusalFile
 from foretwin.contracts.router_log import FILTER, RouterLog
@@ -77,13 +78,8 @@ def _say(word_file: Path, word: str) -> None:
 
     Nobody waits for one that is started again, perhaps on a full disk: that ends no router.
     """
-    partial = word_file.with_suffix(".partial")
-    try:
+    with contextlib.suppress(OSError), partial_file(word_file) as partial:
         partial.write_text(word, encoding="utf-8")
-        partial.replace(word_file)
-    except OSError:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

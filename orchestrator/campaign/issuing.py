@@ -22,6 +22,7 @@ from foretwin.contracts.campaign import (
 )
 from foretwin.contracts.certificates import read_certificate, time_trouble
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.partial_file import partial_file
 
 LOCAL_HOSTS = "localhost", "127.0.0.1", "::1"
 MOST_DAYS = 366
@@ -198,9 +199,8 @@ def _signed_pem(builder: Any, key: Any) -> bytes:
 
 def _write(file: Path, data: bytes) -> None:
     """Write a file that its owner alone may read, complete or not at all."""
-    partial = file.with_name(file.name + ".partial")
-    partial.unlink(missing_ok=True)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-    with os.fdopen(os.open(partial, flags, 0o600), "wb") as opened:
-        opened.write(data)
-    partial.replace(file)
+    with partial_file(file) as partial:
+        partial.unlink(missing_ok=True)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        with os.fdopen(os.open(partial, flags, 0o600), "wb") as opened:
+            opened.write(data)

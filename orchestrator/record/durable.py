@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
+
+from foretwin.contracts.partial_file import partial_file
 
 WRITING = ".writing"
 """What the name of a file ends in until it is whole."""
@@ -15,18 +17,11 @@ WRITING = ".writing"
 def whole_file(path: Path) -> Iterator[Path]:
     """Give the name of a file to write; once it is written, and on the disk, it is called `path`.
 
-    Whoever looks meanwhile sees what was there before. On an error nothing of it stays. That the
-    new name outlives a power cut takes `sync_folder`. Raises OSError.
+    That the new name outlives a power cut takes `sync_folder`. Raises OSError; see `partial_file`.
     """
-    partial = path.with_name(path.name + WRITING)
-    try:
+    with partial_file(path, ending=WRITING) as partial:
         yield partial
         _sync(partial)
-        partial.replace(path)
-    except BaseException:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
-        raise
 
 
 def sync_folder(folder: Path) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
 import msgspec
 
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
+from foretwin.contracts.partial_file import PARTIAL, partial_file
 from foretwin.telemetry.logs import Log, LogError, open_log
 
 Target = Literal["mcap", "ros2", "ros1", "csv"]
@@ -99,22 +99,10 @@ def _check(source: Path, log: Log, counts: Counter[str]) -> None:
         raise LogError(f"{source}: holds no valid sample ({reasons or 'it is empty'})")
 
 
-@contextlib.contextmanager
-def _partial(target: Path) -> Iterator[Path]:
-    """Give the path to write to, which takes the target's place unless something is raised."""
-    partial = target.with_name(target.name + ".partial")
-    try:
-        yield partial
-        partial.replace(target)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
-
-
 def _to_mcap(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
     from foretwin.telemetry.logs.write_mcap import create
 
-    with _partial(target) as partial:
+    with partial_file(target) as partial:
         with create(partial, info=log.info) as writer:
             for channel, message in log.samples():
                 writer.add(channel, message)
@@ -125,7 +113,7 @@ def _to_mcap(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counte
 
 
 def _to_ros1(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
-    with _partial(target) as partial:
+    with partial_file(target) as partial:
         partial.unlink(missing_ok=True)
         counts = _to_bag(source, log, partial, ros1=True)
     return counts, Counter()
@@ -133,7 +121,7 @@ def _to_ros1(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counte
 
 def _to_ros2(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
     # The folder's name is in the names of its files: it must be right from the beginning.
-    around = target.with_name(target.name + ".partial")
+    around = target.with_name(target.name + PARTIAL)
     shutil.rmtree(around, ignore_errors=True)
     try:
         around.mkdir()
@@ -162,7 +150,7 @@ def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> Counter[str]:
 def _to_csv(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
     from foretwin.telemetry.logs.write_csv import write_csv
 
-    with _partial(_declaration_of(target)) as declaration, _partial(target) as table:
+    with partial_file(_declaration_of(target)) as declaration, partial_file(target) as table:
         try:
             counts, left_out = write_csv(log.samples, log.info, table, declaration)
         except LogError:

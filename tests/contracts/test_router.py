@@ -240,7 +240,7 @@ def test_a_port_that_is_taken_is_said_and_nothing_listens(tmp_path: Path) -> Non
 
 def test_a_router_that_cannot_say_its_word_goes_on(tmp_path: Path) -> None:
     """Nobody waits for it where one is started again, and the disk may be full."""
-    endpoint, word = free_endpoint(), tmp_path / "router.partial"
+    endpoint, word = free_endpoint(), tmp_path / "router.word.partial"
     word.mkdir()  # nothing can be written there
     with router(tmp_path, endpoint) as process:
         setup = BusSetup(endpoint=endpoint)
