@@ -188,9 +188,15 @@ class Orchestrator:
             if not self._hears_of_death(conductor):
                 raise
         word = "completed" if ended else self._stopped_by()
-        if word != "interrupted":
+        if self._in_order(word):
             conductor.finish()
         return word
+
+    def _in_order(self, word: str) -> bool:
+        """Whether a drive ends as such drives do; a live car's has no end but being told."""
+        return word in IN_ORDER or (
+            word == "interrupted" and self._plan.config.resolved_source == "live"
+        )
 
     def _stopped_by(self) -> str:
         """Return how a drive ended that was stopped; raises DriveError for an error of ours."""
@@ -248,15 +254,17 @@ class Orchestrator:
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
         to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
-        grace_s = to_write_s if exit_word in IN_ORDER else INTERRUPT_GRACE_S
+        grace_s = to_write_s if self._in_order(exit_word) else INTERRUPT_GRACE_S
         if killed := self._processes.stop(grace_s=grace_s, but={ROUTER}):
             log.warning("had to kill %s", ", ".join(killed))
         try:
             while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
                 conductor.handle(item)
+            if self._in_order(exit_word):
+                conductor.rounds.judge()
         except Exception:
             # An error of ours: what was found until here is written all the same.
-            log.exception("the last messages could not be taken")
+            log.exception("what came last could not be taken")
             exit_word = "failed"
             self._failed_at_end = True
         self._processes.stop(grace_s=0.0)  # the router: nobody has anything to say any more

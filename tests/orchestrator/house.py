@@ -262,6 +262,7 @@ class House:
         self.bus.publish("end", end, vehicle="ego")
         self.settle()
         self.conductor.finish()
+        self.conductor.rounds.judge()
         self.tables.close()
 
     def watched(self, channel: str) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import os
@@ -25,6 +26,8 @@ from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.signing import NOT_NEW, NOT_SIGNED, OrderSigner
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.contracts.zenoh_config import zenoh_config
+from foretwin.orchestrator.record.kept_rows import kept_rows
+from foretwin.orchestrator.record.run_state import RESULTS
 from foretwin.telemetry.ros2.mapping import AUTOWARE
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
@@ -150,7 +153,8 @@ def test_what_a_gateway_turns_away_is_told_and_stands_in_the_record(tmp_path: Pa
         ZenohForeignBus(BusSetup(endpoint=endpoint)) as peer,
     ):
         car = Ros2Car(peer, listens_to=("control/**",))
-        with started(out, *FLAGS, "--ros2", str(file), "--towards-vehicle") as process:
+        flags = (*FLAGS, "--horizon", "1", "--ros2", str(file), "--towards-vehicle")
+        with started(out, *flags) as process:
 
             def driving(condition: Callable[[], bool]) -> Callable[[], bool]:
                 def look() -> bool:
@@ -172,6 +176,8 @@ def test_what_a_gateway_turns_away_is_told_and_stands_in_the_record(tmp_path: Pa
                 place = f"ros2: run/{run.name}/vehicle_command: "
                 told = [f"refused: {place}{why}" for why in orders]
                 wait_for(driving(lambda: all(says(run, text) for text in told)), str(told))
+            windows = functools.partial(kept_rows, run / RESULTS, "windows", "round_id")
+            wait_for(driving(lambda: bool(windows())), "a second simulated and driven")
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=120.0)
     record = json.loads((run / "run.json").read_text(encoding="utf-8"))
@@ -180,5 +186,6 @@ def test_what_a_gateway_turns_away_is_told_and_stands_in_the_record(tmp_path: Pa
     assert {one["reason"]: one["count"] for one in refused} == {
         NOT_SIGNED: 3, NOT_NEW: 2, "too large": 1, "no message": 1,
     }  # fmt: skip
-    assert record["exit"] == "interrupted"
+    # A car's drive has no other end: what was simulated and driven is judged all the same.
+    assert (record["exit"], record["agreement"]["windows"]) == ("interrupted", len(windows()))
     assert len(car.heard) <= 1, "what the run's key has signed counts once, and nothing else does"
