@@ -65,14 +65,14 @@ class _Recorded:
         self._recorder, self._name, self._args = recorder, name, args
 
     def __enter__(self) -> None:
-        self._ready_ns = _ready_ns()
+        self._ready_ns = _thread.stat.ready_ns()
         self._began_ns = time.monotonic_ns()
         self._began_cpu_ns = time.thread_time_ns()
 
     def __exit__(self, *_: object) -> None:
         cpu_ns, ended_ns = time.thread_time_ns(), time.monotonic_ns()
         if ended_ns - self._began_ns > _TOLD_FROM_NS:
-            self._args[READY_MS] = (_ready_ns() - self._ready_ns) / 1e6
+            self._args[READY_MS] = (_thread.stat.ready_ns() - self._ready_ns) / 1e6
         event = {
             "tts": self._began_cpu_ns / 1e3,
             "tdur": (cpu_ns - self._began_cpu_ns) / 1e3,
@@ -82,24 +82,35 @@ class _Recorded:
         self._recorder.add("X", self._name, self._began_ns, event)
 
 
-class _Thread(threading.local):
-    """Where the kernel says how long this thread was ready and had no processor; -1: nowhere."""
+class _SchedStat:
+    """Where the kernel says how long a thread was ready and had no processor, open while it lives.
+
+    A thread that is not ours is a new one to Python each time that it calls in.
+    """
 
     def __init__(self) -> None:
         try:
-            self.file = os.open(
+            self._file = os.open(
                 f"/proc/self/task/{threading.get_native_id()}/schedstat", os.O_RDONLY
             )
         except OSError:
-            self.file = -1
+            self._file = -1
+
+    def ready_ns(self) -> int:
+        return int(os.pread(self._file, 64, 0).split()[1]) if self._file >= 0 else 0
+
+    def __del__(self) -> None:
+        if self._file >= 0:
+            os.close(self._file)
+
+
+class _Thread(threading.local):
+    def __init__(self) -> None:
+        self.stat = _SchedStat()
 
 
 _thread = _Thread()
 os.register_at_fork(after_in_child=_thread.__init__)  # type: ignore[misc]
-
-
-def _ready_ns() -> int:
-    return int(os.pread(_thread.file, 64, 0).split()[1]) if _thread.file >= 0 else 0
 
 
 class _Recorder:

@@ -212,3 +212,18 @@ def test_a_killed_process_leaves_its_whole_lines(tmp_path: Path) -> None:
 
     assert trace.joined(parts, tmp_path / "trace.json") == 2
     assert [event["name"] for event in read(tmp_path / "trace.json")] == ["whole", "whole"]
+
+
+def test_threads_that_ended_leave_nothing_open(tmp_path: Path) -> None:
+    trace.begin(tmp_path / "parts", "w0")
+
+    def work() -> None:
+        with trace.span("job"):
+            pass
+
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    for _ in range(20):
+        thread = threading.Thread(target=work)
+        thread.start()
+        thread.join()
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
