@@ -33,9 +33,10 @@ class RecordKeeper:
         """Have it written what run.json would say now, where it is time to."""
         if now_s < self._next_s:
             return
-        began_s = self.mono_s()
-        record = self._record(RUNNING)
-        self.conductor.tables.keep_so_far(so_far_bytes(record, samples_heard(self.conductor)))
+        began_s, heard = self.mono_s(), samples_heard(self.conductor)
+        if not any(heard.values()):
+            return  # who recovers such a run shall read "unknown", not 0
+        self.conductor.tables.keep_so_far(so_far_bytes(self._record(RUNNING), heard))
         took_s = self.mono_s() - began_s
         self._next_s = now_s + max(EVERY_S, took_s / SHARE)
 

@@ -44,6 +44,13 @@ def test_it_is_told_every_two_seconds(kept: Kept) -> None:
     kept.house.tables.close()
 
 
+def test_nothing_is_told_before_anything_was_heard(kept: Kept) -> None:
+    kept.house.conductor.intake.counts.by_channel.clear()
+    kept.keeper.look(100.0)
+    assert kept.given == []
+    kept.house.tables.close()
+
+
 def test_it_takes_no_more_than_its_share_of_the_time(kept: Kept) -> None:
     times_s = iter([0.0, 0.5, 50.0, 50.1])  # half a second of work: 50 s until the next
     kept.keeper.mono_s = lambda: next(times_s)
