@@ -88,6 +88,7 @@ def test_a_sick_worker_takes_no_round_down_and_is_tried_again(tmp_path: Path) ->
     assert_nothing_left(run)
 
 
+@pytest.mark.judge
 def test_a_run_whose_workers_all_refuse_goes_on_and_says_so_last(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "25") as process:
@@ -156,6 +157,7 @@ def test_in_lock_step_a_sick_worker_changes_no_bit(tmp_path: Path) -> None:
     assert ledger.jobs.results == ledger.jobs.given
 
 
+@pytest.mark.judge
 def test_in_lock_step_nothing_waits_for_a_worker_that_is_started_no_more(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     gone = "w1 ended with code -9; the drive goes on without it"

@@ -100,6 +100,7 @@ def test_a_killed_watcher_is_started_again_with_the_parameters_that_count(tmp_pa
     assert_nothing_left(run)
 
 
+@pytest.mark.judge
 def test_a_frozen_viewer_holds_nothing_up(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "12") as process:

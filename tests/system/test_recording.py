@@ -11,6 +11,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import pytest
 from mcap.exceptions import McapError
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
@@ -84,6 +85,7 @@ def test_a_killed_recorder_comes_back_and_nothing_is_lost(tmp_path: Path) -> Non
     assert_nothing_left(run)
 
 
+@pytest.mark.judge
 def test_a_disk_that_is_full_for_a_while_costs_nothing(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "14") as process:
@@ -100,6 +102,7 @@ def test_a_disk_that_is_full_for_a_while_costs_nothing(tmp_path: Path) -> None:
     assert_all_is_recorded(run, parts=2)
 
 
+@pytest.mark.judge
 def test_what_a_full_disk_cost_is_counted_and_said_last(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "9") as process:
