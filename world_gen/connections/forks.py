@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+from foretwin.contracts.world import DrivingSide
 from foretwin.world_gen.connections.movements import Movement
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft
+from foretwin.world_gen.lanes.legs import is_ring_edge
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _FORK_RAD = math.radians(45.0)
@@ -28,11 +30,22 @@ def _two_way(leg: DirectedEdge) -> bool:
     return leg.edge.forward and leg.edge.backward
 
 
-def merges(cluster: Cluster, ways: tuple[Movement, ...]) -> list[Movement]:
-    """Return the movements of one-way roads that merge into one, from the left, else none."""
-    if cluster.ring or len(cluster.nodes) > 1 or any(_two_way(leg) for leg in cluster.legs):
+def merges(
+    cluster: Cluster, ways: tuple[Movement, ...], driving_side: DrivingSide
+) -> list[Movement]:
+    """Return the movements of one-way roads that merge into one, from the left, else none.
+
+    Where a road enters a ring its lanes join those of the ring on the outside.
+    """
+    if cluster.ring:
+        onto = [m for m in ways if is_ring_edge(m.away.edge)]
+        if len(onto) < 2 or len({m.away.key for m in onto}) > 1:
+            return []
+        inside_first = sorted(onto, key=lambda m: not is_ring_edge(m.toward.edge))
+        return inside_first if driving_side == "right" else inside_first[::-1]
+    if len(cluster.nodes) > 1 or any(_two_way(leg) for leg in cluster.legs):
         return []
-    if len(ways) < 2 or len({(m.away.edge.index, m.away.reverse) for m in ways}) > 1:
+    if len(ways) < 2 or len({m.away.key for m in ways}) > 1:
         return []
     # Who comes from the left turns left to go along with the others.
     ordered = sorted(ways, key=lambda m: -m.angle_rad)

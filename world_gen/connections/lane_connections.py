@@ -11,6 +11,7 @@ from foretwin.contracts.world import Connection, DrivingSide, LineControl, Turn
 from foretwin.geometry.polyline import cross, left_of, unit
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, merges
+from foretwin.world_gen.connections.lane_choice import lanes_chosen, named_by_tags
 from foretwin.world_gen.connections.movements import Movement
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
@@ -19,7 +20,6 @@ from foretwin.world_gen.lanes.lane_plans import LanePlan
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _UNDRAWN = np.zeros((0, 2))
-_FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")
 
 
 class ConnectionDraft(msgspec.Struct):
@@ -67,7 +67,8 @@ def connect(
 ) -> list[ConnectionDraft]:
     """Return the connections of one cluster, yet to be drawn, and enter them as successors."""
     found: list[ConnectionDraft] = []
-    merging = merges(cluster, ways)
+    side = around.driving_side
+    merging = merges(cluster, ways, side)
     by_road: dict[tuple[int, bool], list[Movement]] = {}
     for way in ways:
         by_road.setdefault(way.toward.key, []).append(way)
@@ -76,30 +77,26 @@ def connect(
         plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
         middle = lanes.incoming(toward, around.lanes_along(toward).turning)
-        named = _by_tags(mine, starts)
+        named = named_by_tags(mine, starts)
         beside = beside_at_fork(cluster, named, around)
-        for unnamed, movement in zip(mine, named, strict=True):
-            away = movement.away
-            ends = lanes.outgoing(away, _plans(cluster, away, around))
+        all_ends = [lanes.outgoing(m.away, _plans(cluster, m.away, around)) for m in mine]
+        room = [len(ends) for ends in all_ends]
+        all_chosen = lanes_chosen(named, starts, middle, room, beside, side)
+        rows = zip(mine, named, all_ends, all_chosen, strict=True)
+        for unnamed, movement, ends, chosen in rows:
             if not starts or not ends:
                 continue
-            # Where a road merely goes on its lanes do, whatever their arrows mean for what follows.
-            chosen = starts if cluster.plain else []
-            chosen = chosen or [lane for lane in middle if movement.turn in lane.turns]
-            chosen = chosen or _starting_lanes(
-                movement, starts, mine, len(ends), beside, around.driving_side
-            )
             if not chosen and len(starts) < len(plans):
                 continue  # the lanes for it are beyond the World's edge
             if not chosen:
                 notes.append(
                     f"way {toward.edge.way_id}: its turn lanes leave no lane for "
-                    f"{movement.turn} into way {away.edge.way_id}; left out"
+                    f"{movement.turn} into way {movement.away.edge.way_id}; left out"
                 )
                 continue
-            if merging and len(ends) > 1:
+            if len(ends) > 1 and any(unnamed is m for m in merging):
                 ends = merged_ends(unnamed, merging, ends, around)
-            for a, b in _pairs(chosen, ends, movement.turn, around.driving_side, len(mine) == 1):
+            for a, b in _pairs(chosen, ends, movement.turn, side, len(mine) == 1):
                 found.append(_drafted(a, b, movement, cluster))
     for connection in found:
         connection.start.successors.append(connection.id)
@@ -113,80 +110,6 @@ def _plans(cluster: Cluster, edge: DirectedEdge, around: Surroundings) -> tuple[
     """Return the lanes that lead into a cluster, or out of it, along an edge, from the left."""
     along = around.lanes_along(edge)
     return along.abreast if cluster.plain else along.driven
-
-
-def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:
-    """Let turn lanes correct the names of turns, which angles alone do not determine at forks.
-
-    As many movements as there are tagged turns take them in order from the left; else a turn
-    that no lane names takes the name of a tagged one that no other movement took up.
-    """
-    if any(lane.plan.turns_source != "tagged" for lane in starts):
-        return ways
-    tagged = {turn for lane in starts for turn in lane.plan.turns} - {"u_turn"}
-    forward = sorted((m for m in ways if m.turn != "u_turn"), key=lambda m: -m.angle_rad)
-    have = {m.turn for m in forward}
-    if not tagged or have <= tagged:
-        return ways
-    if len(forward) == len(tagged):
-        named = zip(forward, sorted(tagged, key=_FROM_LEFT.index), strict=True)
-        turn_of = {id(m): turn for m, turn in named}
-    else:
-        turn_of = {id(m): _free_name(m, tagged, have) for m in forward if m.turn not in tagged}
-    return [msgspec.structs.replace(m, turn=turn_of.get(id(m), m.turn)) for m in ways]
-
-
-def _free_name(movement: Movement, tagged: set[Turn], have: set[Turn]) -> Turn:
-    side: Turn = "left" if movement.angle_rad > 0 else "right"
-    names: tuple[Turn, ...] = (side, "straight")
-    return next((name for name in names if name in tagged and name not in have), movement.turn)
-
-
-def _starting_lanes(
-    movement: Movement,
-    starts: list[LaneDraft],
-    ways: list[Movement],
-    room: int,
-    beside: int,
-    driving_side: DrivingSide,
-) -> list[LaneDraft]:
-    """Return the lanes, from the left, from which this movement begins.
-
-    `room` is the number of lanes it leads to. Where a one-way road forks, `beside` is that of
-    the branch straight on, else 0: there one lane at most leads into both branches.
-    """
-    if len(starts) == 1 and starts[0].plan.turns_source != "tagged":
-        return starts
-    turn = movement.turn
-    far: Turn = "left" if driving_side == "right" else "right"
-    cars = [lane for lane in starts if lane.kind == "driving"] or starts
-    fits, named = cars, 1
-    tagged = any(lane.plan.turns_source == "tagged" for lane in starts)
-    if tagged:
-        meant = {turn, far} if turn == "u_turn" else {turn}
-        silent = [lane.plan.turns_source != "tagged" for lane in starts]
-        fits = [n for n, ok in zip(starts, silent, strict=True) if ok or meant & set(n.plan.turns)]
-        named = sum(lane.plan.turns_source == "tagged" for lane in fits)
-    if turn == "u_turn":
-        return _outermost(fits, far)
-    if turn != "straight":
-        # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
-        with_room = min(room, len(cars) + 1 - beside) if beside else 1
-        return _outermost(fits, turn, max(named, with_room))
-    if tagged:
-        return fits
-    have = {m.turn for m in ways}
-    straight = list(starts)
-    # The lane on the far side, from which drivers turn across the road, is the first to be lost.
-    sides: list[Turn] = ["left", "right"] if driving_side == "right" else ["right", "left"]
-    for side in sides:
-        if len(straight) > max(room, 1) and side in have:
-            straight = straight[1:] if side == "left" else straight[:-1]
-    return straight
-
-
-def _outermost(lanes: list[LaneDraft], side: Turn, count: int = 1) -> list[LaneDraft]:
-    return lanes[:count] if side == "left" else lanes[-count:]
 
 
 def _pairs(
