@@ -42,7 +42,7 @@ def compare(map_file: Path) -> Measurement:
     The value is that of the same job, the road network. What the whole World takes, with ground
     and buildings, of which netconvert makes none, stands beside it.
     """
-    netconvert = _netconvert()
+    netconvert = netconvert_command()
     with tempfile.TemporaryDirectory(prefix="foretwin-bench-") as folder:
         work = Path(folder)
         xml = map_file
@@ -82,7 +82,7 @@ def compare(map_file: Path) -> Measurement:
     )
 
 
-def _netconvert() -> list[str]:
+def netconvert_command() -> list[str]:
     """Return the command that runs netconvert from the judges' environment."""
     venv = os.environ.get("JUDGES_VENV")
     if not venv:
