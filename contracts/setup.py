@@ -102,6 +102,8 @@ class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     """Of a large map, what lies within `margin_m` of this line of degrees; empty: all of it."""
     margin_m: float = 0.0
     added_roads: tuple[int, ...] = ()
+    dem: str | None = None
+    """Heights of the ground."""
     worlds_dir: str
     cache_dir: str
     given_worlds: str | None = None

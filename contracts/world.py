@@ -11,6 +11,7 @@ from typing import Literal, get_args
 import msgspec
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.provenance import Choice, Provenance, Quantity
 from foretwin.contracts.signals import Signal, SignalPlan
@@ -265,3 +266,5 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     """What was guessed or left out, in words."""
     attribution: str = ATTRIBUTION
+    elevation: Elevation | msgspec.UnsetType = msgspec.UNSET
+    """Where no elevation model was given, the World is flat, and this is not written."""

@@ -11,9 +11,11 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.worlds.choice import junction_by_id, nearest_junction
+from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.orchestrator.worlds.opening import open_map as read_whole
 from foretwin.world_gen.build import DEFAULT_RADIUS_M, build_world
+from foretwin.world_gen.elevation.dem import DemSet
 from foretwin.world_gen.export.formats import FORMATS, ExportOptions, formats_by_suffix
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 
@@ -21,8 +23,9 @@ from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 class Map:
     """A map that was read: its intersections, and Worlds of them."""
 
-    def __init__(self, opened: OpenMap) -> None:
+    def __init__(self, opened: OpenMap, *, dem: DemSet | None = None) -> None:
         self._opened = opened
+        self._dem = dem
 
     @property
     def attribution(self) -> str:
@@ -51,16 +54,24 @@ class Map:
 
     @functools.cached_property
     def _index(self) -> MapIndex:
-        return index_map(self._opened.osm, self._opened.graph, self._opened.junctions)
+        return index_map(
+            self._opened.osm, self._opened.graph, self._opened.junctions, dem=self._dem
+        )
 
 
-def open_map(file: Path | str, *, service_roads: bool = False) -> Map:
+def open_map(
+    file: Path | str, *, service_roads: bool = False, dem: Path | str | None = None
+) -> Map:
     """Read a map: `.osm`, `.osm.gz`, `.osm.bz2` or `.osm.pbf`.
 
-    With `service_roads`, driveways and parking aisles are roads like any other. Raises MapError, a
-    UserError, where the file is no map or has no roads.
+    With `service_roads`, driveways and parking aisles are roads like any other. With `dem`, an
+    elevation model (`.hgt`, `.hgt.zip`, GeoTIFF, or a folder of these), its Worlds have heights.
+    Raises MapError, a UserError, where the file is no map or has no roads, UserError for an
+    elevation model that cannot be read or lies elsewhere.
     """
-    return Map(read_whole(path_of("file", file), service_roads=service_roads))
+    opened = read_whole(path_of("file", file), service_roads=service_roads)
+    heights = heights_for(opened, None if dem is None else path_of("dem", dem))
+    return Map(opened, dem=heights)
 
 
 def drawn_town() -> Map:

@@ -8,9 +8,17 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from foretwin.contracts.world import Arm, IntersectionSummary, World, WorldJunction
+from foretwin.contracts.world import (
+    Arm,
+    Connection,
+    IntersectionSummary,
+    Lane,
+    World,
+    WorldJunction,
+)
 from foretwin.world_gen.connections.connection_paths import draw_paths
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft, connect
 from foretwin.world_gen.connections.movements import movements
@@ -122,6 +130,9 @@ def _world(
     )
     tracks = tram_tracks(around, osm, beside)
     made = ground_around(index, around, lanes, connections, beside) if ground else Ground()
+    finished = tuple(lane.finished() for lane in lanes.lanes.values())
+    joined = tuple(c.finished() for c in connections)
+    elevation = _elevation(index, around, lanes, finished, joined, notes)
     world = World(
         id="",
         intersection=summary,
@@ -139,8 +150,8 @@ def _world(
             for junction in around.junctions
         ),
         roads=(*lanes.roads, *tracks.roads),
-        lanes=(*(lane.finished() for lane in lanes.lanes.values()), *tracks.lanes),
-        connections=tuple(c.finished() for c in connections),
+        lanes=(*finished, *tracks.lanes),
+        connections=joined,
         conflicts=rules.conflicts,
         stop_lines=rules.stop_lines,
         crossings=crossed,
@@ -157,8 +168,27 @@ def _world(
             )
         ),
         attribution=osm.attribution,
+        elevation=elevation,
     )
     return with_id(world)
+
+
+def _elevation(
+    index: MapIndex,
+    around: Surroundings,
+    lanes: LaneSet,
+    finished: tuple[Lane, ...],
+    joined: tuple[Connection, ...],
+    notes: list[str],
+) -> Elevation | msgspec.UnsetType:
+    if index.profiles is None:
+        return msgspec.UNSET
+    from foretwin.world_gen.ground.heights import world_elevation
+
+    edge_of = {lane.road_id: lane.key.edge for lane in lanes.lanes.values()}
+    found = world_elevation(around, index.profiles, edge_of, lanes.roads, finished, joined)
+    notes.extend(found.notes)
+    return found.elevation
 
 
 def with_id(world: World) -> World:

@@ -21,6 +21,7 @@ from foretwin.orchestrator.commands.cli_logs import (
     repeat,
 )
 from foretwin.orchestrator.commands.cli_options import (
+    DemOption,
     EndpointOption,
     InsecureOption,
     LeastFuturesOption,
@@ -65,6 +66,7 @@ app.add_typer(scenarios)
 def drive(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
     map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
+    dem: DemOption = None,
     route: Annotated[
         str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live; default: predicted")
     ] = None,
@@ -119,8 +121,9 @@ def drive(
     """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
     settings = locals()  # named as the fields of DriveConfig, but for two
     settings["map"] = settings.pop("map_file")
-    settings["towards_vehicle"] = towards_vehicle or None
-    settings |= {"trace": trace or None, "insecure": insecure or None}
+    settings["dem"] = None if dem is None else str(dem)
+    switches = {"towards_vehicle": towards_vehicle, "trace": trace, "insecure": insecure}
+    settings |= {name: given or None for name, given in switches.items()}
     from foretwin.orchestrator.config import load_config
     from foretwin.orchestrator.drive.drive import drive as run_drive
 
@@ -158,6 +161,7 @@ def world(
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="each junction of the map")] = False,
     service_roads: ServiceRoadsOption = False,
+    dem: DemOption = None,
     file_format: Annotated[
         str | None,
         typer.Option(

@@ -12,6 +12,10 @@ ServiceRoadsOption = Annotated[
     bool,
     typer.Option("--service-roads", help="driveways and parking aisles count as roads everywhere"),
 ]
+DemOption = Annotated[
+    Path | None,
+    typer.Option("--dem", help="heights: .hgt, .hgt.zip, GeoTIFF, or a folder [default: flat]"),
+]
 LeastFuturesOption = Annotated[
     int | None,
     typer.Option(

@@ -13,6 +13,7 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.world_files import write_each, write_report
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
+from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import OpenMap, open_map, region_on_map
 from foretwin.world_gen.build import build_region, build_world
 from foretwin.world_gen.export.choices import (
@@ -48,6 +49,7 @@ class WorldRequest:
     route: Path | None = None
     everything: bool = False
     service_roads: bool = False
+    dem: Path | None = None
     file_format: str | None = None
     """None goes by the suffix of `out`."""
     radius_m: float = 150.0
@@ -87,7 +89,7 @@ def write_worlds(request: WorldRequest) -> int:
     if many and not junctions:
         where = "in this map" if request.route is None else f"along {request.route}"
         raise UserError(f"{opened.file}: no intersection {where}")
-    index = _index(opened)
+    index = _index(opened, request.dem)
 
     def built(junction: Junction) -> World:
         radius_m = request.radius_m
@@ -112,7 +114,7 @@ def _region(
 ) -> int:
     opened = open_map(request.map_file, clip=bounds, service_roads=request.service_roads)
     part = region_on_map(opened.file, opened.osm.bounds, bounds)
-    world = build_region(opened.osm, opened.graph, part, index=_index(opened))
+    world = build_region(opened.osm, opened.graph, part, index=_index(opened, request.dem))
     return _write_one(world, request, format_, options)
 
 
@@ -128,8 +130,8 @@ def _write_one(world: World, request: WorldRequest, format_: Format, options: Ex
     return 0
 
 
-def _index(opened: OpenMap) -> MapIndex:
-    return index_map(opened.osm, opened.graph, opened.junctions)
+def _index(opened: OpenMap, dem: Path | None) -> MapIndex:
+    return index_map(opened.osm, opened.graph, opened.junctions, dem=heights_for(opened, dem))
 
 
 def _check_place(request: WorldRequest) -> None:

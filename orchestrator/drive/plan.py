@@ -29,6 +29,7 @@ from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import standin_path
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
+from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import Clip, open_map
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -72,6 +73,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     near = positions if positions is not None else given
     clip = None if near is None else Clip(near, CORRIDOR_M)
     opened = open_map(map_file, clip=clip)
+    heights_for(opened, None if config.dem is None else Path(config.dem))
     osm, graph, junctions = opened.osm, opened.graph, opened.junctions
     index = RoadIndex(graph)
     if positions is not None and log_file is not None:

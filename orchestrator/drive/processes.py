@@ -146,6 +146,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
         near_deg=near_deg,
         margin_m=0.0 if clip is None else clip.margin_m,
         added_roads=plan.added_roads,
+        dem=plan.config.dem,
         worlds_dir=str(plan.worlds_dir),
         cache_dir=str(plan.config.worlds_cache),
         given_worlds=plan.config.worlds,

@@ -50,6 +50,8 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """So many of these junctions, drawn by the seed; None takes all."""
     radius_m: float = 150.0
     service_roads: bool = False
+    dem: str | None = None
+    """Heights of the ground under the map (.hgt, .hgt.zip, GeoTIFF, or a folder); None is flat."""
     scenarios: tuple[str, ...] | None = None
     """Ids of the catalogue or TOML files; None takes the whole catalogue. From where a real car
     was, `as_recorded` adds nobody to those who were there."""
@@ -135,6 +137,7 @@ def _checks(spec: SweepSpec) -> Iterator[tuple[bool, str]]:
     sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
     given = " and ".join(sources) or "none"
     yield len(sources) == 1, f"exactly one of map, worlds and recorded; got {given}"
+    yield spec.dem is None or spec.map is not None, f"dem {spec.dem}: goes with a map alone"
     yield len(spec.junctions) > 0, 'junctions: at least one id, or "all"'
     radius = MIN_RADIUS_M <= spec.radius_m <= MAX_RADIUS_M
     yield radius, f"radius_m {spec.radius_m:g}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"

@@ -15,9 +15,11 @@ from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.record.recorded_jobs import kept_world
 from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
 from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
+from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import NodeClip, open_map
 from foretwin.sim_worker.world_file import load_world
 from foretwin.world_gen.build import with_id
+from foretwin.world_gen.elevation.read_dem import read_dem
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
@@ -52,7 +54,9 @@ def source_digest(spec: SweepSpec) -> str:
             raise UserError(f"map {path}: is a folder, not a file")
         if not path.is_file():
             raise FileNotFoundError(f"map {path}: no such file")
-        return _digest(path)
+        return (
+            _digest(path) if spec.dem is None else f"{_digest(path)} {read_dem(Path(spec.dem)).key}"
+        )
     folder = worlds_folder(spec)
     assert folder is not None
     return " ".join(_digest(path) for path in _files(folder))
@@ -97,8 +101,10 @@ def choose_worlds(spec: SweepSpec) -> Building:
         where = "" if bounds is None else f" in bbox {spec.bbox}"
         raise UserError(f"{spec.map}: no junction{where}")
 
+    dem = heights_for(opened, None if spec.dem is None else Path(spec.dem))
+
     def build(folder: Path, progress: Progress) -> SweepWorlds:
-        index = index_map(opened.osm, opened.graph, opened.junctions)
+        index = index_map(opened.osm, opened.graph, opened.junctions, dem=dem)
         store = WorldStore(folder)
         ids, failures = [], {}
         with progress(len(chosen), "Worlds") as (advance, _):

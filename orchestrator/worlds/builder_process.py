@@ -15,6 +15,7 @@ from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import BuilderSetup
 from foretwin.contracts.simulation import BuildReply
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
+from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import Clip, open_map
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.world_store import WorldStore, cached_build
@@ -29,7 +30,8 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     opened = opened.with_roads(setup.added_roads)
     osm, graph = opened.osm, opened.graph
     junctions = {j.summary.id: j for j in opened.junctions}
-    index = index_map(osm, graph, junctions.values())
+    dem = heights_for(opened, None if setup.dem is None else Path(setup.dem))
+    index = index_map(osm, graph, junctions.values(), dem=dem)
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
     folder = setup.given_worlds
     given = {} if folder is None else read_given_worlds(Path(folder))

@@ -11,10 +11,9 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Lane, Road, World
 from foretwin.geometry.polyline import arc_lengths, length
+from foretwin.world_gen.elevation.crossings import LAYER_HEIGHT_M
 from foretwin.world_gen.export.lane_borders import Borders
 
-LAYER_HEIGHT_M = 5.0
-"""From one OSM layer to the next: a lorry's 4.5 m and a bridge deck."""
 RAMP_SLOPE = 0.06
 """Mean slope of a ramp (RASt 06: at most 6 to 8 % on main roads)."""
 Node = str | tuple[str, bool]

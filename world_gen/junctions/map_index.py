@@ -9,6 +9,8 @@ import shapely
 
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.buildings.footprints import BuildingIndex
+from foretwin.world_gen.elevation.dem import DemSet
+from foretwin.world_gen.elevation.profiles import RoadProfiles
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.beside_roads import BesideIndex
@@ -30,14 +32,17 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
     junction_of_node: Mapping[int, Junction]
     junction_lights: frozenset[int]
     """Nodes of the lights that govern junctions."""
+    profiles: RoadProfiles | None = None
+    """Heights along car roads, where an elevation model was given."""
 
     @property
     def map_key(self) -> str:
-        """The map's SHA-256, and which roads count as car roads beyond its tags."""
+        """The map's SHA-256, which roads count as car roads beyond its tags, and the heights'."""
         edges = (self.graph.edges[i] for i in self.car_edges)
         others = (edge for edge in edges if edge.road_class in OTHER_CLASSES)
         added = [f"w{edge.way_id}.{edge.start_node}.{edge.end_node}" for edge in others]
-        return self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
+        key = self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
+        return key if self.profiles is None else f"{key} over {self.profiles.dem.key}"
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
         """Return indices of car roads that touch an area in the map's frame."""
@@ -45,8 +50,17 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
         return tuple(sorted(self.car_edges[i] for i in found))
 
 
-def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ()) -> MapIndex:
-    """Prepare a map; `junctions` are all known ones, so that neighbours are built as such."""
+def index_map(
+    osm: OsmMap,
+    graph: RoadGraph,
+    junctions: Iterable[Junction] = (),
+    *,
+    dem: DemSet | None = None,
+) -> MapIndex:
+    """Prepare a map; `junctions` are all known ones, so that neighbours are built as such.
+
+    With an elevation model its Worlds have heights; raises UserError where that lies elsewhere.
+    """
     car = tuple(edge.index for edge in graph.edges if edge.drivable)
     known = tuple(junctions)
     lines = Polylines.of([graph.edges[i].xy_m for i in car])
@@ -60,4 +74,12 @@ def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ())
         restrictions=read_turn_restrictions(osm),
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),
+        profiles=None if dem is None else _profiles(osm, graph, car, dem),
     )
+
+
+def _profiles(osm: OsmMap, graph: RoadGraph, car: tuple[int, ...], dem: DemSet) -> RoadProfiles:
+    # Imported here: most Worlds are flat, and need no solver of sparse equations.
+    from foretwin.world_gen.elevation.road_profiles import road_profiles
+
+    return road_profiles(graph, car, dem, osm.node_tags)

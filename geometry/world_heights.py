@@ -1,0 +1,82 @@
+"""How high the lanes of a World lie: its roads' profiles, asked for at places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import shapely
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.elevation import Elevation, HeightProfile
+from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import arc_lengths
+
+
+class LaneSlope(NamedTuple):
+    """Points (N, 2) along a lane, the unit direction in which it is driven there, and its grade."""
+
+    xy_m: Array
+    direction: Array
+    grade: Array
+
+
+class WorldHeights:
+    """Heights above the origin of a World that has an elevation; for others see `heights_of`."""
+
+    def __init__(self, world: World, elevation: Elevation) -> None:
+        self.elevation = elevation
+        self._lines = {road.id: road.reference_line for road in world.roads}
+        self._roads: Mapping[str, HeightProfile] = {p.id: p for p in elevation.roads}
+        self._connections: Mapping[str, HeightProfile] = {p.id: p for p in elevation.connections}
+
+    def road(self, road_id: str) -> HeightProfile | None:
+        """Return a road's profile along its reference line; None for a track of trams alone."""
+        return self._roads.get(road_id)
+
+    def connection(self, connection_id: str) -> HeightProfile | None:
+        """Return a connection's profile along its centerline."""
+        return self._connections.get(connection_id)
+
+    def along(self, part: Lane | Connection, xy_m: Array) -> Array:
+        """Return heights (N,) of places (N, 2) on or beside a lane or connection."""
+        profile, line = self._of(part)
+        if profile is None:
+            return self.elevation.ground_at(xy_m)
+        return profile.height_at(_along(line, xy_m))
+
+    def slope(self, part: Lane | Connection, *, spacing_m: float) -> LaneSlope:
+        """Return how a lane or connection climbs, at places at most `spacing_m` apart."""
+        xy = part.centerline
+        arc = arc_lengths(xy)
+        count = max(int(np.ceil(arc[-1] / spacing_m)), 1)
+        at = (np.arange(count) + 0.5) * (arc[-1] / count)
+        points = np.column_stack([np.interp(at, arc, xy[:, k]) for k in (0, 1)])
+        piece = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(xy) - 2)
+        step = np.diff(xy, axis=0)[piece]
+        direction = step / np.maximum(np.hypot(*step.T), 1e-9)[:, None]
+        profile, line = self._of(part)
+        if profile is None:
+            return LaneSlope(points, direction, np.zeros(count))
+        grade = profile.grade_at(_along(line, points))
+        back = isinstance(part, Lane) and part.reverse
+        return LaneSlope(points, direction, -grade if back else grade)
+
+    def _of(self, part: Lane | Connection) -> tuple[HeightProfile | None, Array]:
+        if isinstance(part, Connection):
+            return self._connections.get(part.id), part.centerline
+        return self._roads.get(part.road_id), self._lines.get(part.road_id, part.centerline)
+
+
+def heights_of(world: World) -> WorldHeights | None:
+    """Return the heights of a World, None where it is flat."""
+    if isinstance(world.elevation, msgspec.UnsetType):
+        return None
+    return WorldHeights(world, world.elevation)
+
+
+def _along(line: Array, xy_m: Array) -> Array:
+    """Return arc lengths (N,) of the places of a line nearest to (N, 2) points."""
+    return np.asarray(shapely.line_locate_point(shapely.LineString(line), shapely.points(xy_m)))

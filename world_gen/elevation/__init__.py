@@ -1,0 +1,1 @@
+"""Heights: elevation models read from files, and what roads make of them."""
