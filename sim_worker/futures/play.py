@@ -131,7 +131,7 @@ class Play:
         target, stop, seen = scene.aims.target_speed_mps, None, None
         if scene.sight is not None and scene.traffic is not None:
             eyes = now[:, :2]
-            if scene.sight.anybody_hidden:
+            if scene.sight.needs_eyes:
                 ahead = np.column_stack([np.cos(now[:, 2]), np.sin(now[:, 2])])
                 eyes = eyes + self.front_m * ahead
             seen = scene.sight.look(tick, scene.traffic, eyes)

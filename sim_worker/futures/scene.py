@@ -25,6 +25,7 @@ from foretwin.sim_worker.road_users.cast import Player, casting
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
+from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid, opaque_grid
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.places import Unplaced
@@ -125,6 +126,10 @@ class SceneMaker:
         """Where this World may be driven on; what one job looked up, the next ones know."""
         return DrivableGround(self.world)
 
+    @functools.cached_property
+    def _walls(self) -> OpaqueGrid | None:
+        return opaque_grid(self.world)
+
     def scene(
         self,
         job: Job,
@@ -204,6 +209,7 @@ class SceneMaker:
                 vehicle,
                 PerceptionFaults._make(numbers.applied(what, 0.0) for what in _PERCEPTION),
                 tick_s=tick_s,
+                walls=self._walls,
             )
         heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}
         return JobScene(

@@ -22,7 +22,8 @@ class Player(NamedTuple):
     """One road user of one future; arc lengths are those of its box centre on its own path.
 
     `size_m` is length and width where measured, else that of its kind. Who stops does so
-    `acts_after_s` after the start; `hidden_by` names another actor of the future.
+    `acts_after_s` after the start; `hidden_by` names another actor of the future; `known` is who
+    the real car perceives, whatever the map says.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Player(NamedTuple):
     acts_after_s: float = np.inf
     decel_mps2: float = 4.0
     hidden_by: str = ""
+    known: bool = False
     size_m: tuple[float, float] | None = None
 
 
@@ -84,20 +86,20 @@ def casting(
     which[:, :first] = len(rows) + np.arange(first)
     rows += [_row(user.kind, user.size_m, len(paths) + k) for k, user in enumerate(replayed)]
     columns = np.moveaxis(np.array(rows)[which], -1, 0).copy()
-    present, lawful, walks = columns[:3] > 0.0
-    path_of, kinds = columns[3:5].astype(np.intp)
+    present, lawful, walks, known = columns[:4] > 0.0
+    path_of, kinds = columns[4:6].astype(np.intp)
     crowd = Crowd._make(
-        [present, lawful, *columns[5:7], path_of, *columns[7:], walks, kinds, hidden]
+        [present, lawful, *columns[6:8], path_of, *columns[8:], walks, kinds, known, hidden]
     )
     replay = Replay(replayed) if replayed else None
     return RoadUserArrays(crowd, tuple(paths.values()), replay)
 
 
 _Row = tuple[float, ...]
-"""Of one player: 1 where present, lawful and walking, places of path and kind, and the columns of
+"""Of one player: 1 where present, lawful, walking, known; places of path and kind; columns of
 `Crowd` from its length on, without the path."""
 _STILL: _Row = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
-_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, *_STILL)
+_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, *_STILL)
 
 
 def _row(
@@ -106,11 +108,13 @@ def _row(
     path: int,
     *,
     lawful: bool = False,
+    known: bool = True,
     motion: _Row = _STILL,
 ) -> _Row:
     traits = KINDS[kind]
     size = size_m or (traits.length_m, traits.width_m)
-    return (1.0, lawful, not traits.keeps_lane, path, KIND_NAMES.index(kind), *size, *motion)
+    kind_place = KIND_NAMES.index(kind)
+    return (1.0, lawful, not traits.keeps_lane, known, path, kind_place, *size, *motion)
 
 
 def _player_row(player: Player, path: int) -> _Row:
@@ -126,4 +130,5 @@ def _player_row(player: Player, path: int) -> _Row:
         player.decel_mps2,
     )
     lawful = player.conduct == "law_abiding"
-    return _row(player.kind, player.size_m, path, lawful=lawful, motion=motion)
+    known = player.known
+    return _row(player.kind, player.size_m, path, lawful=lawful, known=known, motion=motion)

@@ -14,6 +14,7 @@ class Crowd(NamedTuple):
     speed on a free road. From `brakes_at_s` on, infinite for most, it brakes by `brakes_by_mps2`.
     `lawful` ones react to others, the rest keep their speed. `walks` is true of those who keep to
     no lane, `kinds` are places in `KIND_NAMES`, `hidden_by` the column of who hides it, or -1.
+    `known` ones were perceived by the real car: no wall of the map hides them.
     """
 
     present: Flags
@@ -31,6 +32,7 @@ class Crowd(NamedTuple):
     brakes_by_mps2: Array
     walks: Flags
     kinds: Indices
+    known: Flags
     hidden_by: Indices
 
 

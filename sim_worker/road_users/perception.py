@@ -12,12 +12,15 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
 from foretwin.sim_worker.road_users.path_table import PathPlace, PathProjection
+from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid, hidden
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 _MARGIN_M = 0.3
 """What passes the car's side by less than this is in its way."""
 _ROUNDING_M = 1e-6
+_WALLS_EVERY_S = 0.1
+"""Cars see again so often whom walls hide: in that time what comes out goes on by its width."""
 
 
 class PerceptionFaults(NamedTuple):
@@ -46,9 +49,10 @@ class Sight:
         faults: PerceptionFaults,
         *,
         tick_s: float,
+        walls: OpaqueGrid | None = None,
         kept: int | None = None,
     ) -> None:
-        """`along` projects the traffic's paths on the ego's.
+        """`along` projects the traffic's paths on the ego's; nobody sees through `walls`.
 
         What was seen is remembered for the longest delay, or for `kept` ticks.
         """
@@ -61,8 +65,13 @@ class Sight:
         self._faults, self._tick_s = faults, tick_s
         self._hidden = np.nonzero((crowd.hidden_by >= 0) & crowd.present)
         self._hides = crowd.hidden_by[self._hidden]
-        self.anybody_hidden = len(self._hides) > 0
+        self._by_actors = len(self._hides) > 0
+        self._unknown = crowd.present & ~crowd.known
+        self._walls = walls if self._unknown.any() else None
+        self.needs_eyes = self._by_actors or self._walls is not None
         """Whether it matters where the cars' eyes are."""
+        self._behind_walls: Flags | None = None
+        self._walls_every = max(round(_WALLS_EVERY_S / tick_s), 1)
         kept = kept or int(self._late.max(initial=0)) + 1
         self._past: list[tuple[npt.NDArray[Any], ...]] = [_now(traffic)] * kept
         self._anybody_late = bool(self._late.any())
@@ -82,6 +91,7 @@ class Sight:
             self._vehicle,
             PerceptionFaults._make(column[futures] for column in self._faults),
             tick_s=self._tick_s,
+            walls=self._walls,
             kept=len(self._past) + 1,
         )
 
@@ -118,13 +128,20 @@ class Sight:
 
     def _unseen(self, tick: int | Indices, poses: Array, eyes_xy_m: Array) -> Flags | None:
         """(S, R) bool: which are absent, lost or hidden; None where all are seen."""
-        if self._all_there and not self._ever_lost and not self.anybody_hidden:
+        if self._all_there and not self._ever_lost and not self.needs_eyes:
             return None
         unseen = np.isnan(poses[..., 0])
         if self._ever_lost:
             unseen |= self._lost(np.asarray(tick) * self._tick_s)[:, None]
-        if self.anybody_hidden:
+        if self._by_actors:
             unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
+        if self._walls is not None:
+            due = not isinstance(tick, int) or tick % self._walls_every == 0
+            if due or self._behind_walls is None:
+                length_m = self._crowd.length_m
+                found = hidden(self._walls, eyes_xy_m, poses, length_m)
+                self._behind_walls = found & self._unknown
+            unseen |= self._behind_walls
         return unseen
 
     def _lost(self, time_s: float | Array) -> Flags:

@@ -67,6 +67,7 @@ def _actor(number: int, user: SeenRoadUser, path: FrenetPath | None) -> Player:
         conduct="law_abiding" if lawful else "parked" if stands else "heedless",
         lateral_m=offset,
         size_m=(user.length_m, user.width_m),
+        known=True,
     )
 
 

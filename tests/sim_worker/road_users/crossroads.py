@@ -88,6 +88,7 @@ def traffic(
         brakes_by_mps2=4.0 * row,
         walks=row < 0,
         kinds=np.zeros(row.shape, np.intp),
+        known=row > 0,
         hidden_by=np.full(row.shape, -1),
     )
     return Traffic(crowd, PathTable(paths), rules.between([rules.taken(p) for p in paths]))

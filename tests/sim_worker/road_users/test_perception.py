@@ -11,6 +11,7 @@ from foretwin.sim_worker.road_users.cast import Player, casting
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules
+from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
@@ -25,7 +26,9 @@ WALKER = Player("walker", "pedestrian", ACROSS, 0.0, 1.5, hidden_by="van")
 LEAD = Player("lead", "car", EGO_PATH, 40.0, 5.0)
 
 
-def sight(*players: Player, **faults: float) -> tuple[Sight, Traffic]:
+def sight(
+    *players: Player, walls: OpaqueGrid | None = None, **faults: float
+) -> tuple[Sight, Traffic]:
     cast = casting([players], ego_path=EGO_PATH)
     table = PathTable(cast.paths)
     rules = JunctionRules(None).between([()] * len(cast.paths))
@@ -33,7 +36,7 @@ def sight(*players: Player, **faults: float) -> tuple[Sight, Traffic]:
     columns = {name: np.zeros(1) for name in PerceptionFaults._fields}
     columns |= {name: np.array([value]) for name, value in faults.items()}
     faulty = PerceptionFaults(**columns)
-    eyes = Sight(traffic, table.along(EGO_PATH), CAR, faulty, tick_s=0.05)
+    eyes = Sight(traffic, table.along(EGO_PATH), CAR, faulty, tick_s=0.05, walls=walls)
     return eyes, traffic
 
 
@@ -44,6 +47,30 @@ def test_who_stands_behind_a_van_is_seen_only_past_it(eyes_x_m: float, seen: boo
     assert np.isfinite(found.poses[0, 0]).all(), "the van itself is seen"
     assert bool(np.isfinite(found.poses[0, 1]).all()) == seen
     assert found.walks.tolist() == [[False, True]]
+
+
+WALL = OpaqueGrid(np.ones((4, 60), dtype=np.uint8), -10.0, 2.0, 0.5)
+"""A wall of two metres on the left of the road, from 10 m behind its beginning to 20 m."""
+DRIVEWAY = FrenetPath(np.array([[24.5, 20.0], [24.5, -30.0]]))
+
+
+def test_a_wall_hides_whom_the_map_knows_but_not_whom_the_car_perceives() -> None:
+    walker = Player("walker", "pedestrian", DRIVEWAY, 0.0, 1.5)
+    perceived = walker._replace(name="perceived", known=True)
+    eyes, traffic = sight(walker, perceived, walls=WALL)
+    found = eyes.look(0, traffic, np.array([[0.0, 0.0]]))
+    assert np.isfinite(found.arc_m).tolist() == [[False, True]]
+    assert np.isfinite(eyes.look(2, traffic, np.array([[21.0, 0.0]])).arc_m).all()
+    alone, traffic = sight(perceived, walls=WALL)
+    assert not alone.needs_eyes
+
+
+def test_walls_are_looked_at_ten_times_a_second() -> None:
+    eyes, traffic = sight(Player("walker", "pedestrian", DRIVEWAY, 0.0, 1.5), walls=WALL)
+    far, near = np.array([[0.0, 0.0]]), np.array([[21.0, 0.0]])
+    seen = [np.isfinite(eyes.look(k, traffic, at).arc_m).all() for k, at in enumerate((far, near))]
+    assert seen == [False, False]
+    assert np.isfinite(eyes.look(2, traffic, near).arc_m).all()
 
 
 def advance(eyes: Sight, traffic: Traffic, ticks: int) -> Array:
