@@ -22,7 +22,8 @@ from foretwin.world_gen.osm.osm_map import (
 )
 from foretwin.world_gen.roads.build_graph import build_road_graph
 
-GERMANY, ENGLAND = GeoPoint(52.0, 10.0), GeoPoint(53.0, -1.5)
+GERMANY, IRELAND = GeoPoint(52.0, 10.0), GeoPoint(53.0, -8.0)
+"""Lanes of both are equally wide, so that a World of one is the other's, mirrored."""
 Tags = Mapping[str, str]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hypothesis import strategies as st
 
 from foretwin.contracts.world import World
-from tests.world_gen.drawn_maps import ENGLAND, GERMANY, drawn_map, world_of
+from tests.world_gen.drawn_maps import GERMANY, IRELAND, drawn_map, world_of
 
 ARM_M = 110.0
 _SIDES = {"left": "right", "right": "left"}
@@ -90,7 +90,7 @@ def world_of_star(arms: tuple[Arm, ...], *, left_hand: bool = False, mirror: boo
         ways.append((100 + i, refs, mirrored_tags(tags) if mirror else tags))
     if mirror:
         nodes = {node: (-x, y) for node, (x, y) in nodes.items()}
-    return world_of(drawn_map(nodes, ways, origin=ENGLAND if left_hand else GERMANY))
+    return world_of(drawn_map(nodes, ways, origin=IRELAND if left_hand else GERMANY))
 
 
 def mirrored_tags(tags: dict[str, str]) -> dict[str, str]:

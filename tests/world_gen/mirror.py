@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from foretwin.contracts.frames import LocalFrame
-from foretwin.world_gen.osm.driving_side import side_at
+from foretwin.world_gen.countries.outlines import place_at
 from tests.data.junctions.draw import drawings
 from tests.data.junctions.drawing import BREMEN, LEEDS, Drawing
 from tests.world_gen.truth_sheet import TrueJunction, TrueMap
@@ -79,7 +79,7 @@ def _mirrored_junction(junction: TrueJunction, stem: str | None) -> TrueJunction
 
 def _mirrored(drawing: Drawing) -> Drawing:
     origin = drawing.frame.origin
-    keeps_left = side_at(origin.lat_deg, origin.lon_deg) == "left"
+    keeps_left = place_at(origin.lat_deg, origin.lon_deg).driving_side == "left"
     image = Drawing(BREMEN if keeps_left else LEEDS)
     assert image.frame != LocalFrame(origin)
     image.nodes = {

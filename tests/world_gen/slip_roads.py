@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.world import Connection, StopLine, World
 from foretwin.world_gen.osm.osm_map import OsmMap
-from tests.world_gen.drawn_maps import ENGLAND, GERMANY, Tags, drawn_map, world_of
+from tests.world_gen.drawn_maps import GERMANY, IRELAND, Tags, drawn_map, world_of
 
 SIGN = 31
 _WAY = np.array([[0.0, -30.0], [4.0, -14.0], [13.0, -5.0], [30.0, 0.0]])
@@ -44,7 +44,7 @@ def slip_map(share: float = 0.6, *, sign: Tags = _GIVE_WAY, left_hand: bool = Fa
             (15, [n for n, _, _ in along], {"highway": "secondary_link", "oneway": "yes"}),
         ],
         node_tags={**dict.fromkeys(lights, light), SIGN: sign},
-        origin=ENGLAND if left_hand else GERMANY,
+        origin=IRELAND if left_hand else GERMANY,
     )
 
 

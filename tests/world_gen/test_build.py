@@ -15,7 +15,7 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import (
     AVENUE,
-    ENGLAND,
+    IRELAND,
     STREET,
     crossing,
     drawn_map,
@@ -68,7 +68,7 @@ def test_a_plain_crossing_has_twelve_movements():
 
 
 def test_lanes_keep_right_or_left_of_the_road():
-    for origin, side in ((None, -1.5), (ENGLAND, 1.5)):
+    for origin, side in ((None, -1.5), (IRELAND, 1.5)):
         world = world_of(crossing() if origin is None else crossing(origin=origin))
         east_in = next(
             lane for lane in world.lanes if lane.role == "approach" and lane.centerline[0][0] > 50.0
@@ -148,7 +148,7 @@ def test_turn_lanes_are_obeyed():
 
 @pytest.mark.parametrize("left_hand", [False, True])
 def test_a_roundabout_is_driven_by_its_ring(left_hand):
-    osm = roundabout(origin=ENGLAND, clockwise=True) if left_hand else roundabout()
+    osm = roundabout(origin=IRELAND, clockwise=True) if left_hand else roundabout()
     world = world_of(osm)
     assert world.intersection.kind == "roundabout"
     roles = [lane.role for lane in world.lanes]

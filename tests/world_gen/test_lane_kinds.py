@@ -7,7 +7,7 @@ import pytest
 
 from foretwin.contracts.provenance import Quantity
 from foretwin.world_gen.lanes.cross_section import cross_section
-from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
+from tests.world_gen.drawn_maps import GERMANY, IRELAND, crossing, drawn_map, world_of
 from tests.world_gen.road_edges import road
 
 COVERS = ("foretwin.world_gen.lanes.tram_tracks",)
@@ -92,7 +92,7 @@ def test_a_road_of_bus_lanes_alone_keeps_lanes_for_all():
         ({"cycleway:right": "lane"}, Quantity(1.85, "default")),
         (
             {"parking:right": "lane", "parking:right:orientation": "perpendicular"},
-            Quantity(5.0, "inferred"),
+            Quantity(5.0, "default"),
         ),
         ({"parking:right": "lane"}, Quantity(2.0, "default")),
     ],
@@ -113,7 +113,7 @@ def test_changing_lanes():
     assert (plain.change, plain.change_source) == ("both", "default")
 
 
-@pytest.mark.parametrize("place", [GERMANY, ENGLAND])
+@pytest.mark.parametrize("place", [GERMANY, IRELAND])
 def test_a_centre_lane_is_where_turns_across_the_road_begin(place):
     street = {"highway": "secondary", "name": "Street", "lanes": "3", "lanes:both_ways": "1"}
     world = world_of(crossing(street=street, origin=place))

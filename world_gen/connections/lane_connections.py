@@ -169,6 +169,12 @@ def _pairs_by_position(
     return [(starts[i], ends[j]) for i, j in sorted(pairs)]
 
 
+def _narrower(start: Quantity, end: Quantity) -> Quantity:
+    """Return the width that both lanes have; it is inferred, or a default as theirs is."""
+    narrow = min(start, end, key=lambda width: width.value)
+    return Quantity(narrow.value, "default" if narrow.source == "default" else "inferred")
+
+
 def _drafted(
     start: LaneDraft, end: LaneDraft, movement: Movement, cluster: Cluster
 ) -> ConnectionDraft:
@@ -178,7 +184,7 @@ def _drafted(
         end=end,
         turn=movement.turn,
         centerline=_UNDRAWN,
-        width_m=Quantity(min(start.width_m.value, end.width_m.value), "inferred"),
+        width_m=_narrower(start.width_m, end.width_m),
         cluster=cluster,
         movement=movement,
     )

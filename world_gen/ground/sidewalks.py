@@ -85,7 +85,7 @@ def _beside_kerbs(around: Surroundings, lanes: LaneSet) -> Iterator[_Strip]:
             keys = f"sidewalk:{side}:width", "sidewalk:both:width", "sidewalk:width"
             width = metres(next((tags[key] for key in keys if tags.get(key)), None))
             names.append(f"sidewalk:{road.id}:{side}")
-            sources.append("inferred" if width is None else "tagged")
+            sources.append("default" if width is None else "tagged")
             edges.append(lanes.edges[road.id][0 if side == "left" else 1])
             widths.append((width or WIDTH_M) * (1.0 if side == "left" else -1.0))
     outer = offset(Polylines.of(edges), np.array(widths)).split()
@@ -105,5 +105,5 @@ def _of_ways(around: Surroundings, osm: OsmMap, beside: BesideRoads) -> Iterator
     half_m = [(width or WIDTH_M) / 2 for width in tagged]
     strips = shapely.buffer(shapes[near], half_m, cap_style="flat", quad_segs=2)
     strips = shapely.intersection(strips, around.extent.polygon)
-    sources: list[Provenance] = ["inferred" if width is None else "tagged" for width in tagged]
+    sources: list[Provenance] = ["default" if width is None else "tagged" for width in tagged]
     return zip((f"sidewalk:w{way.id}" for way in ways), sources, strips, strict=True)

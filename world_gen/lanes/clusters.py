@@ -23,7 +23,7 @@ from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, side_of
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, country_of, side_of
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
@@ -39,6 +39,8 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
     junctions: tuple[Junction, ...]
     extent: Extent
     driving_side: DrivingSide
+    country: str
+    """Code of the country in which most of its roads lie."""
     edges: Mapping[int, RoadEdge]
     sections: Mapping[int, CrossSection]
     clusters: tuple[Cluster, ...]
@@ -103,6 +105,7 @@ def surroundings(
         junctions=tuple(whole.values()),
         extent=extent,
         driving_side=side,
+        country=country_of(edges.values()),
         edges=edges,
         sections=sections,
         clusters=clusters,
@@ -141,7 +144,8 @@ def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, Cross
             and edge.start_node in index.junction_of_node
             and edge.end_node not in index.junction_of_node
         )
-        driven = (edge.forward, edge.backward, edge.driving_side, centre_reverse)
+        of_place = edge.driving_side, edge.country
+        driven = (edge.forward, edge.backward, *of_place, centre_reverse)
         way = (edge.way_id, *driven)
         if way not in known:
             tags = (kv for kv in edge.tags.items() if kv[0] not in _WITHOUT_EFFECT_ON_LANES)

@@ -10,13 +10,12 @@ from foretwin.contracts.provenance import Quantity
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan, metres
 from foretwin.world_gen.lanes.lane_tags import (
     BUS_WIDTH_M,
-    DEFAULT_WIDTH_M,
     MAX_WIDTH_M,
     MIN_WIDTH_M,
     lanes_of_direction,
+    usual_width_m,
 )
 from foretwin.world_gen.lanes.side_lanes import side_lanes
-from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 MAX_LANES = 12
@@ -71,14 +70,13 @@ def _centre(edge: RoadEdge, reverse: bool, notes: list[str]) -> list[LanePlan]:
     notes.append(
         f"way {edge.way_id}: its centre lane, for turns from both directions, is driven one way"
     )
-    known = road_class(edge.road_class).lane_width_m or DEFAULT_WIDTH_M
     return [
         LanePlan(
             label="centre",
             reverse=reverse,
             number=-1,
             kind="driving",
-            width_m=Quantity(known, "inferred"),
+            width_m=Quantity(usual_width_m(edge), "default"),
             turns=("left",) if edge.driving_side == "right" else ("right",),
             turns_source="tagged" if tagged else "inferred",
             counted=False,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import LaneChange, LaneKind, Turn
+from foretwin.world_gen.countries.rules import rules_of
 from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
 from foretwin.world_gen.roads.road_classes import road_class
@@ -184,13 +185,18 @@ def _lane_width(edge: RoadEdge, tagged: str, kind: LaneKind) -> Quantity:
     if width := tagged_width(tagged, least, MAX_WIDTH_M):
         return width
     if kind == "bus":
-        return Quantity(BUS_WIDTH_M, "inferred")
+        return Quantity(BUS_WIDTH_M, "default")
     if kind == "bicycle":
         return Quantity(BICYCLE_WIDTH_M, "default")
-    known = road_class(edge.road_class).lane_width_m
-    base = Quantity(DEFAULT_WIDTH_M, "default") if known is None else Quantity(known, "inferred")
+    usual_m = usual_width_m(edge)
     ring = edge.tags.get("junction") in ("roundabout", "circular")
     if ring and edge.lanes_forward.value < 1.5:
         # A single ring lane is wide enough for a lorry's swept path (RASt 06: 6.5 to 9 m).
-        return Quantity(max(base.value, 4.5), "inferred")
-    return base
+        usual_m = max(usual_m, 4.5)
+    return Quantity(usual_m, "default")
+
+
+def usual_width_m(edge: RoadEdge) -> float:
+    """Return how wide a lane of a road's class is in its country."""
+    of_class = road_class(edge.road_class).lane_width_m or DEFAULT_WIDTH_M
+    return rules_of(edge.country).width_m(edge.road_class, of_class)

@@ -55,7 +55,7 @@ def _of_side(
     found: list[LanePlan] = []
     opposite = one_way and (kerb_of_forward == edge.backward)
     if opposite and of_side(tags, "busway", side) == "opposite_lane":
-        width = Quantity(bus_width_m, "inferred")
+        width = Quantity(bus_width_m, "default")
         found.append(_lane(side, "bus", width, not reverse))
     word = of_side(tags, "cycleway", side)
     against = opposite and (
@@ -105,7 +105,5 @@ def _parking_width(tags: Mapping[str, str], side: str) -> Quantity | None:
         place = of_side(tags, "parking:lane", side, f":{orientation}")
         if place is not None and place not in _OLD_ON_STREET:
             return None
-    usual = PARKING_WIDTH_M.get(orientation or "")
-    if usual is None:
-        return Quantity(PARKING_WIDTH_M["parallel"], "default")
-    return Quantity(usual, "inferred")
+    usual_m = PARKING_WIDTH_M.get(orientation or "", PARKING_WIDTH_M["parallel"])
+    return Quantity(usual_m, "default")

@@ -14,7 +14,8 @@ from foretwin.world_gen.extent import stretches_inside
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.osm.osm_map import OsmMap, OsmWay
 from foretwin.world_gen.roads.beside_roads import BesideRoads, in_frame
-from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge, road_layer, speed_limit
+from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge, road_layer
+from foretwin.world_gen.roads.speed_limits import speed_limit
 
 TRAM_WIDTH_M = 2.65
 """Width of a usual tram (BOStrab: no wider)."""

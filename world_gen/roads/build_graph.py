@@ -14,6 +14,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import DrivingSide
+from foretwin.world_gen.countries.outlines import CountryPlace, places_of
 from foretwin.world_gen.osm.driving_side import driving_sides
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph, side_of
@@ -26,11 +27,13 @@ from foretwin.world_gen.roads.road_tags import (
     lane_counts,
     open_to_cars,
     road_layer,
-    speed_limit,
 )
+from foretwin.world_gen.roads.speed_limits import speed_limit
 
-_UNUSED = ("name", "ref", "wiki", "note", "description", "addr:", "alt_name")
+_UNUSED = ("name:", "ref", "wiki", "note", "description", "addr:", "alt_name")
 """Keys that begin so have no meaning for how a road is driven."""
+_NAMED = ("name", "named")
+"""Stands for any name: that a road has one tells towns from the country."""
 
 
 def build_road_graph(osm: OsmMap) -> RoadGraph:
@@ -49,8 +52,10 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     ids, row, uses = np.unique(flat, return_inverse=True, return_counts=True)
     lat_lon = osm.locations.of(ids)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
-    sides = _sides(kept, lat_lon[row], xy_m[row])
-    edges = _edges(kept, sides, flat.tolist(), xy_m[row], uses[row] > 1)
+    begin = np.cumsum([0, *(len(path) for _, path in kept)])[:-1]
+    places = places_of(lat_lon[row[begin]])
+    sides = _sides(kept, places, lat_lon[row], xy_m[row])
+    edges = _edges(kept, places, sides, flat.tolist(), xy_m[row], uses[row] > 1)
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
     nodes = {node for edge in edges for node in (edge.start_node, edge.end_node)}
     leaving: dict[int, list[DirectedEdge]] = {node: [] for node in sorted(nodes)}
@@ -73,7 +78,10 @@ def _without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _sides(
-    ways: list[tuple[OsmWay, tuple[int, ...]]], lat_lon_deg: Array, points: Array
+    ways: list[tuple[OsmWay, tuple[int, ...]]],
+    places: tuple[CountryPlace, ...],
+    lat_lon_deg: Array,
+    points: Array,
 ) -> tuple[DrivingSide, ...]:
     """Return on which side each way is driven; its points stand one after the other."""
     if not ways:
@@ -81,7 +89,7 @@ def _sides(
     first = np.cumsum([0, *(len(path) for _, path in ways)])
     arc_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     begin, length_m = first[:-1], arc_m[first[1:] - 1] - arc_m[first[:-1]]
-    return driving_sides([way.tags for way, _ in ways], lat_lon_deg[begin], length_m)
+    return driving_sides([way.tags for way, _ in ways], places, lat_lon_deg[begin], length_m)
 
 
 class _Meaning(NamedTuple):
@@ -94,15 +102,17 @@ class _Meaning(NamedTuple):
     car: bool
 
 
-def _meaning(items: frozenset[tuple[str, str]]) -> _Meaning:
+def _meaning(items: frozenset[tuple[str, str]], country: str) -> _Meaning:
     tags = dict(items)
     allowed = directions(tags)
     car = is_car_road(tags) and open_to_cars(tags)
-    return _Meaning(allowed, lane_counts(tags, allowed), speed_limit(tags), road_layer(tags), car)
+    limit = speed_limit(tags, country)
+    return _Meaning(allowed, lane_counts(tags, allowed), limit, road_layer(tags), car)
 
 
 def _edges(
     ways: list[tuple[OsmWay, tuple[int, ...]]],
+    places: tuple[CountryPlace, ...],
     sides: tuple[DrivingSide, ...],
     nodes: list[int],
     points: Array,
@@ -123,7 +133,9 @@ def _edges(
     meaning = cache(_meaning)  # most ways of a town have the same tags but for their names
     for i, (way, _) in enumerate(ways):
         tags = way.tags
-        means = meaning(frozenset(kv for kv in tags.items() if not kv[0].startswith(_UNUSED)))
+        used = [kv for kv in tags.items() if not kv[0].startswith(_UNUSED) and kv[0] != "name"]
+        named = [_NAMED] if "name" in tags else []
+        means = meaning(frozenset((*used, *named)), places[i].code)
         name = tags.get("name") or tags.get("ref", "")
         for k in range(of_way[i], of_way[i + 1] - 1):
             begin, end = at[k], at[k + 1]
@@ -146,6 +158,7 @@ def _edges(
                     lanes_backward=means.lanes.backward,
                     layer=means.layer,
                     driving_side=sides[i],
+                    country=places[i].code,
                     tags=tags,
                 )
             )

@@ -1,4 +1,4 @@
-"""Classes of roads, and what is usual of each where a map has no tag."""
+"""Classes of roads, and what is usual of each where neither a map nor its country says it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import NamedTuple
 class RoadClass(NamedTuple):
     """One class of `highway`; `importance` ranks roads that meet, lane widths may be unknown."""
 
-    kmph: float = 50.0
+    kmph: float | None = 50.0
+    """None where the country's rules say it, see `speed_limits.py`."""
     lane_width_m: float | None = None
     importance: float = 2.0
     public: bool = True
@@ -16,20 +17,20 @@ class RoadClass(NamedTuple):
 
 
 ROAD_CLASSES = {
-    "motorway": RoadClass(120.0, 3.75, 8.0),
+    "motorway": RoadClass(None, 3.75, 8.0),
     "motorway_link": RoadClass(60.0, 3.75, 2.8),
-    "trunk": RoadClass(100.0, 3.5, 7.0),
+    "trunk": RoadClass(None, 3.5, 7.0),
     "trunk_link": RoadClass(60.0, 3.5, 2.7),
-    "primary": RoadClass(50.0, 3.5, 6.0),
-    "primary_link": RoadClass(50.0, 3.5, 2.6),
-    "secondary": RoadClass(50.0, 3.25, 5.0),
-    "secondary_link": RoadClass(50.0, 3.5, 2.5),
-    "tertiary": RoadClass(50.0, 3.25, 4.0),
-    "tertiary_link": RoadClass(50.0, 3.25, 2.4),
-    "unclassified": RoadClass(50.0, 3.0, 3.0),
-    "residential": RoadClass(30.0, 3.0, 3.0),
-    "living_street": RoadClass(10.0, 2.75, 1.0),
-    "road": RoadClass(50.0, None, 3.0),
+    "primary": RoadClass(None, 3.5, 6.0),
+    "primary_link": RoadClass(None, 3.5, 2.6),
+    "secondary": RoadClass(None, 3.25, 5.0),
+    "secondary_link": RoadClass(None, 3.5, 2.5),
+    "tertiary": RoadClass(None, 3.25, 4.0),
+    "tertiary_link": RoadClass(None, 3.25, 2.4),
+    "unclassified": RoadClass(None, 3.0, 3.0),
+    "residential": RoadClass(None, 3.0, 3.0),
+    "living_street": RoadClass(None, 2.75, 1.0),
+    "road": RoadClass(None, None, 3.0),
     "raceway": RoadClass(100.0, 5.0, 3.0),
     "pedestrian": RoadClass(7.0, None, 1.0, public=False),
     "service": RoadClass(10.0, None, 1.0, public=False),

@@ -39,6 +39,8 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     layer: int
     driving_side: DrivingSide
     tags: Mapping[str, str]
+    country: str = ""
+    """Code of the country where its way begins; empty where there is none."""
 
     @property
     def one_way(self) -> bool:
@@ -124,3 +126,11 @@ def side_of(edges: Iterable[RoadEdge]) -> DrivingSide:
     """Return the side on which most metres of some roads are driven; right where none are."""
     right_m = sum([edge.length_m * (1 if edge.driving_side == "right" else -1) for edge in edges])
     return "right" if right_m >= 0.0 else "left"
+
+
+def country_of(edges: Iterable[RoadEdge]) -> str:
+    """Return the country in which most metres of some roads lie; none where none are."""
+    metres: dict[str, float] = {}
+    for edge in edges:
+        metres[edge.country] = metres.get(edge.country, 0.0) + edge.length_m
+    return max(sorted(metres), key=metres.__getitem__, default="")

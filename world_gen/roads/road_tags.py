@@ -1,13 +1,12 @@
-"""What the tags of a road mean to a driver: access, one-way, lanes, speed limit, level."""
+"""What the tags of a road mean to a driver: access, one-way, lanes, level."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.roads.road_classes import CAR_CLASSES, OTHER_CLASSES, road_class
+from foretwin.world_gen.roads.road_classes import CAR_CLASSES, OTHER_CLASSES
 
 _MOTOR_SPORTS = frozenset({"motor", "motor_sports", "motor_racing", "autocross", "rallycross"})
 """What races on a track for cars; kart, horse, bicycle and motocross tracks are none."""
@@ -17,32 +16,6 @@ _FORBIDDEN = frozenset(
     {"no", "private", "agricultural", "forestry", "emergency", "official", "military"}
 )
 _ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
-
-_ZONE_KMPH = {
-    "urban": 50.0,
-    "rural": 100.0,
-    "motorway": 130.0,
-    "trunk": 120.0,
-    "living_street": 10.0,
-    "bicycle_road": 30.0,
-    "pedestrian_zone": 7.0,
-    "walk": 7.0,
-    "nsl_restricted": 48.28,
-    "nsl_single": 96.56,
-    "nsl_dual": 112.65,
-}
-_RURAL_KMPH = {
-    country: kmph
-    for kmph, countries in (
-        (70.0, "BE SE"),
-        (80.0, "CH DK FR LI NL NO"),
-        (90.0, "CZ ES GR HU IT PL SI SK"),
-    )
-    for country in countries.split()
-}
-"""Of rural roads where a country differs from the hundred of the table above."""
-_KMPH_FROM_UNIT = {"": 1.0, "kmh": 1.0, "km/h": 1.0, "kph": 1.0, "mph": 1.609344, "knots": 1.852}
-_SPEED = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*([a-z/]*)\s*$")
 
 
 class Directions(NamedTuple):
@@ -149,48 +122,6 @@ def _count(text: str | None) -> int | None:
         return max(1, int(float(text.split(";")[0])))
     except (ValueError, OverflowError):
         return None
-
-
-def speed_limit(tags: Mapping[str, str]) -> Quantity:
-    """Return the speed limit in m/s: a sign's number is tagged, a zone's inferred, else default.
-
-    Where the two directions differ the higher one counts. An unlimited motorway gets the
-    recommended 130 km/h.
-    """
-    keys = ("maxspeed", "maxspeed:forward", "maxspeed:backward")
-    both, *each = (_signed_kmph(tags.get(key)) for key in keys)
-    signed = both or max((speed for speed in each if speed is not None), default=None)
-    if signed is not None:
-        return Quantity(signed / 3.6, "tagged")
-    if tags.get("maxspeed") == "none":
-        return Quantity(130.0 / 3.6, "inferred")
-    for key in ("maxspeed", "maxspeed:type", "source:maxspeed", "zone:maxspeed", "zone:traffic"):
-        if (speed := _zone_kmph(tags.get(key))) is not None:
-            return Quantity(speed / 3.6, "inferred")
-    return Quantity(road_class(tags.get("highway", "")).kmph / 3.6, "default")
-
-
-def _signed_kmph(text: str | None) -> float | None:
-    if text is None:
-        return None
-    match = _SPEED.match(text.split(";")[0].lower())
-    if match is None or match[2] not in _KMPH_FROM_UNIT:
-        return None
-    speed = float(match[1]) * _KMPH_FROM_UNIT[match[2]]
-    return speed if speed > 0.0 else None
-
-
-def _zone_kmph(text: str | None) -> float | None:
-    if text is None or text.startswith("http"):
-        return None
-    country, _, zone = text.rpartition(":") if ":" in text else ("", "", text)
-    zone = zone.lower()
-    if zone == "rural":
-        return _RURAL_KMPH.get(country.upper()[:2], _ZONE_KMPH["rural"])
-    if zone in _ZONE_KMPH:
-        return _ZONE_KMPH[zone]
-    number = re.fullmatch(r"(?:zone)?(\d{1,3})", zone)
-    return float(number[1]) if number is not None and int(number[1]) > 0 else None
 
 
 def road_layer(tags: Mapping[str, str]) -> int:

@@ -9,7 +9,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, roundabout, world_of
+from tests.world_gen.drawn_maps import GERMANY, IRELAND, crossing, drawn_map, roundabout, world_of
 
 SIGNALS = {"highway": "traffic_signals"}
 ROAD = {"highway": "secondary", "name": "High Road", "lanes": "2"}
@@ -67,4 +67,4 @@ def race_track() -> World:
 
 
 def _origin(left_hand: bool) -> GeoPoint:
-    return ENGLAND if left_hand else GERMANY
+    return IRELAND if left_hand else GERMANY

@@ -19,7 +19,7 @@ from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import (
-    ENGLAND,
+    IRELAND,
     STREET,
     crossing,
     drawn_map,
@@ -57,11 +57,11 @@ def ring() -> World:
 
 
 def left_hand() -> World:
-    return world_of(crossing(avenue=PRIMARY, origin=ENGLAND))
+    return world_of(crossing(avenue=PRIMARY, origin=IRELAND))
 
 
 def left_hand_ring() -> World:
-    return world_of(roundabout(origin=ENGLAND, clockwise=True))
+    return world_of(roundabout(origin=IRELAND, clockwise=True))
 
 
 def bent_and_widened() -> World:
@@ -238,7 +238,7 @@ def test_any_star_of_roads_closes(
         nodes[10 + i], nodes[20 + i] = (x, y), (x + 40 * math.cos(angle), y + 40 * math.sin(angle))
         tags = {"highway": "secondary", "name": f"{i}", "lanes": str(lanes), "oneway": one_way}
         ways.append((100 + i, [0, 10 + i, 20 + i], tags))
-    osm = drawn_map(nodes, ways, **({"origin": ENGLAND} if left_hand else {}))
+    osm = drawn_map(nodes, ways, **({"origin": IRELAND} if left_hand else {}))
     file = written(world_of(osm), tmp_path_factory.mktemp("star"))
     check_closed(file)
     check_links(file)

@@ -17,7 +17,7 @@ from foretwin.world_gen.export.opendrive import proj_of, write_opendrive
 from tests.world_gen.drawn_maps import (
     AVENUE,
     CROSS,
-    ENGLAND,
+    IRELAND,
     STREET,
     crossing,
     drawn_map,
@@ -46,7 +46,7 @@ def test_who_waits_is_written_for_every_conflict(tmp_path: Path) -> None:
     assert said == wanted
 
 
-@pytest.mark.parametrize("origin", [None, ENGLAND])
+@pytest.mark.parametrize("origin", [None, IRELAND])
 def test_lights_stand_on_their_lanes_and_have_controllers(tmp_path: Path, origin) -> None:
     more = {} if origin is None else {"origin": origin}
     world = world_of(crossing(node_tags={0: {"highway": "traffic_signals"}}, **more))
@@ -254,7 +254,7 @@ def test_lanes_that_would_jump_aside_are_not_linked(tmp_path: Path) -> None:
     assert [(a[2], b[2]) for a, b in file.joints()] == [(-1, -1), (-1, -1)]
 
 
-@pytest.mark.parametrize("origin", [None, ENGLAND])
+@pytest.mark.parametrize("origin", [None, IRELAND])
 def test_a_sidewalk_along_a_road_is_a_lane_of_it(tmp_path: Path, origin) -> None:
     more = {} if origin is None else {"origin": origin}
     world = world_of(crossing(street={**STREET, "sidewalk": "left"}, **more))

@@ -41,9 +41,9 @@ def test_lanes_are_numbered_from_the_left_as_their_driver_sees_them():
 def test_widths_are_tagged_or_inferred_or_default():
     lanes = cross_section(_road({"width:lanes": "3.1|2.7"}, forward=2, backward=0)).lanes
     assert [lane.width_m for lane in lanes] == [Quantity(3.1, "tagged"), Quantity(2.7, "tagged")]
-    assert cross_section(_road()).lanes[0].width_m == Quantity(3.0, "inferred")
+    assert cross_section(_road()).lanes[0].width_m == Quantity(3.0, "default")
     odd = cross_section(_road(road_class="corridor"))
-    assert odd.lanes[0].width_m.source == "default"
+    assert odd.lanes[0].width_m == Quantity(3.0, "default")
     narrow = cross_section(_road({"width": "5 m"}))
     assert [lane.width_m for lane in narrow.lanes] == [Quantity(2.5, "inferred")] * 2
 

@@ -50,7 +50,7 @@ def _subject(junction: JunctionReport, name: str) -> SubjectReport:
 def test_sentences_name_the_road_and_the_value(junction):
     assert "Street: 3 lanes, inferred (2 times)" in _subject(junction, "lane counts").guessed
     assert (
-        "Street: lane 3.00 m wide, inferred (6 times)" in _subject(junction, "lane widths").guessed
+        "Street: lane 3.00 m wide, default (6 times)" in _subject(junction, "lane widths").guessed
     )
     assert _subject(junction, "directions").guessed == (
         "Street: traffic both ways, inferred (6 times)",

@@ -10,7 +10,6 @@ from foretwin.world_gen.roads.road_tags import (
     lane_counts,
     open_to_cars,
     road_layer,
-    speed_limit,
 )
 
 
@@ -40,30 +39,6 @@ def test_directions(tags: dict[str, str], expected: tuple[bool, bool]) -> None:
 def test_farm_and_forest_roads_are_closed_unless_another_use_is_named() -> None:
     assert not open_to_cars({"highway": "track", "vehicle": "agricultural;forestry"})
     assert open_to_cars({"highway": "track", "vehicle": "agricultural;destination"})
-
-
-@pytest.mark.parametrize(
-    ("tags", "km_per_h", "source"),
-    [
-        ({"maxspeed": "50"}, 50.0, "tagged"),
-        ({"maxspeed": "30 mph"}, 48.28032, "tagged"),
-        ({"maxspeed": "DE:urban"}, 50.0, "inferred"),
-        ({"source:maxspeed": "DE:rural"}, 100.0, "inferred"),
-        ({"source:maxspeed": "FR:rural"}, 80.0, "inferred"),
-        ({"maxspeed:type": "DE:zone30"}, 30.0, "inferred"),
-        ({"maxspeed": "walk"}, 7.0, "inferred"),
-        ({"maxspeed": "none"}, 130.0, "inferred"),
-        ({"maxspeed": "signals", "maxspeed:forward": "80"}, 80.0, "tagged"),
-        ({"maxspeed:forward": "70", "maxspeed:backward": "50"}, 70.0, "tagged"),
-        ({"maxspeed": "50;30"}, 50.0, "tagged"),
-        ({"maxspeed": "fast", "highway": "residential"}, 30.0, "default"),
-        ({"maxspeed": "0", "highway": "secondary"}, 50.0, "default"),
-    ],
-)
-def test_speed_limit(tags: dict[str, str], km_per_h: float, source: str) -> None:
-    limit = speed_limit(tags)
-    assert limit.value * 3.6 == pytest.approx(km_per_h, abs=0.01)
-    assert limit.source == source
 
 
 @pytest.mark.parametrize(
