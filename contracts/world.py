@@ -31,12 +31,14 @@ LaneChange = Literal["both", "left", "right", "none"]
 """To which sides, as the driver sees them, a lane may be left."""
 _YieldByRoad = Literal["stop", "give_way", "roundabout", "priority_road", "lesser_road"]
 _YieldByMovement = Literal["turn_across", "near_side", "u_turn", "merge_order", "order"]
-YieldRule = Literal[_YieldByRoad, _YieldByMovement]
+_YieldByCountry = Literal["far_side"]
+YieldRule = Literal[_YieldByRoad, _YieldByMovement, _YieldByCountry]
 """Why one movement waits for another.
 
 A stop or give-way sign, a ring, a signed priority road, a road of lower class or a way out of a
 yard, a turn across oncoming traffic, who comes from the near side (right before left where traffic
-keeps right), a U-turn, merging lanes, or, where no rule says, a fixed order.
+keeps right), in some countries from the far side, a U-turn, merging lanes, or, where no rule says,
+a fixed order.
 """
 
 ATTRIBUTION = "© OpenStreetMap contributors"

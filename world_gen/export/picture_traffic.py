@@ -21,7 +21,7 @@ from foretwin.world_gen.export.picture_style import Look, View
 ARROW_SPACING_M = 24.0
 _KIND_COLOUR: Mapping[str, str] = {"bus": style.BUS, "bicycle": style.BICYCLE, "tram": style.TRAM}
 _TURN_DEG: Mapping[Turn, float] = {"straight": 0.0, "left": 75.0, "right": -75.0, "u_turn": 160.0}
-_GENERAL: frozenset[YieldRule] = frozenset(("near_side", "order", "merge_order"))
+_GENERAL: frozenset[YieldRule] = frozenset(("near_side", "far_side", "order", "merge_order"))
 """Rules under which two roads wait for each other: neither has priority."""
 _ACROSS: frozenset[YieldRule] = frozenset(("turn_across", "u_turn"))
 

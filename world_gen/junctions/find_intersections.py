@@ -10,6 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.world import IntersectionSummary, JunctionKind
+from foretwin.world_gen.countries.rules import rules_of
 from foretwin.world_gen.junctions.chains import CarRoads, car_roads
 from foretwin.world_gen.junctions.grouping import JunctionCluster
 from foretwin.world_gen.junctions.intersections import Junction
@@ -17,7 +18,7 @@ from foretwin.world_gen.junctions.junction_arms import ArmChains, ClusterRoads, 
 from foretwin.world_gen.junctions.junction_clusters import cluster_branchings
 from foretwin.world_gen.junctions.junction_control import control_of
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.roads.road_graph import RoadGraph, side_of
+from foretwin.world_gen.roads.road_graph import RoadGraph, country_of, side_of
 
 STAGGER_M = 8.0
 """Opposite arms whose axes lie farther apart make a junction staggered."""
@@ -90,7 +91,11 @@ def _junction(
     core = frozenset(cluster.core)
     incoming = tuple([chain for item in arms for chain in item.chains if chain.inward])
     ring = kind in ("roundabout", "mini_roundabout")
-    control, lights = control_of(core, around.inside, incoming, osm.node_tags, ring=ring)
+    legs = [leg.edge for item in arms for leg in item.arm.outward]
+    all_way = rules_of(country_of(legs)).all_way_stops
+    control, lights = control_of(
+        core, around.inside, incoming, osm.node_tags, ring=ring, all_way_stops=all_way
+    )
     return Junction(
         summary=IntersectionSummary(
             id=f"n{min(cluster.core)}",
@@ -99,7 +104,7 @@ def _junction(
             lon=round(lon_deg, 7),
             arms=len(arms),
             control=control,
-            driving_side=side_of(leg.edge for item in arms for leg in item.arm.outward),
+            driving_side=side_of(legs),
             osm_nodes=tuple(sorted(nodes)),
             name=_name(cluster, arms, around),
         ),

@@ -27,11 +27,13 @@ def control_of(
     node_tags: Mapping[int, Tags],
     *,
     ring: bool,
+    all_way_stops: bool = False,
 ) -> JunctionControl:
     """Return how the junction is controlled, from the tags in it and on its roads in.
 
     A light or sign counts for the nearer junction of the road it stands on, or the one that it
-    faces; signs on every road in make an all-way stop.
+    faces; signs on every road in make an all-way stop, in countries of `all_way_stops` one on
+    the junction's own node, too, unless it says which roads it stops.
     """
     inner = [node_tags[node] for node in core if node in node_tags]
     inner += [mark.tags for chain in inside for mark in chain.marks]
@@ -42,15 +44,18 @@ def control_of(
         found.update(mark.node for mark in met if _is_light(mark.tags, mark.distance_m))
     if found:
         return JunctionControl("signals", frozenset(found))
-    return JunctionControl("roundabout" if ring else _signs(inner, incoming), frozenset())
+    return JunctionControl(
+        "roundabout" if ring else _signs(inner, incoming, all_way_stops), frozenset()
+    )
 
 
-def _signs(inner: list[Tags], incoming: tuple[Chain, ...]) -> Control:
+def _signs(inner: list[Tags], incoming: tuple[Chain, ...], all_way_stops: bool) -> Control:
     """Return the control by signs among `inner` tags and on the roads in."""
     stops = [tags for chain in incoming if (tags := _sign(chain, "stop")) is not None]
     inner_stops = [tags for tags in inner if tags.get("highway") == "stop"]
     all_way = any(tags.get("stop") == "all" for tags in (*inner_stops, *stops))
-    if all_way or len(stops) == len(incoming) >= 3:
+    unsaid = all_way_stops and not stops and any("stop" not in tags for tags in inner_stops)
+    if all_way or unsaid or len(stops) == len(incoming) >= 3:
         return "all_way_stop"
     if inner_stops or stops:
         return "stop"

@@ -37,6 +37,7 @@ _RULES: Mapping[YieldRule, str] = {
     "lesser_road": "lesser road",
     "turn_across": "turns across oncoming traffic",
     "near_side": "who comes from the near side goes first",
+    "far_side": "who comes from the far side goes first",
     "u_turn": "turns back",
     "merge_order": "merging lanes",
     "order": "no rule says; a fixed order",

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from foretwin.contracts.signals import Signal, SignalPlan
 from foretwin.contracts.world import Conflict, Crossing, StopLine
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.countries.rules import rules_of
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneSet
 from foretwin.world_gen.rules.approaches import Approach, approaches
@@ -54,7 +55,9 @@ def junction_rules(
     _control(connections, found, lines, signs, node_tags, around)
     whole = {id(junction) for junction in around.junctions}
     ruled = [c for c in connections if id(c.cluster.junction) in whole]
-    conflicts, met = right_of_way(ruled, found, signs, around.driving_side)
+    conflicts, met = right_of_way(
+        ruled, found, signs, around.driving_side, rules_of(around.country).first_from
+    )
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
     line_of = {line.lane_id: line for line in lines}

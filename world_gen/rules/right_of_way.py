@@ -19,6 +19,7 @@ Rules stand in the order in which they apply:
 7. Of equals the one whose near side the other comes from: right before left where traffic
    keeps right (§8 (1); Code de la route R415-5; UVC 11-401, also at all-way stops), mirrored
    where it keeps left. British law knows no such rule (Highway Code 146): it is a default there.
+   Some that keep left let the right go first (`countries.rules.first_from`).
 8. Roads that run together: who goes straighter (§18 (3)), then who has the shorter way.
 """
 
@@ -92,12 +93,15 @@ def right_of_way(
     found: Sequence[Approach],
     signs: SignsInside,
     driving_side: DrivingSide,
+    first_from: DrivingSide | None = None,
 ) -> tuple[tuple[Conflict, ...], Meetings]:
     """Return every conflict with its answer, and enter them into the connections.
 
-    Each of `connections` belongs to a junction that lies whole in the World.
+    Each of `connections` belongs to a junction that lies whole in the World. Of equals who comes
+    from the side `first_from` goes first, without it from the near side.
     """
     met = meetings(connections)
+    side = first_from or driving_side
     ways = _ways(connections, found, signs, driving_side)
     headings = np.array([way.heading for way in ways])
     turned = headings[met.second] - headings[met.first]
@@ -113,7 +117,7 @@ def right_of_way(
         if a.sign_node != b.sign_node:
             own, other = (_standing_at(way, area, point, merging) for way in (a, b))
             standing = own, other
-        answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
+        answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side, side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
         conflicting[i].append(b.draft.id)
         conflicting[j].append(a.draft.id)
@@ -209,6 +213,7 @@ def _answer(
     angle: float,
     crossing: bool,
     driving_side: DrivingSide,
+    first_from: DrivingSide,
 ) -> Yielding:
     """Return who of two waits; `angle` turns a's first heading into b's, positive to the left.
 
@@ -248,7 +253,8 @@ def _answer(
         return _across(a, b)
     if abs(angle) > (FAST_ALONGSIDE_RAD if a.fast and b.fast else ALONGSIDE_RAD):
         # Who is seen to the right comes with a heading turned to the left.
-        return Yielding((angle > 0.0) == (driving_side == "right"), "near_side", "default")
+        rule: YieldRule = "near_side" if first_from == driving_side else "far_side"
+        return Yielding((angle > 0.0) == (first_from == "right"), rule, "default")
     return _beside(a, b)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.world import World
-from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
+from tests.world_gen.drawn_maps import GERMANY, IRELAND, crossing, drawn_map, world_of
 from tests.world_gen.where_lanes_lead import lane_ends, maps_in, whole_world
 
 Tags = Mapping[str, str]
@@ -32,7 +32,7 @@ def _ring(*, ring: Tags, entry: Tags, left_hand: bool = False, exit_there: bool 
     ]
     if exit_there:
         ways.append((13, [112, 3], road | {"name": "Next out", "oneway": "yes"}))
-    return world_of(drawn_map(nodes, ways, origin=ENGLAND if left_hand else GERMANY))
+    return world_of(drawn_map(nodes, ways, origin=IRELAND if left_hand else GERMANY))
 
 
 def _leads(world: World, way: int) -> dict[str, set[tuple[int, str]]]:
