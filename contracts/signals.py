@@ -40,8 +40,9 @@ class SignalPhase(msgspec.Struct, frozen=True, kw_only=True):
 class SignalPlan(msgspec.Struct, frozen=True, kw_only=True):
     """A fixed-time plan: phases in order, each followed by `amber_s` and `all_red_s`.
 
-    Groups of one phase never conflict, but for turns across oncoming traffic, which wait as
-    `Conflict` says. A live `SignalState` overrides it.
+    Cycles begin `offset_s` after time 0. In the last `red_amber_s` of the red before its green a
+    group shows red and amber together. Groups of one phase never conflict, but for turns across
+    oncoming traffic, which wait as `Conflict` says. A live `SignalState` overrides it.
     """
 
     groups: tuple[SignalGroup, ...]
@@ -49,3 +50,5 @@ class SignalPlan(msgspec.Struct, frozen=True, kw_only=True):
     amber_s: float
     all_red_s: float
     source: Provenance
+    offset_s: float = 0.0
+    red_amber_s: float = 0.0

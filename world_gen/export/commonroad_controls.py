@@ -216,7 +216,10 @@ def cycle(plan: SignalPlan, group_id: str) -> list[CycleElement]:
         stays = green and group_id in following.green_group_ids
         show("green" if green else "red", phase.green_s)
         show("green" if stays else "yellow" if green else "red", plan.amber_s)
-        show("green" if stays else "red", plan.all_red_s)
+        next_green = not green and group_id in following.green_group_ids
+        red_amber_s = min(plan.red_amber_s, plan.all_red_s)
+        show("green" if stays else "red", plan.all_red_s - red_amber_s)
+        show("green" if stays else "redYellow" if next_green else "red", red_amber_s)
     return shown
 
 

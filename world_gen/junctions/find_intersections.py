@@ -83,8 +83,8 @@ def _junction(
 ) -> Junction:
     cluster, around, arms, mini, nodes = place
     inner = {item.edge.index for chain in around.inside for item in chain.edges}
-    if cluster.ring is not None:
-        inner.update([edge.index for edge in cluster.ring.edges])
+    ring_edges = cluster.ring.edges if cluster.ring is not None else ()
+    inner.update([edge.index for edge in ring_edges])
     centre_xy_m = centre.tolist()
     kind = _kind(cluster, arms, mini)
     lat_deg, lon_deg = lat_lon_deg
@@ -94,7 +94,13 @@ def _junction(
     legs = [leg.edge for item in arms for leg in item.arm.outward]
     all_way = rules_of(country_of(legs)).all_way_stops
     control, lights = control_of(
-        core, around.inside, incoming, osm.node_tags, ring=ring, all_way_stops=all_way
+        core,
+        around.inside,
+        incoming,
+        osm.node_tags,
+        ring=ring,
+        ring_edges=ring_edges,
+        all_way_stops=all_way,
     )
     return Junction(
         summary=IntersectionSummary(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from foretwin.contracts.world import Control
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.junctions.chains import Chain, Mark, Tags
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 SIGNALS_WITHIN_M, SIGNS_WITHIN_M = 40.0, 30.0
 PEDESTRIAN_LIGHT_M = 15.0
@@ -27,9 +29,12 @@ def control_of(
     node_tags: Mapping[int, Tags],
     *,
     ring: bool,
+    ring_edges: Iterable[RoadEdge] = (),
     all_way_stops: bool = False,
 ) -> JunctionControl:
     """Return how the junction is controlled, from the tags in it and on its roads in.
+
+    `ring_edges` are those of the ring that it is made of, if it is one.
 
     A light or sign counts for the nearer junction of the road it stands on, or the one that it
     faces; signs on every road in make an all-way stop, in countries of `all_way_stops` one on
@@ -39,6 +44,11 @@ def control_of(
     inner += [mark.tags for chain in inside for mark in chain.marks]
     found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
     found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
+    found.update(
+        mark.node
+        for mark in _marks_on(ring_edges, node_tags)
+        if _is_light(mark.tags, mark.distance_m)
+    )
     for chain in incoming:
         met = facing(chain, SIGNALS_WITHIN_M, "traffic_signals")
         found.update(mark.node for mark in met if _is_light(mark.tags, mark.distance_m))
@@ -47,6 +57,18 @@ def control_of(
     return JunctionControl(
         "roundabout" if ring else _signs(inner, incoming, all_way_stops), frozenset()
     )
+
+
+def _marks_on(edges: Iterable[RoadEdge], node_tags: Mapping[int, Tags]) -> Iterator[Mark]:
+    """Yield the tagged nodes on a ring's edges, each so far before the edge's end."""
+    for edge in edges:
+        if node_tags.keys().isdisjoint(edge.node_ids):
+            continue
+        way = DirectedEdge(edge, reverse=not edge.forward)
+        along_m = arc_lengths(way.xy_m)
+        for node, at_m in zip(way.node_ids, along_m.tolist(), strict=True):
+            if node in node_tags:
+                yield Mark(node, node_tags[node], float(along_m[-1]) - at_m)
 
 
 def _signs(inner: list[Tags], incoming: tuple[Chain, ...], all_way_stops: bool) -> Control:

@@ -101,8 +101,8 @@ def approaches(
 
     `junction_lights` are the nodes of the lights that are known to govern some junction,
     `signs` what `signs_inside` finds.
-    Roads of a ring are approaches only where a light stands on them, ways past it only where
-    they have a sign.
+    Roads of a ring are approaches only where a light or sign stands on them, ways past it only
+    where they have a sign.
     """
     tagged_on = passed_on(around.edges, node_tags)
     inside: dict[tuple[int, bool], list[Met]] = {}
@@ -135,7 +135,11 @@ def approaches(
             met = met_toward(leg, plain_from, node_tags, junction.nodes, tagged_on)
             lights = [m for m in met if is_light(m.tags) and m.node in junction.lights]
             sign = own_sign(met, toward, cluster, around.edges)
-            if (on_ring and not lights) or (past_ring and sign is None):
+            if on_ring and sign is not None:
+                # On a roundabout the ring has the way, and a sign on its node is for who enters.
+                stops = junction.summary.kind == "circular" and sign.distance_m > 0.1
+                sign = sign if stops else None
+            if ((on_ring and not lights) or past_ring) and sign is None:
                 continue
             lights = lights or inside.get(toward.key, [])
             if signalled and not lights:
@@ -200,17 +204,21 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
         word: YieldRule = "stop" if "stop" in at_node else "give_way"
         ranks = [Standing(r.rank, word, "inferred") if r.rank <= Rank.MINOR else r for r in ranks]
     ring_has_way = kind == "roundabout" or (
-        kind == "circular" and any(d.cluster.ring and d.sign for d in drafts)
+        kind == "circular"
+        and any(d.cluster.ring and d.sign and not is_ring_edge(d.toward.edge) for d in drafts)
     )
     lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
+    # Where a light holds back the ring, those who enter there have their turn meanwhile.
+    ring_waits = {d.cluster.key for d in drafts if d.lights and is_ring_edge(d.toward.edge)}
     found = []
     for d, entry, standing in zip(drafts, entries, ranks, strict=True):
         entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
         if (entering and ring_has_way) or kind == "mini_roundabout":
             source = "tagged" if d.sign or kind != "circular" else "inferred"
             standing = Standing(Rank.MINOR, "roundabout", source)  # type: ignore[arg-type]
-        approach = _approach(d, standing, control == "signals", lights_for_all)
-        if entry.opposite is not None:
+        for_all = lights_for_all or d.cluster.key in ring_waits
+        approach = _approach(d, standing, control == "signals", for_all)
+        if entry.opposite is not None and not d.cluster.ring:
             approach.opposite = drafts[entry.opposite].toward.key
         found.append(approach)
     return found

@@ -10,6 +10,7 @@ from foretwin.contracts.world import YieldRule
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.legs import is_ring_edge
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 LOOK_BACK_M = 40.0
@@ -66,8 +67,8 @@ def met_toward(
 ) -> list[Met]:
     """Walk outward along the leg, on through nodes where the road merely goes on.
 
-    A node without a tagged direction counts for the nearer junction. `passed`
-    is that of `passed_on`.
+    A node without a tagged direction counts for the nearer junction, on a ring, which is driven
+    one way round, for the road that enters next. `passed` is that of `passed_on`.
     """
     found: list[tuple[Met, bool]] = []
     gone, current, meets_another = 0.0, leg, False
@@ -77,7 +78,8 @@ def met_toward(
             at_m = gone + (length_m - arc_m if current.reverse else arc_m)
             facing = faces(node_tags[node], current.reverse)
             if facing is not False and at_m <= LOOK_BACK_M:
-                found.append((Met(node, at_m, node_tags[node]), facing is None))
+                unsaid = facing is None and not is_ring_edge(current.edge)
+                found.append((Met(node, at_m, node_tags[node]), unsaid))
         gone += length_m
         cluster = plain_from.get(current.end_node)
         meets_another = cluster is None

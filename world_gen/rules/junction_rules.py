@@ -16,6 +16,7 @@ from foretwin.world_gen.rules.approaches import Approach, approaches
 from foretwin.world_gen.rules.control_devices import NodeTags, lights_inside
 from foretwin.world_gen.rules.lone_lights import lone_lights
 from foretwin.world_gen.rules.right_of_way import right_of_way
+from foretwin.world_gen.rules.ring_exits import with_ring_exits
 from foretwin.world_gen.rules.signal_groups import lane_groups, walk_groups
 from foretwin.world_gen.rules.signal_heads import signal_heads
 from foretwin.world_gen.rules.signal_plan import signal_plans
@@ -43,10 +44,13 @@ def junction_rules(
     connections: Sequence[ConnectionDraft],
     crossings: Sequence[Crossing],
     junction_lights: Collection[int],
+    *,
+    red_amber_s: float = 0.0,
 ) -> TrafficControl:
     """Return the rules of every whole junction, and of every light away from one.
 
-    `junction_lights` are the nodes of the lights of all junctions of the map.
+    `junction_lights` are the nodes of the lights of all junctions of the map, `red_amber_s` is
+    how long lights show red and amber before green, where the country has it.
     Control, signal group and conflicts are entered into the connections.
     """
     signs = signs_inside(connections, node_tags, around)
@@ -63,13 +67,15 @@ def junction_rules(
     line_of = {line.lane_id: line for line in lines}
     heads = signal_heads(list(chain(*groups.values())), line_of, around)
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
-    lone = lone_lights(around, node_tags, lanes, crossings, known)
+    lone = lone_lights(around, node_tags, lanes, crossings, known, red_amber_s=red_amber_s)
+    plans = signal_plans(groups, walks, ruled, conflicts, met, red_amber_s=red_amber_s)
+    plans, lone = with_ring_exits(plans, lone, around)
     return TrafficControl(
         # Where a lane has two lines the one at the junction stands last, so that it wins by lane.
         stop_lines=(*lone.stop_lines, *lines, *lines_at_signs(connections, signs)),
         signals=(*heads, *lone.signals),
         conflicts=conflicts,
-        plans=signal_plans(groups, walks, ruled, conflicts, met),
+        plans=plans,
         crossing_plans=lone.plans,
     )
 

@@ -45,6 +45,8 @@ def lone_lights(
     lanes: LaneSet,
     crossings: Sequence[Crossing],
     known: Collection[int],
+    *,
+    red_amber_s: float = 0.0,
 ) -> LoneLights:
     """Return what governs the lanes at each light that belongs to no junction.
 
@@ -83,7 +85,7 @@ def lone_lights(
             continue
         lines.extend(line for _, line in stopped)
         heads.extend(_heads(stopped, node, around))
-        plans.append(_plan(node, by_node.get(node)))
+        plans.append(_plan(node, by_node.get(node), red_amber_s))
     return LoneLights(tuple(lines), tuple(heads), tuple(plans))
 
 
@@ -117,7 +119,7 @@ def _heads(
             Signal(
                 id=f"{lane.id}:light{node}",
                 osm_node=node,
-                group_id=f"n{node}:g0",
+                group_id=group_names(node)[0],
                 lane_ids=tuple(item.id for item, _ in mine),
                 position=np.round(np.array([place[0], place[1], BESIDE_HEIGHT_M]), 3),
                 yaw_rad=towards_drivers_rad(line.ends),
@@ -128,10 +130,16 @@ def _heads(
     return heads
 
 
-def _plan(node: int, crossing: Crossing | None) -> SignalPlan:
-    drive = SignalGroup(id=f"n{node}:g0", connection_ids=())
+def group_names(node: int) -> tuple[str, str]:
+    """Return the ids of a lone light's groups: of those who drive, and of those on foot."""
+    return f"n{node}:g0", f"n{node}:g1"
+
+
+def _plan(node: int, crossing: Crossing | None, red_amber_s: float) -> SignalPlan:
+    drive_id, walk_id = group_names(node)
+    drive = SignalGroup(id=drive_id, connection_ids=())
     crossed = () if crossing is None else (crossing.id,)
-    walk = SignalGroup(id=f"n{node}:g1", connection_ids=(), crossing_ids=crossed)
+    walk = SignalGroup(id=walk_id, connection_ids=(), crossing_ids=crossed)
     return SignalPlan(
         groups=(drive, walk) if crossed else (drive,),
         phases=(
@@ -140,5 +148,6 @@ def _plan(node: int, crossing: Crossing | None) -> SignalPlan:
         ),
         amber_s=AMBER_S,
         all_red_s=ALL_RED_S,
+        red_amber_s=red_amber_s,
         source="default",
     )

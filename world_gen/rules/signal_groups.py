@@ -7,6 +7,7 @@ from itertools import compress
 
 import msgspec
 import numpy as np
+import shapely
 
 from foretwin.contracts.signals import SignalGroup
 from foretwin.contracts.world import Crossing
@@ -109,8 +110,10 @@ def walk_groups(
                 way = [c.movement.toward, *c.movement.inside]
                 if c.turn == "straight":
                     way.append(c.movement.away)
-                for node in against.keys() & {node for part in way for node in part.edge.node_ids}:
-                    against[node].add(group.id)
+                on_way = {node for part in way for node in part.edge.node_ids}
+                for node in against:
+                    if node in on_way or (c.turn == "straight" and _crosses(c, lit[node])):
+                        against[node].add(group.id)
         found[name] = [
             WalkGroup(
                 id=f"{name}:g{len(mine) + i}", crossing=lit[node], against=frozenset(against[node])
@@ -118,6 +121,12 @@ def walk_groups(
             for i, node in enumerate(sorted(against))
         ]
     return found
+
+
+def _crosses(connection: ConnectionDraft, crossing: Crossing) -> bool:
+    """Return whether a path leads over a crossing of another carriageway that begins beside it."""
+    path = shapely.LineString(connection.centerline)
+    return bool(path.intersects(shapely.LineString(crossing.line)))
 
 
 def _nodes_at(junction_id: str, around: Surroundings) -> Iterator[int]:

@@ -21,6 +21,7 @@ from foretwin.contracts.signals import SignalPhase, SignalPlan
 from foretwin.contracts.world import Conflict, YieldRule
 from foretwin.world_gen.connections.conflicts import Meetings
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.lanes.legs import is_ring_edge
 from foretwin.world_gen.rules.signal_groups import LaneGroup, WalkGroup
 
 CYCLE_S, LONG_CYCLE_S, MANY_PHASES = 90.0, 120.0, 4
@@ -50,8 +51,13 @@ def signal_plans(
     connections: Sequence[ConnectionDraft],
     conflicts: Sequence[Conflict],
     met: Meetings,
+    *,
+    red_amber_s: float = 0.0,
 ) -> dict[str, SignalPlan]:
-    """Return a plan for each junction with groups, by its id; `met` are the conflicts' places."""
+    """Return a plan for each junction with groups, by its id; `met` are the conflicts' places.
+
+    `red_amber_s` is how long drivers see red and amber before green, where the country has it.
+    """
     of = {c.id: g for mine in groups.values() for g in mine for c in g.connections}
     pairs: dict[tuple[str, str], Between] = {}
     rows = zip(conflicts, met.first_m.tolist(), met.second_m.tolist(), strict=True)
@@ -64,7 +70,9 @@ def signal_plans(
         old = pairs.get(key, Between(False, False, 0.0))
         clear_s = max(_clear_s(first_m, second_m), _clear_s(second_m, first_m), old.clear_s)
         pairs[key] = Between(old.crossing or not waits, old.waiting or waits, clear_s)
-    return {name: _plan(mine, walks.get(name, ()), pairs) for name, mine in groups.items()}
+    return {
+        name: _plan(mine, walks.get(name, ()), pairs, red_amber_s) for name, mine in groups.items()
+    }
 
 
 def oncoming(a: LaneGroup, b: LaneGroup) -> bool:
@@ -80,6 +88,7 @@ def _plan(
     groups: Sequence[LaneGroup],
     walks: Sequence[WalkGroup],
     pairs: Mapping[tuple[str, str], Between],
+    red_amber_s: float,
 ) -> SignalPlan:
     phases = _phases(groups, pairs)
     names = [[group.id for group in phase] for phase in phases]
@@ -112,6 +121,7 @@ def _plan(
         ),
         amber_s=amber_s,
         all_red_s=all_red_s,
+        red_amber_s=red_amber_s,
         source="default",
     )
 
@@ -124,7 +134,8 @@ def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between
 def _phases(
     groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]
 ) -> list[list[LaneGroup]]:
-    """Return groups that are green together: roads that face each other first.
+    """Return groups that are green together: roads that face each other first, on a ring who goes
+    round, and all who enter.
 
     Where two roads that face each other both have lanes of their own for the turn across, these
     go in a phase of theirs; else who turns across waits.
@@ -144,13 +155,19 @@ def _phases(
     while waiting:
         first = waiting[0]
         phase = [first]
-        for other in sorted(waiting[1:], key=lambda g: not oncoming(first, g)):
+        for other in sorted(waiting[1:], key=lambda g: _unlike(first, g)):
             if all(together(other, mine) for mine in phase):
                 phase.append(other)
         taken = {group.id for group in phase}
         waiting = [group for group in waiting if group.id not in taken]
         found.append(sorted(phase, key=lambda g: g.id))
     return found
+
+
+def _unlike(a: LaneGroup, b: LaneGroup) -> tuple[bool, bool]:
+    """Return what sorts groups by how well they go with another one in a phase."""
+    rings = [is_ring_edge(group.approach.toward.edge) for group in (a, b)]
+    return not oncoming(a, b), rings[0] != rings[1]
 
 
 def _amber_s(groups: Sequence[LaneGroup]) -> float:

@@ -31,29 +31,34 @@ def cycle_s(plan: SignalPlan) -> float:
 
 def parts_of_cycle(plan: SignalPlan, time_s: Array) -> npt.NDArray[np.intp]:
     """Return (K,) which parts of a plan's cycle times (K,) fall into; none changes colours."""
-    parts = [(phase.green_s, plan.amber_s, plan.all_red_s) for phase in plan.phases]
+    red_amber_s = min(plan.red_amber_s, plan.all_red_s)
+    red_s = plan.all_red_s - red_amber_s
+    parts = [(phase.green_s, plan.amber_s, red_s, red_amber_s) for phase in plan.phases]
     if not parts:
         return np.zeros(len(time_s), dtype=np.intp)
     ends = np.cumsum(parts)
-    return np.asarray(np.searchsorted(ends, time_s % ends[-1], side="right"))
+    into_s = (time_s - plan.offset_s) % ends[-1]
+    return np.asarray(np.searchsorted(ends, into_s, side="right"))
 
 
 def colours_at(
     plan: SignalPlan, time_s: float, live: Mapping[str, LiveColour] | None = None
 ) -> dict[str, SignalColour]:
-    """Return the colour of each group of a plan at a drive time; cycles begin at time 0.
+    """Return the colour of each group of a plan at a drive time.
 
     A group that the next phase lets go as well stays green in between. Those on foot get no
     amber. What was heard no more than `LIVE_FOR_S` ago counts instead, unless it is `unknown`;
     so does what is heard later than `time_s`, since clocks differ.
     """
     colours: dict[str, SignalColour] = {group.id: "red" for group in plan.groups}
-    into_s = time_s % cycle_s(plan) if plan.phases else 0.0
+    into_s = (time_s - plan.offset_s) % cycle_s(plan) if plan.phases else 0.0
     on_foot = {g.id for g in plan.groups if g.crossing_ids and not g.connection_ids}
     for i, phase in enumerate(plan.phases):
         step_s = phase.green_s + plan.amber_s + plan.all_red_s
         if into_s < step_s:
             following = plan.phases[(i + 1) % len(plan.phases)].green_group_ids
+            if into_s >= step_s - min(plan.red_amber_s, plan.all_red_s):
+                colours.update((name, "red_amber") for name in following if name not in on_foot)
             for name in phase.green_group_ids:
                 if into_s < phase.green_s or name in following:
                     colours[name] = "green"

@@ -39,9 +39,10 @@ def stop_lines(
 
 
 def entering(approach: Approach, around: Surroundings, lanes: LaneSet) -> list[LaneDraft]:
-    """Return the lanes of an approach from the left."""
-    toward = approach.toward
-    return lanes.incoming(toward, around.lanes_along(toward).driven)
+    """Return the lanes of an approach from the left, one in the middle for turns among them."""
+    toward, along = approach.toward, around.lanes_along(approach.toward)
+    driven, middle = (lanes.incoming(toward, plans) for plans in (along.driven, along.turning))
+    return [*middle, *driven] if around.driving_side == "right" else [*driven, *middle]
 
 
 def _line_back_m(approach: Approach, around: Surroundings) -> float:

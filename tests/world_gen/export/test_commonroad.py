@@ -160,11 +160,16 @@ def test_lights_show_the_plan_of_their_group(tmp_path: Path) -> None:
 @given(
     greens_s=st.lists(st.floats(5.0, 60.0), min_size=1, max_size=5),
     amber_s=st.floats(0.0, 5.0),
+    red_amber_s=st.floats(0.0, 3.0),
     all_red_s=st.floats(0.0, 4.0),
     mine=st.data(),
 )
 def test_a_cycle_is_as_long_as_its_plan(
-    greens_s: list[float], amber_s: float, all_red_s: float, mine: st.DataObject
+    greens_s: list[float],
+    amber_s: float,
+    red_amber_s: float,
+    all_red_s: float,
+    mine: st.DataObject,
 ) -> None:
     flags = [mine.draw(st.booleans()) for _ in greens_s]
     plan = SignalPlan(
@@ -174,6 +179,7 @@ def test_a_cycle_is_as_long_as_its_plan(
             for green, flag in zip(greens_s, flags, strict=True)
         ),
         amber_s=amber_s,
+        red_amber_s=red_amber_s,
         all_red_s=all_red_s,
         source="default",
     )
@@ -183,6 +189,8 @@ def test_a_cycle_is_as_long_as_its_plan(
     green = sum(e.duration_s for e in shown if e.color == "green")
     assert green >= sum(g for g, flag in zip(greens_s, flags, strict=True) if flag) - 1e-9
     assert all(a.color != b.color for a, b in pairwise(shown))
+    both = [i for i, e in enumerate(shown) if e.color == "redYellow"]
+    assert all(shown[(i + 1) % len(shown)].color == "green" for i in both)
 
 
 def test_a_light_without_a_plan_is_not_active(tmp_path: Path) -> None:
