@@ -44,13 +44,10 @@ def junction_rules(
     connections: Sequence[ConnectionDraft],
     crossings: Sequence[Crossing],
     junction_lights: Collection[int],
-    *,
-    red_amber_s: float = 0.0,
 ) -> TrafficControl:
     """Return the rules of every whole junction, and of every light away from one.
 
-    `junction_lights` are the nodes of the lights of all junctions of the map, `red_amber_s` is
-    how long lights show red and amber before green, where the country has it.
+    `junction_lights` are the nodes of the lights of all junctions of the map.
     Control, signal group and conflicts are entered into the connections.
     """
     signs = signs_inside(connections, node_tags, around)
@@ -59,17 +56,17 @@ def junction_rules(
     _control(connections, found, lines, signs, node_tags, around)
     whole = {id(junction) for junction in around.junctions}
     ruled = [c for c in connections if id(c.cluster.junction) in whole]
-    conflicts, met = right_of_way(
-        ruled, found, signs, around.driving_side, rules_of(around.country).first_from
-    )
+    country = rules_of(around.country)
+    conflicts, met = right_of_way(ruled, found, signs, around.driving_side, country.first_from)
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
     line_of = {line.lane_id: line for line in lines}
     heads = signal_heads(list(chain(*groups.values())), line_of, around)
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
+    red_amber_s = country.red_amber_s
     lone = lone_lights(around, node_tags, lanes, crossings, known, red_amber_s=red_amber_s)
-    plans = signal_plans(groups, walks, ruled, conflicts, met, red_amber_s=red_amber_s)
-    plans, lone = with_ring_exits(plans, lone, around)
+    own = signal_plans(groups, walks, ruled, conflicts, met, red_amber_s=red_amber_s)
+    plans, lone = with_ring_exits(own, lone, around)
     return TrafficControl(
         # Where a lane has two lines the one at the junction stands last, so that it wins by lane.
         stop_lines=(*lone.stop_lines, *lines, *lines_at_signs(connections, signs)),

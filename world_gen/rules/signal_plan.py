@@ -110,7 +110,7 @@ def _plan(
     amber_s = _amber_s(groups)
     clear_s = max((b.clear_s for b in _within(groups, pairs)), default=0.0)
     # Half seconds; amber is no time to enter, so it counts for clearing only from its end.
-    all_red_s = max(LEAST_ALL_RED_S, math.ceil(2.0 * clear_s) / 2.0)
+    all_red_s = max(LEAST_ALL_RED_S, red_amber_s, math.ceil(2.0 * clear_s) / 2.0)
     cycle_s = CYCLE_S if len(names) < MANY_PHASES else LONG_CYCLE_S
     greens = share_green(weights, least, cycle_s - len(names) * (amber_s + all_red_s))
     return SignalPlan(

@@ -9,10 +9,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.signals import SignalPhase
 from foretwin.contracts.world import World
 from foretwin.world_gen.rules.signal_state import colours_at
-from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
+from tests.world_gen.drawn_maps import GERMANY, crossing, drawn_map, world_of
 from tests.world_gen.green_together import green_together
 from tests.world_gen.plan_checks import check_plans, plan_of
 from tests.world_gen.where_lanes_lead import maps_in, whole_world
@@ -22,6 +23,7 @@ COVERS = ("foretwin.world_gen.rules.ring_exits",)
 LIGHT = {"highway": "traffic_signals"}
 FOOT = LIGHT | {"crossing": "traffic_signals"}
 RADIUS_M = 40.0
+BRITAIN = GeoPoint(53.0, -1.5)
 
 
 def _ring(
@@ -51,7 +53,7 @@ def _ring(
         (13, [13, 3, 112], road | {"name": "West"}),
         (14, [109, 4, 14], road | {"name": "West out"}),
     ]
-    origin = ENGLAND if left_hand else GERMANY
+    origin = BRITAIN if left_hand else GERMANY
     return world_of(drawn_map(nodes, ways, node_tags=lights, origin=origin))
 
 
@@ -116,6 +118,14 @@ def test_lights_on_the_roads_out_change_with_the_ring():
     # The other stands 120 m out, where nobody waits on the ring.
     assert [p.groups[0].id for p in world.crossing_plans] == ["n14:g0"]
     assert check_plans(world) == 1
+
+
+@pytest.mark.parametrize(("left_hand", "red_amber_s"), [(False, 1.0), (True, 2.0)])
+def test_red_and_amber_come_before_green_in_germany_and_longer_in_britain(
+    left_hand: bool, red_amber_s: float
+):
+    plan = plan_of(_ring({122: LIGHT, 110: LIGHT}, left_hand=left_hand))
+    assert plan.red_amber_s == red_amber_s <= plan.all_red_s
 
 
 def test_red_and_amber_come_before_green_where_a_plan_has_them():
