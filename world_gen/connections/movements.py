@@ -93,8 +93,10 @@ def _ways_through(
                 continue
             if restrictions.path_allowed((toward, *path, leg)):
                 best[leg.key] = (leg, path)
+        passed = {toward.end_node, *(part.end_node for part in path)}
         for step in inner.get(last.end_node, ()):
-            if step.edge.index == last.edge.index or not restrictions.step_allowed(last, step):
+            # Around an island and back to the same node nobody means to go.
+            if step.end_node in passed or not restrictions.step_allowed(last, step):
                 continue
             count += 1
             heapq.heappush(queue, (cost + step.edge.length_m, count, step, (*path, step)))

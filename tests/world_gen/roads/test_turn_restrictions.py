@@ -11,10 +11,11 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
-from tests.world_gen.drawn_maps import crossing, world_of
+from tests.world_gen.drawn_maps import crossing, drawn_map, world_of
 
 FROM_WEST = ("w", 13, "from")
 VIA = ("n", 0, "via")
+WAYS = (13, 12, 21, 22, 23, 31, 32)
 
 
 def _leaving_west(tags, ends=(12,)) -> set[int]:
@@ -77,3 +78,23 @@ def test_a_restriction_over_ways_within_a_junction_needs_no_note():
     (junction,) = find_intersections(osm, graph)
     assert len(read_turn_restrictions(osm).over_ways) == 2
     assert not [n for n in build_world(osm, graph, junction).notes if n.startswith("relation")]
+
+
+def _beside_an_island(forbidden: bool) -> set[int]:
+    """Return where way 13 leads from the west: at node 0 it meets 12, which leads north, and an
+    island's two sides, 21 and 23, behind which 31 and 32 leave."""
+    nodes = {0: (0.0, 0.0), 2: (0.0, 100.0), 3: (-100.0, 0.0), 5: (14.0, -6.0), 6: (14.0, 6.0)}
+    nodes |= {7: (110.0, -20.0), 8: (110.0, 20.0)}
+    road = {"highway": "secondary"}
+    ends = ([3, 0], [0, 2], [0, 5], [5, 6], [6, 0], [5, 7], [6, 8])
+    ways = [(way, members, road) for way, members in zip(WAYS, ends, strict=True)]
+    members = [FROM_WEST, VIA, ("w", 12, "to")]
+    relations = [(1, members, {"type": "restriction", "restriction": "no_left_turn"})]
+    world = world_of(drawn_map(nodes, ways, relations=relations if forbidden else ()))
+    way_of = {lane.id: lane.osm_way for lane in world.lanes}
+    return {way_of[c.to_lane_id] for c in world.connections if way_of[c.from_lane_id] == 13}
+
+
+def test_a_forbidden_turn_is_not_made_by_a_tour_around_an_island():
+    assert _beside_an_island(forbidden=False) == {12, 31, 32}
+    assert _beside_an_island(forbidden=True) == {31, 32}
