@@ -19,6 +19,11 @@ from foretwin.world_gen.lanes.side_lanes import side_lanes
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 MAX_LANES = 12
+PASSING_M = 4.75
+"""Two cars pass each other on a road so wide (RASt 06: car meets car)."""
+LEAST_HALF_M = 1.25
+"""Half of the narrowest road that a car of 1.9 m drives with some room."""
+_ONE_EACH_WAY = ([True, False], [False, True])
 TRANSITION = "transition"
 _PLACEMENT = re.compile(r"^(left_of|right_of|middle_of):(\d+)$")
 
@@ -42,7 +47,10 @@ def cross_section(edge: RoadEdge, *, centre_reverse: bool = False) -> CrossSecti
     if edge.driving_side == "left":
         first, last = last, first
     ordered = [*first, *centre, *last]
-    ordered = _fit_total_width(edge, ordered)
+    if _is_shared(edge, ordered):
+        ordered = _halves(edge, ordered, notes)
+    else:
+        ordered = _fit_total_width(edge, ordered)
     total = _width(ordered)
     left = total / 2 + _placement_shift(edge, ordered, total, notes)
     left += _width(beside.left)
@@ -84,9 +92,31 @@ def _centre(edge: RoadEdge, reverse: bool, notes: list[str]) -> list[LanePlan]:
     ]
 
 
+def _is_shared(edge: RoadEdge, lanes: list[LanePlan]) -> bool:
+    """Return whether both directions have but one lane, on which cars cannot pass each other."""
+    if edge.tags.get("lanes") != "1" or [lane.reverse for lane in lanes] not in _ONE_EACH_WAY:
+        return False
+    total_m = _tagged_total_m(edge)
+    tagged = any(lane.width_m.source == "tagged" for lane in lanes)
+    return not tagged and (total_m is None or total_m < PASSING_M)
+
+
+def _halves(edge: RoadEdge, lanes: list[LanePlan], notes: list[str]) -> list[LanePlan]:
+    """Return the two directions of one lane, each with half of its width."""
+    notes.append(f"way {edge.way_id}: one lane for both directions; each has half of its width")
+    total_m = _tagged_total_m(edge)
+    least_m = max(total_m or usual_width_m(edge), 2.0 * LEAST_HALF_M)
+    half = Quantity(least_m / 2.0, "default" if total_m is None else "inferred")
+    return [msgspec.structs.replace(lane, width_m=half) for lane in lanes]
+
+
+def _tagged_total_m(edge: RoadEdge) -> float | None:
+    return metres(edge.tags.get("width")) or metres(edge.tags.get("est_width"))
+
+
 def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan]) -> list[LanePlan]:
     """Spread a tagged total width over lanes whose own width is not tagged."""
-    total = metres(edge.tags.get("width")) or metres(edge.tags.get("est_width"))
+    total = _tagged_total_m(edge)
     if total is None or not lanes or any(lane.width_m.source == "tagged" for lane in lanes):
         return lanes
     cars = [lane for lane in lanes if lane.kind != "bicycle"]

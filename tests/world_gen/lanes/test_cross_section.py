@@ -29,6 +29,31 @@ def test_two_way_road_keeps_left_around_its_way():
     assert [(lane.reverse, lane.left_m) for lane in section.lanes] == [(False, 1.5), (True, -1.5)]
 
 
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize(
+    ("tags", "each_m", "source"),
+    [
+        ({}, 1.5, "default"),
+        ({"width": "3.5"}, 1.75, "inferred"),
+        ({"est_width": "2.2"}, 1.25, "inferred"),  # a car has to fit
+        ({"width": "7"}, 3.5, "inferred"),  # cars pass each other, whatever `lanes` says
+        ({"width": "4.8"}, 2.4, "inferred"),
+    ],
+)
+def test_one_lane_for_both_directions_is_shared(side, tags, each_m, source):
+    section = cross_section(_road({"lanes": "1", **tags}, side=side))
+    assert [lane.width_m for lane in section.lanes] == [Quantity(each_m, source)] * 2
+    assert section.width_m == pytest.approx(2 * each_m)
+    assert [lane.left_m for lane in section.lanes] == [each_m / 2, -each_m / 2]
+    assert bool(section.notes) == (each_m < 2.0)
+
+
+def test_a_lane_each_way_is_not_shared():
+    assert cross_section(_road()).width_m == 6.0
+    assert cross_section(_road({"lanes": "1"}, backward=0)).width_m == 3.0
+    assert cross_section(_road({"lanes": "1", "width:lanes:forward": "3.2"})).width_m > 6.0
+
+
 def test_lanes_are_numbered_from_the_left_as_their_driver_sees_them():
     section = cross_section(_road(forward=2, backward=2))
     assert [lane.left_m for lane in section.along(reverse=False).driven] == [-1.5, -4.5]
