@@ -141,3 +141,17 @@ def test_content_counts_and_the_class_that_holds_it_does_not() -> None:
     assert content_digest(Lane("a", line)) == content_digest(SameLane(None, line, "a"))
     assert content_digest(Lane("a", line)) != content_digest(Lane("a", line, 3.0))
     assert content_digest((Lane("a", line),)) != content_digest((Lane("b", line),))
+
+
+class LaneWithHeight(msgspec.Struct):
+    id: str
+    centre: np.ndarray
+    width_m: float | None = None
+    height_m: float | msgspec.UnsetType = msgspec.UNSET
+
+
+def test_a_field_that_is_not_set_is_not_there() -> None:
+    line = np.arange(6.0).reshape(3, 2)
+
+    assert content_digest(LaneWithHeight("a", line)) == content_digest(Lane("a", line))
+    assert content_digest(LaneWithHeight("a", line, None, 1.0)) != content_digest(Lane("a", line))

@@ -156,7 +156,9 @@ def _fields(value: Any) -> list[tuple[str, Any]]:
     names = getattr(value, "__struct_fields__", None)
     if names is None:
         names = [field.name for field in dataclasses.fields(value)]
-    return [(name, getattr(value, name)) for name in sorted(names)]
+    found = [(name, getattr(value, name)) for name in sorted(names)]
+    # A field that is not set is not there: it is not written either.
+    return [(name, one) for name, one in found if type(one).__name__ != "UnsetType"]
 
 
 def _codes(value: Any) -> Any:
