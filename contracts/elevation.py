@@ -84,3 +84,13 @@ class Elevation(msgspec.Struct, frozen=True, kw_only=True):
         low = near[row, left] * (1.0 - u) + near[row, left + 1] * u
         high = far[row, left] * (1.0 - u) + far[row, left + 1] * u
         return np.asarray(low * (1.0 - v) + high * v)
+
+
+class RoadSlopes(msgspec.Struct, frozen=True, kw_only=True):
+    """How roads climb at places (N, 2): the unit `direction` (N, 2) there and the `grade` (N,) that
+    way, rise over run; `grade_std` is how far one is off."""
+
+    xy_m: Array
+    direction: Array
+    grade: Array
+    grade_std: float

@@ -89,6 +89,8 @@ class TuningSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
 
     vehicle: VehicleParameters
     drive_frame: LocalFrame
+    slopes: str | None = None
+    """A file of RoadSlopes in that frame, where the map has heights."""
 
 
 class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

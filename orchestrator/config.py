@@ -132,6 +132,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     secure: str | None = None
     """A campaign's folder: the bus is over a network, and each role shows its certificate."""
     standin_plan_shift_m: float = 0.0
+    standin_dem: str | None = None
+    """What the ground under the stand-in car really is, hidden from the twin; None is `dem`."""
     standin_parameters: str | None = None
     """What the stand-in car really is, hidden from the twin: a TOML file, or the bundled one."""
     ros2: str | None = None

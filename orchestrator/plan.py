@@ -11,6 +11,7 @@ import msgspec
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.campaign import role_files
 from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.elevation import RoadSlopes
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
@@ -57,6 +58,8 @@ class DriveInputs:
     routes: tuple[Route, ...]
     route_source: str
     drive_frame: LocalFrame
+    slopes: RoadSlopes | None
+    """How the map's roads climb, in that frame; None where they are flat."""
     vehicle: VehicleParameters
     beside: tuple[OtherVehiclePlan, ...]
     log_file: Path | None
@@ -146,6 +149,11 @@ class DrivePlan(DriveInputs):
     def standin_path_file(self) -> Path:
         """What the stand-in car drives."""
         return self.processes_dir / "standin_path.json"
+
+    @property
+    def slopes_file(self) -> Path:
+        """How the map's roads climb, where they do."""
+        return self.processes_dir / "slopes.msg"
 
     @property
     def start_stamp_ns(self) -> int:

@@ -63,7 +63,8 @@ class PlannerView(NamedTuple):
     `lead_gap_m` (S,) from bumper to bumper, infinite without a lead, and `lead_speed_mps` (S,);
     `stop_arc_m` (S,) where the front has to stand for a light, infinite without one; `users` and
     `ground` are None where there are none; `car_plan` where none was received; `heading` (2, S) is
-    the cosine and sine of the states' yaw, where these are known already.
+    the cosine and sine of the states' yaw, where these are known already; `climb_mps2` (S,) is what
+    the slope takes of the acceleration that is commanded, None where the World is flat.
     """
 
     time_s: float
@@ -82,6 +83,7 @@ class PlannerView(NamedTuple):
     ground: SharedGround | None = None
     car_plan: KnownPlan | None = None
     heading: Array | None = None
+    climb_mps2: Array | None = None
 
 
 class PlannerOutput(NamedTuple):
@@ -134,5 +136,5 @@ def rows_of(view: PlannerView, rows: Indices) -> PlannerView:
 
 _BY_CAR = (
     *("states", "arc_m", "offset_m", "desired_offset_m", "target_speed_mps", "speed_factor"),
-    *("lead_gap_m", "lead_speed_mps", "stop_arc_m"),
+    *("lead_gap_m", "lead_speed_mps", "stop_arc_m", "climb_mps2"),
 )

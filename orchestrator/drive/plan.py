@@ -12,6 +12,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.campaign import role_files
+from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
@@ -29,7 +30,7 @@ from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import standin_path
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
-from foretwin.orchestrator.worlds.heights import heights_for
+from foretwin.orchestrator.worlds.heights import profiles_of, slopes_in
 from foretwin.orchestrator.worlds.opening import Clip, open_map
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -73,7 +74,6 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     near = positions if positions is not None else given
     clip = None if near is None else Clip(near, CORRIDOR_M)
     opened = open_map(map_file, clip=clip)
-    heights_for(opened, None if config.dem is None else Path(config.dem))
     osm, graph, junctions = opened.osm, opened.graph, opened.junctions
     index = RoadIndex(graph)
     if positions is not None and log_file is not None:
@@ -89,15 +89,19 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         routes, route_source = _routes(config, graph, index, given)
     if config.worlds is not None:
         check_given_worlds(Path(config.worlds), osm, junctions, radius_m=config.radius_m)
+    heights = profiles_of(opened, None if config.dem is None else Path(config.dem))
     standin = None
     if source == "standin":
-        standin = standin_path(osm, graph, routes[0])
+        real = config.standin_dem
+        ground = heights if real is None else profiles_of(opened, Path(real))
+        standin = standin_path(osm, graph, routes[0], ground)
     if positions is not None:
         origin = positions[0]
     elif standin is not None:
         origin = np.array([standin.lat_deg[0], standin.lon_deg[0]])
     else:
         origin = np.array([graph.frame.origin.lat_deg, graph.frame.origin.lon_deg])
+    drive_frame = LocalFrame(GeoPoint(float(origin[0]), float(origin[1])))
     return DriveInputs(
         config=config,
         map_file=map_file,
@@ -109,7 +113,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         added_roads=added,
         routes=routes,
         route_source=route_source,
-        drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
+        drive_frame=drive_frame,
+        slopes=None if heights is None else slopes_in(drive_frame, graph, heights),
         vehicle=vehicle,
         beside=tuple(_read_beside(one, config, vehicle) for one in config.vehicles),
         log_file=log_file,
@@ -218,10 +223,12 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
         ),
         live_view=live,
     )
-    if plan.standin is not None:
-        try:
+    try:
+        if plan.standin is not None:
             plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
-        except OSError:
-            shutil.rmtree(folder)
-            raise
+        if plan.slopes is not None:
+            write_message(plan.slopes, plan.slopes_file)
+    except OSError:
+        shutil.rmtree(folder)
+        raise
     return plan

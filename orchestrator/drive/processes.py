@@ -130,6 +130,7 @@ def _tuning(plan: DrivePlan, process_id: str) -> ProcessSetup:
         **_base(plan, process_id),
         vehicle=plan.vehicle,
         drive_frame=plan.drive_frame,
+        slopes=None if plan.slopes is None else str(plan.slopes_file),
     )
 
 

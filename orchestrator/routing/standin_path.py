@@ -14,6 +14,8 @@ from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.speed_profile import accelerated, braked, speed_in_bends_mps
 from foretwin.orchestrator.routing.driving_path import driving_path
 from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.route_heights import heights_along
+from foretwin.world_gen.elevation.profiles import RoadProfiles
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
@@ -31,18 +33,28 @@ class StandinPath:
     lat_deg: Array
     lon_deg: Array
     speed_mps: Array
+    altitude_m: Array | None = None
+    """Heights (N,) of the road; None where it is flat."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the lists that the stand-in's process reads."""
+        height = self.altitude_m
+        climbs = {} if height is None else {"altitude_m": [round(float(v), 3) for v in height]}
         return {
             "lat_deg": [round(float(v), 9) for v in self.lat_deg],
             "lon_deg": [round(float(v), 9) for v in self.lon_deg],
             "speed_mps": [round(float(v), 3) for v in self.speed_mps],
+            **climbs,
         }
 
 
-def standin_path(osm: OsmMap, graph: RoadGraph, route: Route) -> StandinPath:
-    """Return the path along a route: limits, slow in bends, a halt at the stop signs on its way."""
+def standin_path(
+    osm: OsmMap, graph: RoadGraph, route: Route, profiles: RoadProfiles | None = None
+) -> StandinPath:
+    """Return the path along a route: limits, slow in bends, a halt at the stop signs on its way.
+
+    It climbs as `profiles` say.
+    """
     start_m, end_m = float(route.start_m[0]) + LEAD_M, route.end_m - LEAD_M
     geometry = driving_path(route, s_from_m=start_m, s_to_m=end_m)
     stops = [int(np.searchsorted(geometry.s_m, s_m)) for s_m in stop_signs(osm, route)]
@@ -52,7 +64,10 @@ def standin_path(osm: OsmMap, graph: RoadGraph, route: Route) -> StandinPath:
         stop_indices=[index for index in stops if 0 < index < len(geometry.s_m)],
     )
     geo = geo_from_local(graph.frame, geometry.xy_m)
-    return StandinPath(lat_deg=geo[:, 0], lon_deg=geo[:, 1], speed_mps=speed)
+    height = None
+    if profiles is not None:
+        height = heights_along(route, geometry.s_m, profiles)
+    return StandinPath(lat_deg=geo[:, 0], lon_deg=geo[:, 1], speed_mps=speed, altitude_m=height)
 
 
 def stop_signs(osm: OsmMap, route: Route) -> list[float]:

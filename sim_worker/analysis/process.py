@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Reply, Request
@@ -17,6 +18,7 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import TuningSetup
 from foretwin.contracts.trace import item_name, span
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
+from foretwin.geometry.slopes import read_slopes
 from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
 
 _DEPTH = 16384
@@ -57,6 +59,7 @@ class TuningWorker:
         self._bus = bus
         self._mailbox = mailbox
         self._lock_step = setup.bus.lossless
+        self._roads = None if setup.slopes is None else read_slopes(Path(setup.slopes))
         self._held: list[tuple[tuple[int, int, int], str, Any]] = []
         self._received: Counter[str] = Counter()
         self._asked_for_info = 0
@@ -119,7 +122,9 @@ class TuningWorker:
     def _begin(self, info: VehicleInfo) -> None:
         if self._watch is not None:
             return
-        self._watch = VehicleWatch(info, self._setup.vehicle, frame=self._setup.drive_frame)
+        self._watch = VehicleWatch(
+            info, self._setup.vehicle, frame=self._setup.drive_frame, roads=self._roads
+        )
         if self._used is not None:
             self._watch.use(self._used)
         if not self._lock_step:

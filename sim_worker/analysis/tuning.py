@@ -13,6 +13,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.gap.monitor import GapMonitor
 from foretwin.sim_worker.analysis.identify.acceptance import with_priors
 from foretwin.sim_worker.analysis.identify.tuner import Tuner
@@ -35,7 +36,16 @@ class VehicleWatch:
     of the states are passed over, since one wrong stamp would make all later ones late.
     """
 
-    def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
+    def __init__(
+        self,
+        info: VehicleInfo,
+        vehicle: VehicleParameters,
+        *,
+        frame: LocalFrame,
+        roads: Slopes | None = None,
+    ) -> None:
+        """`roads` in `frame` are those of the map, where it is known not to be flat."""
+        self._roads = roads
         self._in_force = vehicle
         self._info, self._frame = info, frame
         self._state_ns: int | None = None
@@ -43,9 +53,11 @@ class VehicleWatch:
 
     def _begin(self, *, pinned: Collection[str]) -> None:
         vehicle_id, frame = self._info.vehicle_id, self._frame
-        self._tuner = Tuner(vehicle=self._in_force, vehicle_id=vehicle_id, frame=frame)
+        self._tuner = Tuner(
+            vehicle=self._in_force, vehicle_id=vehicle_id, frame=frame, roads=self._roads
+        )
         self._tuner.pinned = set(pinned)
-        self._monitor = GapMonitor(self._info, self._in_force, frame=frame)
+        self._monitor = GapMonitor(self._info, self._in_force, frame=frame, roads=self._roads)
 
     def handle(self, channel: str, message: Any) -> list[Finding]:
         """Take one message; return what follows from it."""

@@ -10,12 +10,14 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.slopes import Slopes, slopes_of
 from foretwin.sim_worker.batch.model import PREFIX, change_vehicle, compile_stage, world_spec
 from foretwin.sim_worker.batch.nearness import NearStatics
 from foretwin.sim_worker.batch.physics import Physics
 from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
+from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m, cog_from_base
@@ -55,8 +57,12 @@ class BatchSimulation:
         nsim: int,
         control_hz: float = 20.0,
         threads: int = 1,
+        slopes: Slopes | None = None,
     ) -> None:
-        """Compile; raises ValueError where a control tick is no whole number of physics steps."""
+        """Compile; raises ValueError where a control tick is no whole number of physics steps.
+
+        `slopes` are of the ground where that is not the World's own.
+        """
         silence_step_clock()
         log_mujoco_warnings()
         steps = 1.0 / (control_hz * TIMESTEP_S)
@@ -65,6 +71,9 @@ class BatchSimulation:
                 f"control rate {control_hz:g} Hz must divide {1.0 / TIMESTEP_S:g} Hz evenly"
             )
         self.world = world
+        self.slopes = slopes_of(world) if slopes is None else slopes
+        self.climb_mps2: Array | None = None
+        """(S,) what the slope under each car takes of its acceleration; None where all is flat."""
         self.vehicle = vehicle
         self.nsim = nsim
         self.control_dt_s = 1.0 / control_hz
@@ -169,6 +178,11 @@ class BatchSimulation:
         self._live = self._states[rows]
         self._motion_now = self._physics.motion[rows].T
         self._heading = np.array([np.cos(start[:, 2]), np.sin(start[:, 2])])
+        self._feel_slope()
+
+    def _feel_slope(self) -> None:
+        if self.slopes is not None:
+            self.climb_mps2 = climb_mps2(self.slopes, self._live, self._heading)
 
     def reseed(
         self,
@@ -189,6 +203,7 @@ class BatchSimulation:
         friction = self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
         self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
         self.static_contact[rows] = False
+        self._feel_slope()
 
     def _place(self, rows: slice | Indices, states: Array) -> Array:
         """Put vehicles where their states are, and return these, within limits."""
@@ -206,7 +221,9 @@ class BatchSimulation:
     def step(self, controls: Controls) -> None:
         """Advance one control tick."""
         columns = self._live.T
-        self._actuation.apply(speed_mps=columns[3], accel_mps2=controls.accel_mps2)
+        self._actuation.apply(
+            speed_mps=columns[3], accel_mps2=controls.accel_mps2, climb_mps2=self.climb_mps2
+        )
         angle = np.asarray(controls.tire_angle_rad, dtype=np.float64)
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
         rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
@@ -214,6 +231,7 @@ class BatchSimulation:
         self._advance(self._controls)
         rear = self.vehicle.cog_from_rear_axle_m.value
         compiled.read_base(self._motion_now, rear, self.control_dt_s, columns, self._heading)
+        self._feel_slope()
 
     def _advance(self, per_step: Array) -> None:
         if self.looked:

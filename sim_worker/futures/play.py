@@ -160,6 +160,7 @@ class Play:
             ground=scene.ground,
             car_plan=scene.car_plan,
             heading=heading,
+            climb_mps2=self.stage.climb_mps2,
         )
 
 

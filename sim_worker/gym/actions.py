@@ -30,7 +30,7 @@ def commands(actions: Array, view: PlannerView, *, control: Control) -> PlannerO
     """Return what actions (S, A) command."""
     wanted = np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
     accel = wanted[:, 0] * np.where(wanted[:, 0] < 0.0, MAX_DECEL_MPS2, MAX_ACCEL_MPS2)
-    accel = accel + resistance_mps2(view.vehicle, view.states[:, 3])
+    accel = accel + resistance_mps2(view.vehicle, view.states[:, 3], view.climb_mps2)
     if control == "free":
         return PlannerOutput(accel, wanted[:, 1] * view.vehicle.max_tire_angle_rad.value)
     return PlannerOutput(accel, pure_pursuit(view))

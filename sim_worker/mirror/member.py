@@ -142,7 +142,7 @@ class Member:
 
     def command_twin(self, stamp_ns: int) -> None:
         """Command the twin for the step from `stamp_ns` on: as its vehicle was, or as it moved."""
-        command = self.commands.at(stamp_ns) or self.track.command()
+        command = self.commands.at(stamp_ns) or self.track.command(self.body.slopes)
         self.body.command(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
 
     def draw(self, measured: MeasuredPose, stamp_ns: int, *, follow: bool) -> None:

@@ -176,7 +176,7 @@ class Mirror:
 
     def _advance(self, stamp_ns: int) -> None:
         """Step in whole physics steps, moving the shadow evenly towards its measured pose."""
-        guess = self._track.command()
+        guess = self._track.command(self._twin.slopes)
         total = (stamp_ns - self._seed_stamp_ns) // STEP_NS
         while self._steps < total:
             now_ns = self._seed_stamp_ns + self._steps * STEP_NS

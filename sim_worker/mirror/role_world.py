@@ -15,6 +15,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.roles import Role
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.model import change_vehicle, world_spec
 from foretwin.sim_worker.mirror.twin_body import TwinBody
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
@@ -49,7 +50,7 @@ class RoleWorld:
         self._commanded = commanded
         self._prefixes = {name: f"v{number}_" for number, name in enumerate(vehicles)}
         parameters = {name: self._as_driven(name, vehicle) for name, vehicle in vehicles.items()}
-        spec = world_spec(world)
+        spec, slopes = world_spec(world), slopes_of(world)
         for name, vehicle in parameters.items():
             prefix = self._prefixes[name]
             spec.attach(vehicle_spec(vehicle), prefix=prefix, frame=spec.worldbody.add_frame())
@@ -65,7 +66,7 @@ class RoleWorld:
         self._owner_of_geom: dict[int, str] = {}
         for name, vehicle in parameters.items():
             prefix = self._prefixes[name]
-            self.twins[name] = TwinBody(model, data, vehicle, prefix=prefix)
+            self.twins[name] = TwinBody(model, data, vehicle, prefix=prefix, slopes=slopes)
             self._mocap[name] = int(model.body(prefix + _BOX).mocapid[0])
             geoms = (model.geom(prefix + "box").id, model.geom(prefix + _BOX + "_measured").id)
             self._geoms[name] = geoms

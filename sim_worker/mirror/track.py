@@ -10,7 +10,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.vehicle.commands import TwinCommand, estimated_command
+from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.seeding import local_state
 
 LOST_AFTER_NS = 1_000_000_000
@@ -81,15 +83,21 @@ class Track:
         row[2] = newest[2] + ahead_s * newest[5]
         return MeasuredPose(row[:3], _rate(row))
 
-    def command(self) -> TwinCommand:
+    def command(self, slopes: Slopes | None = None) -> TwinCommand:
         """Return the command that turned the last state but one into the last; see commands."""
         newest_ns, newest = self._rows[-1]
         oldest_ns, oldest = self._rows[0]
         span_s = (newest_ns - oldest_ns) / 1e9
         if len(self._rows) < 2 or not 0.0 < span_s <= self._continuous_ns / 1e9:
             oldest, span_s = newest, 1.0
+        climb = climb_mps2(slopes, newest[None])
         return estimated_command(
-            self.vehicle, oldest, newest, stamp_ns=oldest_ns, duration_s=span_s
+            self.vehicle,
+            oldest,
+            newest,
+            stamp_ns=oldest_ns,
+            duration_s=span_s,
+            climb_mps2=0.0 if climb is None else float(climb[0]),
         )
 
 

@@ -7,7 +7,9 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
+from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
@@ -22,8 +24,16 @@ class TwinBody:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, vehicle: VehicleParameters, *, prefix: str
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        vehicle: VehicleParameters,
+        *,
+        prefix: str,
+        slopes: Slopes | None = None,
     ) -> None:
+        """`slopes` are those of the roads, where the World is not flat."""
+        self.slopes = slopes
         self._model, self._data, self._vehicle = model, data, vehicle
         self._actuators = actuator_ids(model, prefix)
         self._steer = self._actuators.steer
@@ -85,7 +95,11 @@ class TwinBody:
     def command(self, *, accel_mps2: float, tire_angle_rad: float) -> None:
         """Set the vehicle's command for the next step."""
         if self._steps % _REFRESH_STEPS == 0:
-            self._actuation.apply(speed_mps=self._state[:, 3], accel_mps2=np.array([accel_mps2]))
+            self._actuation.apply(
+                speed_mps=self._state[:, 3],
+                accel_mps2=np.array([accel_mps2]),
+                climb_mps2=climb_mps2(self.slopes, self._state),
+            )
         self._steps += 1
         reach = self._vehicle.max_tire_rate_radps.value * TIMESTEP_S
         change = tire_angle_rad - self._tire_command

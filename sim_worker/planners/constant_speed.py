@@ -31,5 +31,5 @@ class ConstantSpeed:
         most = _LIMIT_MPS2 * np.minimum(np.maximum(view.speed_factor, HASTE[0]), HASTE[1])
         accel = np.maximum(np.minimum(accel, most), -_LIMIT_MPS2)
         stands = (np.abs(speed) < 0.05) & (view.target_speed_mps < 0.05)
-        command = accel + resistance_mps2(view.vehicle, speed)
+        command = accel + resistance_mps2(view.vehicle, speed, view.climb_mps2)
         return PlannerOutput(np.where(stands, -_LIMIT_MPS2, command), angle)

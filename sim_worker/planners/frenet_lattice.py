@@ -99,7 +99,7 @@ class LatticeDriver:
         command = accel + _SPEED_GAIN * (speed - present) + _PLACE_GAIN * (place - view.arc_m)
         command = np.minimum(np.maximum(command, -MAX_DECEL_MPS2), CANDIDATE_ACCEL_MPS2)
         hold = (present < HOLD_SPEED_MPS) & (speed < HOLD_SPEED_MPS) & (accel < HOLD_SPEED_MPS)
-        command = command + resistance_mps2(view.vehicle, present)
+        command = command + resistance_mps2(view.vehicle, present, view.climb_mps2)
         return PlannerOutput(np.where(hold, HOLD_MPS2, command), angle)
 
     def _due(

@@ -95,7 +95,7 @@ class PurePursuitIdm:
         if view.stop_arc_m is not None or np.count_nonzero(view.lead_gap_m < np.inf):
             accel -= self._interaction(view, speed)
         np.maximum(accel, -driver.MAX_DECEL_MPS2, out=accel)
-        command = accel + resistance_mps2(view.vehicle, speed)
+        command = accel + resistance_mps2(view.vehicle, speed, view.climb_mps2)
         slow = speed < driver.HOLD_SPEED_MPS
         if np.count_nonzero(slow):
             command = np.where(slow & (accel <= 0.0), driver.HOLD_MPS2, command)

@@ -39,7 +39,7 @@ class ReversePursuit:
         accel = np.minimum(np.maximum(accel, -_MAX_DECEL_MPS2), _ACCEL_MPS2)
         hold = (speed < _HOLD_MPS) & (accel <= _HOLD_MPS)
         hold &= (wanted < _HOLD_MPS) | (room <= 0.0)
-        command = accel + resistance_mps2(view.vehicle, speed)
+        command = accel + resistance_mps2(view.vehicle, speed, view.climb_mps2)
         return PlannerOutput(np.where(hold, HOLD_MPS2, command), steer_towards(view, goal))
 
     def _free_m(self, view: PlannerView) -> Array:

@@ -64,7 +64,9 @@ def track(view: PlannerView, trajectories: Trajectories, *, time_s: Array | floa
     hold = (
         (np.abs(present) < HOLD_SPEED_MPS) & (speed < HOLD_SPEED_MPS) & (wanted <= HOLD_SPEED_MPS)
     )
-    command = np.where(hold, HOLD_MPS2, wanted + resistance_mps2(view.vehicle, present))
+    command = np.where(
+        hold, HOLD_MPS2, wanted + resistance_mps2(view.vehicle, present, view.climb_mps2)
+    )
     goal = line.point_at(own_arc + lookahead_m(present, aside), view)
     return PlannerOutput(command, steer_towards(view, goal))
 

@@ -24,6 +24,8 @@ _MIN_LATERAL_SHARE = 0.2
 """Of the friction limit, left to lateral force under full braking: a real ABS leaves that much."""
 _TINY_N, _TINY_KG = 1e-9, 1e-9
 """A force range of exactly 0 would mean unlimited."""
+_STANDS_MPS = 0.05
+"""Below it, brakes that are strong enough hold a car on a slope instead of slowing it down."""
 
 
 class ActuatorIds(NamedTuple):
@@ -95,6 +97,7 @@ class Actuation:
         self._max_drive = vehicle.max_drive_accel_mps2.value
         self._max_brake = vehicle.max_brake_decel_mps2.value
         drag = vehicle.drag_npv2.value / effective
+        self._pulled_kg = mass / effective
         rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
         self._constants = tuple(map(float, (mass, rolling, drag, _TINY_KG, _MIN_SPEED_MPS)))
         self._friction = np.array(friction, dtype=np.float64)
@@ -126,11 +129,14 @@ class Actuation:
         if self._lag is not None:
             self._lag.restart(rows, accel_mps2)
 
-    def apply(self, *, speed_mps: Array, accel_mps2: Array) -> None:
+    def apply(
+        self, *, speed_mps: Array, accel_mps2: Array, climb_mps2: Array | None = None
+    ) -> None:
         """Set the forces of the next control tick from body speed and command, each (S,).
 
-        Forces along the road are divided by the effective mass factor instead of adding wheel
-        inertia to the chassis, which would add it sideways too.
+        `climb_mps2` (S,) is the deceleration by a slope, where there is one. Forces along the road
+        are divided by the effective mass factor instead of adding wheel inertia to the chassis,
+        which would add it sideways too.
         """
         accel = self._carried_out(np.asarray(accel_mps2, dtype=np.float64))
         compiled.forces(
@@ -150,6 +156,18 @@ class Actuation:
             self._along_low,
             self._along_high,
         )
+        if climb_mps2 is not None:
+            self._pull(speed_mps, climb_mps2)
+
+    def _pull(self, speed_mps: Array, climb_mps2: Array) -> None:
+        """Let a slope pull, with the wheels' inertia to move as well; what is held stays."""
+        pull = -self._pulled_kg * climb_mps2
+        low, high = self._along_low + pull, self._along_high + pull
+        held = (np.abs(speed_mps) < _STANDS_MPS) & (low <= 0.0) & (high >= 0.0)
+        brake = (high - low) / 2.0
+        self._along_low[:] = np.where(held, -brake, low)
+        self._along_high[:] = np.where(held, brake, high)
+        self._drive_n[:] = np.where(held, 0.0, self._drive_n + pull)
 
     def _carried_out(self, command_mps2: Array) -> Array:
         """Return the acceleration (S,) by the tyres that a command leads to now."""

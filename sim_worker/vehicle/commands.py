@@ -88,13 +88,20 @@ class CommandMemory:
 
 
 def estimated_command(
-    vehicle: VehicleParameters, before: Array, after: Array, *, stamp_ns: int, duration_s: float
+    vehicle: VehicleParameters,
+    before: Array,
+    after: Array,
+    *,
+    stamp_ns: int,
+    duration_s: float,
+    climb_mps2: float = 0.0,
 ) -> TwinCommand:
     """Return the command that turns one measured state (8,) into the next `duration_s` later.
 
-    Inverts the twin's own gains and resistances, with the mean tyre angle of both ends and no
-    delay: the twin then repeats the motion, and its gap tests the plumbing alone. In a curve,
-    F / m = du/dt - v r + (F_front / m) sin δ at the centre of gravity (Rajamani 2012, ch. 2).
+    Inverts the twin's own gains and resistances, a slope's `climb_mps2` included, with the mean
+    tyre angle of both ends and no delay: the twin then repeats the motion, and its gap tests the
+    plumbing alone. In a curve, F / m = du/dt - v r + (F_front / m) sin δ at the centre of gravity
+    (Rajamani 2012, ch. 2).
     """
     speed, slip, rate, angle = 0.5 * (before[3:7] + after[3:7])
     if abs(before[3]) < _STANDS_MPS and abs(after[3]) < _STANDS_MPS:
@@ -104,6 +111,6 @@ def estimated_command(
     wanted = float(after[3] - before[3]) / duration_s
     wanted += float(front_force * np.sin(angle) - (slip + rear * rate) * rate)
     force = wanted * vehicle.wheel_inertia_mass_factor.value
-    force += float(resistance_mps2(vehicle, np.array([speed]))[0])
+    force += float(resistance_mps2(vehicle, np.array([speed]))[0]) + climb_mps2
     gain = vehicle.drive_gain.value if force > 0.0 else vehicle.brake_gain.value
     return TwinCommand(stamp_ns, force / gain, float(angle))

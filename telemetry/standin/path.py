@@ -140,7 +140,7 @@ def _smoothed(xy_m: Array, sigma: float) -> Array:
 
 
 def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
-    """Read a JSON object with lists lat_deg, lon_deg, speed_mps.
+    """Read a JSON object with lists lat_deg, lon_deg, speed_mps, and altitude_m on a hilly road.
 
     Raises UserError naming the file and what is wrong, FileNotFoundError without a file.
     """
@@ -150,7 +150,9 @@ def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
             np.asarray(given[name], dtype=np.float64)
             for name in ("lat_deg", "lon_deg", "speed_mps")
         )
-        return DrivenPath(lat, lon, speed, driver=driver)
+        height = given.get("altitude_m")
+        altitude_m = None if height is None else np.asarray(height, dtype=np.float64)
+        return DrivenPath(lat, lon, speed, driver=driver, altitude_m=altitude_m)
     except KeyError as missing:
         raise UserError(f"{file}: no list {missing}; lat_deg, lon_deg, speed_mps needed") from None
     except (ValueError, TypeError) as problem:

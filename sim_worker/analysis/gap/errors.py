@@ -33,6 +33,7 @@ from foretwin.sim_worker.analysis.gap.measured_motion import (
     manoeuvre_of,
 )
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.analysis.road_grade import climb_under
 from foretwin.sim_worker.vehicle.lag import without_lags
 
 _EVERY_S = 1.0
@@ -104,15 +105,18 @@ class GapMeter:
         signals = tire_angles(record, vehicle)
         recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
         independent = bool(recorded[starts].mean() > 0.9)
-        tire = signals.measured_rad
+        tire, climb = signals.measured_rad, climb_under(record, runner.roads)
         if independent:
             accel, steer = record.command_accel_mps2, signals.commanded_rad
         else:
             if self._immediate is None:
-                self._immediate = FreeRunner(without_lags(vehicle))
+                self._immediate = FreeRunner(without_lags(vehicle), roads=runner.roads)
             runner = self._immediate
             accel = accel_commands_from_motion(
-                vehicle, speed_mps=motion.speed_mps, accel_mps2=motion.accel_mps2
+                vehicle,
+                speed_mps=motion.speed_mps,
+                accel_mps2=motion.accel_mps2,
+                climb_mps2=None if climb is None else climb.mps2,
             )
             begin = start_states(vehicle, motion, tire_rad=tire)
             steer = np.where(known, begin[:, 6], np.nan)
@@ -126,6 +130,7 @@ class GapMeter:
             accel_mps2=accel,
             tire_rad=steer,
             delayed=independent,
+            climb_mps2=None if climb is None else climb.mps2,
         )
         for row, horizon in wanted:
             start, count = int(starts[row]), round(horizon / PERIOD_S)

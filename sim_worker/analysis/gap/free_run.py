@@ -12,6 +12,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.geometry.steering import column_of
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
@@ -52,8 +53,11 @@ class FreeRunner:
     Belongs to one thread. The grid is that of a MotionRecord (20 ms).
     """
 
-    def __init__(self, vehicle: VehicleParameters, *, batch: int = 32) -> None:
-        self.vehicle = vehicle
+    def __init__(
+        self, vehicle: VehicleParameters, *, batch: int = 32, roads: Slopes | None = None
+    ) -> None:
+        """`roads` are those under the vehicle, where they are known not to be flat."""
+        self.vehicle, self.roads = vehicle, roads
         self._stage = BatchSimulation(None, vehicle, nsim=batch, control_hz=1.0 / PERIOD_S)
 
     def run(
@@ -66,13 +70,14 @@ class FreeRunner:
         tire_rad: Array,
         hold_speed_mps: Array | None = None,
         delayed: bool | Flags = True,
+        climb_mps2: Array | None = None,
     ) -> Array:
         """Return (K, steps + 1, 8) states, K runs from `states` (K, 8) at grid indices `starts`.
 
         `accel_mps2` and `tire_rad` (N,) are commands on the grid. Where `hold_speed_mps` (N,) is
         known the model follows that speed instead of accelerations; where `delayed`, for all or
         for each run (K,), is false the tyres follow at once, as measured angles must. Gaps in
-        commands hold what was before.
+        commands hold what was before. `climb_mps2` (N,) is what slopes take of the acceleration.
         """
         accel, tire = _filled(accel_mps2), _filled(tire_rad)
         last = len(tire) - 1
@@ -100,6 +105,7 @@ class FreeRunner:
                     follows = (hold_speed_mps[later] - hold_speed_mps[now]) / PERIOD_S
                     follows += _SPEED_GAIN_PS * behind
                     pushed = np.where(np.isfinite(follows), follows, pushed)
+                self._stage.climb_mps2 = None if climb_mps2 is None else climb_mps2[now]
                 self._stage.step(Controls(pushed, tire[now]))
                 seen.append(self._stage.states.copy())
             parts.append(np.stack(seen, axis=1))
@@ -118,11 +124,15 @@ def start_states(vehicle: VehicleParameters, motion: MeasuredMotion, *, tire_rad
 
 
 def accel_commands_from_motion(
-    vehicle: VehicleParameters, *, speed_mps: Array, accel_mps2: Array
+    vehicle: VehicleParameters,
+    *,
+    speed_mps: Array,
+    accel_mps2: Array,
+    climb_mps2: Array | None = None,
 ) -> Array:
     """Return the accelerations (N,) to command so that the model moves as measured, no lags."""
     force = accel_mps2 * vehicle.wheel_inertia_mass_factor.value
-    force = force + resistance_mps2(vehicle, np.nan_to_num(speed_mps))
+    force = force + resistance_mps2(vehicle, np.nan_to_num(speed_mps), climb_mps2)
     gain = np.where(force > 0.0, vehicle.drive_gain.value, vehicle.brake_gain.value)
     return np.asarray(force / gain)
 

@@ -10,6 +10,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
@@ -30,11 +31,20 @@ class GapMonitor:
     four seconds over the long ones too.
     """
 
-    def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
+    def __init__(
+        self,
+        info: VehicleInfo,
+        vehicle: VehicleParameters,
+        *,
+        frame: LocalFrame,
+        roads: Slopes | None = None,
+    ) -> None:
+        """`roads` in `frame` are those of the map, where it is known not to be flat."""
+        self._roads = roads
         self._vehicle_id = info.vehicle_id
         self._frame = frame
-        self._detector = FaultDetector(info, vehicle, frame=frame)
-        self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=info.vehicle_id)
+        self._detector = FaultDetector(info, vehicle, frame=frame, roads=roads)
+        self._meter = GapMeter(FreeRunner(vehicle, roads=self._roads), vehicle_id=info.vehicle_id)
         self._limits = GapLimits()
         self._recorder = self._detector.recorder
         self._states: deque[VehicleState] = deque(maxlen=round(KEPT_S * _MOST_STATES_HZ))
@@ -43,7 +53,7 @@ class GapMonitor:
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Compare with a model of other parameters from now on."""
-        self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=self._vehicle_id)
+        self._meter = GapMeter(FreeRunner(vehicle, roads=self._roads), vehicle_id=self._vehicle_id)
         self._detector.use_vehicle(vehicle)
 
     def handle(self, channel: str, message: Any) -> list[GapSample | GapAlarm | Verdict]:

@@ -21,12 +21,15 @@ from foretwin.sim_worker.analysis.gap.free_run import (
 )
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.analysis.road_grade import climb_under
 
 BLOCK = round(0.2 / PERIOD_S)
 BLOCK_S = BLOCK * PERIOD_S
 _LAG = round(0.1 / PERIOD_S)
 """With which a car follows its command, give or take as much."""
 _NOISE_MPS2, _UNEVEN = 0.15, 0.6
+_ALIKE = 2.0
+"""Root of how many blocks in a row a map's grade errs alike: it does over some 80 m. Chosen."""
 """Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 """A run lasts a second, the end of which is compared: where it began is forgotten by then."""
@@ -216,6 +219,8 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
     # One batch for both kinds: the stretch as commanded, then as measured with its speed held.
     held = np.arange(len(at)) < len(measured)
 
+    climb = climb_under(record, runner.roads)
+
     def run(rows: Indices) -> Array:
         begun, zero = at[rows], np.zeros(len(rows))
         motion = MeasuredMotion(zero, zero, zero, eased[begun], rate[begun], slope[begun])
@@ -228,6 +233,7 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
             tire_rad=np.concatenate([signals.commanded_rad, led]),
             hold_speed_mps=np.concatenate([nothing, eased]),
             delayed=~held[rows],
+            climb_mps2=None if climb is None else np.concatenate([climb.mps2, climb.mps2]),
         )
 
     states = memory.states(
@@ -243,15 +249,22 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
     commanded = np.flatnonzero(~held)[turned]
     by_command[at[commanded][:, None] + tail] = curvature[commanded]
     tire[at[commanded][:, None] + tail] = states[commanded][:, tail, 6]
-    pushes = push_blocks(record, eased, told_starts, states[~held][:, :, 3])
+    doubt = 0.0 if climb is None else _ALIKE * climb.std_mps2
+    pushes = push_blocks(record, eased, told_starts, states[~held][:, :, 3], doubt_mps2=doubt)
     return {**found, "pushes": pushes}
 
 
 def push_blocks(
-    record: MotionRecord, speed_mps: Array, starts: Indices, model_mps: Array
+    record: MotionRecord,
+    speed_mps: Array,
+    starts: Indices,
+    model_mps: Array,
+    *,
+    doubt_mps2: float = 0.0,
 ) -> PushBlocks:
     """Return the last two blocks of each run at grid indices `starts` (K,).
 
+    `doubt_mps2` is how far what slopes take is off.
     `speed_mps` (N,) is the car's on the grid, `model_mps` (K, steps + 1) the model's of each run.
     """
     asked = record.command_accel_mps2
@@ -269,7 +282,7 @@ def push_blocks(
                     (speed_mps[at] - speed_mps[at - BLOCK]) / BLOCK_S,
                     (model[end] - model[end - BLOCK]) / BLOCK_S,
                     speed_mps[at - BLOCK // 2],
-                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late)),
+                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late), doubt_mps2),
                 )
             )
     return PushBlocks(*np.array(rows, dtype=np.float64).reshape(len(rows), 6).T)

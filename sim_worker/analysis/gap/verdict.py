@@ -14,6 +14,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import Verdict
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushTest
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, began_ns, consistency_of
 from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
@@ -43,13 +44,23 @@ class FaultDetector:
     accuse the same, and is given once as long as it holds.
     """
 
-    def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
+    def __init__(
+        self,
+        info: VehicleInfo,
+        vehicle: VehicleParameters,
+        *,
+        frame: LocalFrame,
+        roads: Slopes | None = None,
+    ) -> None:
+        """`roads` in `frame` are those of the map, where it is known not to be flat."""
+        self._roads = roads
         lever = info.body_from_antenna_m
         self._vehicle_id = info.vehicle_id
         self._ahead_m = 0.0 if lever is None else lever[0]
         self.recorder = MotionRecorder(frame=frame, keep_s=KEPT_S, depth=4000)
         """The samples that are kept."""
-        self._runner, self._runs = FreeRunner(vehicle, batch=_AT_ONCE), RunMemory()
+        self._runner = FreeRunner(vehicle, batch=_AT_ONCE, roads=self._roads)
+        self._runs = RunMemory()
         self._first_ns: int | None = None
         self._done = 0
         self._push = PushTest()
@@ -61,7 +72,8 @@ class FaultDetector:
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Judge a model of other parameters from now on; what was about to be said is forgotten."""
-        self._runner, self._runs = FreeRunner(vehicle, batch=_AT_ONCE), RunMemory()
+        self._runner = FreeRunner(vehicle, batch=_AT_ONCE, roads=self._roads)
+        self._runs = RunMemory()
         self._push = PushTest()
         self._pending = None
 

@@ -18,6 +18,7 @@ from foretwin.contracts.tuning import (
     ParameterOrigin,
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.identify.acceptance import (
     STIFFNESS,
     is_acceptable,
@@ -56,7 +57,10 @@ class Tuner(ParametersInForce):
         frame: LocalFrame,
         window_s: float = 60.0,
         every_s: float = 10.0,
+        roads: Slopes | None = None,
     ) -> None:
+        """`roads` in `frame` tell grades where measured altitude does not."""
+        self._roads = roads
         super().__init__(vehicle=vehicle, vehicle_id=vehicle_id)
         self._window_ns, self._every_ns = round(window_s * 1e9), round(every_s * 1e9)
         self._recorder = MotionRecorder(frame=frame, keep_s=window_s + 5.0)
@@ -95,7 +99,9 @@ class Tuner(ParametersInForce):
 
     def _examined(self, newest_ns: int) -> Identification:
         record = self._recorder.record(self._from_ns, newest_ns, period_s=_PERIOD_S)
-        result, steering = examine(record, self._given, vehicle_id=self._vehicle_id)
+        result, steering = examine(
+            record, self._given, vehicle_id=self._vehicle_id, roads=self._roads
+        )
         self._bends = None if steering is None else bends_before(steering)
         return with_priors(result, self.vehicle)
 

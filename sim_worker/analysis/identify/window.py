@@ -17,14 +17,15 @@ from foretwin.contracts.tuning import (
     SteeringMapBin,
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.identify import longitudinal
 from foretwin.sim_worker.analysis.identify.acceptance import HALF_OF_95
 from foretwin.sim_worker.analysis.identify.actuator import fit_following
-from foretwin.sim_worker.analysis.identify.longitudinal import grade_from_altitude
 from foretwin.sim_worker.analysis.identify.steering import SteeringFit, fit_steering, steering_map
 from foretwin.sim_worker.analysis.identify.steering_signals import Theta
 from foretwin.sim_worker.analysis.identify.step import TURNING_MPS2
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
+from foretwin.sim_worker.analysis.road_grade import grade_from_altitude, grade_from_roads
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient
 
 UNDERSTEER_NAME = UNDERSTEER_GRADIENT
@@ -76,18 +77,29 @@ def turning_s(record: MotionRecord) -> float:
 
 
 def identify(
-    record: MotionRecord, vehicle: VehicleParameters, *, vehicle_id: str, grade: Array | None = None
+    record: MotionRecord,
+    vehicle: VehicleParameters,
+    *,
+    vehicle_id: str,
+    grade: Array | None = None,
+    roads: Slopes | None = None,
 ) -> Identification:
     """Identify what `record` tells of a car whose parameters in force are `vehicle`.
 
-    `grade` (N,) is the road's rise over run; without it, the record's altitude is asked. An
+    `grade` (N,) is the road's rise over run; without it, the record's altitude is asked, and where
+    that does not tell it, the map's `roads`. An
     estimate may be taken where its `reason` is empty. Raises ValueError for less than 1 s.
     """
-    return examine(record, vehicle, vehicle_id=vehicle_id, grade=grade).result
+    return examine(record, vehicle, vehicle_id=vehicle_id, grade=grade, roads=roads).result
 
 
 def examine(
-    record: MotionRecord, vehicle: VehicleParameters, *, vehicle_id: str, grade: Array | None = None
+    record: MotionRecord,
+    vehicle: VehicleParameters,
+    *,
+    vehicle_id: str,
+    grade: Array | None = None,
+    roads: Slopes | None = None,
 ) -> Examined:
     """Identify as `identify` does, and return the steering's fit along."""
     if len(record.stamp_ns) < 2 or record.time_s[-1] < 1.0:
@@ -102,7 +114,7 @@ def examine(
     else:
         estimates = _steering(fit, vehicle, turned_s)
         bins = steering_map(record, fit)
-    along, worked_s = _longitudinal(record, vehicle, grade)
+    along, worked_s = _longitudinal(record, vehicle, grade, roads)
     result = Identification(
         vehicle_id=vehicle_id,
         from_stamp_ns=int(record.stamp_ns[0]),
@@ -217,13 +229,23 @@ _ALONG = ("drive_gain", "brake_gain", "drag_npv2", "rolling_resistance_n", "acce
 """In the order of a `LongitudinalFit`."""
 
 
+def _grade(record: MotionRecord, roads: Slopes | None) -> Array:
+    """Return the road's grade: by altitude, which tells it better, or else by the map."""
+    try:
+        return grade_from_altitude(record)
+    except ValueError:
+        if roads is None:
+            raise
+        return grade_from_roads(record, roads)
+
+
 def _longitudinal(
-    record: MotionRecord, vehicle: VehicleParameters, grade: Array | None
+    record: MotionRecord, vehicle: VehicleParameters, grade: Array | None, roads: Slopes | None
 ) -> tuple[list[ParameterEstimate], float]:
     priors: dict[str, Parameter] = {name: getattr(vehicle, name) for name in _ALONG}
     try:
         if record.has("command_accel_mps2") and grade is None:
-            grade = grade_from_altitude(record)
+            grade = _grade(record, roads)
         along = longitudinal.fit_longitudinal(record, vehicle, grade=grade)
     except ValueError as lack:
         return _unknown({name: prior.value for name, prior in priors.items()}, lack), 0.0
