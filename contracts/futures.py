@@ -14,6 +14,7 @@ import msgspec
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.signals import LearntSignal
 
 _POSE = ("x_m", "y_m", "yaw_rad")
 STATE_COLUMNS = (*_POSE, "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2")
@@ -132,6 +133,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """The first road users of every future, in this order."""
     signals: tuple[SignalState, ...] = ()
     """Live colours, the newest of each group."""
+    learnt_signals: tuple[LearntSignal, ...] = ()
+    """Cycles that groups were heard to repeat; they go before the colours."""
     drive_time_s: float = 0.0
     """Of the state: signal plans run by it."""
     lights_by_plan: bool = False

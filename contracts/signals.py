@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.provenance import Provenance
 
 
@@ -52,3 +53,20 @@ class SignalPlan(msgspec.Struct, frozen=True, kw_only=True):
     source: Provenance
     offset_s: float = 0.0
     red_amber_s: float = 0.0
+
+
+class LearntSignal(msgspec.Struct, frozen=True, kw_only=True):
+    """How a group of lights was heard to change, the same cycle again and again.
+
+    A cycle began at `begins_ns` of the vehicle's clock and takes `cycle_s`; `colours` begin
+    `from_s` seconds into it, ascending from 0. What was heard of `cycles` whole ones strays from
+    this by no more than `spread_s`.
+    """
+
+    group_id: str
+    begins_ns: int
+    cycle_s: float
+    from_s: tuple[float, ...]
+    colours: tuple[SignalColour, ...]
+    cycles: int
+    spread_s: float

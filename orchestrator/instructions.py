@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 from foretwin.contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
 from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.signals import LearntSignal
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,3 +75,4 @@ class LatestReports(NamedTuple):
     plan: PlannedTrajectory | None
     road_users: RoadUsers | None
     signals: tuple[SignalState, ...]
+    learnt_signals: tuple[LearntSignal, ...] = ()

@@ -24,11 +24,9 @@ from foretwin.geometry.steering import column_of
 from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
 from foretwin.orchestrator.instructions import LatestReports, LatestState
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
+from foretwin.orchestrator.rounds.learnt_signals import SignalLearner
 from foretwin.telemetry.estimator.estimator import StateEstimator, estimator_of
 from foretwin.telemetry.estimator.map_aid import RoadLine
-
-MOST_SIGNALS = 1000
-"""Signal groups whose state is kept."""
 
 
 class Intake:
@@ -46,8 +44,7 @@ class Intake:
         self.plan: PlannedTrajectory | None = None
         self.status: VehicleStatus | None = None
         self.road_users: RoadUsers | None = None
-        self.signals: dict[str, SignalState] = {}
-        """The newest of each signal group."""
+        self.signals = SignalLearner()
         self.states = 0
         self.first_stamp_ns: int | None = None
         self.refused = 0
@@ -108,7 +105,7 @@ class Intake:
         elif isinstance(message, RoadUsers):
             self.road_users = message
         elif isinstance(message, SignalState):
-            self._take_signal(message)
+            self.signals.take(message)
         if self._estimator is None:
             return None
         received_ns = self._drive_ns(item.received_mono_ns)
@@ -118,12 +115,6 @@ class Intake:
             self.latest = LatestState(state, item.received_mono_ns)
             self.states += 1
         return state
-
-    def _take_signal(self, signal: SignalState) -> None:
-        """Keep the newest of its group; of too many groups the one silent for longest goes."""
-        self.signals[signal.group_id] = signal
-        if len(self.signals) > MOST_SIGNALS:
-            del self.signals[min(self.signals, key=lambda name: self.signals[name].stamp_ns)]
 
     def take_line(self, line: RoadLine) -> None:
         """Take the line of the map along which the latest state drives."""
@@ -169,12 +160,19 @@ class Intake:
         receiver_utc_ns = time.time_ns() - time.monotonic_ns()
         found = record(self._estimator, self.watch, receiver_utc_ns=receiver_utc_ns)
         state = None if self.latest is None else self.latest.state
-        return {**self.counts.record(self.skipped_invalid), **found, **_position_record(state)}
+        lights = self.signals.record(self.now_stamp_ns, self.start_stamp_ns)
+        return {
+            **self.counts.record(self.skipped_invalid),
+            **found,
+            **_position_record(state),
+            **({"learnt_lights": lights} if lights else {}),
+        }
 
     @property
     def surroundings(self) -> LatestReports:
         """What the car last said of its plan, of other road users and of lights."""
-        return LatestReports(self.plan, self.road_users, tuple(self.signals.values()))
+        learnt = self.signals.learnt(self.now_stamp_ns)
+        return LatestReports(self.plan, self.road_users, self.signals.newest, learnt)
 
     @property
     def start_stamp_ns(self) -> int:

@@ -134,6 +134,7 @@ class RoundPlanner:
                     scenarios=tuple(s for s in scenarios if s.id in named),
                     road_users=users,
                     signals=signals,
+                    learnt_signals=reports.learnt_signals,
                     drive_time_s=(state.stamp_ns - start_stamp_ns) / 1e9,
                     car_plan=car_plan,
                     metrics=ROW_METRICS,

@@ -74,6 +74,7 @@ def measure(
         user_mass_kg=_masses(scene) if "user_mass_kg" in needs else None,
         start_s=job.drive_time_s,
         live=scene.lights.live,
+        learnt=scene.lights.learnt,
     )
     found = evaluate(rollout, names, context=context)
     if CLEARANCE in found:

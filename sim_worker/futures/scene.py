@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
-from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.numbers import Quantity
@@ -17,6 +16,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.futures.lights import Lights, lights_of
 from foretwin.sim_worker.futures.number_columns import NumberColumns, number_columns
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
@@ -34,7 +34,6 @@ from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.seen import SeenActors
 from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
-from foretwin.world_gen.rules.signal_state import LiveColour, world_colours_at
 
 _MAX_OFFSET_M = 8.0
 _CAR_WITHIN_M = 60.0
@@ -89,24 +88,6 @@ class JobScene(NamedTuple):
         if not self.rules.groups:
             return self.rules.stop_arcs_m
         return self.rules.red(self.lights.at(time_s))
-
-
-class Lights(NamedTuple):
-    """The colours of a World's lights during a job."""
-
-    world: World
-    start_s: float
-    live: Mapping[str, LiveColour]
-    by_plan: bool
-
-    def at(self, time_s: float) -> dict[str, SignalColour]:
-        """Return colours by group: those received, kept, and by option those of the World's plans.
-
-        A plan that no map holds is a guess: cars that follow a real one do not stop for it.
-        """
-        drive_s = self.start_s + time_s
-        found = world_colours_at(self.world, drive_s) if self.by_plan else {}
-        return {**found, **{group: heard.colour for group, heard in self.live.items()}}
 
 
 class SceneMaker:
@@ -211,7 +192,6 @@ class SceneMaker:
                 tick_s=tick_s,
                 walls=self._walls,
             )
-        heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}
         return JobScene(
             path=path,
             starts=starts,
@@ -226,7 +206,7 @@ class SceneMaker:
             rules=rules,
             ground=self._rules.ground(taken[0], path),
             car_plan=_known_plan(job),
-            lights=Lights(self.world, job.drive_time_s, heard, job.lights_by_plan),
+            lights=lights_of(job, self.world),
             left_out=tuple(left_out),
         )
 

@@ -19,7 +19,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
-from foretwin.world_gen.rules.signal_state import LiveColour
+from foretwin.world_gen.rules.signal_state import HeardCycle, LiveColour
 
 _Kept = TypeVar("_Kept")
 _FUTURES_AT_ONCE = 8
@@ -59,7 +59,8 @@ class Context(NamedTuple):
 
     `reference` (N, 3) holds base_link poses at the rollout's instants, NaN where unknown;
     `user_mass_kg` (S, R) the road users' masses. `start_s` is the drive time
-    of the rollout's time 0, at which signal plans are read, and `live` what signals were heard.
+    of the rollout's time 0, at which signal plans are read, `live` what signals were heard, and
+    `learnt` the cycles that they repeat, in the rollout's time.
     """
 
     path: FrenetPath | None = None
@@ -69,6 +70,7 @@ class Context(NamedTuple):
     user_mass_kg: Array | None = None
     start_s: float = 0.0
     live: Mapping[str, LiveColour] | None = None
+    learnt: Mapping[str, HeardCycle] = {}
 
 
 class Relative(NamedTuple):

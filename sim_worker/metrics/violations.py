@@ -71,6 +71,8 @@ def _rules(view: RolloutView) -> RouteRules:
 def _colours(view: RolloutView, group_id: str, at_s: Array) -> list[SignalColour]:
     """Return the colours of a group at times (K,)."""
     context, world = view.context, _rules(view).world
+    if group_id in context.learnt:
+        return [context.learnt[group_id].colour_at(time_s) for time_s in at_s.tolist()]
     plans = (*(junction.plan for junction in world.junctions), *world.crossing_plans)
     mine = [p for p in plans if p is not None and group_id in {group.id for group in p.groups}]
     plan = mine[-1] if mine else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
-from foretwin.contracts.signals import SignalPlan
+from foretwin.contracts.signals import LearntSignal, SignalPlan
 from foretwin.contracts.world import World
 
 LIVE_FOR_S = 2.0
@@ -22,6 +23,27 @@ class LiveColour(NamedTuple):
 
     time_s: float
     colour: SignalColour
+
+
+class HeardCycle(NamedTuple):
+    """A cycle that a group was heard to repeat: one begins at `begins_s`, each of its colours
+    `from_s` later."""
+
+    begins_s: float
+    cycle_s: float
+    from_s: tuple[float, ...]
+    colours: tuple[SignalColour, ...]
+
+    def colour_at(self, time_s: float) -> SignalColour:
+        """Return what the group shows at a time, if it goes on so."""
+        into_s = (time_s - self.begins_s) % self.cycle_s
+        return self.colours[bisect_right(self.from_s, into_s) - 1]
+
+
+def heard_cycle(learnt: LearntSignal, stamp_ns: int) -> HeardCycle:
+    """Return what was learnt of a group, in seconds from a stamp on."""
+    begins_s = (learnt.begins_ns - stamp_ns) / 1e9
+    return HeardCycle(begins_s, learnt.cycle_s, learnt.from_s, learnt.colours)
 
 
 def cycle_s(plan: SignalPlan) -> float:

@@ -6,8 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.contracts.drive import SignalState
+from foretwin.contracts.drive import SignalColour, SignalState
 from foretwin.contracts.futures import Future, Job, PathAhead, SeenRoadUser
+from foretwin.contracts.signals import LearntSignal
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
@@ -17,7 +18,11 @@ from tests.sim_worker.places import crossroads, happening, job, state_at
 from tests.sim_worker.road_users.crossroads import crossroads as mapped_crossroads
 from tests.sim_worker.road_users.crossroads import straight_on
 
-COVERS = ("foretwin.sim_worker.futures.measuring", "foretwin.sim_worker.futures.play")
+COVERS = (
+    "foretwin.sim_worker.futures.lights",
+    "foretwin.sim_worker.futures.measuring",
+    "foretwin.sim_worker.futures.play",
+)
 
 CAR = load_vehicle()
 STANDING_LEAD = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
@@ -143,6 +148,32 @@ def test_lights_that_are_heard_are_obeyed(lit: World, colour: str, stops: bool) 
     assert (end[3] < 0.3) == stops
     front_m = end[0] + CAR.length_m.value - CAR.rear_overhang_m.value
     assert (front_m < -4.0) == stops, "it stands before the junction"
+
+
+@pytest.mark.parametrize(
+    ("shown", "changes_s", "stops"),
+    [("red", 4.0, False), ("red", 40.0, True), ("green", 2.0, True), ("green", 40.0, False)],
+)
+def test_a_learnt_cycle_tells_when_lights_change(
+    lit: World, shown: SignalColour, changes_s: float, stops: bool
+) -> None:
+    question, scenes, stage = approach(lit)
+    groups = scenes.scene(question, CAR, tick_s=0.05).rules.groups
+    other: SignalColour = "green" if shown == "red" else "red"
+    learnt = tuple(
+        LearntSignal(
+            group_id=g, begins_ns=question.state.stamp_ns, cycle_s=100.0, cycles=3, spread_s=0.1,
+            from_s=(0.0, changes_s), colours=(shown, other),
+        )
+        for g in groups
+    )  # fmt: skip
+    heard = tuple(SignalState(stamp_ns=0, group_id=g, colour=shown) for g in groups)
+    asked = msgspec.structs.replace(
+        question, signals=heard, learnt_signals=learnt, metrics=("red_light_violations",)
+    )
+    result = run_job(asked, stage, scenes=scenes)
+    assert (result.trajectory.states[0, -1, 3] < 0.3) == stops
+    assert result.metrics["red_light_violations"].tolist() == [0.0]
 
 
 def test_a_plan_that_no_map_tells_stops_nobody_unless_asked_for(lit: World) -> None:

@@ -10,12 +10,14 @@ import pytest
 import shapely
 from scipy.signal import savgol_filter
 
+from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import comfort
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.table import METRICS, computable, evaluate
+from foretwin.world_gen.rules.signal_state import HeardCycle
 from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
 from tests.sim_worker.places import box, crossroads, turning_path
@@ -30,6 +32,7 @@ COVERS = (
 )
 
 HALF_M = LENGTH_M / 2
+GREEN_RED: tuple[SignalColour, ...] = ("green", "red")
 
 
 def value(driven: Rollout, name: str, given: Context | None = None) -> float:
@@ -147,6 +150,16 @@ def test_crossing_the_line_at_red_is_a_violation(start_s: float, violations: int
     given = context(lights=True, start_s=start_s)
 
     assert value(rollout(crossing_at(2.0)), "red_light_violations", given) == violations
+
+
+def test_a_learnt_cycle_goes_before_the_plan() -> None:
+    given = context(lights=True)
+    red_at_two = HeardCycle(begins_s=-50.0, cycle_s=100.0, from_s=(0.0, 51.0), colours=GREEN_RED)
+
+    assert value(rollout(crossing_at(2.0)), "red_light_violations", given) == 0
+    given = given._replace(learnt={"ew": red_at_two})
+    assert value(rollout(crossing_at(2.0)), "red_light_violations", given) == 1
+    assert value(rollout(crossing_at(0.8)), "red_light_violations", given) == 0
 
 
 def test_stopping_before_the_line_or_turning_off_elsewhere_is_none() -> None:
