@@ -226,6 +226,32 @@ class Building(msgspec.Struct, frozen=True, kw_only=True):
     min_height_m: float = 0.0
 
 
+ObstacleKind = Literal[
+    "tree", "lamp", "pole", "bollard", "block", "wall", "fence", "hedge", "guard_rail", "shelter"
+]
+SEEN_OVER_BELOW_M = 1.4
+"""What is lower hides nobody who stands: a driver's eyes are at 1.08 m (AASHTO Green Book, 2018,
+3.2.6), and who walks is higher."""
+SEEN_THROUGH: frozenset[ObstacleKind] = frozenset(
+    ("tree", "lamp", "pole", "bollard", "fence", "guard_rail")
+)
+
+
+class Obstacle(msgspec.Struct, frozen=True, kw_only=True):
+    """What stands beside the road and is no building: outline as of `Area`, from the road up."""
+
+    id: str
+    kind: ObstacleKind
+    outline: Array
+    holes: tuple[Array, ...] = ()
+    height_m: Quantity
+
+    @property
+    def opaque(self) -> bool:
+        """Whether it hides who stands behind it from a driver."""
+        return self.kind not in SEEN_THROUGH and self.height_m.value >= SEEN_OVER_BELOW_M
+
+
 class WorldJunction(msgspec.Struct, frozen=True, kw_only=True):
     """A junction that lies whole in a World; connections name it by `summary.id`."""
 
@@ -268,5 +294,6 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     """What was guessed or left out, in words."""
     attribution: str = ATTRIBUTION
+    obstacles: tuple[Obstacle, ...] = ()
     elevation: Elevation | msgspec.UnsetType = msgspec.UNSET
     """Where no elevation model was given, the World is flat, and this is not written."""

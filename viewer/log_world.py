@@ -10,7 +10,7 @@ import rerun as rr
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_source
 from foretwin.contracts.provenance import Provenance
-from foretwin.contracts.world import Area, Building, World
+from foretwin.contracts.world import Area, Building, Obstacle, World
 from foretwin.geometry.polyline import left_of
 from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
 from foretwin.viewer.rows import Row, path_part, raised
@@ -22,6 +22,7 @@ ISLAND: Colour = (66, 92, 66)
 PAINT: Colour = (226, 228, 232)
 LANE_EDGE: Colour = (138, 143, 152)
 KERB: Colour = (112, 116, 124)
+OBSTACLE: Colour = (96, 116, 84)
 CONNECTION: Colour = (84, 118, 150)
 SIGNAL: Colour = (255, 196, 64)
 BUILDING: dict[Provenance, Colour] = {
@@ -94,6 +95,14 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
             colours=[BUILDING[building.height_m.source] for building in world.buildings],
         )
         rows.append(row("buildings", _archetype(mesh)))
+    if world.obstacles:
+        mesh = prism_mesh(
+            move.polygons(_polygons(world.obstacles)),
+            low_m=[0.0] * len(world.obstacles),
+            high_m=[one.height_m.value for one in world.obstacles],
+            colours=[OBSTACLE] * len(world.obstacles),
+        )
+        rows.append(row("obstacles", _archetype(mesh)))
     if world.lanes:
         lanes = rr.GeoLineStrings(
             lat_lon=[geo_from_local(world.frame, lane.centerline) for lane in world.lanes],
@@ -104,7 +113,7 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     return rows
 
 
-def _polygons(areas: Iterable[Area | Building]) -> list[Polygon]:
+def _polygons(areas: Iterable[Area | Building | Obstacle]) -> list[Polygon]:
     return [Polygon(area.outline, area.holes) for area in areas]
 
 

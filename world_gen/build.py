@@ -35,7 +35,7 @@ from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError, OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from foretwin.world_gen.rules.junction_rules import junction_rules
 
-GENERATOR_VERSION = 9
+GENERATOR_VERSION = 10
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
@@ -162,6 +162,7 @@ def _world(
         road_surface=made.road_surface,
         sidewalks=made.sidewalks,
         buildings=made.buildings,
+        obstacles=made.obstacles,
         notes=tuple(
             dict.fromkeys(
                 (*lanes.notes, *notes, *tracks.notes, *made.notes, *_reading_notes(osm, around))

@@ -13,6 +13,15 @@ from foretwin.contracts.frames import METRES_PER_DEG
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
+NODE_FILTERS = (
+    '["natural"="tree"]',
+    '["highway"="street_lamp"]',
+    '["power"="pole"]',
+    '["amenity"="shelter"]',
+    '["highway"="bus_stop"]["shelter"]',
+    '["barrier"~"^(bollard|block)$"]',
+)
+"""What stands beside roads at nodes of no way."""
 SIMPLIFIED_M = 20.0
 """A route is asked for within its margin plus this, so that fewer points say where it runs."""
 MOST_POINTS = 2000
@@ -52,12 +61,14 @@ def line_filter(lat_lon_deg: Array, margin_m: float) -> str:
 
 
 def overpass_query(area: str, *, timeout_s: int, max_bytes: int) -> str:
-    """Return a query for all roads, rails, barriers and buildings of an area, whole.
+    """Return a query for all roads, rails, barriers, trees, posts and buildings of an area, whole.
 
     Ways come with all their nodes, buildings with all their outlines, and with them the turn
     restrictions that name one of the ways.
     """
     ways = "".join(f'way["{key}"]{area};' for key in WAY_KEYS)
+    ways += f'way["amenity"="shelter"]{area};'
+    nodes = "".join(f"node{tags}{area};" for tags in NODE_FILTERS)
     return (
         f"[out:xml][timeout:{timeout_s}][maxsize:{max_bytes}];"
         f"({ways})->.w;"
@@ -65,6 +76,6 @@ def overpass_query(area: str, *, timeout_s: int, max_bytes: int) -> str:
         f'rel["type"="multipolygon"]["building"]{area};'
         f'rel["type"="multipolygon"]["building:part"]{area};)->.r;'
         "(.w;way(r.r);)->.w;"
-        "(node(w.w);.w;.r;);"
+        f"(node(w.w);{nodes}.w;.r;);"
         "out body;"
     )

@@ -38,12 +38,15 @@ class OpaqueGrid(NamedTuple):
 def opaque_grid(world: World) -> OpaqueGrid | None:
     """Return where a World has walls at the height of eyes; None where it has none.
 
-    What stands on pillars, or has room for a car below it, hides nothing.
+    What stands on pillars, or has room for a car below it, hides nothing, nor does a fence.
     """
     walls = [(b.outline, b.holes) for b in world.buildings if b.min_height_m < HEADROOM_M]
-    if not walls:
+    thin = [(o.outline, o.holes) for o in world.obstacles if o.opaque]
+    if not walls and not thin:
         return None
-    shapes = polygons_from(walls)
+    # No line may slip between the middles of two cells through a wall that is thinner than one.
+    broad = shapely.buffer(polygons_from(thin), CELL_M / 2.0, join_style="mitre") if thin else []
+    shapes = np.array([*(polygons_from(walls) if walls else []), *broad], dtype=object)
     west, south, east, north = shapely.total_bounds(shapes).tolist()
     cell_m = max(CELL_M, max(east - west, north - south) / MOST_CELLS)
     shape = math.ceil((north - south) / cell_m) + 1, math.ceil((east - west) / cell_m) + 1

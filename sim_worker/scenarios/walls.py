@@ -1,4 +1,4 @@
-"""The buildings of a World: nothing comes out of their walls or parks in them."""
+"""The walls of a World, of buildings and others: nothing comes out of them or parks in them."""
 
 from __future__ import annotations
 
@@ -6,18 +6,22 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import World
+from foretwin.contracts.world import ObstacleKind, World
 from foretwin.geometry.frenet_path import FrenetPath
+
+_WALLS: frozenset[ObstacleKind] = frozenset(("wall", "fence", "hedge", "shelter", "guard_rail"))
 
 
 class Walls:
-    """An index of a World's buildings."""
+    """An index of a World's buildings, walls, fences and hedges; ways lead past trees and posts."""
 
     def __init__(self, world: World) -> None:
-        self._tree = shapely.STRtree([shapely.Polygon(b.outline) for b in world.buildings])
+        walls = [shapely.Polygon(o.outline, o.holes) for o in world.obstacles if o.kind in _WALLS]
+        walls += [shapely.Polygon(b.outline) for b in world.buildings]
+        self._tree = shapely.STRtree(walls)
 
     def meet(self, shape: shapely.Geometry) -> bool:
-        """Return whether a shape touches a building."""
+        """Return whether a shape touches one."""
         return len(self._tree.query(shape, "intersects")) > 0
 
     def block(

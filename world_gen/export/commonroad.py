@@ -17,6 +17,7 @@ import numpy as np
 from lxml import etree
 from shapely.geometry import Polygon
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import (
     ROUNDABOUT_KINDS,
     Building,
@@ -24,6 +25,7 @@ from foretwin.contracts.world import (
     Crossing,
     Lane,
     LaneKind,
+    ObstacleKind,
     World,
 )
 from foretwin.world_gen.buildings.tags import HEADROOM_M
@@ -33,9 +35,11 @@ from foretwin.world_gen.export.commonroad_controls import DEFAULT_COUNTRY, point
 from foretwin.world_gen.export.commonroad_intersections import intersections
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lanelets import URBAN_MPS, Marking
+from foretwin.world_gen.export.sdformat_shapes import extrusions
 from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment, leaves
 
 VERSION = "2020a"
+_PILLARS: frozenset[ObstacleKind] = frozenset(("tree", "lamp", "pole", "bollard"))
 TIME_STEP_S = 0.1
 UNKNOWN_GEONAME = -999
 _KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
@@ -100,10 +104,18 @@ def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iter
     for building in world.buildings:
         if building.min_height_m < HEADROOM_M and _is_sound(building):
             # The outline of its ground: the format has no courtyards.
-            obstacle = element("environmentObstacle", id=next(ids))
-            child(obstacle, "type", "building")
-            points(child(child(obstacle, "shape"), "polygon"), building.outline)
-            yield obstacle
+            yield _environment("building", building.outline, next(ids))
+    for one in world.obstacles:
+        kind = "pillar" if one.kind in _PILLARS else "unknown"
+        for ring in extrusions(one.outline, one.holes):  # the format has no holes
+            yield _environment(kind, ring, next(ids))
+
+
+def _environment(kind: str, outline: Array, number: int) -> Element:
+    obstacle = element("environmentObstacle", id=number)
+    child(obstacle, "type", kind)
+    points(child(child(obstacle, "shape"), "polygon"), outline)
+    return obstacle
 
 
 class _Lanelets:

@@ -31,6 +31,7 @@ FIELDS = {
     "signal": "osm_node group_id lane_ids",
     "conflict": "first_id second_id kind:conflict_kind yields_id rule source",
     "building": "height_m min_height_m",
+    "obstacle": "kind:obstacle_kind height_m",
     "road_surface": "source",
     "sidewalk": "source",
     "island": "source",
@@ -49,6 +50,7 @@ _AREAS = {
     "sidewalk": "sidewalks",
     "island": "islands",
     "building": "buildings",
+    "obstacle": "obstacles",
 }
 
 Shape = Literal["Point", "LineString", "Polygon"]

@@ -1,12 +1,17 @@
-"""Buildings, islands and sidewalks as areas of a Lanelet2 map."""
+"""Buildings, obstacles, islands and sidewalks as areas of a Lanelet2 map."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import shapely
 from shapely.geometry import Polygon
 
-from foretwin.contracts.world import Area, Building, World
+from foretwin.contracts.world import Area, Building, Obstacle, ObstacleKind, World
 from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
+
+_EDGES: Mapping[ObstacleKind, str] = {"wall": "wall", "fence": "fence", "guard_rail": "guard_rail"}
+"""Linestring types of Lanelet2 that are walls to it."""
 
 
 def add_surroundings(world: World, drawn: Lanelet2Map) -> None:
@@ -20,6 +25,15 @@ def add_surroundings(world: World, drawn: Lanelet2Map) -> None:
             "foretwin:height": building.height_m.source,
         }
         _add_area(building, tags, drawn, edge={"type": "building"})
+    for one in world.obstacles:
+        tags = {
+            "subtype": "obstacle",
+            "height": f"{one.height_m.value:.2f}",
+            "foretwin:id": one.id,
+            "foretwin:kind": one.kind,
+            "foretwin:height": one.height_m.source,
+        }
+        _add_area(one, tags, drawn, edge={"type": _EDGES.get(one.kind, "obstacle")})
     for island in world.islands:
         tags = {"subtype": "traffic_island", "foretwin:id": island.id}
         _add_area(island, tags, drawn, edge={"type": "curbstone", "subtype": "high"})
@@ -42,7 +56,9 @@ def add_intersection_areas(world: World, drawn: Lanelet2Map) -> dict[str, int]:
     return found
 
 
-def _add_area(area: Area | Building, tags: Tags, drawn: Lanelet2Map, *, edge: Tags) -> None:
+def _add_area(
+    area: Area | Building | Obstacle, tags: Tags, drawn: Lanelet2Map, *, edge: Tags
+) -> None:
     polygon = Polygon(area.outline, area.holes) if len(area.outline) >= 3 else Polygon()
     if polygon.is_empty or not polygon.is_valid:
         return

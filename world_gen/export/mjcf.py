@@ -1,4 +1,5 @@
-"""A World as a MuJoCo model: a plane, the road to look at, buildings and islands to run into.
+"""A World as a MuJoCo model: a plane, the road to look at, buildings, walls, trees and islands to
+run into.
 
 Collision bits of all rooms: two geoms collide where the contype of one meets the conaffinity of
 the other. Static geoms stand in worldbody, never in bodies of their own (93 against 2 µs a step).
@@ -6,9 +7,10 @@ the other. Static geoms stand in worldbody, never in bodies of their own (93 aga
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import mujoco
 import numpy as np
@@ -17,14 +19,14 @@ import shapely
 from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Area, Building, World
+from foretwin.contracts.world import Area, Building, Obstacle, World
 from foretwin.world_gen.buildings.convex_parts import convex_cover, sound_polygons
 from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.xml_tree import in_comment, in_section
 from foretwin.world_gen.polygon_areas import polygons_from
 
 STATIC = 1
-"""Contype of buildings and islands; their conaffinity is VEHICLE."""
+"""Contype of buildings, obstacles and islands; their conaffinity is VEHICLE."""
 VEHICLE = 2
 """Contype of a simulated vehicle; its conaffinity is STATIC | ROAD_USER."""
 ROAD_USER = 4
@@ -33,8 +35,10 @@ ROAD_USER = 4
 UNTOUCHED = {"contype": 0, "conaffinity": 0}
 TIMESTEP_S = 0.01
 WORKER_REACH_M = 20.0
-"""Without visuals, buildings farther than this from the road are left out."""
+"""Without visuals, what stands farther than this from the road is left out."""
 VISUAL_GROUP, COLLISION_GROUP = 2, 1
+
+_Block = TypeVar("_Block", Building, Obstacle)
 
 
 def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
@@ -58,9 +62,13 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
     if visual:
         _add_road(spec, world)
         spec.worldbody.add_light(pos=[0, 0, 200], dir=[0.3, 0.2, -1], castshadow=False)
-    buildings = world.buildings if visual else _near_road(world)
+    near = (lambda things: things) if visual else _near_road(world)
+    buildings, obstacles = near(world.buildings), near(world.obstacles)
     extents = [(f"building:{b.id}", b.min_height_m, b.height_m.value) for b in buildings]
     _add_blocks(spec, "building", solids.BUILDING, buildings, extents, solid=True)
+    if obstacles:
+        extents = [(f"{o.kind}:{o.id}", 0.0, o.height_m.value) for o in obstacles]
+        _add_blocks(spec, "obstacle", solids.OBSTACLE, obstacles, extents, solid=True)
     _add_islands(spec, world, visual=visual)
     return spec
 
@@ -87,15 +95,19 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
-def _near_road(world: World) -> list[Building]:
-    if not world.buildings or not world.road_surface:
-        return []
+def _near_road(world: World) -> Callable[[Sequence[_Block]], Sequence[_Block]]:
+    """Return what picks those things that a road comes near."""
     roads = [Polygon(area.outline).simplify(1.0) for area in world.road_surface]
     reach = shapely.union_all(shapely.buffer(roads, WORKER_REACH_M, quad_segs=2))
     shapely.prepare(reach)
-    outlines = polygons_from([(b.outline, ()) for b in world.buildings])
-    near = shapely.intersects(reach, outlines).tolist()
-    return [b for b, is_near in zip(world.buildings, near, strict=True) if is_near]
+
+    def near(things: Sequence[_Block]) -> Sequence[_Block]:
+        if not things or not roads:
+            return ()
+        found = shapely.intersects(reach, polygons_from([(one.outline, ()) for one in things]))
+        return [one for one, is_near in zip(things, found.tolist(), strict=True) if is_near]
+
+    return near
 
 
 def _add_islands(spec: mujoco.MjSpec, world: World, *, visual: bool) -> None:
@@ -111,7 +123,7 @@ def _add_blocks(
     spec: mujoco.MjSpec,
     default: str,
     rgba: solids.Rgba,
-    outlines: Sequence[Building | Area],
+    outlines: Sequence[Building | Obstacle | Area],
     extents: Sequence[tuple[str, float, float]],
     *,
     solid: bool,

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import StopLine, World
+from foretwin.contracts.world import ObstacleKind, StopLine, World
 from foretwin.geometry.polyline import left_of, unit
 from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.lanelets import crosswalk_edges
@@ -27,6 +27,19 @@ from foretwin.world_gen.export.xml_tree import Element, child, number
 ISLAND_HEIGHT_M = 0.15
 _CROSSWALKS = {"zebra": "zebra", "marked": "zebra", "uncontrolled": "zebra", "unmarked": "virtual"}
 """OpenDRIVE's kinds of crosswalks by OSM's; all others are `pedestrian`."""
+_OBSTACLES: Mapping[ObstacleKind, tuple[str, str | None]] = {
+    "tree": ("tree", None),
+    "lamp": ("pole", "streetLamp"),
+    "pole": ("pole", "powerPole"),
+    "bollard": ("pole", "bollard"),
+    "block": ("obstacle", None),
+    "wall": ("barrier", "wall"),
+    "fence": ("barrier", "fence"),
+    "hedge": ("barrier", "hedge"),
+    "guard_rail": ("barrier", "guardRail"),
+    "shelter": ("building", "busStop"),
+}
+"""Type and subtype of objects (ASAM OpenDRIVE 1.8, 13.14)."""
 
 
 class _Thing(NamedTuple):
@@ -77,6 +90,10 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
         rings, bottom = (building.outline, *building.holes), building.min_height_m
         height = max(building.height_m.value - bottom, 0.0)
         yield _Thing("building", None, building.id, rings, bottom, height, grounded=True)
+    for one in world.obstacles:
+        kind, subtype = _OBSTACLES[one.kind]
+        rings, height = (one.outline, *one.holes), one.height_m.value
+        yield _Thing(kind, subtype, one.id, rings, 0.0, height, grounded=True)
     for area in world.islands:
         rings = (area.outline, *area.holes)
         yield _Thing("trafficIsland", None, area.id, rings, 0.0, ISLAND_HEIGHT_M)

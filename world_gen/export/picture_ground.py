@@ -14,7 +14,7 @@ from matplotlib.path import Path as Outline
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import PROVENANCES, Provenance
-from foretwin.contracts.world import Area, Building, Crossing, Road, World
+from foretwin.contracts.world import Area, Building, Crossing, Obstacle, Road, World
 from foretwin.geometry.polyline import left_of, offset
 from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import picture_style as style
@@ -45,10 +45,11 @@ def draw_ground(axes: Axes, world: World, view: View) -> None:
     axes.add_collection(kerbs)
     _tunnels_and_decks(axes, world, view)
     _buildings(axes, world, view)
+    _obstacles(axes, world, view)
     _crossings(axes, world, view)
 
 
-def _outline(area: Area | Building) -> Outline:
+def _outline(area: Area | Building | Obstacle) -> Outline:
     rings = (np.concatenate([ring, ring[:1]]) for ring in (area.outline, *area.holes))
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
@@ -80,6 +81,17 @@ def _buildings(axes: Axes, world: World, view: View) -> None:
                 zorder=6.8 if overhang else 3.0,
             )
         )
+
+
+def _obstacles(axes: Axes, world: World, view: View) -> None:
+    """Draw what stands beside the road; posts at least as dots, however far the view reaches."""
+    near = [one for one in world.obstacles if view.meets(one.outline)]
+    for opaque in (False, True):
+        paths = [_outline(one) for one in near if one.opaque is opaque]
+        colour = style.OPAQUE if opaque else style.SEEN_PAST
+        if paths:
+            drawn = PathCollection(paths, facecolors=colour, edgecolors=colour, linewidths=1.2)
+            axes.add_collection(drawn).set_zorder(6.2)
 
 
 def _tunnels_and_decks(axes: Axes, world: World, view: View) -> None:

@@ -115,6 +115,11 @@ def draw_legend(figure: Figure) -> None:
         _box(style.ROAD, "bridge, above", style.DECK_EDGE, linewidth=1.6),
         _box(style.TUNNEL, "tunnel, below", alpha=0.4),
     ]
+    beside = [
+        _box(style.OPAQUE, "wall, hedge"),
+        _box(style.SEEN_PAST, "tree, post, fence"),
+        *(_box("none", "", "none") for _ in range(4)),
+    ]
     heights = [
         _box(style.PARKING, "parking lane"),
         _box(_BUILDING, "height tagged", "#3f3226", linewidth=1.4),
@@ -123,7 +128,7 @@ def draw_legend(figure: Figure) -> None:
         _box(_BUILDING, "open below", _GUESSED, alpha=0.35, linestyle=":"),
         _box("none", "", "none"),
     ]
-    columns: list[list[Any]] = [sources, lanes, turns, waits, signs, ground, heights]
+    columns: list[list[Any]] = [sources, lanes, turns, waits, signs, ground, heights, beside]
     handles = [entry for column in columns for entry in column]
     place = Look(loc="lower left", bbox_to_anchor=(0.008, 0.022), ncols=len(columns))
     look = Look(fontsize=9.2, frameon=False, labelcolor="#222222")

@@ -25,6 +25,8 @@ LANE_EDGE, LANE, BUS, BICYCLE, TRAM, RING = (
     "#2b6f9e",
 )
 ISLAND, ISLAND_EDGE = "#b7cfa1", "#6f8f56"
+OPAQUE, SEEN_PAST = "#4a2f1b", "#2f6b3a"
+"""What hides who stands behind it, and trees, posts and fences."""
 DECK_EDGE, TUNNEL, PARKING = "#20262d", "#8d7fa8", "#aebfd4"
 TURN_COLOUR: Mapping[Turn, str] = {
     "straight": "#2a7f3f",

@@ -86,6 +86,7 @@ def write_sdf(
     _markings(made, world)
     _signals(made, world)
     _buildings(made, world)
+    _obstacles(made, world)
     for vehicle in vehicles:
         add_vehicle(made, vehicle, simulator)
     etree.indent(root, space=" ")
@@ -93,7 +94,7 @@ def write_sdf(
 
 
 def _check_names(vehicles: Sequence[SdfVehicle]) -> None:
-    taken = {"ground", "road", "markings", "signals", "buildings"}
+    taken = {"ground", "road", "markings", "signals", "buildings", "obstacles"}
     for vehicle in vehicles:
         if not vehicle.name.isidentifier() or vehicle.name.startswith("__"):
             raise ValueError(f"vehicle name {vehicle.name!r}: letters, digits and _ alone")
@@ -186,3 +187,14 @@ def _buildings(made: Element, world: World) -> None:
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
             link.prism(f"{building.id}.{number}", ring, (low, high), solids.BUILDING, solid=True)
+
+
+def _obstacles(made: Element, world: World) -> None:
+    if not world.obstacles:
+        return
+    link = StaticLink(made, "obstacles")
+    for one in world.obstacles:
+        rings = extrusions(one.outline, one.holes, tolerance_m=solids.THINNEST_M)
+        for number, ring in enumerate(rings):
+            name = f"{one.kind}.{one.id}.{number}"
+            link.prism(name, ring, (0.0, one.height_m.value), solids.OBSTACLE, solid=True)

@@ -14,6 +14,7 @@ GROUND: Rgba = (0.55, 0.58, 0.52, 1.0)
 ROAD: Rgba = (0.25, 0.25, 0.27, 1.0)
 ISLAND: Rgba = (0.45, 0.55, 0.35, 1.0)
 BUILDING: Rgba = (0.72, 0.68, 0.62, 1.0)
+OBSTACLE: Rgba = (0.38, 0.34, 0.26, 1.0)
 ROAD_TOP_M = 0.01
 RING_ISLAND_HEIGHT_M = 1.0
 """A roundabout's middle is a mound with plants: a car that drives straight on must hit it."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Area, Building
+from foretwin.contracts.world import Area, Building, Obstacle
 from foretwin.world_gen.buildings.footprints import buildings_in_frame
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.ground.islands import mapped_islands
@@ -17,6 +17,7 @@ from foretwin.world_gen.junctions.map_index import MapIndex
 from foretwin.world_gen.lanes.clusters import Surroundings, in_map
 from foretwin.world_gen.lanes.lane_curves import LaneSet
 from foretwin.world_gen.roads.beside_roads import BesideRoads
+from foretwin.world_gen.roadside.obstacles import obstacles_in_frame
 
 
 class Ground(NamedTuple):
@@ -31,6 +32,7 @@ class Ground(NamedTuple):
     kerbs: tuple[Array, ...] = ()
     sidewalks: tuple[Area, ...] = ()
     buildings: tuple[Building, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -44,8 +46,16 @@ def ground_around(
     """Return the ground of a World, given its lanes and connections."""
     surface = areas(around, lanes, connections)
     map_frame = index.graph.frame
-    near = index.buildings.within(in_map(around.extent, around.frame, map_frame))
+    on_map = in_map(around.extent, around.frame, map_frame)
+    near = index.buildings.within(on_map)
     buildings, cut = buildings_in_frame(near, around.frame, map_frame, surface.driven)
+    obstacles, cut_too = obstacles_in_frame(
+        index.obstacles.within(on_map),
+        around.frame,
+        around.extent,
+        surface.driven,
+        [road.reference_line for road in lanes.roads],
+    )
     mapped = mapped_islands(around, index.osm, beside, surface.driven)
     return Ground(
         road_surface=surface.road_surface,
@@ -54,5 +64,6 @@ def ground_around(
         kerbs=surface.kerbs,
         sidewalks=sidewalk_areas(around, lanes, surface.road_surface, index.osm, beside),
         buildings=buildings,
-        notes=tuple(cut),
+        obstacles=obstacles,
+        notes=(*cut, *cut_too),
     )

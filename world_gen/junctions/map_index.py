@@ -17,6 +17,7 @@ from foretwin.world_gen.roads.beside_roads import BesideIndex
 from foretwin.world_gen.roads.road_classes import OTHER_CLASSES
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, read_turn_restrictions
+from foretwin.world_gen.roadside.obstacles import ObstacleIndex
 
 
 class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
@@ -28,6 +29,7 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
     car_edge_tree: shapely.STRtree
     buildings: BuildingIndex
     beside: BesideIndex
+    obstacles: ObstacleIndex
     restrictions: TurnRestrictions
     junction_of_node: Mapping[int, Junction]
     junction_lights: frozenset[int]
@@ -71,6 +73,7 @@ def index_map(
         car_edge_tree=shapely.STRtree(shapely.linestrings(lines.xy_m, indices=lines.line)),
         buildings=BuildingIndex(osm),
         beside=BesideIndex(osm),
+        obstacles=ObstacleIndex(osm),
         restrictions=read_turn_restrictions(osm),
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),

@@ -11,7 +11,7 @@ import msgspec
 from foretwin.world_gen.osm.map_cells import PackedNodes, PackedWays, pack
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 """Counts changes of the format and of what is kept; part of an index's name."""
 KINDS = WAYS, NODES, RELATIONS, NOTES = range(4)
 _SCHEMA = """

@@ -108,9 +108,10 @@ def sections(text: bytes) -> Iterator[tuple[str, bytes]]:
         yield chr(text[begin]), text[begin:end]
 
 
-def any_key(keys: Iterable[str]) -> re.Pattern[str]:
-    """Return what finds one of the keys in tags as OPL."""
-    return re.compile(f"(?:^|,)(?:{'|'.join(re.escape(key) for key in keys)})=")
+def any_tag(keys: Iterable[str], tags: Iterable[str] = ()) -> re.Pattern[str]:
+    """Return what finds one of the keys, or one of the `tags` as `key=value`, in tags as OPL."""
+    named = [re.escape(key) + "=" for key in keys] + [f"{re.escape(tag)}(?:,|$)" for tag in tags]
+    return re.compile(f"(?:^|,)(?:{'|'.join(named)})")
 
 
 def read_nodes(section: bytes, wanted: Callable[[str], object]) -> NodeObjects:

@@ -38,7 +38,10 @@ NODE_KEYS = (
     "give_way",
     "kerb",
 )
-WANTED_WAYS, WANTED_NODES = opl.any_key(WAY_KEYS), opl.any_key(NODE_KEYS)
+WAY_TAGS = ("amenity=shelter",)
+NODE_TAGS = ("natural=tree", "power=pole", "amenity=shelter")
+WANTED_WAYS = opl.any_tag(WAY_KEYS, WAY_TAGS)
+WANTED_NODES = opl.any_tag(NODE_KEYS, NODE_TAGS)
 DECODE_ERRORS = (RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError)
 """All that osmium raises for a file that is damaged."""
 

@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.world import Building, Quantity, World
+from foretwin.contracts.world import Building, Obstacle, Quantity, World
 from foretwin.sim_worker.road_users.sight_lines import CELL_M, OpaqueGrid, hidden, opaque_grid
 from tests.orchestrator.trip import town_world
 
@@ -19,7 +19,7 @@ CORNER = ((10.0, 5.0), (40.0, 5.0), (40.0, 30.0), (10.0, 30.0))
 
 @pytest.fixture(scope="module")
 def empty() -> World:
-    return msgspec.structs.replace(town_world("n4"), buildings=())
+    return msgspec.structs.replace(town_world("n4"), buildings=(), obstacles=())
 
 
 def house(low_m: float = 0.0, *, outline: tuple[tuple[float, float], ...] = CORNER) -> Building:
@@ -81,12 +81,25 @@ def test_a_car_beside_a_courtyard_does_not_see_into_it(empty: World) -> None:
     assert sees(walls, (-5.0, 20.0), (5.0, 30.0, 0.0))
 
 
+def test_a_thin_wall_hides_and_a_fence_does_not(empty: World) -> None:
+    outline = np.array([(10.0, -20.0), (10.2, -20.0), (10.2, 20.0), (10.0, 20.0)])
+    height = Quantity(value=1.8, source="default")
+    wall = Obstacle(id="w2", kind="wall", outline=outline, height_m=height)
+    walls = opaque_grid(msgspec.structs.replace(empty, obstacles=(wall,)))
+    assert walls is not None
+    for degrees in range(-60, 61, 3):
+        far = 30.0 * np.cos(np.radians(degrees)), 30.0 * np.sin(np.radians(degrees))
+        assert not sees(walls, (0.0, 0.0), (*far, 0.0)), degrees
+    fence = msgspec.structs.replace(wall, kind="fence")
+    assert opaque_grid(msgspec.structs.replace(empty, obstacles=(fence,))) is None
+
+
 coordinate = st.floats(-60.0, 60.0)
 
 
 @given(coordinate, coordinate, coordinate, coordinate)
 def test_it_agrees_with_geometry_but_for_a_cell(x: float, y: float, u: float, v: float) -> None:
-    empty = msgspec.structs.replace(town_world("n4"), buildings=())
+    empty = msgspec.structs.replace(town_world("n4"), buildings=(), obstacles=())
     walls = grid(empty, house())
     corner = shapely.Polygon(CORNER)
     line = shapely.LineString([(x, y), (u, v)])

@@ -45,7 +45,7 @@ def test_keeps_roads_buildings_and_the_tags_of_signals(street: Sketch, tmp_path:
     assert list(osm.ways) == [10, 11]
     assert osm.ways[10].tags == {"highway": "residential", "name": "Seestraße", "maxspeed": "30"}
     assert osm.ways[10].nodes == (1, 2, 3)
-    assert osm.node_tags == {4: {"highway": "traffic_signals"}}
+    assert osm.node_tags == {4: {"highway": "traffic_signals"}, 6: {"natural": "tree"}}
     assert list(osm.relations) == [20]
     assert osm.relations[20].members[0].role == "outer"
     assert set(osm.locations) == {1, 2, 3, 4, 5, 6}

@@ -1,0 +1,1 @@
+"""What stands beside roads and is no building: trees, lamps, posts, walls, rails, shelters."""
