@@ -20,6 +20,7 @@ from foretwin.world_gen.rules.ring_exits import with_ring_exits
 from foretwin.world_gen.rules.signal_groups import lane_groups, walk_groups
 from foretwin.world_gen.rules.signal_heads import signal_heads
 from foretwin.world_gen.rules.signal_plan import signal_plans
+from foretwin.world_gen.rules.signal_systems import signal_systems
 from foretwin.world_gen.rules.signs_inside import SignsInside, signs_inside
 from foretwin.world_gen.rules.stop_lines import line_controls, lines_at_signs, stop_lines
 
@@ -65,7 +66,8 @@ def junction_rules(
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
     red_amber_s = country.red_amber_s
     lone = lone_lights(around, node_tags, lanes, crossings, known, red_amber_s=red_amber_s)
-    own = signal_plans(groups, walks, ruled, conflicts, met, red_amber_s=red_amber_s)
+    systems = signal_systems(groups, around)
+    own = signal_plans(groups, walks, conflicts, met, systems, red_amber_s=red_amber_s)
     plans, lone = with_ring_exits(own, lone, around)
     return TrafficControl(
         # Where a lane has two lines the one at the junction stands last, so that it wins by lane.

@@ -11,7 +11,7 @@ own longer clearing time is not in the plan.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -20,9 +20,9 @@ import numpy as np
 from foretwin.contracts.signals import SignalPhase, SignalPlan
 from foretwin.contracts.world import Conflict, YieldRule
 from foretwin.world_gen.connections.conflicts import Meetings
-from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.legs import is_ring_edge
 from foretwin.world_gen.rules.signal_groups import LaneGroup, WalkGroup
+from foretwin.world_gen.rules.signal_systems import SignalSystems
 
 CYCLE_S, LONG_CYCLE_S, MANY_PHASES = 90.0, 120.0, 4
 LEAST_GREEN_S = 5.0
@@ -48,14 +48,15 @@ class Between(NamedTuple):
 def signal_plans(
     groups: Mapping[str, Sequence[LaneGroup]],
     walks: Mapping[str, Sequence[WalkGroup]],
-    connections: Sequence[ConnectionDraft],
     conflicts: Sequence[Conflict],
     met: Meetings,
+    systems: SignalSystems,
     *,
     red_amber_s: float = 0.0,
 ) -> dict[str, SignalPlan]:
     """Return a plan for each junction with groups, by its id; `met` are the conflicts' places.
 
+    Plans of one system have the same phases at the same times, as of one controller.
     `red_amber_s` is how long drivers see red and amber before green, where the country has it.
     """
     of = {c.id: g for mine in groups.values() for g in mine for c in g.connections}
@@ -70,9 +71,11 @@ def signal_plans(
         old = pairs.get(key, Between(False, False, 0.0))
         clear_s = max(_clear_s(first_m, second_m), _clear_s(second_m, first_m), old.clear_s)
         pairs[key] = Between(old.crossing or not waits, old.waiting or waits, clear_s)
-    return {
-        name: _plan(mine, walks.get(name, ()), pairs, red_amber_s) for name, mine in groups.items()
-    }
+    found: dict[str, SignalPlan] = {}
+    for names in systems.members:
+        members = {name: groups[name] for name in names}
+        found.update(_plans(members, walks, pairs, systems.follow, red_amber_s))
+    return {name: found[name] for name in groups}
 
 
 def oncoming(a: LaneGroup, b: LaneGroup) -> bool:
@@ -84,46 +87,76 @@ def _clear_s(clearing_m: float, entering_m: float) -> float:
     return (clearing_m + _CAR_M) / _CLEARING_MPS - entering_m / _ENTERING_MPS
 
 
-def _plan(
-    groups: Sequence[LaneGroup],
-    walks: Sequence[WalkGroup],
+def _plans(
+    members: Mapping[str, Sequence[LaneGroup]],
+    walks: Mapping[str, Sequence[WalkGroup]],
     pairs: Mapping[tuple[str, str], Between],
+    follow: Collection[tuple[str, str]],
     red_amber_s: float,
-) -> SignalPlan:
-    phases = _phases(groups, pairs)
-    names = [[group.id for group in phase] for phase in phases]
+) -> dict[str, SignalPlan]:
+    """Return the plans of the junctions of one system, most often of one junction alone."""
+    groups = [group for mine in members.values() for group in mine]
+    phases = _phases(groups, pairs, follow)
+    green = {name: _greens_of(mine, phases) for name, mine in members.items()}
     weights = [max(len(group.lanes) for group in phase) for phase in phases]
     least = [LEAST_GREEN_S for _ in phases]
-    for walk in walks:
-        free = [mine for mine in names if not walk.against & set(mine)]
-        for mine in free:
-            mine.append(walk.id)
-        if not free:
-            names.append([walk.id])
-            weights.append(0)
-            least.append(max(LEAST_GREEN_S, _walking_s(walk)))
-    if len(names) == 1:
-        # One road alone has a light: the others, or those on foot, need their turn too.
-        names.append([])
+
+    def one_more(least_s: float, walked: str) -> None:
         weights.append(0)
-        least.append(2.0 * LEAST_GREEN_S)
+        least.append(least_s)
+        for name, mine in green.items():
+            goes_on = name != walked and sum(map(bool, mine)) > 1
+            mine.append(list(mine[-1]) if goes_on else [])
+
+    for name in members:
+        for walk in walks.get(name, ()):
+            free = [mine for mine in green[name] if not walk.against & set(mine)]
+            for mine in free:
+                mine.append(walk.id)
+            if not free:
+                one_more(max(LEAST_GREEN_S, _walking_s(walk)), name)
+                green[name][-1].append(walk.id)
+    if len(weights) == 1:
+        # One road alone has a light: the others, or those on foot, need their turn too.
+        one_more(2.0 * LEAST_GREEN_S, "")
     amber_s = _amber_s(groups)
     clear_s = max((b.clear_s for b in _within(groups, pairs)), default=0.0)
     # Half seconds; amber is no time to enter, so it counts for clearing only from its end.
     all_red_s = max(LEAST_ALL_RED_S, red_amber_s, math.ceil(2.0 * clear_s) / 2.0)
-    cycle_s = CYCLE_S if len(names) < MANY_PHASES else LONG_CYCLE_S
-    greens = share_green(weights, least, cycle_s - len(names) * (amber_s + all_red_s))
-    return SignalPlan(
-        groups=(*(group.finished() for group in groups), *(walk.finished() for walk in walks)),
-        phases=tuple(
-            SignalPhase(green_s=green_s, green_group_ids=tuple(mine))
-            for green_s, mine in zip(greens, names, strict=True)
-        ),
-        amber_s=amber_s,
-        all_red_s=all_red_s,
-        red_amber_s=red_amber_s,
-        source="default",
-    )
+    cycle_s = CYCLE_S if len(weights) < MANY_PHASES else LONG_CYCLE_S
+    greens_s = share_green(weights, least, cycle_s - len(weights) * (amber_s + all_red_s))
+    return {
+        name: SignalPlan(
+            groups=(
+                *(group.finished() for group in members[name]),
+                *(walk.finished() for walk in walks.get(name, ())),
+            ),
+            phases=tuple(
+                SignalPhase(green_s=green_s, green_group_ids=tuple(mine))
+                for green_s, mine in zip(greens_s, green[name], strict=True)
+            ),
+            amber_s=amber_s,
+            all_red_s=all_red_s,
+            red_amber_s=red_amber_s,
+            source="default",
+        )
+        for name in members
+    }
+
+
+def _greens_of(mine: Sequence[LaneGroup], phases: Sequence[Sequence[LaneGroup]]) -> list[list[str]]:
+    """Return which groups of one junction each phase of its system lets go.
+
+    Where a phase is for the others alone its own last one goes on, unless it has no other.
+    """
+    known = {group.id for group in mine}
+    green = [[group.id for group in phase if group.id in known] for phase in phases]
+    if sum(map(bool, green)) > 1:
+        for i, names in enumerate(green):
+            if not names:
+                before = next(green[k] for k in range(i - 1, i - 1 - len(green), -1) if green[k])
+                names.extend(before)
+    return green
 
 
 def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]) -> list[Between]:
@@ -132,10 +165,12 @@ def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between
 
 
 def _phases(
-    groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]
+    groups: Sequence[LaneGroup],
+    pairs: Mapping[tuple[str, str], Between],
+    follow: Collection[tuple[str, str]],
 ) -> list[list[LaneGroup]]:
-    """Return groups that are green together: roads that face each other first, on a ring who goes
-    round, and all who enter.
+    """Return groups that are green together: roads that face each other first, then those of the
+    next junction to which these lead, on a ring who goes round, and all who enter.
 
     Where two roads that face each other both have lanes of their own for the turn across, these
     go in a phase of theirs; else who turns across waits.
@@ -155,7 +190,7 @@ def _phases(
     while waiting:
         first = waiting[0]
         phase = [first]
-        for other in sorted(waiting[1:], key=lambda g: _unlike(first, g)):
+        for other in sorted(waiting[1:], key=lambda g: _unlike(first, g, follow)):
             if all(together(other, mine) for mine in phase):
                 phase.append(other)
         taken = {group.id for group in phase}
@@ -164,10 +199,13 @@ def _phases(
     return found
 
 
-def _unlike(a: LaneGroup, b: LaneGroup) -> tuple[bool, bool]:
+def _unlike(
+    a: LaneGroup, b: LaneGroup, follow: Collection[tuple[str, str]]
+) -> tuple[bool, bool, bool]:
     """Return what sorts groups by how well they go with another one in a phase."""
+    apart = (a.id, b.id) not in follow and (b.id, a.id) not in follow
     rings = [is_ring_edge(group.approach.toward.edge) for group in (a, b)]
-    return not oncoming(a, b), rings[0] != rings[1]
+    return not oncoming(a, b), apart, rings[0] != rings[1]
 
 
 def _amber_s(groups: Sequence[LaneGroup]) -> float:
