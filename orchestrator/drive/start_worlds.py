@@ -37,7 +37,7 @@ def prepare_start(
     stop: Callable[[], bool],
 ) -> None:
     """Have the first Worlds built and loaded; nothing to do where no route's start is known."""
-    if not plan.routes or plan.config.start_s > 0.0:
+    if not _begins_at_route(plan):
         return
     began_s = time.monotonic()
     first = junctions_at_start(plan.routes[0], plan.junctions, WITHIN_M)
@@ -47,3 +47,9 @@ def prepare_start(
             return
         look_after(conductor, time.monotonic())
         conductor.handle(conductor.mailbox.take(0.1))
+
+
+def _begins_at_route(plan: DrivePlan) -> bool:
+    """Whether the car starts where the route does; a file's route may begin before `--start`."""
+    config = plan.config
+    return bool(plan.routes) and (config.route == "from-log" or config.start_s == 0.0)

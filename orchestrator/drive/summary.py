@@ -13,17 +13,17 @@ BEGINNING_S = 0.5
 """Where a junction is near so soon, the drive began near it."""
 
 
-def _readiness(junction: dict[str, Any], *, lock_step: bool) -> str:
+def _readiness(junction: dict[str, Any], config: dict[str, Any]) -> str:
     """Say how long before the car came near a World was ready; a drive may begin near one.
 
     In lock step the drive waits for Worlds, and how long that takes says nothing of the drive.
     """
-    if lock_step:
+    if config["speed"] is None:
         return "world never came" if junction["built_at_s"] is None else "world ready"
     before_s = junction["world_ready_before_s"]
     if before_s < 0.0:
         return f"world {-before_s:.1f} s late"
-    if junction["within_radius_at_s"] < BEGINNING_S:
+    if junction["within_radius_at_s"] - config["start_s"] < BEGINNING_S:
         return "world ready before the drive began"
     return f"world ready {before_s:.1f} s before the car came near"
 
@@ -66,10 +66,10 @@ def summary_text(record: dict[str, object]) -> str:
             f"  machine too slow for {futures['wanted_per_round']} futures in every round: "
             f"{sizes} futures, {futures['spared_rounds']} rounds spared"
         )
-    lock_step = record["config"]["speed"] is None  # type: ignore[index]
+    config: dict[str, Any] = record["config"]  # type: ignore[assignment]
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
-        f"{junction['name'] or junction['id']}  {_readiness(junction, lock_step=lock_step)}"
+        f"{junction['name'] or junction['id']}  {_readiness(junction, config)}"
         for junction in junctions
     ]
     if "map" in record["telemetry"]["position_from"]:  # type: ignore[index]

@@ -169,20 +169,22 @@ def test_the_summary_says_where_the_map_helped_to_find_the_car(house: House) -> 
 
 
 @pytest.mark.parametrize(
-    ("before_s", "within_at_s", "said"),
+    ("start_s", "before_s", "within_at_s", "said"),
     [
-        (0.008, 0.1, "world ready before the drive began"),
-        (17.82, 20.1, "world ready 17.8 s before the car came near"),
-        (-2.34, 0.1, "world 2.3 s late"),
-        (-2.34, 20.1, "world 2.3 s late"),
+        (0.0, 0.008, 0.1, "world ready before the drive began"),
+        (60.0, 0.008, 60.1, "world ready before the drive began"),
+        (0.0, 17.82, 20.1, "world ready 17.8 s before the car came near"),
+        (0.0, -2.34, 0.1, "world 2.3 s late"),
+        (0.0, -2.34, 20.1, "world 2.3 s late"),
     ],
 )
 def test_the_summary_says_when_a_world_was_ready(
-    house: House, before_s: float, within_at_s: float, said: str
+    house: House, start_s: float, before_s: float, within_at_s: float, said: str
 ) -> None:
     house.drive(200, round_every=5)
     house.end()
     record = record_of(house)
+    record["config"]["start_s"] = start_s
     record["intersections"][0] |= {
         "world_ready_before_s": before_s, "within_radius_at_s": within_at_s,
     }  # fmt: skip
