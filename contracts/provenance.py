@@ -12,6 +12,10 @@ PROVENANCES: tuple[Provenance, ...] = get_args(Provenance)
 """From the best known to the least."""
 
 
+PlaceSource = Literal["driven"]
+"""Of a lane, or of a path, that lies where the car's own passes were; else it is not told."""
+
+
 class Quantity(msgspec.Struct, frozen=True):
     """A number and where it came from."""
 

@@ -106,6 +106,8 @@ class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     added_roads: tuple[int, ...] = ()
     dem: str | None = None
     """Heights of the ground."""
+    tracks: str | None = None
+    """A store of tracks that correct where lanes lie."""
     worlds_dir: str
     cache_dir: str
     given_worlds: str | None = None

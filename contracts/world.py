@@ -13,7 +13,7 @@ import msgspec
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.frames import LocalFrame
-from foretwin.contracts.provenance import Choice, Provenance, Quantity
+from foretwin.contracts.provenance import Choice, PlaceSource, Provenance, Quantity
 from foretwin.contracts.signals import Signal, SignalPlan
 
 _RingKind = Literal["roundabout", "circular", "mini_roundabout"]
@@ -37,8 +37,7 @@ YieldRule = Literal[_YieldByRoad, _YieldByMovement, _YieldByCountry]
 
 A stop or give-way sign, a ring, a signed priority road, a road of lower class or a way out of a
 yard, a turn across oncoming traffic, who comes from the near side (right before left where traffic
-keeps right), in some countries from the far side, a U-turn, merging lanes, or, where no rule says,
-a fixed order.
+keeps right), in some countries the far side, a U-turn, merging lanes, or, without a rule, an order.
 """
 
 ATTRIBUTION = "© OpenStreetMap contributors"
@@ -128,6 +127,7 @@ class Lane(msgspec.Struct, frozen=True, kw_only=True):
     layer: int = 0
     successor_ids: tuple[str, ...] = ()
     """Lanes and connections that begin where this lane ends."""
+    position_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
 
 
 class Connection(msgspec.Struct, frozen=True, kw_only=True):
@@ -151,6 +151,7 @@ class Connection(msgspec.Struct, frozen=True, kw_only=True):
     place_id: str = ""
     signal_group_id: str | None = None
     layer: int = 0
+    path_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
 
 
 class Conflict(msgspec.Struct, frozen=True, kw_only=True):

@@ -74,6 +74,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     map: str | None = None
     dem: str | None = None
     """Heights of the ground (.hgt, .hgt.zip, GeoTIFF, or a folder of these); None is flat."""
+    tracks: str | None = None
+    """A store of earlier drives that correct where lanes lie: `own`, or a folder; None is none."""
     route: str | None = None
     """A GPX or GeoJSON file, `from-log`, or `live`: to the goal that the live car says it has; None
     predicts the route from the road graph."""

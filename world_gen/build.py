@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -35,6 +36,9 @@ from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError, OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from foretwin.world_gen.rules.junction_rules import junction_rules
 
+if TYPE_CHECKING:
+    from foretwin.world_gen.driven.correction import Driven
+
 GENERATOR_VERSION = 10
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
@@ -61,7 +65,8 @@ def build_world(
         raise UserError(f"radius {radius_m} m is not between 10 and 2000 m")
     index = index or index_map(osm, graph, (junction,))
     around = surroundings(index, world_frame(junction), Disc(radius_m), (junction,))
-    return _world(index, around, junction.summary, ground=ground)
+    corrected = _corrected(index, around, (junction,))
+    return _world(index, *corrected, junction.summary, ground=ground)
 
 
 def build_region(
@@ -84,7 +89,33 @@ def build_region(
     around = surroundings(index, frame, _rectangle(bounds, frame), ())
     if not around.edges:
         raise MapError(f"{osm.file}: no road for cars between {_words(bounds)}")
-    return _world(index, around, _region_summary(bounds, middle, graph), ground=ground)
+    corrected = _corrected(index, around, ())
+    return _world(index, *corrected, _region_summary(bounds, middle, graph), ground=ground)
+
+
+def _corrected(
+    index: MapIndex, around: Surroundings, made_for: tuple[Junction, ...]
+) -> tuple[Surroundings, Driven | None]:
+    """Return the roads where tracks say that they lie, and what these say of connections."""
+    if index.tracks is None:
+        return around, None
+    # Loaded where passes are asked for: its solver takes as long as a small World.
+    from foretwin.world_gen.driven.correction import driven
+    from foretwin.world_gen.driven.passes import passes_within
+
+    passes = passes_within(index.tracks.tracks, around.frame, around.extent)
+    if not passes:
+        return around, None
+    lanes = build_lanes(around)
+    connections = _connections(index, around, lanes, [])
+    found = driven(around.edges, lanes, connections, passes, around.trims_m)
+    if not (found.roads or found.passes):
+        return around, None
+    again = surroundings(
+        index, around.frame, around.extent, made_for,
+        moved=found.roads, least_trims_m=found.trims_m,
+    )  # fmt: skip
+    return again, found
 
 
 def _rectangle(bounds: LatLonBounds, frame: LocalFrame) -> Rectangle:
@@ -116,12 +147,19 @@ def _words(bounds: LatLonBounds) -> str:
 
 
 def _world(
-    index: MapIndex, around: Surroundings, summary: IntersectionSummary, *, ground: bool
+    index: MapIndex,
+    around: Surroundings,
+    driven: Driven | None,
+    summary: IntersectionSummary,
+    *,
+    ground: bool,
 ) -> World:
     osm, extent = index.osm, around.extent
     notes: list[str] = []
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, notes)
+    if driven is not None:
+        notes.extend(driven.hold(lanes, connections))
     on_map = in_map(extent, around.frame, index.graph.frame)
     beside = index.beside.within(on_map)
     crossed = crossings(around, osm.node_tags, beside)

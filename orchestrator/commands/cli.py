@@ -12,14 +12,7 @@ import typer
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.cli_logs import (
-    convert,
-    gap,
-    identify,
-    judge,
-    recover,
-    repeat,
-)
+from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge, recover, repeat
 from foretwin.orchestrator.commands.cli_options import (
     DemOption,
     EndpointOption,
@@ -29,12 +22,14 @@ from foretwin.orchestrator.commands.cli_options import (
     OutOption,
     SecureOption,
     ServiceRoadsOption,
+    TracksOption,
     TuningOption,
 )
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_secure import doctor
 from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
+from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
     drop_output,
@@ -60,6 +55,7 @@ maps = typer.Typer(name="map", help="Fetch maps and prepare them.", no_args_is_h
 app.add_typer(maps)
 
 app.add_typer(scenarios)
+app.add_typer(tracks_commands, name="tracks")
 
 
 @app.command()
@@ -67,6 +63,7 @@ def drive(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
     map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
     dem: DemOption = None,
+    tracks: TracksOption = None,
     route: Annotated[
         str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live; default: predicted")
     ] = None,
@@ -162,6 +159,7 @@ def world(
     everything: Annotated[bool, typer.Option("--all", help="each junction of the map")] = False,
     service_roads: ServiceRoadsOption = False,
     dem: DemOption = None,
+    tracks: TracksOption = None,
     file_format: Annotated[
         str | None,
         typer.Option(

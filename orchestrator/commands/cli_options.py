@@ -16,6 +16,12 @@ DemOption = Annotated[
     Path | None,
     typer.Option("--dem", help="heights: .hgt, .hgt.zip, GeoTIFF, or a folder [default: flat]"),
 ]
+TracksOption = Annotated[
+    str | None,
+    typer.Option(
+        "--tracks", help="lanes lie where you drove: own, or a store's folder [default: none]"
+    ),
+]
 LeastFuturesOption = Annotated[
     int | None,
     typer.Option(

@@ -15,6 +15,7 @@ from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import OpenMap, open_map, region_on_map
+from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.world_gen.build import build_region, build_world
 from foretwin.world_gen.export.choices import (
     OPENDRIVE_VERSIONS,
@@ -50,6 +51,7 @@ class WorldRequest:
     everything: bool = False
     service_roads: bool = False
     dem: Path | None = None
+    tracks: str | None = None
     file_format: str | None = None
     """None goes by the suffix of `out`."""
     radius_m: float = 150.0
@@ -89,7 +91,7 @@ def write_worlds(request: WorldRequest) -> int:
     if many and not junctions:
         where = "in this map" if request.route is None else f"along {request.route}"
         raise UserError(f"{opened.file}: no intersection {where}")
-    index = _index(opened, request.dem)
+    index = _index(opened, request)
 
     def built(junction: Junction) -> World:
         radius_m = request.radius_m
@@ -114,7 +116,7 @@ def _region(
 ) -> int:
     opened = open_map(request.map_file, clip=bounds, service_roads=request.service_roads)
     part = region_on_map(opened.file, opened.osm.bounds, bounds)
-    world = build_region(opened.osm, opened.graph, part, index=_index(opened, request.dem))
+    world = build_region(opened.osm, opened.graph, part, index=_index(opened, request))
     return _write_one(world, request, format_, options)
 
 
@@ -130,8 +132,10 @@ def _write_one(world: World, request: WorldRequest, format_: Format, options: Ex
     return 0
 
 
-def _index(opened: OpenMap, dem: Path | None) -> MapIndex:
-    return index_map(opened.osm, opened.graph, opened.junctions, dem=heights_for(opened, dem))
+def _index(opened: OpenMap, request: WorldRequest) -> MapIndex:
+    dem = heights_for(opened, request.dem)
+    tracks = tracks_for(opened.osm.bounds, request.tracks)
+    return index_map(opened.osm, opened.graph, opened.junctions, dem=dem, tracks=tracks)
 
 
 def _check_place(request: WorldRequest) -> None:

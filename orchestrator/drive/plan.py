@@ -32,6 +32,7 @@ from foretwin.orchestrator.routing.standin_path import standin_path
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
 from foretwin.orchestrator.worlds.heights import profiles_of, slopes_in
 from foretwin.orchestrator.worlds.opening import Clip, open_map
+from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
@@ -74,6 +75,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     near = positions if positions is not None else given
     clip = None if near is None else Clip(near, CORRIDOR_M)
     opened = open_map(map_file, clip=clip)
+    tracks_for(opened.osm.bounds, config.tracks)
     osm, graph, junctions = opened.osm, opened.graph, opened.junctions
     index = RoadIndex(graph)
     if positions is not None and log_file is not None:

@@ -148,6 +148,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
         margin_m=0.0 if clip is None else clip.margin_m,
         added_roads=plan.added_roads,
         dem=plan.config.dem,
+        tracks=plan.config.tracks,
         worlds_dir=str(plan.worlds_dir),
         cache_dir=str(plan.config.worlds_cache),
         given_worlds=plan.config.worlds,

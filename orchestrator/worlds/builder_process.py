@@ -17,6 +17,7 @@ from foretwin.contracts.simulation import BuildReply
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import Clip, open_map
+from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.world_store import WorldStore, cached_build
 
@@ -31,7 +32,8 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     osm, graph = opened.osm, opened.graph
     junctions = {j.summary.id: j for j in opened.junctions}
     dem = heights_for(opened, None if setup.dem is None else Path(setup.dem))
-    index = index_map(osm, graph, junctions.values(), dem=dem)
+    tracks = tracks_for(osm.bounds, setup.tracks)
+    index = index_map(osm, graph, junctions.values(), dem=dem, tracks=tracks)
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
     folder = setup.given_worlds
     given = {} if folder is None else read_given_worlds(Path(folder))

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.provenance import PlaceSource, Quantity
 from foretwin.contracts.world import Connection, DrivingSide, LineControl, Turn
 from foretwin.geometry.polyline import cross, left_of, unit
 from foretwin.geometry.steering import LEAST_RADIUS_M
@@ -37,6 +37,7 @@ class ConnectionDraft(msgspec.Struct):
     conflicts_with: tuple[str, ...] = ()
     yields_to: tuple[str, ...] = ()
     signal_group_id: str | None = None
+    path_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
 
     def finished(self) -> Connection:
         """Return the connection as the World holds it."""
@@ -55,6 +56,7 @@ class ConnectionDraft(msgspec.Struct):
             place_id=self.cluster.key,
             signal_group_id=self.signal_group_id,
             layer=self.start.edge.layer,
+            path_source=self.path_source,
         )
 
 

@@ -23,9 +23,10 @@ FIELDS = {
     "road": "osm_way name road_class left_m right_m lane_ids from_place to_place layer bridge "
     "tunnel",
     "lane": "osm_way name kind:lane_kind role width_m speed_limit_mps turns turns_source "
-    "direction_source change change_source left_id right_id road_id layer successor_ids",
+    "direction_source change change_source left_id right_id road_id layer successor_ids "
+    "position_source",
     "connection": "from_lane_id to_lane_id turn width_m control conflicts_with yields_to "
-    "junction_id place_id signal_group_id layer",
+    "junction_id place_id signal_group_id layer path_source",
     "stop_line": "lane_id connection_id control",
     "crossing": "kind:crossing_kind width_m osm_node island:refuge",
     "signal": "osm_node group_id lane_ids",
@@ -165,6 +166,8 @@ def _properties(kind: str, part: object) -> Json:
     for field in FIELDS[kind].split():
         own, _, shown = field.partition(":")
         value, name = getattr(part, own), shown or own
+        if value is msgspec.UNSET:
+            continue
         if isinstance(value, Quantity | Choice):
             found |= {name: value.value, f"{name}_source": value.source}
         else:

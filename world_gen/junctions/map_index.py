@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 import msgspec
 import shapely
 
+from foretwin.contracts.tracks import TrackSet
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.buildings.footprints import BuildingIndex
 from foretwin.world_gen.elevation.dem import DemSet
@@ -36,6 +37,8 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
     """Nodes of the lights that govern junctions."""
     profiles: RoadProfiles | None = None
     """Heights along car roads, where an elevation model was given."""
+    tracks: TrackSet | None = None
+    """Earlier drives that correct where lanes lie, where some were given."""
 
     @property
     def map_key(self) -> str:
@@ -44,7 +47,8 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
         others = (edge for edge in edges if edge.road_class in OTHER_CLASSES)
         added = [f"w{edge.way_id}.{edge.start_node}.{edge.end_node}" for edge in others]
         key = self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
-        return key if self.profiles is None else f"{key} over {self.profiles.dem.key}"
+        key = key if self.profiles is None else f"{key} over {self.profiles.dem.key}"
+        return key if self.tracks is None else f"{key} driven {self.tracks.key}"
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
         """Return indices of car roads that touch an area in the map's frame."""
@@ -58,10 +62,12 @@ def index_map(
     junctions: Iterable[Junction] = (),
     *,
     dem: DemSet | None = None,
+    tracks: TrackSet | None = None,
 ) -> MapIndex:
     """Prepare a map; `junctions` are all known ones, so that neighbours are built as such.
 
     With an elevation model its Worlds have heights; raises UserError where that lies elsewhere.
+    With tracks their lanes and turns lie where these were driven.
     """
     car = tuple(edge.index for edge in graph.edges if edge.drivable)
     known = tuple(junctions)
@@ -78,6 +84,7 @@ def index_map(
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),
         profiles=None if dem is None else _profiles(osm, graph, car, dem),
+        tracks=tracks,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import compress
+from types import MappingProxyType
 from typing import NamedTuple
 
 import msgspec
@@ -78,11 +79,19 @@ def world_frame(junction: Junction) -> LocalFrame:
 
 
 def surroundings(
-    index: MapIndex, frame: LocalFrame, extent: Extent, made_for: tuple[Junction, ...]
+    index: MapIndex,
+    frame: LocalFrame,
+    extent: Extent,
+    made_for: tuple[Junction, ...],
+    *,
+    moved: Mapping[int, RoadEdge] = MappingProxyType({}),
+    least_trims_m: Mapping[tuple[int, bool], float] = MappingProxyType({}),
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
 
-    Roads of the junctions in `made_for` are kept even where they lie beyond.
+    Roads of the junctions in `made_for` are kept even where they lie beyond. `moved` are roads
+    that lie elsewhere than the map has them, by edge index, in this frame already;
+    `least_trims_m` are metres that lanes end at least before a place, as in `trims_m`.
     """
     graph = index.graph
     area = in_map(extent, frame, graph.frame)
@@ -92,6 +101,7 @@ def surroundings(
         near = (*(graph.edges[i] for i in junction.inner), *legs)
         wanted.update(edge.index for edge in near if edge.drivable)
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
+    edges.update(moved)
     sections = _sections(index, edges)
     clusters = _clusters(index, made_for, edges, extent)
     whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
@@ -109,7 +119,7 @@ def surroundings(
         edges=edges,
         sections=sections,
         clusters=clusters,
-        trims_m=trims(clusters, edges, sections, shifts, heads),
+        trims_m=trims(clusters, edges, sections, shifts, heads, least_trims_m),
         heads=heads,
         shifts_m=shifts,
         ring_edges=ring_edges,

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.provenance import Provenance, Quantity
+from foretwin.contracts.provenance import PlaceSource, Provenance, Quantity
 from foretwin.contracts.world import Lane, LaneKind, Road, Turn
 from foretwin.geometry.polyline_batch import Polylines, offset, without_repeats
 from foretwin.world_gen.lanes.cluster import Cluster
@@ -48,6 +48,7 @@ class LaneDraft(msgspec.Struct):
     left_id: str | None = None
     right_id: str | None = None
     successors: list[str] = msgspec.field(default_factory=list)
+    position_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
 
     def finished(self) -> Lane:
         """Return the lane as the World holds it."""
@@ -72,6 +73,7 @@ class LaneDraft(msgspec.Struct):
             left_of_reference_m=round(self.plan.left_m, 3),
             layer=self.edge.layer,
             successor_ids=tuple(sorted(set(self.successors))),
+            position_source=self.position_source,
         )
 
 

@@ -52,6 +52,7 @@ def trims(
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
     heads: Heads,
+    least_m: Mapping[tuple[int, bool], float],
 ) -> dict[tuple[int, bool], float]:
     """Return metres cut off an edge's lanes by (edge index, at its end node)."""
     found: dict[tuple[int, bool], float] = {}
@@ -71,7 +72,7 @@ def trims(
             else:
                 values = np.maximum(areas[cluster.key], turning[k])
             for leg, value in zip(cluster.legs, values.tolist(), strict=True):
-                found[leg.key] = min(value, MAX_TRIM_M)
+                found[leg.key] = min(max(value, least_m.get(leg.key, 0.0)), MAX_TRIM_M)
     for index, edge in edges.items():
         start, end = found.get((index, False), 0.0), found.get((index, True), 0.0)
         room = 0.8 * edge.length_m

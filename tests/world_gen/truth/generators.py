@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.tracks import DrivenTrack, TrackSet
 from foretwin.world_gen.build import build_region
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.benchmarks.netconvert import netconvert_command
@@ -20,10 +24,13 @@ RECOMMENDED = (
 """What SUMO's documentation recommends for OpenStreetMap, and to read its turn lanes."""
 
 
-def by_foretwin(map_file: Path, frame: LocalFrame) -> LaneModel:
+def by_foretwin(map_file: Path, frame: LocalFrame, tracks: Sequence[DrivenTrack] = ()) -> LaneModel:
     """Return the lanes of the one World of the whole map."""
     osm = read_map(map_file)
-    return of_world(build_region(osm, build_road_graph(osm), osm.bounds, ground=False), frame)
+    graph = build_road_graph(osm)
+    known = TrackSet.of(tuple(tracks)) if tracks else None
+    index = index_map(osm, graph, find_intersections(osm, graph), tracks=known)
+    return of_world(build_region(osm, graph, osm.bounds, index=index, ground=False), frame)
 
 
 def by_netconvert(map_file: Path, frame: LocalFrame, work: Path, *options: str) -> LaneModel:

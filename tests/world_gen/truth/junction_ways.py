@@ -52,7 +52,9 @@ def movements(hd: HdMap) -> list[Movement]:
     for lane in hd.lanes.values():
         if lane.inside or lane.kind == "bicycle":
             continue
-        paths = [(key,) for key in lane.successors if key in hd.lanes and hd.lanes[key].inside]
+        paths: list[tuple[str, ...]] = [
+            (key,) for key in lane.successors if key in hd.lanes and hd.lanes[key].inside
+        ]
         while paths:
             path = paths.pop()
             if hd.lanes[path[-1]].kind == "bicycle" or len(path) > 12:

@@ -1,0 +1,52 @@
+"""The command line of the user's own tracks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+tracks = typer.Typer(
+    help="Where your car drove, to correct lanes by (docs/tracks.md): yours to list and delete.",
+    no_args_is_help=True,
+)
+
+StoreOption = Annotated[
+    str | None, typer.Option("--store", help="folder of the store [default: your own]")
+]
+
+
+@tracks.command("list")
+def list_(store: StoreOption = None) -> None:
+    """List the tracks: id, length, when added, from what."""
+    from foretwin.orchestrator.commands.tracks import list_tracks
+
+    list_tracks(store=store)
+
+
+@tracks.command()
+def add(
+    log: Annotated[Path, typer.Argument(help="recorded drive, such as RUN/drive.mcap")],
+    store: StoreOption = None,
+    name: Annotated[str | None, typer.Option(help="what it is called [default: the file]")] = None,
+    declaration: Annotated[
+        Path | None, typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml")
+    ] = None,
+) -> None:
+    """Keep where a recorded drive went."""
+    from foretwin.orchestrator.commands.tracks import add_track
+
+    add_track(log, store=store, name=name, declaration=declaration)
+
+
+@tracks.command()
+def delete(
+    ids: Annotated[list[str] | None, typer.Argument(help="ids of tracks")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="all tracks of the store")] = False,
+    store: StoreOption = None,
+) -> None:
+    """Delete tracks."""
+    from foretwin.orchestrator.commands.tracks import delete_tracks
+
+    delete_tracks(ids or [], everything=everything, store=store)

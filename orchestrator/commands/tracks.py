@@ -1,0 +1,102 @@
+"""The commands of `foretwin tracks`: what the user's own passes are, and where they stay."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.contracts.terminal import say
+from foretwin.contracts.tracks import DrivenTrack, track_id
+from foretwin.orchestrator.worlds.track_store import TrackStore, store_folder
+
+_STEP_M = 1.0
+_LEAST_M = 50.0
+_ROUGH_M = 3.0
+"""Positions rougher than this tell no lane from the next: a lane's width (RASt 06: 3.00 m)."""
+
+
+def list_tracks(*, store: str | None) -> None:
+    """Say what the store holds: id, metres, when it was added, from what."""
+    found = TrackStore(store_folder(store))
+    tracks = [found.load(name) for name in found.ids()]
+    for track in tracks:
+        say(f"{track.id}  {_length_m(track):8.0f} m  {track.added_utc}  {track.name}")
+    say(f"{found.folder}: {len(tracks)} tracks")
+
+
+def add_track(
+    log: Path, *, store: str | None, name: str | None = None, declaration: Path | None = None
+) -> None:
+    """Put where a recorded drive went into the store."""
+    track = track_of_log(log, name=name or log.name, declaration=declaration)
+    kept = TrackStore(store_folder(store))
+    new = kept.add(track)
+    said = f"{_length_m(track):.0f} m of {log}" if new else f"{log} is there already"
+    say(f"{kept.folder}: track {track.id}, {said}")
+
+
+def delete_tracks(names: list[str], *, everything: bool, store: str | None) -> None:
+    """Remove tracks by id, or all."""
+    if bool(names) == everything:
+        raise UserError("tracks delete: name tracks by id, or give --all")
+    found = TrackStore(store_folder(store))
+    doomed = found.ids() if everything else names
+    for track in doomed:
+        found.delete(track)
+    say(f"{found.folder}: {len(doomed)} tracks deleted, {len(found.ids())} left")
+
+
+def track_of_log(log: Path, *, name: str, declaration: Path | None = None) -> DrivenTrack:
+    """Return where a recorded drive went, as the estimator saw it without the help of a map.
+
+    Raises UserError where it went nowhere, or its positions are too rough to tell lanes.
+    """
+    from foretwin.telemetry.estimator.estimator import StateEstimator
+    from foretwin.telemetry.logs.opening import open_log
+
+    opened = open_log(log, declaration=declaration)
+    estimator = StateEstimator(opened.info)
+    kept: list[VehicleState] = []
+    frame, last = None, None
+    for channel, message in opened.samples():
+        state = estimator.handle(channel, message)
+        if state is None or not state.yaw_valid:
+            continue
+        position = state.position
+        frame = frame or LocalFrame(GeoPoint(position.lat_deg, position.lon_deg))
+        here = local_from_geo(frame, position.lat_deg, position.lon_deg)
+        if last is None or np.hypot(*(here - last)) >= _STEP_M:
+            kept.append(state)
+            last = here
+    if len(kept) < _LEAST_M / _STEP_M:
+        raise UserError(f"{log}: drives less than {_LEAST_M:g} m with a known heading; no track")
+    rough = [s.position_std_m for s in kept if s.position_std_m is not None]
+    if rough and float(np.median(rough)) > _ROUGH_M:
+        raise UserError(
+            f"{log}: positions are known to {np.median(rough):.1f} m alone; "
+            f"{_ROUGH_M:g} m or better tell one lane from the next"
+        )
+    lat_deg = np.array([s.position.lat_deg for s in kept])
+    lon_deg = np.array([s.position.lon_deg for s in kept])
+    stamp_ns = np.array([s.stamp_ns for s in kept], dtype=np.int64)
+    return DrivenTrack(
+        id=track_id(lat_deg, lon_deg, stamp_ns),
+        name=name,
+        added_utc=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        stamp_ns=stamp_ns,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        speed_mps=np.array([s.speed_mps for s in kept]),
+    )
+
+
+def _length_m(track: DrivenTrack) -> float:
+    frame = LocalFrame(GeoPoint(float(track.lat_deg[0]), float(track.lon_deg[0])))
+    xy_m: Array = local_from_geo(frame, track.lat_deg, track.lon_deg)
+    return float(np.hypot(*np.diff(xy_m, axis=0).T).sum())

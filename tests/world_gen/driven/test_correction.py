@@ -1,0 +1,130 @@
+"""Lanes and turns lie where the car drove, where it is clear which they were, and nowhere else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+import shapely
+
+from tests.world_gen.driven.drives import crossing, height_at, moved, street, track, world_of
+
+COVERS = ("foretwin.world_gen.driven.passes",)
+
+
+def line(*points: tuple[float, float]) -> np.ndarray:
+    return np.array(points)
+
+
+def test_a_street_moves_to_where_it_was_driven(tmp_path: Path) -> None:
+    before = world_of(street(), tmp_path)
+    lane_m = height_at(before, ".f0", 0.0)
+
+    after = world_of(street(), tmp_path, track(line((-290.0, lane_m + 0.9), (290.0, lane_m + 0.9))))
+
+    assert height_at(after, ".f0", 0.0) == pytest.approx(lane_m + 0.9, abs=0.05)
+    assert height_at(after, ".b0", 0.0) - height_at(before, ".b0", 0.0) == pytest.approx(
+        0.9, abs=0.05
+    )
+    assert {lane.position_source for lane in after.lanes} == {"driven"}
+    assert "1 roads and 0 turns lie where the car's own passes were" in after.notes
+
+
+def test_a_street_of_several_lanes_stays_where_the_lane_is_not_clear(tmp_path: Path) -> None:
+    tags = {"oneway": "yes", "lanes": "2"}
+    before = world_of(street(**tags), tmp_path)
+    left_m, right_m = height_at(before, ".f0", 0.0), height_at(before, ".f1", 0.0)
+    between_m = 0.6 * right_m + 0.4 * left_m
+
+    unclear = world_of(street(**tags), tmp_path, track(line((-60.0, between_m), (60.0, between_m))))
+    clear = world_of(
+        street(**tags), tmp_path, track(line((-290.0, right_m + 0.5), (290.0, right_m + 0.5)))
+    )
+
+    assert unclear.id == before.id
+    assert height_at(clear, ".f1", 0.0) == pytest.approx(right_m + 0.5, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("ends", "why"),
+    [
+        (((-290.0, 7.0), (290.0, 7.0)), "too far off"),
+        (((-40.0, -40.0), (40.0, 40.0)), "aslant across it"),
+        (((-5.0, -1.0), (5.0, -1.0)), "too short to tell a lane"),
+        (((-290.0, 900.0), (290.0, 900.0)), "beyond the World"),
+    ],
+)
+def test_what_tells_nothing_of_a_street_changes_no_byte(
+    ends: tuple[tuple[float, float], ...], why: str, tmp_path: Path
+) -> None:
+    assert world_of(street(), tmp_path, track(line(*ends))).id == world_of(street(), tmp_path).id, (
+        why
+    )
+
+
+def test_without_tracks_no_field_tells_of_them(tmp_path: Path) -> None:
+    world = world_of(crossing(), tmp_path)
+
+    assert all(lane.position_source is msgspec.UNSET for lane in world.lanes)
+    assert b"position_source" not in msgspec.msgpack.encode(world.lanes[0], enc_hook=str)
+
+
+def test_a_shift_fades_where_nobody_drove(tmp_path: Path) -> None:
+    lane_m = height_at(world_of(street(), tmp_path), ".f0", 0.0)
+
+    after = world_of(street(), tmp_path, track(line((-290.0, lane_m + 0.9), (-50.0, lane_m + 0.9))))
+
+    shifts = [height_at(after, ".f0", x) - lane_m for x in (-150.0, 0.0, 60.0, 250.0)]
+    assert shifts == sorted(shifts, reverse=True)
+    assert shifts[0] == pytest.approx(0.9, abs=0.05)
+    assert abs(shifts[-1]) < 0.03
+
+
+def test_glitches_of_single_fixes_move_nothing_far(tmp_path: Path) -> None:
+    lane_m = height_at(world_of(street(), tmp_path), ".f0", 0.0)
+    x = np.arange(-290.0, 290.0)
+    y = np.full(len(x), lane_m + 0.3)
+    y[::40] += 1.8
+
+    after = world_of(street(), tmp_path, track(np.stack([x, y], axis=1)))
+
+    found = [height_at(after, ".f0", x_m) - lane_m for x_m in np.arange(-250.0, 250.0, 5.0)]
+    assert np.abs(np.array(found) - 0.3).max() < 0.25
+
+
+def test_a_turn_follows_the_pass_and_stays_joined_to_its_lanes(tmp_path: Path) -> None:
+    before = world_of(crossing(), tmp_path)
+    turn = next(c for c in before.connections if c.turn == "left")
+    lanes = {lane.id: lane.centerline for lane in before.lanes}
+    drawn = moved(
+        before, np.concatenate([lanes[turn.from_lane_id], turn.centerline, lanes[turn.to_lane_id]])
+    )
+    middle = len(lanes[turn.from_lane_id]) + len(turn.centerline) // 2
+    inward = drawn[middle - 3] + drawn[middle + 3] - 2.0 * drawn[middle]
+    away_m = np.hypot(*(drawn - drawn[middle]).T)
+    bulge = 0.4 * np.exp(-((away_m / 5.0) ** 2))
+    driven = drawn + bulge[:, None] * inward / np.hypot(*inward)
+
+    after = world_of(crossing(), tmp_path, track(driven))
+    found = next(c for c in after.connections if c.id == turn.id)
+
+    assert found.path_source == "driven"
+    path = shapely.LineString(moved(after, found.centerline))
+    seen = drawn[middle] + 0.4 * inward / np.hypot(*inward)
+    assert path.distance(shapely.Point(seen)) < 0.1
+    ends = {lane.id: lane.centerline for lane in after.lanes}
+    assert np.array_equal(found.centerline[0], ends[found.from_lane_id][-1])
+    assert np.array_equal(found.centerline[-1], ends[found.to_lane_id][0])
+
+
+def test_the_order_in_which_tracks_are_given_changes_no_byte(tmp_path: Path) -> None:
+    lane_m = height_at(world_of(street(), tmp_path), ".f0", 0.0)
+    one = track(line((-290.0, lane_m + 0.9), (290.0, lane_m + 0.9)))
+    two = track(line((-290.0, lane_m + 0.5), (290.0, lane_m + 0.5)))
+
+    both = world_of(street(), tmp_path, one, two)
+
+    assert both.id == world_of(street(), tmp_path, two, one).id
+    assert height_at(both, ".f0", 0.0) == pytest.approx(lane_m + 0.7, abs=0.1)
