@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -13,6 +14,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.elevation import Elevation, HeightProfile
 from foretwin.contracts.world import Connection, Lane, World
 from foretwin.geometry.polyline import arc_lengths
+
+_BESIDE_M, _SAMPLES_M = 8.0, 4.0
+"""Beyond this from a lane's middle the ground begins to be its own, and is at twice of it."""
 
 
 class LaneSlope(NamedTuple):
@@ -28,6 +32,7 @@ class WorldHeights:
 
     def __init__(self, world: World, elevation: Elevation) -> None:
         self.elevation = elevation
+        self._parts: list[Lane | Connection] = [*world.lanes, *world.connections]
         self._lines = {road.id: road.reference_line for road in world.roads}
         self._roads: Mapping[str, HeightProfile] = {p.id: p for p in elevation.roads}
         self._connections: Mapping[str, HeightProfile] = {p.id: p for p in elevation.connections}
@@ -46,6 +51,45 @@ class WorldHeights:
         if profile is None:
             return self.elevation.ground_at(xy_m)
         return profile.height_at(_along(line, xy_m))
+
+    def surface_at(self, xy_m: Array) -> Array:
+        """Return how high the ground lies at places (N, 2): as the road there, else as open ground.
+
+        Bridges and tunnels are no ground.
+        """
+        open_m = self.elevation.ground_at(xy_m)
+        tree, places, direction, height, grade = self._on_ground
+        if tree is None:
+            return open_m
+        far, near = tree.query(xy_m)
+        ahead = ((xy_m - places[near]) * direction[near]).sum(axis=1)
+        road_m = height[near] + grade[near] * np.clip(ahead, -_BESIDE_M, _BESIDE_M)
+        share = np.clip((far - _BESIDE_M) / _BESIDE_M, 0.0, 1.0)
+        return np.asarray((1.0 - share) * road_m + share * open_m)
+
+    @cached_property
+    def _on_ground(self) -> tuple[Any, Array, Array, Array, Array]:
+        """Return a spatial tree over places of lanes on the ground, and what is known there."""
+        found, heights = [], []
+        for part in self._parts:
+            if not part.layer:
+                slope = self.slope(part, spacing_m=_SAMPLES_M)
+                found.append(slope)
+                heights.append(self.along(part, slope.xy_m))
+        if not found:
+            nothing = np.zeros((0, 2))
+            return None, nothing, nothing, np.zeros(0), np.zeros(0)
+        # Imported here: most Worlds are flat.
+        from scipy.spatial import cKDTree
+
+        places = np.concatenate([one.xy_m for one in found])
+        return (
+            cKDTree(places),
+            places,
+            np.concatenate([one.direction for one in found]),
+            np.concatenate(heights),
+            np.concatenate([one.grade for one in found]),
+        )
 
     def slope(self, part: Lane | Connection, *, spacing_m: float) -> LaneSlope:
         """Return how a lane or connection climbs, at places at most `spacing_m` apart."""

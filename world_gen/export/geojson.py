@@ -15,6 +15,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.world import World
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.world_heights import heights_of
 
 DEGREE_DIGITS = 9
 """A nanodegree is 0.1 mm: files keep the millimetres of a World."""
@@ -72,6 +74,7 @@ class _FeatureDraft:
 def write_geojson(world: World, path: Path) -> None:
     """Write a World as one FeatureCollection; coordinates are longitude, latitude.
 
+    Where the World has heights a third number is that above the sea, as its elevation model has it.
     Lengths are metres, angles radians counter-clockwise from east, speeds m/s. A value `x` of the
     map has its source (tagged, inferred or default) in `x_source`. What crosses the antimeridian
     is cut there, as RFC 7946 recommends.
@@ -83,7 +86,7 @@ def geojson_of(world: World) -> Json:
     """Return the FeatureCollection of `write_geojson` as plain values."""
     drafts = list(_drafts(world))
     rings = [ring for draft in drafts for ring in draft.rings]
-    lon_lat = iter(_lon_lat(world.frame, rings))
+    lon_lat = iter(_with_heights(world, drafts, _lon_lat(world.frame, rings)))
     features = [
         {
             "type": "Feature",
@@ -201,11 +204,35 @@ def _lon_lat(frame: LocalFrame, rings: Sequence[Array]) -> list[Array]:
     return np.split(lon_lat, np.cumsum([len(ring) for ring in rings])[:-1])
 
 
+def _with_heights(
+    world: World, drafts: Sequence[_FeatureDraft], lon_lat: list[Array]
+) -> list[Array]:
+    """Return all rings with heights above the sea beside them, where the World has some."""
+    hills = heights_of(world)
+    if hills is None:
+        return lon_lat
+    parts = {f"lane:{lane.id}": lane for lane in world.lanes}
+    links = {f"connection:{link.id}": link for link in world.connections}
+    heights = []
+    for draft in drafts:
+        name = f"{draft.kind}:{draft.id}"
+        part, profile = parts.get(name) or links.get(name), None
+        if draft.kind == "road":
+            profile = hills.road(draft.id)
+        for ring in draft.rings:
+            if profile is not None:
+                height = profile.height_at(arc_lengths(ring))
+            else:
+                height = hills.surface_at(ring) if part is None else hills.along(part, ring)
+            heights.append(np.round(height + hills.elevation.base_m, 2))
+    return [np.column_stack(both) for both in zip(lon_lat, heights, strict=True)]
+
+
 def _geometry(shape: Shape, rings: list[Array]) -> Json:
     west = min(float(ring[:, 0].min()) for ring in rings)
     east = max(float(ring[:, 0].max()) for ring in rings)
     if west < -180.0 or east > 180.0:
-        return _cut(shape, rings)
+        return _cut(shape, [ring[:, :2] for ring in rings])
     if shape == "Polygon":
         return {"type": shape, "coordinates": [ring.tolist() for ring in rings]}
     (line,) = rings

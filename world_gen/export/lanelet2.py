@@ -1,16 +1,20 @@
 """A World as a Lanelet2 map in OSM XML, as the Lanelet2 library and Autoware read it.
 
 Nodes carry latitude and longitude and, for readers that want metres, `local_x` and `local_y` in
-the World's frame; `ele` is the height above the World's plane. A file beside the map gives
+the World's frame; `ele` is the height above the World's plane, or, where an elevation model was
+given, above the sea. A file beside the map gives
 Autoware the projection: transverse Mercator of scale 1 about the World's origin, as the World's
 own frame.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Crossing, Lane, LaneKind, World
+from foretwin.geometry.world_heights import heights_of
 from foretwin.world_gen.export import lanelets
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lanelet2_orientation import oriented
@@ -56,9 +60,9 @@ def write_lanelet2(world: World, path: Path, *, crosswalk_rules: bool = False) -
 
 def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
     """Return the World's lanes, connections, rules and surroundings as a map not yet written."""
-    drawn = Lanelet2Map()
+    drawn = Lanelet2Map(heights_of(world))
     borders = lane_borders(world)
-    heights = RoadHeights(world, borders)
+    heights = _heights(world, borders, drawn)
     members = _lane_members(world, borders, heights, drawn)
     members |= _connection_members(world, borders, heights, drawn)
     crosswalks = {c.id: _crosswalk(c, drawn) for c in world.crossings}
@@ -80,14 +84,23 @@ def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
     return drawn
 
 
+_Heights = Callable[[Lane | Connection, Array], Array]
+"""Gives the heights (N,) of a border (N, 2) of a lane or connection."""
+
+
+def _heights(world: World, borders: dict[str, Borders], drawn: Lanelet2Map) -> _Heights:
+    if drawn.hills is not None:
+        return drawn.hills.along
+    layers = RoadHeights(world, borders)
+    return lambda part, line: layers.along(line, part.layer)
+
+
 def _lane_members(
-    world: World, borders: dict[str, Borders], heights: RoadHeights, drawn: Lanelet2Map
+    world: World, borders: dict[str, Borders], heights: _Heights, drawn: Lanelet2Map
 ) -> dict[str, list[RelationMember]]:
     """Draw the borders of lanes, each once, and return them as left and right of every lane."""
     nodes = {
-        lane.id: tuple(
-            drawn.road_nodes(line, heights.along(line, lane.layer)) for line in borders[lane.id]
-        )
+        lane.id: tuple(drawn.road_nodes(line, heights(lane, line)) for line in borders[lane.id])
         for lane in world.lanes
     }
     markings = lanelets.lane_markings(world, borders)
@@ -116,14 +129,14 @@ def border_tags(marking: Marking) -> dict[str, str]:
 
 
 def _connection_members(
-    world: World, borders: dict[str, Borders], heights: RoadHeights, drawn: Lanelet2Map
+    world: World, borders: dict[str, Borders], heights: _Heights, drawn: Lanelet2Map
 ) -> dict[str, list[RelationMember]]:
     found: dict[str, list[RelationMember]] = {}
     for connection in world.connections:
         if connection.id in borders:
             members = found[connection.id] = []
             for side, line in zip(SIDES, oriented(borders[connection.id]), strict=True):
-                nodes = drawn.road_nodes(line, heights.along(line, connection.layer))
+                nodes = drawn.road_nodes(line, heights(connection, line))
                 members.append(RelationMember("way", drawn.road_way(nodes, VIRTUAL), side))
     return found
 

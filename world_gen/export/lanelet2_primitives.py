@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
 from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.export.xml_tree import in_comment, legal
 
 Tags = Mapping[str, str]
@@ -35,7 +36,9 @@ class Lanelet2Map:
     lines over the same nodes one way, whichever way they run.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, hills: WorldHeights | None = None) -> None:
+        """Ground lies as high as `hills` say, else at 0; files tell heights above the sea then."""
+        self.hills = hills
         self._next_id = 1
         self._xyz: list[tuple[float, float, float]] = []
         self._node_ids: list[int] = []
@@ -59,9 +62,16 @@ class Lanelet2Map:
             self._node_tags[node] = tags
         return node
 
+    def ground_m(self, points: Array) -> Array:
+        """Return how high the ground lies at points (N, 2)."""
+        return np.zeros(len(points)) if self.hills is None else self.hills.surface_at(points)
+
     def ground_nodes(self, points: Array) -> tuple[int, ...]:
-        """Add nodes of their own at points (N, 2) on the World's plane."""
-        return tuple(self.node(x, y, 0.0) for x, y in points.tolist())
+        """Add nodes of their own at points (N, 2) on the ground."""
+        z_m = self.ground_m(points)
+        return tuple(
+            self.node(x, y, z) for (x, y), z in zip(points.tolist(), z_m.tolist(), strict=True)
+        )
 
     def road_nodes(self, line: Array, z_m: Array) -> tuple[int, ...]:
         """Return the nodes of a line (N, 2) at heights (N,), shared where coordinates are equal."""
@@ -122,6 +132,8 @@ class Lanelet2Map:
         if not self._xyz:
             return
         xyz = np.array(self._xyz, dtype=np.float64)
+        if self.hills is not None:
+            xyz[:, 2] += self.hills.elevation.base_m
         lat_lon = geo_from_local(frame, xyz[:, :2]).tolist()
         for node, (lat, lon), (x, y, z) in zip(self._node_ids, lat_lon, xyz.tolist(), strict=True):
             yield (

@@ -222,7 +222,7 @@ def _draw_light(signal: Signal, drawn: Lanelet2Map) -> tuple[int, int]:
     x, y, z = signal.position.tolist()
     facing = np.array([math.cos(signal.yaw_rad), math.sin(signal.yaw_rad)])
     left = left_of(-facing) * (LIGHT_WIDTH_M / 2)
-    low = z - LIGHT_HEIGHT_M / 2
+    low = z - LIGHT_HEIGHT_M / 2 + float(drawn.ground_m(signal.position[None, :2])[0])
     edge = [drawn.node(x + side * left[0], y + side * left[1], low) for side in (1.0, -1.0)]
     tags = {
         "type": "traffic_light",

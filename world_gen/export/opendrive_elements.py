@@ -46,7 +46,9 @@ def road_element(road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion)
     _add_links(made, road)
     _add_type(made, road, version)
     _add_plan_view(made, road.curve)
-    child(child(made, "elevationProfile"), "elevation", s=0, **road.height._asdict())
+    profile = child(made, "elevationProfile")
+    for s, height in road.height.pieces:
+        child(profile, "elevation", s=s, **height._asdict())
     _add_lanes(made, road, side=side, version=version)
     return made
 

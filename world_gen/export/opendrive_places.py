@@ -14,9 +14,9 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Connection, DrivingSide, Lane, Road, World
 from foretwin.geometry.polyline import unit
+from foretwin.world_gen.export.opendrive_cubics import Cubic, Rise
 from foretwin.world_gen.export.opendrive_curve import curve_between, fit_curve
 from foretwin.world_gen.export.opendrive_roads import (
-    Cubic,
     End,
     OdrLane,
     OdrRoad,
@@ -246,7 +246,7 @@ def _connecting_road(
         offset=Cubic.between(half * first, half * last, curve.length_m),
         lanes=[lane],
         road_class=a.road.road_class,
-        height=Cubic(a.height_m),
+        height=Rise.joining(a.height_m, a.grade_out, b.height_m, -b.grade_out, curve.length_m),
         predecessor=("road", a.road.id, a.at_end),
         successor=("road", b.road.id, b.at_end),
     )

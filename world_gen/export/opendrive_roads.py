@@ -11,36 +11,17 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide, Lane, Road, World
 from foretwin.geometry.polyline import left_of
+from foretwin.geometry.world_heights import heights_of
+from foretwin.world_gen.export.opendrive_cubics import Cubic, Rise
 from foretwin.world_gen.export.opendrive_curve import Curve, fit_curve
 from foretwin.world_gen.export.opendrive_sidewalks import Sidewalk
-from foretwin.world_gen.export.road_heights import heights_of, node_of
+from foretwin.world_gen.export.road_heights import layer_heights, node_of
 
 GAP_M = 0.01
 """Lanes farther apart than this have a strip without traffic between them."""
 
 
 Link = tuple[Literal["road", "junction"], int, bool]
-
-
-class Cubic(NamedTuple):
-    """a + b s + c s² + d s³, as widths and offsets are written."""
-
-    a: float
-    b: float = 0.0
-    c: float = 0.0
-    d: float = 0.0
-
-    @staticmethod
-    def between(start: float, end: float, length_m: float) -> Cubic:
-        """Return the change from `start` to `end` that is level at both ends."""
-        rise = end - start
-        if abs(rise) < 1e-9:
-            return Cubic(start)
-        return Cubic(start, 0.0, 3.0 * rise / length_m**2, -2.0 * rise / length_m**3)
-
-    def at(self, s_m: float) -> float:
-        """Return the value at arc length `s_m`."""
-        return self.a + s_m * (self.b + s_m * (self.c + s_m * self.d))
 
 
 class Pose(NamedTuple):
@@ -79,7 +60,7 @@ class OdrRoad:
     offset: Cubic
     lanes: list[OdrLane]
     road_class: str
-    height: Cubic
+    height: Rise
     junction: int = -1
     predecessor: Link | None = None
     """What it is linked to before its start, its id, and, for a road, whether at its end."""
@@ -104,6 +85,12 @@ class End(NamedTuple):
     def height_m(self) -> float:
         """Height of the road here."""
         return self.road.height.at(self.s_m)
+
+    @property
+    def grade_out(self) -> float:
+        """How the road climbs here towards its end."""
+        grade = self.road.height.slope_at(self.s_m)
+        return grade if self.at_end else -grade
 
     def link(self, kind: Literal["road", "junction"], number: int, *, at_end: bool = False) -> None:
         """Say what follows after this end: a junction, or a road from its start or its end."""
@@ -156,7 +143,7 @@ def roads_of(
     Roads without lanes are left out.
     """
     side = world.intersection.driving_side
-    heights = heights_of(world.roads)
+    heights, hills = layer_heights(world.roads), heights_of(world)
     found: list[OdrRoad] = []
     for road in world.roads:
         mine = [lanes[i] for i in road.lane_ids if i in lanes]
@@ -164,7 +151,12 @@ def roads_of(
             continue
         start, end = headings.get((road.id, False)), headings.get((road.id, True))
         curve = fit_curve(road.reference_line, start=start, end=end)
-        rise = heights[node_of(road, at_end=False)], heights[node_of(road, at_end=True)]
+        profile = None if hills is None else hills.road(road.id)
+        if hills is None:
+            rise = heights[node_of(road, at_end=False)], heights[node_of(road, at_end=True)]
+        elif profile is None:
+            # A track of trams alone lies on the ground.
+            rise = tuple(hills.surface_at(road.reference_line[[0, -1]]).tolist())
         strips, centre_m = _strips(mine, side)
         strips = _with_sidewalks(strips, centre_m, road, sidewalks.get(road.id, ()))
         found.append(
@@ -176,7 +168,9 @@ def roads_of(
                 offset=Cubic(centre_m),
                 lanes=strips,
                 road_class=road.road_class,
-                height=Cubic.between(*rise, curve.length_m),
+                height=Rise.between(*rise, curve.length_m)
+                if profile is None
+                else Rise.of(profile, curve.length_m),
                 road=road,
                 numbers={s.lane.id: s.number for s in strips if s.lane is not None},
             )

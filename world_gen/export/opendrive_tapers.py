@@ -6,8 +6,9 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 
 from foretwin.contracts.world import Connection, DrivingSide, Lane
+from foretwin.world_gen.export.opendrive_cubics import Cubic, Rise
 from foretwin.world_gen.export.opendrive_curve import curve_between
-from foretwin.world_gen.export.opendrive_roads import Cubic, End, OdrLane, OdrRoad, Pose, inward
+from foretwin.world_gen.export.opendrive_roads import End, OdrLane, OdrRoad, Pose, inward
 
 
 def taper(
@@ -60,7 +61,7 @@ def taper(
             for i, ((lane, l0, r0), (_, l1, r1)) in enumerate(zip(first, second, strict=True))
         ],
         road_class=a.road.road_class,
-        height=Cubic(a.height_m),
+        height=Rise.joining(a.height_m, a.grade_out, b.height_m, -b.grade_out, curve.length_m),
     )
     for (lane, _, _), (other, _, _), mine in zip(first, second, road.lanes, strict=True):
         mine.predecessor, mine.successor = a.road.numbers[lane.id], b.road.numbers[other.id]

@@ -61,7 +61,7 @@ def node_of(road: Road, *, at_end: bool) -> Node:
     return place if place is not None else (road.id, at_end)
 
 
-def heights_of(roads: Sequence[Road]) -> Mapping[Node, float]:
+def layer_heights(roads: Sequence[Road]) -> Mapping[Node, float]:
     """Return the heights in metres of all places and free ends.
 
     Roads of another layer than 0 lie level at their layer's height; from there roads come down,

@@ -11,13 +11,16 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from lxml import etree
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, World
+from foretwin.geometry.world_heights import WorldHeights, heights_of
 from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.choices import SIMULATORS, Simulator
+from foretwin.world_gen.export.sdformat_hills import add_hills
 from foretwin.world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
 from foretwin.world_gen.export.sdformat_shapes import StaticLink, extrusions, numbers, shaped
 from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
@@ -35,13 +38,9 @@ from foretwin.world_gen.export.xml_tree import (
 SDF_VERSION = "1.7"
 NAMESPACE = "urn:foretwin:sdformat"
 """Of our own elements, which SDFormat lets pass and keeps because they have a namespace."""
-MARKING_TOP_M, SIDEWALK_TOP_M = 0.02, 0.03
 BUILDING_TOLERANCE_M, AREA_TOLERANCE_M = 0.1, 0.02
 STEP_S = 0.002
 
-_SIDEWALK: Rgba = (0.62, 0.61, 0.58, 1.0)
-_PAINT: Rgba = (0.92, 0.92, 0.9, 1.0)
-_CROSSING: Rgba = (0.8, 0.8, 0.74, 1.0)
 _SIGNAL: Rgba = (0.1, 0.1, 0.1, 1.0)
 _LAMPS: tuple[tuple[str, Rgba], ...] = (
     ("red", (0.85, 0.1, 0.1, 1.0)),
@@ -66,12 +65,15 @@ def write_sdf(
 ) -> None:
     """Write a World, and vehicles in it, for Gazebo Classic with ROS 2 or for Gazebo.
 
+    Where the World has heights, ground, roads and what is painted on them lie beside the file as
+    meshes of their own, which it names.
     Coordinates are the World's; `<spherical_coordinates>` has its origin. Raises ValueError for
     an unknown simulator and for vehicles whose names are not their own.
     """
     if simulator not in SIMULATORS:
         raise ValueError(f"simulator {simulator!r}: one of {', '.join(SIMULATORS)}")
-    _check_names(vehicles)
+    hills = heights_of(world)
+    _check_names(vehicles, hilly=hills is not None)
     root = element("sdf", version=SDF_VERSION)
     place = world.intersection
     about = f" {world.attribution}; world {world.id}, {place.kind} {place.name} ({place.id}) "
@@ -81,20 +83,25 @@ def write_sdf(
     etree.SubElement(made, attribution, nsmap={"foretwin": NAMESPACE}).text = legal(
         world.attribution
     )
-    _surroundings(made, world, simulator)
-    _road(made, world)
-    _markings(made, world)
-    _signals(made, world)
-    _buildings(made, world)
-    _obstacles(made, world)
+    _surroundings(made, world, simulator, flat=hills is None)
+    if hills is None:
+        _road(made, world)
+        _markings(made, world)
+    else:
+        add_hills(made, world, hills, path)
+    _signals(made, world, hills)
+    _buildings(made, world, hills)
+    _obstacles(made, world, hills)
     for vehicle in vehicles:
         add_vehicle(made, vehicle, simulator)
     etree.indent(root, space=" ")
     path.write_bytes(document(root))
 
 
-def _check_names(vehicles: Sequence[SdfVehicle]) -> None:
+def _check_names(vehicles: Sequence[SdfVehicle], *, hilly: bool) -> None:
     taken = {"ground", "road", "markings", "signals", "buildings", "obstacles"}
+    if hilly:
+        taken |= {"sidewalks", "mounds", "islands", "crossings"}
     for vehicle in vehicles:
         if not vehicle.name.isidentifier() or vehicle.name.startswith("__"):
             raise ValueError(f"vehicle name {vehicle.name!r}: letters, digits and _ alone")
@@ -103,23 +110,27 @@ def _check_names(vehicles: Sequence[SdfVehicle]) -> None:
         taken.add(vehicle.name)
 
 
-def _surroundings(made: Element, world: World, simulator: Simulator) -> None:
+def _surroundings(made: Element, world: World, simulator: Simulator, *, flat: bool) -> None:
     rate = {"max_step_size": numbers(STEP_S), "real_time_factor": "1"}
     rate["real_time_update_rate"] = numbers(1 / STEP_S)
     leaves(child(made, "physics", type="ode"), rate)
     world_plugins(made, simulator)
     leaves(child(made, "scene"), _SCENE)
     origin = world.frame.origin
+    known = world.elevation
+    base_m = 0.0 if isinstance(known, msgspec.UnsetType) else known.base_m
     where = {
         "surface_model": "EARTH_WGS84",
         "world_frame_orientation": "ENU",
         "latitude_deg": numbers(origin.lat_deg, digits=9),
         "longitude_deg": numbers(origin.lon_deg, digits=9),
-        "elevation": numbers(origin.alt_m),
+        "elevation": numbers(origin.alt_m + base_m),
         "heading_deg": HEADING_DEG[simulator],
     }
     leaves(child(made, "spherical_coordinates"), where)
     leaves(child(made, "light", name="sun", type="directional"), _SUN)
+    if not flat:
+        return
     ground = child(made, "model", name="ground")
     child(ground, "static", "1")
     link = child(ground, "link", name="link")
@@ -133,7 +144,7 @@ def _road(made: Element, world: World) -> None:
     for area in world.road_surface:
         _area(link, area, solids.ROAD_TOP_M, solids.ROAD)
     for area in world.sidewalks:
-        _area(link, area, SIDEWALK_TOP_M, _SIDEWALK)
+        _area(link, area, solids.SIDEWALK_TOP_M, solids.SIDEWALK)
     for island in world.islands:
         solid = solids.stops_cars(island)
         _area(link, island, solids.island_height_m(solid=solid), solids.ISLAND, solid=solid)
@@ -151,26 +162,28 @@ def _markings(made: Element, world: World) -> None:
         if line.control.value != "none":
             yields = line.control.value == "give_way"
             wide = solids.YIELD_LINE_M if yields else solids.STOP_LINE_M
-            _stripe(link, line.id, line.ends, wide, _PAINT)
+            _stripe(link, line.id, line.ends, wide, solids.PAINT)
     for crossing in world.crossings:
-        _stripe(link, crossing.id, crossing.line, crossing.width_m.value, _CROSSING)
+        _stripe(link, crossing.id, crossing.line, crossing.width_m.value, solids.CROSSING)
 
 
 def _stripe(link: StaticLink, name: str, ends: Array, width_m: float, rgba: Rgba) -> None:
     along = ends[1] - ends[0]
     middle, long = ends.mean(axis=0), float(np.hypot(*along))
-    if long < 0.05:
+    if long < solids.SHORTEST_STRIPE_M:
         return
-    at = (*middle, MARKING_TOP_M / 2, math.atan2(along[1], along[0]))
-    link.box(name, at, (long, width_m, MARKING_TOP_M), rgba)
+    at = (*middle, solids.MARKING_TOP_M / 2, math.atan2(along[1], along[0]))
+    link.box(name, at, (long, width_m, solids.MARKING_TOP_M), rgba)
 
 
-def _signals(made: Element, world: World) -> None:
+def _signals(made: Element, world: World, hills: WorldHeights | None) -> None:
     link = StaticLink(made, "signals")
     for signal in world.signals:
         x, y, z = (float(v) for v in signal.position)
+        foot = 0.0 if hills is None else float(hills.surface_at(signal.position[None, :2])[0])
         yaw = signal.yaw_rad
-        link.cylinder(f"{signal.id}.pole", (x, y, z / 2), 0.06, z, _SIGNAL)
+        link.cylinder(f"{signal.id}.pole", (x, y, foot + z / 2), 0.06, z, _SIGNAL)
+        z += foot
         link.box(f"{signal.id}.head", (x, y, z, yaw), (0.2, 0.35, 0.95), _SIGNAL)
         front = x + 0.11 * math.cos(yaw), y + 0.11 * math.sin(yaw)
         for number, (lamp, rgba) in enumerate(_LAMPS):
@@ -178,18 +191,23 @@ def _signals(made: Element, world: World) -> None:
             link.box(f"{signal.id}.{lamp}", at, (0.03, 0.2, 0.2), rgba)
 
 
-def _buildings(made: Element, world: World) -> None:
+def _buildings(made: Element, world: World, hills: WorldHeights | None) -> None:
     link = StaticLink(made, "buildings")
     for building in world.buildings:
         low, high = building.min_height_m, building.height_m.value
         if high - low < solids.THINNEST_M:
             continue
+        if hills is not None:
+            # A house on a slope stands on its lowest corner, and is as high over its highest.
+            ground = hills.surface_at(building.outline)
+            top = float(ground.max())
+            low, high = low + (top if low else float(ground.min())), high + top
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
             link.prism(f"{building.id}.{number}", ring, (low, high), solids.BUILDING, solid=True)
 
 
-def _obstacles(made: Element, world: World) -> None:
+def _obstacles(made: Element, world: World, hills: WorldHeights | None) -> None:
     if not world.obstacles:
         return
     link = StaticLink(made, "obstacles")
@@ -197,4 +215,8 @@ def _obstacles(made: Element, world: World) -> None:
         rings = extrusions(one.outline, one.holes, tolerance_m=solids.THINNEST_M)
         for number, ring in enumerate(rings):
             name = f"{one.kind}.{one.id}.{number}"
-            link.prism(name, ring, (0.0, one.height_m.value), solids.OBSTACLE, solid=True)
+            low, high = 0.0, one.height_m.value
+            if hills is not None:
+                ground = hills.surface_at(ring)
+                low, high = float(ground.min()), high + float(ground.max())
+            link.prism(name, ring, (low, high), solids.OBSTACLE, solid=True)

@@ -16,6 +16,7 @@ import numpy as np
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import direction_at, length, points_at
+from foretwin.geometry.world_heights import heights_of
 from foretwin.world_gen.export.choices import Simulator, VehicleKind
 from foretwin.world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
 from foretwin.world_gen.export.sdformat_shapes import numbers, pose, shaped
@@ -40,6 +41,9 @@ _COLOURS: dict[str, Rgba] = {
 _TYRE: Rgba = (0.08, 0.08, 0.08, 1.0)
 
 
+_DROP_M = 0.05
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SdfVehicle:
     """One vehicle of a world: its kind, and where base_link (the rear axle's centre) begins."""
@@ -50,6 +54,7 @@ class SdfVehicle:
     x_m: float = 0.0
     y_m: float = 0.0
     yaw_rad: float = 0.0
+    z_m: float = 0.0
 
 
 def place_vehicles(
@@ -71,7 +76,7 @@ def place_vehicles(
         for line in lanes
         if behind + row * _GAP_M + ahead <= length(line)
     ]
-    vehicles = []
+    vehicles, hills = [], heights_of(world)
     for number, (name, kind) in enumerate(named):
         x, y, yaw = number * _GAP_M, 0.0, 0.0
         if number < len(room):
@@ -79,14 +84,22 @@ def place_vehicles(
             (x, y), heading = points_at(line, s), direction_at(line, s)
             yaw = math.atan2(heading[1], heading[0])
         at = {"x_m": float(x), "y_m": float(y), "yaw_rad": yaw}
+        if hills is not None:
+            # Level above a slope: it falls as far as its front axle is higher than its rear one.
+            places = np.array([[x, y], np.add((x, y), ahead * np.array(_heading(yaw)))])
+            at["z_m"] = float(hills.surface_at(places).max()) + _DROP_M
         vehicles.append(SdfVehicle(name=name, kind=kind, parameters=parameters, **at))
     return tuple(vehicles)
+
+
+def _heading(yaw_rad: float) -> tuple[float, float]:
+    return math.cos(yaw_rad), math.sin(yaw_rad)
 
 
 def add_vehicle(parent: Element, vehicle: SdfVehicle, simulator: Simulator) -> None:
     """Add a vehicle to a world; its model's frame is base_link."""
     model = child(parent, "model", name=vehicle.name)
-    pose(model, vehicle.x_m, vehicle.y_m, 0.0, vehicle.yaw_rad)
+    pose(model, vehicle.x_m, vehicle.y_m, vehicle.z_m, vehicle.yaw_rad)
     if vehicle.kind == "twin":
         _add_twin(model, vehicle, simulator)
     else:

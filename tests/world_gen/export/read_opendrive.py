@@ -93,7 +93,14 @@ class FileRoad:
         return self.beside(s, inner), self.beside(s, outer)
 
     def height_m(self, s: float) -> float:
-        return _poly(self.element.find("elevationProfile/elevation"), s)
+        pieces = self.element.findall("elevationProfile/elevation")
+        piece = max((p for p in pieces if float(p.get("s")) <= s), key=lambda p: float(p.get("s")))
+        return _poly(piece, s - float(piece.get("s")))
+
+    def grade(self, s: float) -> float:
+        step = 0.01
+        low, high = max(s - step, 0.0), min(s + step, self.length_m)
+        return (self.height_m(high) - self.height_m(low)) / (high - low)
 
     def placed(self, item: etree._Element) -> list[Array]:
         """Return the outlines of an `<object>`, each (N, 2)."""

@@ -1,0 +1,75 @@
+"""Ground and roads of a World with heights as triangles, for simulators that drive on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import World
+from foretwin.geometry.world_heights import WorldHeights
+from foretwin.world_gen.export.xml_tree import in_comment
+
+EDGE_M = 5.0
+"""Outlines are cut into pieces no longer: roads bend over hills."""
+BELOW_ROAD_M = 0.3
+"""The raster of the ground lies so far below the roads on it, so that it nowhere looks through."""
+
+
+class Terrain(NamedTuple):
+    """Points (N, 3) in the World's frame and triangles (M, 3), seen from above."""
+
+    points: Array
+    triangles: Array
+
+
+def ground_mesh(world: World, hills: WorldHeights) -> Terrain:
+    """Return the open ground, which makes room for what lies on it."""
+    elevation = hills.elevation
+    rows, columns = elevation.ground_m.shape
+    west, south = elevation.ground_from_m
+    step = elevation.ground_step_m
+    x, y = np.meshgrid(west + step * np.arange(columns), south + step * np.arange(rows))
+    points = np.column_stack([x.ravel(), y.ravel(), elevation.ground_m.ravel()])
+    paved = shapely.union_all([_polygon(a.outline, a.holes) for a in world.road_surface])
+    near = shapely.dwithin(paved, shapely.points(points[:, :2]), 1.5 * step)
+    points[near, 2] -= BELOW_ROAD_M
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    lower = np.column_stack([corner, corner + 1, corner + columns + 1])
+    upper = np.column_stack([corner, corner + columns + 1, corner + columns])
+    return Terrain(points, np.concatenate([lower, upper]))
+
+
+def draped(
+    outlines: Iterable[tuple[Array, tuple[Array, ...]]], hills: WorldHeights, *, above_m: float
+) -> Terrain:
+    """Return areas (outline and holes) as they lie on the ground, lifted by `above_m`."""
+    areas = [_polygon(*outline) for outline in outlines]
+    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(areas)) if areas else []
+    corners = [shapely.get_coordinates(part)[:3] for part in parts]
+    if not corners:
+        return Terrain(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
+    flat = np.concatenate(corners)
+    xy, which = np.unique(np.round(flat, 4), axis=0, return_inverse=True)
+    triangles = which.reshape(-1, 3)
+    a, b, c = (xy[triangles[:, k]] for k in range(3))
+    across = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    triangles = np.where((across < 0.0)[:, None], triangles[:, ::-1], triangles)[across != 0.0]
+    return Terrain(np.column_stack([xy, hills.surface_at(xy) + above_m]), triangles)
+
+
+def _polygon(outline: Array, holes: tuple[Array, ...] = ()) -> shapely.Geometry:
+    shape = shapely.Polygon(outline, list(holes))
+    return shapely.segmentize(shape if shape.is_valid else shapely.make_valid(shape), EDGE_M)
+
+
+def write_obj(mesh: Terrain, path: Path, attribution: str) -> None:
+    """Write triangles as Wavefront OBJ, which Gazebo and most programs read; z is up."""
+    lines = [f"# {in_comment(attribution)}"]
+    lines += [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in mesh.points.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.triangles + 1).tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
