@@ -13,6 +13,7 @@ from foretwin.contracts.world import ATTRIBUTION, ROUNDABOUT_KINDS, World
 from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.opendrive_elements import road_element
 from foretwin.world_gen.export.opendrive_objects import add_objects
+from foretwin.world_gen.export.opendrive_one_ways import parted_by_direction
 from foretwin.world_gen.export.opendrive_places import OdrJunction, OdrNetwork, network_of
 from foretwin.world_gen.export.opendrive_signals import Controller, add_signals
 from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment
@@ -37,14 +38,16 @@ def write_opendrive(world: World, path: Path, *, version: OpenDriveVersion = "1.
 
 def opendrive_element(world: World, *, version: OpenDriveVersion = "1.8") -> Element:
     """Return the `<OpenDRIVE>` element that `write_opendrive` writes."""
-    network = network_of(world)
+    one_ways = version == "1.4" and world.intersection.driving_side == "left"
+    world = parted_by_direction(world) if one_ways else world
+    network = network_of(world, rule="right" if version == "1.4" else None)
     if not network.roads:
         raise ValueError(f"world {world.id}: no road with lanes to write as OpenDRIVE")
     root = element("OpenDRIVE")
     root.append(etree.Comment(f" Made by foretwin from map data: {in_comment(world.attribution)} "))
     root.append(_header(world, version))
     elements = {
-        road.id: road_element(road, side=network.side, version=version) for road in network.roads
+        road.id: road_element(road, side=network.rule, version=version) for road in network.roads
     }
     add_objects(world, network, elements, version)
     controllers = add_signals(world, network, elements, version)

@@ -31,10 +31,8 @@ LINE_M = 0.12
 
 def road_element(road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion) -> Element:
     """Return a `<road>` without objects and signals."""
-    rule: str | None = "RHT" if side == "right" else "LHT"
-    if version == "1.4" and side == "right":
-        # 1.4 does not define it, but its readers that support left-hand traffic read it there too.
-        rule = None
+    # 1.4 knows right-hand traffic alone, and has no word for it.
+    rule = None if version == "1.4" else "RHT" if side == "right" else "LHT"
     made = element(
         "road",
         name=road.name,

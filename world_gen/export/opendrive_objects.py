@@ -59,7 +59,9 @@ class _Thing(NamedTuple):
     @property
     def middle(self) -> Array:
         """The mean (2,) of its corners."""
-        middle: Array = self.outlines[0].mean(axis=0)
+        corners = self.outlines[0]
+        closed = len(corners) > 1 and np.array_equal(corners[0], corners[-1])
+        middle: Array = corners[: len(corners) - closed].mean(axis=0)
         return middle
 
 
@@ -106,7 +108,9 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
     for crossing in world.crossings:
         kind = _CROSSWALKS.get(crossing.kind.value, "pedestrian")
         left, right = crosswalk_edges(crossing)
-        yield _Thing("crosswalk", kind, crossing.id, (np.concatenate([right, left[::-1]]),))
+        # CARLA tells one crosswalk from the next by the first corner, which comes again.
+        ring = np.concatenate([right, left[::-1], right[:1]])
+        yield _Thing("crosswalk", kind, crossing.id, (ring,))
     for line in world.stop_lines:
         road = network.road_across(line.across_id)
         if line.control.value != "none" and road is not None:
@@ -176,7 +180,9 @@ def _add_outlines(made: Element, thing: _Thing, origin: Array, version: OpenDriv
     if version == "1.4":
         _add_corners(child(made, "outline"), thing, thing.outlines[0] - origin, None)
         return
-    group, corners = child(made, "outlines"), count()
+    corners = count()
+    # CARLA reads crosswalks from an outline of the object itself alone, as 1.8 allows for one.
+    group = made if thing.type == "crosswalk" else child(made, "outlines")
     for i, points in enumerate(thing.outlines):
         kind = {"closed": "true", "outer": "false" if i else "true"}
         outline = child(group, "outline", **kind, id=i, laneType=thing.lane_type)

@@ -56,7 +56,8 @@ class OdrJunction(NamedTuple):
 class OdrNetwork(NamedTuple):
     """All roads and junctions of a file; `road_of` names the road of each of the World's lanes."""
 
-    side: DrivingSide
+    rule: DrivingSide
+    """The side that lanes to the right of lane 0 are driven along on, as the file says it."""
     roads: tuple[OdrRoad, ...]
     junctions: tuple[OdrJunction, ...]
     road_of: Mapping[str, OdrRoad]
@@ -81,18 +82,19 @@ class _RoadJoint:
     connections: list[Connection] = field(default_factory=list)
 
 
-def network_of(world: World) -> OdrNetwork:
+def network_of(world: World, *, rule: DrivingSide | None = None) -> OdrNetwork:
     """Return the World's roads, joined at every place as the kind of place demands.
 
     Where two roads merely go on they are linked; where their lanes go on one by one, but bend or
-    move aside, a short road bridges the gap; everywhere else is a junction.
+    move aside, a short road bridges the gap; everywhere else is a junction. Lanes are numbered by
+    `rule`, without it by the side on which the World drives.
     """
-    side = world.intersection.driving_side
+    side = rule or world.intersection.driving_side
     lanes = {lane.id: lane for lane in world.lanes}
     places = _places(world, lanes)
     joined = [place for place in places.values() if _goes_on(place, lanes)]
     sidewalks = sidewalks_of(world)
-    roads = roads_of(world, lanes, _headings(joined), sidewalks.beside)
+    roads = roads_of(world, lanes, _headings(joined), sidewalks.beside, side)
     by_source = {road.source: road for road in roads}
     road_of = {lane: road for road in roads for lane in road.numbers}
     for place in joined:
@@ -125,7 +127,7 @@ def network_of(world: World) -> OdrNetwork:
         junctions.append(OdrJunction(number, key, name, tuple(made)))
         roads.extend(item.road for item in made)
     return OdrNetwork(
-        side=side,
+        rule=side,
         roads=tuple(roads),
         junctions=tuple(junctions),
         road_of=road_of,

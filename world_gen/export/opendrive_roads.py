@@ -134,15 +134,15 @@ def roads_of(
     lanes: Mapping[str, Lane],
     headings: Mapping[tuple[str, bool], Array],
     sidewalks: Mapping[str, Sequence[Sidewalk]],
+    side: DrivingSide,
 ) -> list[OdrRoad]:
     """Return the World's roads, numbered from 1.
 
     `headings` holds the unit direction (2,) along the reference line that a road must have at
     its start or, True, its end, where it is joined to another; elsewhere its own line decides.
-    `sidewalks` are by road.
+    `sidewalks` are by road, `side` is the rule by which lanes are numbered.
     Roads without lanes are left out.
     """
-    side = world.intersection.driving_side
     heights, hills = layer_heights(world.roads), heights_of(world)
     found: list[OdrRoad] = []
     for road in world.roads:

@@ -12,7 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.signals import Signal
-from foretwin.contracts.world import Lane, StopLine, World
+from foretwin.contracts.world import DrivingSide, Lane, StopLine, World
 from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.opendrive_places import OdrNetwork
 from foretwin.world_gen.export.opendrive_roads import OdrRoad
@@ -98,6 +98,7 @@ def _signs(world: World, network: OdrNetwork, lanes: Mapping[str, Lane]) -> Iter
     """Yield the signs at stop lines, one for those of one road and direction."""
     together: dict[tuple[int, bool, str], list[StopLine]] = defaultdict(list)
     inside = []
+    side = world.intersection.driving_side
     for line in world.stop_lines:
         if line.control.value not in _SIGNS:
             continue
@@ -107,11 +108,11 @@ def _signs(world: World, network: OdrNetwork, lanes: Mapping[str, Lane]) -> Iter
         elif line.across_id in network.connecting:
             inside.append(line)
     for lines in together.values():
-        yield _sign(lines, network, _ruled(network, lanes, [line.lane_id for line in lines]))
+        yield _sign(lines, side, _ruled(network, lanes, [line.lane_id for line in lines]))
     for line in inside:
         # A connecting road runs as it is driven, and has one lane.
         road = network.connecting[line.across_id]
-        yield _sign([line], network, (road, True, [road.lanes[0].number]))
+        yield _sign([line], side, (road, True, [road.lanes[0].number]))
 
 
 def _ruled(network: OdrNetwork, lanes: Mapping[str, Lane], lane_ids: Sequence[str]) -> _Ruled:
@@ -119,11 +120,11 @@ def _ruled(network: OdrNetwork, lanes: Mapping[str, Lane], lane_ids: Sequence[st
     return road, not lanes[lane_ids[0]].reverse, [road.numbers[i] for i in lane_ids]
 
 
-def _sign(lines: Sequence[StopLine], network: OdrNetwork, ruled: _Ruled) -> _Post:
+def _sign(lines: Sequence[StopLine], side: DrivingSide, ruled: _Ruled) -> _Post:
     kind, meaning = _SIGNS[lines[0].control.value]
     # Germany's signs stand for the Vienna convention's, which left-hand countries may not share.
-    country = "DE" if network.side == "right" else "OpenDRIVE"
-    place, yaw_rad = _beside(lines, kerb=1 if network.side == "right" else 0)
+    country = "DE" if side == "right" else "OpenDRIVE"
+    place, yaw_rad = _beside(lines, kerb=1 if side == "right" else 0)
     return _Post(*ruled, lines[0].id, kind, country, meaning, "no", SIGN_M, place, yaw_rad)
 
 

@@ -24,7 +24,7 @@ def judges_python() -> Path:
     return python
 
 
-def ask_judge(script: str, tasks: list[dict[str, Any]], *, timeout_s: float = 600.0) -> Any:
+def ask_judge(script: str, tasks: list[Any], *, timeout_s: float = 600.0) -> Any:
     """Run a script of this folder in the judges' interpreter; return what it says of the tasks."""
     path = Path(__file__).with_name(script)
     run = subprocess.run(
