@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import msgspec
@@ -33,17 +34,23 @@ def with_ring_exits(
 
     Cars drive out in all phases but the longest, in which those on foot cross.
     """
+    rings: dict[str, list[Cluster]] = defaultdict(list)
+    for cluster in around.clusters:
+        if cluster.ring and cluster.junction is not None and cluster.junction.summary.id in plans:
+            rings[cluster.junction.summary.id].append(cluster)
+    if not rings or not lone.plans:
+        return RingPlans(plans, lone)
     alone = {plan.groups[0].id: plan for plan in lone.plans}
+    plain_from = {leg.start_node: c for c in around.clusters if c.plain for leg in c.legs}
     renamed: dict[str, str] = {}
     joined = dict(plans)
-    for junction in around.junctions:
-        name = junction.summary.id
+    for name, of_ring in rings.items():
         exits = [
             alone[drive]
-            for node in dict.fromkeys(_lights_out(name, around))
+            for node in dict.fromkeys(_lights_out(of_ring, plain_from))
             if (drive := group_names(node)[0]) in alone
         ]
-        if name in plans and exits:
+        if exits:
             joined[name], names = _joined(name, plans[name], exits)
             renamed |= names
     kept = tuple(plan for plan in lone.plans if plan.groups[0].id not in renamed)
@@ -76,13 +83,9 @@ def _joined(
     return msgspec.structs.replace(plan, groups=(*plan.groups, *groups), phases=phases), names
 
 
-def _lights_out(junction_id: str, around: Surroundings) -> Iterator[int]:
+def _lights_out(ring: Iterable[Cluster], plain_from: Mapping[int, Cluster]) -> Iterator[int]:
     """Yield the nodes of the roads that lead out of a ring, as far as its lights may stand."""
-    plain_from = {leg.start_node: c for c in around.clusters if c.plain for leg in c.legs}
-    for cluster in around.clusters:
-        junction = cluster.junction
-        if junction is None or junction.summary.id != junction_id or not cluster.ring:
-            continue
+    for cluster in ring:
         for leg in cluster.legs:
             if leg.allowed and not is_ring_edge(leg.edge):
                 yield from _nodes_along(leg, plain_from)
