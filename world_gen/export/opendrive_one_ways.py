@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.world import Area, Connection, Lane, Road, World
 
 SECOND = "~"
@@ -36,6 +37,7 @@ def parted_by_direction(world: World) -> World:
             _placed(part, road, lanes, places) for road in world.roads for part in parts[road.id]
         ),
         connections=tuple(_joined(c, of_lane, places) for c in world.connections),
+        elevation=_both_high(world, parts),
         sidewalks=tuple(_renamed(area, parts) for area in world.sidewalks),
     )
 
@@ -118,6 +120,20 @@ def _joined(
         return connection
     place = _toward(connection.place_id, of_lane[connection.to_lane_id].id)
     return msgspec.structs.replace(connection, place_id=place)
+
+
+def _both_high(world: World, parts: dict[str, tuple[Road, ...]]) -> Elevation | msgspec.UnsetType:
+    """Return the heights, those of a road for both of its parts."""
+    elevation = world.elevation
+    if elevation is msgspec.UNSET:
+        return elevation
+    known = elevation.roads
+    more = [
+        msgspec.structs.replace(profile, id=profile.id + SECOND)
+        for profile in known
+        if len(parts.get(profile.id, ())) > 1
+    ]
+    return msgspec.structs.replace(elevation, roads=(*known, *more))
 
 
 def _renamed(area: Area, parts: dict[str, tuple[Road, ...]]) -> Area:

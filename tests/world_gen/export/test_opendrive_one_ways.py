@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
+from foretwin.contracts.elevation import Elevation, HeightProfile
 from foretwin.contracts.world import World
 from foretwin.world_gen.export.opendrive_one_ways import SECOND, parted_by_direction
 from tests.world_gen.drawn_maps import IRELAND, STREET, crossing, roundabout, world_of
@@ -80,6 +82,33 @@ def test_where_a_street_goes_on_each_direction_does(tmp_path: Path) -> None:
     assert len(old.root.findall("junction")) == len(new.root.findall("junction"))
     kinds = Counter(e.get("type") for road in old.roads.values() for e in road.lanes.values())
     assert kinds["sidewalk"] == len(world.sidewalks) > 0
+
+
+def test_both_directions_climb_as_the_road_does(tmp_path: Path) -> None:
+    flat = WORLDS["crossing"]()
+    profiles = [
+        HeightProfile(
+            id=part.id,
+            along_m=np.array([0.0, 93.5]),
+            height_m=np.array([0.0, 4.0]),
+            grade=np.full(2, 4.0 / 93.5),
+        )
+        for part in (*flat.roads, *flat.connections)
+    ]
+    elevation = Elevation(
+        source="drawn",
+        base_m=0.0,
+        grade_std=0.0,
+        roads=tuple(profiles[: len(flat.roads)]),
+        connections=tuple(profiles[len(flat.roads) :]),
+        ground_from_m=(-200.0, -200.0),
+        ground_step_m=400.0,
+        ground_m=np.zeros((2, 2)),
+    )
+    file = written(msgspec.structs.replace(flat, elevation=elevation), tmp_path, "1.4")
+    roads = [road for road in file.roads.values() if road.junction == "-1"]
+    assert len(roads) == 2 * len(flat.roads)
+    assert [round(road.height_m(road.length_m), 2) for road in roads] == [4.0] * len(roads)
 
 
 def test_a_road_of_one_direction_stays_as_it_is() -> None:
