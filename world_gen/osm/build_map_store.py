@@ -16,11 +16,14 @@ from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import (
     NO_WAYS,
     WayNote,
+    on_earth,
+    sound_ways,
+)
+from foretwin.world_gen.osm.map_bounds import (
+    believed_bounds,
     bounds_of,
     centre_of,
-    on_earth,
     reach_deg,
-    sound_ways,
 )
 from foretwin.world_gen.osm.map_cells import Boxes, WayTable, pack_nodes, place
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
@@ -66,14 +69,15 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
         _place_relations(table, part / "relations.opl", batches, nodes.notes)
         box = batches.road_box(map_file)
         centre = centre_of(box)
+        bounds, words = believed_bounds(stream.header.bounds, box)
         meta = MapMeta(
             sha256=stream.sha256,
             attribution=stream.header.attribution,
-            bounds=stream.header.bounds or box,
+            bounds=bounds,
             origin=(centre.lat_deg, centre.lon_deg) if reach_deg(box) <= WIDEST_FRAME_DEG else None,
             ways=batches.count,
             nodes=nodes.count,
-            notes=tuple(dict.fromkeys(nodes.notes))[:MOST_NOTES],
+            notes=tuple(dict.fromkeys((*words, *nodes.notes)))[:MOST_NOTES],
         )
         table.finish(meta)
     return meta.sha256

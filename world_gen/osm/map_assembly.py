@@ -10,15 +10,13 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.frames import LocalFrame
+from foretwin.world_gen.osm.map_bounds import believed_bounds, bounds_of, centre_of
 from foretwin.world_gen.osm.map_file import MapHeader
 from foretwin.world_gen.osm.opl import NO_POSITION, UNITS_PER_DEG, NodePositions, WayNodes
 from foretwin.world_gen.osm.osm_map import (
     BoolArray,
     IntArray,
-    LatLonBounds,
-    MapError,
     NodeLocations,
     NoRoadsError,
     OsmMap,
@@ -29,8 +27,6 @@ from foretwin.world_gen.osm.osm_map import (
 
 LONGEST_WAY_DEG = 2.0
 """A way that reaches farther has a node in the wrong place: no street spans 200 km."""
-WIDEST_MAP_DEG = 60.0
-"""One plane of metres serves no more of the Earth than this."""
 MOST_VISITS = 16
 """A road that passes one of its nodes more often than this is a mistake."""
 MOST_NAMED = 3
@@ -100,7 +96,8 @@ def assemble_map(
     bounds = header.bounds
     if frame is None or bounds is None:
         box = bounds_of(file, locations.of(road_nodes))
-        bounds = bounds or box
+        bounds, words = believed_bounds(header.bounds, box)
+        notes.extend(words)
         frame = frame or LocalFrame(centre_of(box))
     return OsmMap(
         file=file,
@@ -254,37 +251,3 @@ def _turns_on_itself(nodes: Sequence[int]) -> str:
         return ""
     node, visits = Counter(nodes).most_common(1)[0]
     return f"passes node {node} {visits} times" if visits > MOST_VISITS else ""
-
-
-def bounds_of(file: str, lat_lon_deg: Array, *, widest_deg: float = WIDEST_MAP_DEG) -> LatLonBounds:
-    """Return the box around positions (N, 2); across the antimeridian where that is narrower.
-
-    Raises `MapError` where it is too wide for one plane.
-    """
-    lat, lon = lat_lon_deg[:, 0], lat_lon_deg[:, 1]
-    west, east = float(lon.min()), float(lon.max())
-    if east - west > 180.0:
-        beyond = np.where(lon < 0.0, lon + 360.0, lon)
-        if np.ptp(beyond) < east - west:
-            west, east = float(beyond.min()), float(beyond.max()) - 360.0
-    box = LatLonBounds(float(lat.min()), west, float(lat.max()), east)
-    if reach_deg(box) > widest_deg:
-        width_deg = (east - west) % 360.0
-        raise MapError(
-            f"{file}: its roads reach over {width_deg:.0f} by {box.north - box.south:.0f} degrees; "
-            f"cut out a region of less than {widest_deg:.0f}"
-        )
-    return box
-
-
-def reach_deg(box: LatLonBounds) -> float:
-    """Return the longer side of a box; near a pole its width in degrees means nothing."""
-    near_pole = max(abs(box.south), abs(box.north)) > 89.0
-    return max(0.0 if near_pole else (box.east - box.west) % 360.0, box.north - box.south)
-
-
-def centre_of(box: LatLonBounds) -> GeoPoint:
-    """Return the middle of a box, its longitude within ±180 degrees."""
-    width_deg = (box.east - box.west) % 360.0 if box.west > box.east else box.east - box.west
-    middle = box.west + width_deg / 2.0 if box.west > box.east else (box.west + box.east) / 2.0
-    return GeoPoint((box.south + box.north) / 2.0, middle - 360.0 if middle > 180.0 else middle)

@@ -97,13 +97,13 @@ def test_a_name_that_hides_the_packing_does_no_harm(street: Sketch, tmp_path: Pa
 
 
 def test_bounds_are_the_declared_ones_else_those_of_the_roads(tmp_path: Path) -> None:
-    declared = Sketch(bounds='<bounds minlat="53" minlon="8" maxlat="54" maxlon="9"/>')
+    declared = Sketch(bounds='<bounds minlat="53.48" minlon="8.08" maxlat="53.52" maxlon="8.12"/>')
     free = Sketch()
     for sketch in (declared, free):
         sketch.node(1, 0.0, 0.0)
         sketch.node(2, 100.0, 100.0)
         sketch.road(10, [1, 2])
-    assert tuple(declared.read(tmp_path).bounds) == (53.0, 8.0, 54.0, 9.0)
+    assert tuple(declared.read(tmp_path).bounds) == (53.48, 8.08, 53.52, 8.12)
     bounds = free.read(tmp_path).bounds
     assert bounds.south == pytest.approx(53.5, abs=1e-6)
     assert 100.0 / 111_500 < bounds.north - bounds.south < 100.0 / 111_000
