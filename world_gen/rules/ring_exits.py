@@ -48,7 +48,7 @@ def with_ring_exits(
         exits = [
             alone[drive]
             for node in dict.fromkeys(_lights_out(of_ring, plain_from))
-            if (drive := group_names(node)[0]) in alone
+            if (drive := group_names(node)[0]) in alone and drive not in renamed
         ]
         if exits:
             joined[name], names = _joined(name, plans[name], exits)

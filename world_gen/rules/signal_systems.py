@@ -46,13 +46,18 @@ def signal_systems(
                 for other, before in let_go.get(road.key, ()):
                     if other != name:
                         follow.add((before.id, group.id))
-                        joined = {leader[name], leader[other]}
-                        first = min(joined)
-                        leader = {k: first if v in joined else v for k, v in leader.items()}
+                        first, second = sorted((_first_of(name, leader), _first_of(other, leader)))
+                        leader[second] = first
     members: dict[str, list[str]] = {}
     for name in sorted(groups):
-        members.setdefault(leader[name], []).append(name)
+        members.setdefault(_first_of(name, leader), []).append(name)
     return SignalSystems(tuple(members.values()), frozenset(follow))
+
+
+def _first_of(name: str, leader: Mapping[str, str]) -> str:
+    while leader[name] != name:
+        name = leader[name]
+    return name
 
 
 def _back_along(toward: DirectedEdge, cluster_at: Mapping[int, Cluster]) -> Iterator[DirectedEdge]:
