@@ -7,7 +7,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.bends import rounded_through
-from foretwin.geometry.polyline import cross, offset, without_repeats
+from foretwin.geometry.polyline import cross, offset, turn_rad, without_repeats
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
@@ -19,6 +19,8 @@ _LONG_PATH_M = 25.0
 _MAX_DETOUR_M = 9.0
 _GUIDED_RADIUS_M = 12.0
 _GRID_SHARE = 0.95
+_LONGEST_CHORD_M, _SHARPEST_LANE_PM = 8.0, 0.12
+"""Lanes with longer pieces at an end are straight there; what bends more is a kink of the map."""
 
 
 def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
@@ -33,7 +35,9 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     ends = np.array([c.end.centerline[0] for c in connections])
     headings = _units(begins - np.array([c.start.centerline[-2] for c in connections]))
     end_headings = _units(np.array([c.end.centerline[1] for c in connections]) - ends)
-    turns = turn_curves(begins, headings, ends, end_headings)
+    bends = _bends([c.start.centerline[-3:] for c in connections])
+    end_bends = _bends([c.end.centerline[:3] for c in connections])
+    turns = turn_curves(begins, headings, ends, end_headings, bend_pm=bends, end_bend_pm=end_bends)
     for c, path in zip(connections, turns.lines.split(), strict=True):
         c.centerline = path
     fits = turns.radius_m > 0.0
@@ -62,6 +66,23 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
                 f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
                 f"into way {c.end.edge.way_id} ({c.turn})"
             )
+
+
+def _bends(lines: list[Array]) -> Array:
+    """Return the curvatures of lanes by the three points (3, 2) at an end of each, (L,).
+
+    They are 0 where a lane has two points, and where it ends so far from its bend that it ends
+    straight.
+    """
+    known = [i for i, line in enumerate(lines) if len(line) == 3]
+    found = np.zeros(len(lines))
+    if known:
+        steps = np.diff(np.array([lines[i] for i in known]), axis=1)
+        length = np.hypot(steps[..., 0], steps[..., 1])
+        bend = turn_rad(steps[:, 0], steps[:, 1]) / np.maximum(length.mean(axis=1), 1e-3)
+        curved = (length.max(axis=1) < _LONGEST_CHORD_M) & (np.abs(np.abs(bend) - 0.07) < 0.05)
+        found[known] = np.where(curved, bend, 0.0)
+    return found
 
 
 def _leave_out(connections: list[ConnectionDraft], notes: list[str]) -> None:

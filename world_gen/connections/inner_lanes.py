@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import length, offset, points_at, turn_rad, without_repeats
+from foretwin.geometry.polyline import length, offset, points_at, without_repeats
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
@@ -18,8 +18,8 @@ from foretwin.world_gen.lanes.lane_plans import LanePlan
 _LONG_EDGE_M = 18.0
 """Roads inside a junction that are shorter are crossed in one sweep."""
 _TURN_ROOM_M = 10.0
-_MOST_TURN_RAD = math.radians(170.0)
-"""A piece between two lanes that turns farther goes round in a loop: no car drives it."""
+_MOST_LEFT_RAD = math.radians(30.0)
+"""A piece that leaves the angle between two lanes farther has no room there: no car drives it."""
 
 
 class _Pose(NamedTuple):
@@ -64,9 +64,10 @@ def paths_along_inner_lanes(
     )
     pieces: dict[int, list[Array]] = {}
     refused: set[int] = set()
-    for i, piece, radius_m in zip(owner, turns.lines.split(), turns.radius_m.tolist(), strict=True):
+    no_room = (turns.radius_m < LEAST_RADIUS_M) | (turns.left_rad > _MOST_LEFT_RAD)
+    for i, piece, refuse in zip(owner, turns.lines.split(), no_room.tolist(), strict=True):
         pieces.setdefault(i, []).append(piece)
-        if radius_m < LEAST_RADIUS_M or _turned_rad(piece) > _MOST_TURN_RAD:
+        if refuse:
             refused.add(i)
     kept = {i: pieces[i] for i in pieces.keys() - refused}
     return {i: np.concatenate([mine[0], *(p[1:] for p in mine[1:])]) for i, mine in kept.items()}
@@ -122,8 +123,3 @@ def _poses_along(way: Array, left_m: float) -> list[_Pose]:
 
 def _unit(vector: Array) -> Array:
     return np.asarray(vector / max(math.hypot(*vector), 1e-9))
-
-
-def _turned_rad(line: Array) -> float:
-    step = np.diff(line, axis=0)
-    return float(np.abs(turn_rad(step[:-1], step[1:])).sum())

@@ -119,7 +119,7 @@ def surroundings(
         edges=edges,
         sections=sections,
         clusters=clusters,
-        trims_m=trims(clusters, edges, sections, shifts, heads, least_trims_m),
+        trims_m=trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags),
         heads=heads,
         shifts_m=shifts,
         ring_edges=ring_edges,

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import Flags
 from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
-from foretwin.geometry.turn_curves import LEAD_M, WANTED_RADIUS_M
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.lanes.legs import Heads, heading_out, is_ring_edge, lateral_positions
+from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, lateral_positions
+from foretwin.world_gen.lanes.stopping import NodeTags, stop_line_m
+from foretwin.world_gen.lanes.turning_room import turning_trims
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 CORNER_M = 3.5
-"""Room between the kerb of the other road and a lane's end: makes turns wider than 4 m radius."""
+"""Room between the kerb of the other road and a lane's end."""
 RING_CORNER_M = 1.5
-MAX_TRIM_M = 22.0
+MAX_TRIM_M = 30.0
 _LEG_LOOK_M = 45.0
 _OWN_START_M = 15.0
 """What overlaps a leg farther out belongs to another place, unless it goes on from here."""
@@ -29,21 +28,8 @@ TAPER_M = 6.0
 """Lanes end so far before, and begin so far behind, a place where their number changes."""
 SHARPEST_BEND_COS = math.cos(math.radians(75.0))
 """Lanes run on through bends; sharper ones are driven as turns."""
-SOFTEST_TURN_RAD, SHARPEST_TURN_RAD = math.radians(20.0), math.radians(150.0)
-SHARPEST_ARC_RAD = math.radians(140.0)
-"""Sharper turns begin with a swing to the other side instead of farther back."""
-
-
-class _Legs(NamedTuple):
-    """The legs of K clusters that have n legs each; (K, n) or (K, n, 2) arrays."""
-
-    heads: Array
-    starts_m: Array
-    half_m: Array
-    into_m: Array
-    """How far the outermost lanes toward the place lie to their drivers' left and right."""
-    out_m: Array
-    on_ring: Flags
+MOST_CUT, MOST_WANTED = 0.8, 0.6
+"""Shares of an edge that its two ends may take: to clear other roads, and for turns to be wider."""
 
 
 def trims(
@@ -52,61 +38,73 @@ def trims(
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
     heads: Heads,
-    least_m: Mapping[tuple[int, bool], float],
+    driven_m: Mapping[tuple[int, bool], float],
+    node_tags: NodeTags,
 ) -> dict[tuple[int, bool], float]:
-    """Return metres cut off an edge's lanes by (edge index, at its end node)."""
-    found: dict[tuple[int, bool], float] = {}
-    by_size: dict[int, list[Cluster]] = {}
-    for cluster in clusters:
-        by_size.setdefault(len(cluster.legs), []).append(cluster)
+    """Return metres cut off an edge's lanes by (edge index, at its end node).
+
+    `driven_m` are such metres by which cars were seen to have begun to turn.
+    """
+    least: dict[tuple[int, bool], float] = {}
+    wanted: dict[tuple[int, bool], float] = {}
+    by_size: dict[int, list[tuple[Cluster, Array]]] = {}
     wide = [cluster for cluster in clusters if len(cluster.nodes) > 1]
     areas = dict(zip([c.key for c in wide], _area_trims(wide, edges, sections), strict=True))
+    nodes = _node_trims([c for c in clusters if len(c.nodes) == 1], sections, heads)
+    for cluster in clusters:
+        if cluster.plain:
+            values = _plain_trims(cluster, sections, shifts_m, heads)
+        else:
+            values = areas[cluster.key] if len(cluster.nodes) > 1 else nodes[cluster.key]
+        driven = np.array([driven_m.get(leg.key, 0.0) for leg in cluster.legs])
+        if values is not None or driven.any():
+            values = driven if values is None else np.maximum(values, driven)
+            by_size.setdefault(len(cluster.legs), []).append((cluster, values))
     for alike in by_size.values():
-        legs = _legs_of(alike, sections, heads)
-        turning, at_node = _turning_trims(legs), _node_trims(legs)
-        for k, cluster in enumerate(alike):
-            if cluster.plain:
-                values = _plain_trims(cluster, legs.heads[k], turning[k], sections, shifts_m)
-            elif len(cluster.nodes) == 1:
-                values = np.maximum(at_node[k], turning[k])
-            else:
-                values = np.maximum(areas[cluster.key], turning[k])
-            for leg, value in zip(cluster.legs, values.tolist(), strict=True):
-                found[leg.key] = min(max(value, least_m.get(leg.key, 0.0)), MAX_TRIM_M)
+        mine = [cluster for cluster, _ in alike]
+        legs = [leg for cluster in mine for leg in cluster.legs]
+        cleared = np.minimum([values for _, values in alike], MAX_TRIM_M)
+        lines = [stop_line_m(leg, cl, node_tags) for cl in mine for leg in cl.legs]
+        most = np.minimum(np.reshape(lines, cleared.shape), MAX_TRIM_M)
+        turning = turning_trims(mine, sections, cleared, most)
+        keys = [leg.key for leg in legs]
+        least.update(zip(keys, cleared.ravel().tolist(), strict=True))
+        wanted.update(zip(keys, turning.ravel().tolist(), strict=True))
+    for cluster in clusters:
+        for leg in cluster.legs:
+            wanted.setdefault(leg.key, 0.0)
+    _share(least, wanted, edges)
+    return wanted
+
+
+def _share(
+    least: Mapping[tuple[int, bool], float],
+    wanted: dict[tuple[int, bool], float],
+    edges: Mapping[int, RoadEdge],
+) -> None:
+    """Let both ends of short edges want no more than leaves a lane between them."""
     for index, edge in edges.items():
-        start, end = found.get((index, False), 0.0), found.get((index, True), 0.0)
-        room = 0.8 * edge.length_m
-        if start + end > room:
-            # What is left is shared in proportion, so that a lane of some length remains.
-            found[index, False] = start * room / (start + end)
-            found[index, True] = end * room / (start + end)
-    return found
-
-
-def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection], heads: Heads) -> _Legs:
-    legs = [leg for cluster in clusters for leg in cluster.legs]
-    mine = [sections[leg.edge.index] for leg in legs]
-    shape = (len(clusters), len(clusters[0].legs))
-    into = [s.along(reverse=not leg.reverse).reach_m for s, leg in zip(mine, legs, strict=True)]
-    out = [s.along(reverse=leg.reverse).reach_m for s, leg in zip(mine, legs, strict=True)]
-    return _Legs(
-        heads=np.array([heads[leg.key] for leg in legs]).reshape(*shape, 2),
-        starts_m=np.array([leg.xy_m[0] for leg in legs]).reshape(*shape, 2),
-        half_m=np.array([section.half_width_m for section in mine]).reshape(shape),
-        into_m=np.array(into).reshape(*shape, 2),
-        out_m=np.array(out).reshape(*shape, 2),
-        on_ring=np.array([is_ring_edge(leg.edge) for leg in legs]).reshape(shape),
-    )
+        ends = (index, False), (index, True)
+        want = [wanted.get(end, 0.0) for end in ends]
+        if sum(want) <= MOST_WANTED * edge.length_m:
+            continue
+        need = [least.get(end, 0.0) for end in ends]
+        room = max(MOST_WANTED * edge.length_m, min(sum(need), MOST_CUT * edge.length_m))
+        if sum(need) < room:
+            share = (room - sum(need)) / (sum(want) - sum(need))
+            shared = [n + share * (w - n) for n, w in zip(need, want, strict=True)]
+        else:
+            shared = [n * room / sum(need) for n in need]
+        wanted.update(zip(ends, shared, strict=True))
 
 
 def _plain_trims(
     cluster: Cluster,
-    heads: Array,
-    turning: Array,
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
-) -> Array:
-    """Lanes of one road run on where they fit; where lanes change they get room for a taper."""
+    heads: Heads,
+) -> Array | None:
+    """Lanes of one road run on where they fit (None); where lanes change there is a taper."""
     first, second = cluster.legs
     a, b = sections[first.edge.index], sections[second.edge.index]
     by_first, by_second = (
@@ -115,50 +113,38 @@ def _plain_trims(
     fits = lateral_positions(first, a, outward=False, shift_m=by_first) == lateral_positions(
         second, b, outward=True, shift_m=by_second
     )
-    if fits and -heads[0] @ heads[1] > SHARPEST_BEND_COS:
-        return np.zeros(2)
-    room = [0.0 if fits else min(TAPER_M, 0.3 * leg.edge.length_m) for leg in cluster.legs]
-    return np.maximum(room, turning)
+    if fits and -dot(heads[first.key], heads[second.key]) > SHARPEST_BEND_COS:
+        return None
+    room = (0.0 if fits else min(TAPER_M, 0.3 * leg.edge.length_m) for leg in cluster.legs)
+    return np.array(list(room))
 
 
-def _node_trims(legs: _Legs) -> Array:
-    """Cut each leg where the kerbs of straight legs from one point cross, and a corner more."""
-    cos = np.clip(legs.heads @ legs.heads.transpose(0, 2, 1), -1.0, 1.0)
-    sin = np.sqrt(1.0 - cos * cos)
-    half = legs.half_m
-    reach = (half[:, None, :] + half[:, :, None] * cos) / np.maximum(sin, 0.2)
-    # Where the road goes straight on, and with itself, nothing crosses.
-    reach = np.where((cos < -0.94) | np.eye(half.shape[1], dtype=bool), 0.0, reach)
-    corner = np.where(legs.on_ring, RING_CORNER_M, CORNER_M)
-    return np.asarray(np.maximum(reach.max(axis=2), 0.0) + corner)
+def _node_trims(
+    clusters: list[Cluster], sections: Mapping[int, CrossSection], heads: Heads
+) -> dict[str, Array]:
+    """Cut each leg where the kerbs of straight legs from one point cross, and a corner more.
 
-
-def _turning_trims(legs: _Legs) -> Array:
-    """Return (K, n) how far from their node lanes must end for every turn to have its radius.
-
-    A turn by an angle with radius R ends R tan(angle / 2) from where the lanes' lines cross.
+    Returns metres (n,) by the key of each cluster.
     """
-    # From leg i into leg j; an angle above 0 is a turn to the left.
-    x, y = legs.heads[..., 0], legs.heads[..., 1]
-    cos = np.clip(legs.heads @ legs.heads.transpose(0, 2, 1), -1.0, 1.0)
-    sin = y[:, :, None] * x[:, None, :] - x[:, :, None] * y[:, None, :]
-    angle = np.arctan2(sin, -cos)
-    size = np.abs(angle)
-    left = angle > 0.0
-    start = np.where(left, -legs.into_m[:, :, None, 0], legs.into_m[:, :, None, 1])
-    end = np.where(left, -legs.out_m[:, None, :, 0], legs.out_m[:, None, :, 1])
-    # To the right of who drives in, and to the left of who drives out.
-    aside = np.stack([-y, x], axis=-1)
-    gap = legs.starts_m[:, None, :] - legs.starts_m[:, :, None]
-    gap = gap - end[..., None] * aside[:, None, :] - start[..., None] * aside[:, :, None]
-    across = np.where(np.abs(sin) < 0.2, np.copysign(0.2, sin), sin)
-    from_start = (gap[..., 1] * x[:, None, :] - gap[..., 0] * y[:, None, :]) / across
-    from_end = (gap[..., 1] * x[:, :, None] - gap[..., 0] * y[:, :, None]) / across
-    room = WANTED_RADIUS_M * np.tan(np.minimum(size, SHARPEST_ARC_RAD) / 2.0) + LEAD_M
-    turns = (size > SOFTEST_TURN_RAD) & (size < SHARPEST_TURN_RAD)
-    from_start = np.where(turns & np.isfinite(from_start), from_start + room, 0.0)
-    from_end = np.where(turns & np.isfinite(from_end), from_end + room, 0.0)
-    return np.asarray(np.maximum(from_start.max(axis=2), from_end.max(axis=1)))
+    by_size: dict[int, list[Cluster]] = {}
+    for cluster in clusters:
+        if not cluster.plain:
+            by_size.setdefault(len(cluster.legs), []).append(cluster)
+    found: dict[str, Array] = {}
+    for n, alike in by_size.items():
+        legs = [leg for cluster in alike for leg in cluster.legs]
+        head = np.array([heads[leg.key] for leg in legs]).reshape(-1, n, 2)
+        half = np.array([sections[leg.edge.index].half_width_m for leg in legs]).reshape(-1, n)
+        on_ring = np.array([is_ring_edge(leg.edge) for leg in legs]).reshape(-1, n)
+        cos = np.clip(head @ head.transpose(0, 2, 1), -1.0, 1.0)
+        sin = np.sqrt(1.0 - cos * cos)
+        reach = (half[:, None, :] + half[:, :, None] * cos) / np.maximum(sin, 0.2)
+        # Where the road goes straight on, and with itself, nothing crosses.
+        reach = np.where((cos < -0.94) | np.eye(n, dtype=bool), 0.0, reach)
+        corner = np.where(on_ring, RING_CORNER_M, CORNER_M)
+        trim = np.maximum(reach.max(axis=2), 0.0) + corner
+        found.update(zip([c.key for c in alike], trim, strict=True))
+    return found
 
 
 def _area_trims(

@@ -14,10 +14,15 @@ from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.legs import RING_KINDS, dot, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.stopping import (
+    BEFORE_CROSSING_M,
+    CROSSING_NEAR_M,
+    OWN_LINE_M,
+    NodeTags,
+)
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.rules.control_devices import (
     Met,
-    NodeTags,
     is_light,
     lights_behind,
     lights_inside,
@@ -37,13 +42,8 @@ from foretwin.world_gen.rules.priority_roads import (
 )
 from foretwin.world_gen.rules.signs_inside import SignsInside, shared_signs
 
-OWN_LINE_M = 3.0
-"""A sign or signal farther than this from the junction's node stands at the stop line."""
-BEFORE_CROSSING_M = 3.0
-"""From a crossing's middle to the line before it: half its width and a metre (RMS 2)."""
 LIGHT_NEAR_M = 25.0
 _SIGN_NEAR_M = 25.0
-_CROSSING_NEAR_M = 16.0
 
 
 class Approach(msgspec.Struct, kw_only=True):
@@ -276,5 +276,5 @@ def _word(standing: Standing) -> Choice:
 def _before_crossing(met: list[Met]) -> float | None:
     """Return where cars wait for a light before the crossing that they would else block."""
     crossings = [m for m in met if m.tags.get("highway") == "crossing" or "crossing" in m.tags]
-    at = [m.distance_m for m in crossings if 1.0 < m.distance_m <= _CROSSING_NEAR_M]
+    at = [m.distance_m for m in crossings if 1.0 < m.distance_m <= CROSSING_NEAR_M]
     return max(at) + BEFORE_CROSSING_M if at else None

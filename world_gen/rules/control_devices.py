@@ -11,10 +11,10 @@ from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.legs import is_ring_edge
+from foretwin.world_gen.lanes.stopping import NodeTags, faces
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 LOOK_BACK_M = 40.0
-NodeTags = Mapping[int, Mapping[str, str]]
 
 
 class Met(NamedTuple):
@@ -135,15 +135,3 @@ def lights_behind(leg: DirectedEdge, node_tags: NodeTags, within_m: float) -> li
     places = zip(leg.node_ids, arc_lengths(leg.xy_m), strict=False)
     near = [node for node, at_m in places if 0.1 < at_m <= within_m]
     return [node for node in near if is_light(node_tags.get(node, {}))]
-
-
-def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:
-    """Return whether a sign or light is for those who drive along (true) the way's nodes.
-
-    `against_outward` is whether traffic in question runs along the nodes. None: it is not tagged.
-    """
-    for key in ("traffic_signals:direction", "stop:direction", "give_way:direction", "direction"):
-        word = tags.get(key)
-        if word in ("forward", "backward"):
-            return (word == "forward") == against_outward
-    return None

@@ -12,8 +12,9 @@ from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.countries.rules import rules_of
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneSet
+from foretwin.world_gen.lanes.stopping import NodeTags
 from foretwin.world_gen.rules.approaches import Approach, approaches
-from foretwin.world_gen.rules.control_devices import NodeTags, lights_inside
+from foretwin.world_gen.rules.control_devices import lights_inside
 from foretwin.world_gen.rules.lone_lights import lone_lights
 from foretwin.world_gen.rules.right_of_way import right_of_way
 from foretwin.world_gen.rules.ring_exits import with_ring_exits

@@ -14,8 +14,8 @@ from foretwin.contracts.world import Crossing, StopLine
 from foretwin.geometry.polyline import length, locate, points_at
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
-from foretwin.world_gen.rules.approaches import BEFORE_CROSSING_M
-from foretwin.world_gen.rules.control_devices import NodeTags, faces, is_light
+from foretwin.world_gen.lanes.stopping import BEFORE_CROSSING_M, NodeTags, faces
+from foretwin.world_gen.rules.control_devices import is_light
 from foretwin.world_gen.rules.signal_heads import (
     BESIDE_HEIGHT_M,
     beside,

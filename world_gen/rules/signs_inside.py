@@ -15,8 +15,9 @@ from foretwin.geometry.polyline import arc_lengths, locate, points_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.stopping import NodeTags, faces
 from foretwin.world_gen.roads.road_graph import DirectedEdge
-from foretwin.world_gen.rules.control_devices import NodeTags, faces, sign_of
+from foretwin.world_gen.rules.control_devices import sign_of
 
 _BESIDE_M = 1.0
 

@@ -15,10 +15,9 @@ from foretwin.geometry.polyline_batch import Polylines, segments_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
+from foretwin.world_gen.lanes.stopping import LINE_SETBACK_M
 from foretwin.world_gen.rules.approaches import Approach
 from foretwin.world_gen.rules.signs_inside import SignsInside
-
-LINE_SETBACK_M = 0.3
 
 
 def stop_lines(

@@ -1,0 +1,108 @@
+"""Corners are as wide as norms build them, by how far is turned and between which roads."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.drawn_maps import CROSS, GERMANY, crossing, drawn_map, world_of
+from tests.world_gen.drawn_stars import stars, world_of_star
+from tests.world_gen.path_shape import tightest_radius_m
+
+MAIN = {"highway": "secondary", "name": "Main", "lanes": "2"}
+LANE_M = 3.0, 3.25
+"""Of residential and of secondary roads, where a map says no width."""
+
+
+def _right_turns(world: World) -> dict[tuple[str, str], float]:
+    """Return the least radius of right turns by the ways from which and to which they lead."""
+    return {
+        (c.from_lane_id.split(".")[0], c.to_lane_id.split(".")[0]): tightest_radius_m(c.centerline)
+        for c in world.connections
+        if c.turn == "right"
+    }
+
+
+def test_residential_streets_have_corners_of_4_6_m():
+    radii = _right_turns(world_of(crossing()))
+    assert len(radii) == 4
+    assert list(radii.values()) == pytest.approx([4.6 + LANE_M[0] / 2] * 4, rel=0.12)
+
+
+def test_a_main_road_has_wider_corners_than_a_lesser_one_into_it():
+    radii = _right_turns(world_of(crossing(street=MAIN)))
+    assert list(radii.values()) == pytest.approx([6.0 + LANE_M[1] / 2] * 4, rel=0.12)
+
+
+def test_between_main_roads_who_leaves_the_greater_turns_widest():
+    primary = MAIN | {"highway": "primary"}
+    radii = _right_turns(world_of(crossing(street=primary, avenue=MAIN)))
+    # Both ends of a corner lie where the wider of its turns wants them.
+    assert min(radii.values()) > 8.0 + LANE_M[1] / 2 - 0.9
+    assert max(radii.values()) == pytest.approx(12.0 + 3.5 / 2, rel=0.12)
+
+
+@pytest.mark.parametrize(("angle_deg", "corner_m"), [(60.0, 12.0), (90.0, 9.0), (120.0, 6.0)])
+def test_the_more_is_turned_the_tighter_a_corner_is(angle_deg, corner_m):
+    at = math.radians(angle_deg)
+    side = {2: (100.0 * math.cos(at), 100.0 * math.sin(at))}
+    nodes = {i: CROSS[i] for i in (0, 1, 3)} | side
+    ways = [(11, [0, 1], MAIN), (12, [0, 2], MAIN), (13, [3, 0], MAIN)]
+    radii = _right_turns(world_of(drawn_map(nodes, ways, origin=GERMANY)))
+    # From the side road into the western one, by the angle between them.
+    assert radii["w12", "w13"] == pytest.approx(corner_m * 10.0 / 9.0 + LANE_M[1] / 2, rel=0.15)
+
+
+def test_a_line_that_the_map_has_goes_before_a_wide_corner():
+    light = {"highway": "traffic_signals", "traffic_signals:direction": "forward"}
+    nodes = CROSS | {5: (-9.0, 0.0)}
+    ways = [(11, [0, 1], MAIN), (12, [0, 2], MAIN), (13, [3, 5, 0], MAIN), (14, [4, 0], MAIN)]
+    world = world_of(drawn_map(nodes, ways, node_tags={5: light}, origin=GERMANY))
+    ends = {lane.osm_way: lane.centerline for lane in world.lanes if lane.id.endswith("f0")}
+    assert ends[13][-1, 0] == pytest.approx(-8.7, abs=0.05)
+    assert ends[14][-1, 1] < -12.0  # no light of its own on the map
+
+
+def test_short_roads_keep_a_lane_between_their_corners():
+    nodes = CROSS | {5: (20.0, 0.0), 6: (20.0, 100.0), 7: (20.0, -100.0)}
+    ways = [
+        (11, [0, 5], MAIN),
+        (12, [0, 2], MAIN),
+        (13, [3, 0], MAIN),
+        (15, [6, 5, 7], MAIN),
+        (16, [5, 1], MAIN),
+    ]
+    osm = drawn_map(nodes, ways, origin=GERMANY)
+    graph = build_road_graph(osm)
+    for junction in find_intersections(osm, graph):
+        world = build_world(osm, graph, junction)
+        between = [lane for lane in world.lanes if lane.osm_way == 11]
+        for lane in between:
+            assert np.hypot(*(lane.centerline[-1] - lane.centerline[0])) > 3.9
+
+
+@settings(max_examples=25, deadline=None)
+@given(arms=stars(), left_hand=st.booleans())
+def test_no_turn_at_one_node_leaves_the_angle_between_its_lanes_by_more_than_30_degrees(
+    arms, left_hand
+):
+    world = world_of_star(arms, left_hand=left_hand)
+    lanes = {lane.id: lane for lane in world.lanes}
+    for c in world.connections:
+        before, behind = lanes[c.from_lane_id].centerline, lanes[c.to_lane_id].centerline
+        steps = np.diff(np.concatenate([before[-2:-1], c.centerline, behind[1:2]]), axis=0)
+        yaw = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        yaw -= yaw[0]
+        if c.turn == "u_turn" or abs(yaw[-1]) > math.radians(160.0):
+            continue
+        assert yaw.max() < max(yaw[-1], 0.0) + math.radians(30.0)
+        assert yaw.min() > min(yaw[-1], 0.0) - math.radians(30.0)
+        assert abs(yaw[-1]) < math.pi
