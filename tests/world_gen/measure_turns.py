@@ -1,0 +1,239 @@
+"""Measure the paths of turns: over whole maps, and on tracks of cars at a signalised crossing.
+
+`python -m tests.world_gen.measure_turns [NAME ...]` reads the folder named by FORETWIN_DATA and
+prints one row for each map, one for all, and one for the tracks, which are measured alike:
+
+- `turned`: connections whose heading leaves the angle from lane to lane by more than 30°; then
+  those of them that leave it so far beyond the direction from their start to their end, which some
+  piece of any path has, as where two arms of a crossing lie aside of one another; then those at
+  places of one node, without roads inside to drive along; then U-turns;
+- `radius`: quartiles of the least radius of near-side turns at lights, as `least_radius_m` has it,
+  of those that turn by 45 to 135°, then of those by 50 to 85° as the tracks do;
+- `step`: 50 %, 90 % and 99 % of the greatest change of curvature in 0.5 m along a turn, in 1/m,
+  and `rate` of its derivative by the way, in 1/m². Lines between points have no curvature: that of
+  each point is its bend over the mean length of the lines beside it.
+
+`--worst N` names the N connections that leave their angle farthest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import os
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from foretwin.contracts.world import Connection, World
+from foretwin.world_gen.build import build_region
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.osm_map import LatLonBounds
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+
+MAPS = {
+    "austin": "osm-austin-downtown/austin.osm.gz",
+    "badhersfeld": "osm-badhersfeld/badhersfeld.osm.xml.gz",
+    "berlin-mitte": "osm-berlin-mitte/berlin-mitte.osm",
+    "grosser-stern": "osm-berlin-grosser-stern/berlin-siegessaeule.osm.gz",
+    "kingsway": "osm-kingsway/kingsway_junction.osm",
+    "leeds": "osm-leeds/leeds.osm.gz",
+    "liechtenstein": "osm-liechtenstein/liechtenstein-latest.osm.pbf",
+    "monaco": "osm-monaco/monaco.osm.gz",
+    "moritzplatz": "osm-berlin-moritzplatz/berlin-moritzplatz.osm",
+    "testfeld": "osm-testfeld-nds/TestfeldNDS_main_roads.osm.xml.gz",
+}
+TRACKS = "traffic-karlsruhe-k729"
+
+CHORD_M = 4.0
+"""A radius is that of the circle through a point of a path and those so far before and behind it:
+so long a piece that tracks of tracked cars, which shake, have one."""
+SHAKE_M = 1.0
+"""Standard deviation along the way with which tracks are smoothed."""
+STEP_M = 0.25
+NEAR_SIDE_RAD = math.radians(45.0), math.radians(135.0)
+TRACKED_RAD = math.radians(50.0), math.radians(85.0)
+ALLOWED_RAD = math.radians(30.0)
+
+
+class Turn(NamedTuple):
+    """What is measured of one connection."""
+
+    name: str
+    kind: str
+    roads_inside: bool
+    left_rad: float
+    left_needlessly_rad: float
+    radius_m: float
+    near_side_at_lights_rad: float
+    """How far is turned; 0 for all others."""
+    step_pm: float
+    rate_pm2: float
+
+
+def least_radius_m(path: np.ndarray) -> float:
+    """Return the least radius of circles through points (N, 2) of a path `CHORD_M` apart."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    if arc[-1] < 2.0 * CHORD_M:
+        return math.inf
+    at = np.arange(CHORD_M, arc[-1] - CHORD_M + 1e-9, STEP_M)
+    a, b, c = (
+        np.stack([np.interp(at + shift, arc, path[:, k]) for k in (0, 1)], axis=-1)
+        for shift in (-CHORD_M, 0.0, CHORD_M)
+    )
+    twice = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    product = np.hypot(*(b - a).T) * np.hypot(*(c - b).T) * np.hypot(*(c - a).T)
+    return float(1.0 / max(float((2.0 * twice / np.maximum(product, 1e-9)).max()), 1e-6))
+
+
+def left_interval_rad(path: np.ndarray, *directions: np.ndarray) -> float:
+    """Return how far a path's heading leaves the angle between directions (2,), that of entry
+    first."""
+    steps = np.diff(path, axis=0)
+    yaws = np.arctan2(steps[:, 1], steps[:, 0])
+    yaw = np.unwrap(np.concatenate([[_yaw(directions[0])], yaws]))
+    turns = [math.remainder(_yaw(d) - yaw[0], math.tau) for d in directions]
+    low, high = min(turns), max(turns)
+    return float(max(yaw[0] + low - yaw.min(), yaw.max() - yaw[0] - high, 0.0))
+
+
+def curvature_changes(path: np.ndarray) -> tuple[float, float]:
+    """Return the greatest change of curvature in 0.5 m along a path (N, 2), and its rate."""
+    steps = np.diff(path, axis=0)
+    length = np.hypot(*steps.T)
+    yaw = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    if len(yaw) < 3:
+        return 0.0, 0.0
+    curvature = np.diff(yaw) / ((length[1:] + length[:-1]) / 2.0)
+    rate = np.abs(np.diff(curvature)) / length[1:-1]
+    step = np.minimum(np.abs(np.diff(curvature)), rate * 0.5)
+    return float(step.max()), float(rate.max())
+
+
+def region_of(path: Path) -> World:
+    """Return all of a map as one World without its ground."""
+    osm = read_map(path)
+    graph = build_road_graph(osm)
+    index = index_map(osm, graph, find_intersections(osm, graph))
+    lat, lon = np.array(list(osm.locations.values())).T
+    bounds = LatLonBounds(lat.min(), lon.min(), lat.max(), lon.max())
+    return build_region(osm, graph, bounds, index=index, ground=False)
+
+
+def turns_of(world: World) -> Iterator[Turn]:
+    """Yield what is measured of each connection of a World."""
+    lanes = {lane.id: lane for lane in world.lanes}
+    near_side = world.intersection.driving_side
+    wide = {j.summary.id for j in world.junctions if len(j.summary.osm_nodes) > 1}
+    for c in world.connections:
+        start, end = lanes[c.from_lane_id].centerline, lanes[c.to_lane_id].centerline
+        whole = np.concatenate([start[-2:-1], c.centerline, end[1:2]])
+        before, behind = start[-1] - start[-2], end[1] - end[0]
+        angle = abs(math.remainder(_yaw(behind) - _yaw(before), math.tau))
+        counts = c.turn == near_side and c.signal_group_id is not None
+        longer = np.concatenate([start[:-1], c.centerline, end[1:]])
+        yield Turn(
+            name=c.id,
+            kind=_kind(c, angle),
+            roads_inside=c.junction_id in wide,
+            left_rad=left_interval_rad(c.centerline, before, behind),
+            left_needlessly_rad=left_interval_rad(c.centerline, before, behind, end[0] - start[-1]),
+            radius_m=least_radius_m(longer),
+            near_side_at_lights_rad=angle if counts else 0.0,
+            step_pm=curvature_changes(whole)[0],
+            rate_pm2=curvature_changes(whole)[1],
+        )
+
+
+def _yaw(direction: np.ndarray) -> float:
+    return math.atan2(direction[1], direction[0])
+
+
+def _kind(c: Connection, angle_rad: float) -> str:
+    return "u_turn" if c.turn == "u_turn" or angle_rad > math.radians(160.0) else "turn"
+
+
+def tracked_radii_m(folder: Path) -> list[float]:
+    """Return the least radius of each near-side turn of a car among the tracks."""
+    tracks: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
+    for file in sorted(folder.glob("vehicle_tracks_*.csv")):
+        with file.open(encoding="utf-8") as rows:
+            for row in csv.DictReader(rows):
+                if row["agent_type"] == "Car":
+                    key = file.stem, row["track_id"]
+                    tracks[key].append((float(row["x"]), float(row["y"])))
+    radii = []
+    for points in tracks.values():
+        kept = [points[0]]
+        for p in points[1:]:
+            if math.dist(p, kept[-1]) > 0.4:  # a car that stands shakes on the spot
+                kept.append(p)
+        line = np.array(kept)
+        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        if arc[-1] < 15.0:
+            continue
+        at = np.arange(0.0, arc[-1], STEP_M)
+        even = np.stack([np.interp(at, arc, line[:, k]) for k in (0, 1)], axis=-1)
+        smooth = gaussian_filter1d(even, SHAKE_M / STEP_M, axis=0, mode="nearest")
+        yaw = np.unwrap([_yaw(step) for step in smooth[8::8] - smooth[:-8:8]])
+        if -NEAR_SIDE_RAD[1] <= yaw[-1] - yaw[0] <= -NEAR_SIDE_RAD[0]:
+            radii.append(least_radius_m(smooth))
+    return radii
+
+
+def row_of(turns: list[Turn]) -> str:
+    """Return the figures of one map, or of several, as a row."""
+    turned = [t for t in turns if t.kind == "turn" and t.left_rad > ALLOWED_RAD]
+    needless = [t for t in turned if t.left_needlessly_rad > ALLOWED_RAD]
+    alone = [t for t in needless if not t.roads_inside]
+    u_turned = [t for t in turns if t.kind == "u_turn" and t.left_rad > ALLOWED_RAD]
+    radii = "  ".join(
+        _quartiles([t.radius_m for t in turns if low <= t.near_side_at_lights_rad <= high])
+        for low, high in (NEAR_SIDE_RAD, TRACKED_RAD)
+    )
+    step = np.percentile([t.step_pm for t in turns], [50, 90, 99])
+    rate = np.percentile([t.rate_pm2 for t in turns], [50, 90, 99])
+    counts = f"{len(turned):4d} {len(needless):4d} {len(alone):3d} + {len(u_turned):3d} U"
+    shape = f"step {_words(step)}  rate {_words(rate)}"
+    return f"{len(turns):7d} turned {counts}  radius {radii}  {shape}"
+
+
+def _quartiles(values: list[float]) -> str:
+    if not values:
+        return "       -       (n=  0)"
+    return f"{_words(np.percentile(values, [25, 50, 75]), 1)} (n={len(values):3d})"
+
+
+def _words(values: np.ndarray, digits: int = 3) -> str:
+    return "/".join(f"{value:.{digits}f}" for value in values)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(MAPS))
+    parser.add_argument("--worst", type=int, default=0)
+    chosen = parser.parse_args()
+    data = Path(os.environ["FORETWIN_DATA"])
+    every: list[Turn] = []
+    for name in chosen.names or MAPS:
+        begin_s = time.process_time()
+        turns = list(turns_of(region_of(data / MAPS[name])))
+        every += turns
+        print(f"{name:14}{row_of(turns)}  ({time.process_time() - begin_s:.0f} s)", flush=True)
+        worst = sorted(turns, key=lambda t: -t.left_needlessly_rad)
+        for t in [t for t in worst if t.kind == "turn"][: chosen.worst]:
+            print(f"    {math.degrees(t.left_needlessly_rad):5.0f}°  {t.radius_m:5.1f} m  {t.name}")
+    print(f"{'all':14}{row_of(every)}")
+    print(f"{'tracks':14}{'':46}radius {_quartiles(tracked_radii_m(data / TRACKS))}")
+
+
+if __name__ == "__main__":
+    main()
