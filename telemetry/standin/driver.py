@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from foretwin.geometry.steering import MAX_CURVATURE_PM
+from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
 from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.parameters import CarParameters, DriverParameters
 from foretwin.telemetry.standin.path import DrivenPath
@@ -56,8 +57,12 @@ class Driver:
         """Return what to ask of the car, and keep track of the stops."""
         self.s_m = self.path.locate(motion.x_m, motion.y_m, near_s_m=self.s_m)
         self._wait(motion.vx_mps)
+        accel = self._accel(self.s_m, motion.vx_mps, self._next_stop)
+        if motion.grade and motion.vx_mps > _STANDING_MPS:
+            # Whoever drives uphill presses as much harder as it takes to go as on the level.
+            accel += STANDARD_GRAVITY_MPS2 * math.sin(math.atan(motion.grade))
         return DriverCommand(
-            accel_mps2=self._accel(self.s_m, motion.vx_mps, self._next_stop),
+            accel_mps2=accel,
             steering_wheel_rad=self._steering_wheel(motion),
         )
 

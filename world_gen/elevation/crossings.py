@@ -11,8 +11,6 @@ from foretwin.world_gen.roads.road_graph import RoadEdge
 
 LAYER_HEIGHT_M = 5.0
 """From one OSM layer to the next: a lorry's 4.5 m and a bridge deck."""
-_MOST_LAYERS = 2
-"""Tunnels are tagged five layers down where they merely pass below all else."""
 
 
 class Overpass(NamedTuple):
@@ -26,7 +24,10 @@ class Overpass(NamedTuple):
 
 
 def crossings_of(edges: Sequence[RoadEdge]) -> list[Overpass]:
-    """Return where roads of different layers cross in plan, but for those that share a node."""
+    """Return where roads of different layers cross in plan, but for those that share a node.
+
+    However many layers are between, they say an order alone: a lorry's height is what is known.
+    """
     lines = [shapely.LineString(edge.xy_m) for edge in edges]
     tree = shapely.STRtree(lines)
     found = []
@@ -44,9 +45,8 @@ def crossings_of(edges: Sequence[RoadEdge]) -> list[Overpass]:
             continue
         above, below = (one, other) if a.layer > b.layer else (other, one)
         meeting = shapely.intersection(lines[one], lines[other])
-        apart = min(abs(a.layer - b.layer), _MOST_LAYERS)
         for point in shapely.get_parts(meeting):
             if point.geom_type == "Point":
                 along = [float(shapely.line_locate_point(lines[i], point)) for i in (above, below)]
-                found.append(Overpass(above, along[0], below, along[1], apart * LAYER_HEIGHT_M))
+                found.append(Overpass(above, along[0], below, along[1], LAYER_HEIGHT_M))
     return found
