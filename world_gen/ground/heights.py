@@ -67,7 +67,11 @@ def world_elevation(
         for at_end in (False, True)
     }
     joined, notes = _connections(connections, ends)
-    corner, step_m, ground = _ground(around, profiles, roads, known, base_m)
+    corner, step_m, ground, unknown = _ground(around, profiles, roads, known, base_m)
+    if unknown:
+        notes.append(
+            f"the elevation model knows no height of {math.ceil(100.0 * unknown)} % of the ground"
+        )
     return WorldElevation(
         Elevation(
             source=profiles.dem.name,
@@ -159,8 +163,9 @@ def _ground(
     roads: Sequence[Road],
     known: Mapping[str, HeightProfile],
     base_m: float,
-) -> tuple[tuple[float, float], float, Array]:
-    """Return where the raster of open ground begins, its step, and its heights (rows, columns).
+) -> tuple[tuple[float, float], float, Array, float]:
+    """Return where the raster of open ground begins, its step, its heights (rows, columns), and of
+    which share of them the model knows nothing.
 
     It is that of the elevation model, drawn to roads that lie on it.
     """
@@ -179,6 +184,7 @@ def _ground(
         return profiles.dem.at(*geo_from_local(around.frame, places).T) - base_m
 
     heights = model(xy)
+    unknown = float(np.isnan(heights[around.extent.holds(xy)]).mean())
     places, above = [np.zeros((0, 2))], [np.zeros(0)]
     for road in roads:
         if road.id in known and not (road.bridge or road.tunnel):
@@ -197,4 +203,4 @@ def _ground(
         share = np.exp(-0.5 * np.square(np.maximum(far[:, 0] - step_m, 0.0) / _BESIDE_M))
         heights = np.where(np.isnan(heights), beside, share * beside + (1.0 - share) * heights)
     heights = np.nan_to_num(heights).reshape(rows, columns)
-    return corner, step_m, np.asarray(np.round(heights, 2))
+    return corner, step_m, np.asarray(np.round(heights, 2)), unknown

@@ -13,11 +13,14 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.gap import Verdict
+from foretwin.contracts.setup import BuilderSetup, TuningSetup
 from foretwin.contracts.tuning import Identification
-from foretwin.geometry.slopes import Slopes
+from foretwin.geometry.slopes import Slopes, read_slopes
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.plan import read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.drive.processes import PROCESSES, process_ids
 from foretwin.orchestrator.plan import DriveInputs
 from foretwin.orchestrator.routing.route_heights import heights_along
 from foretwin.orchestrator.routing.standin_path import standin_path
@@ -31,6 +34,7 @@ from foretwin.telemetry.standin.path import DrivenPath, read_path
 from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from foretwin.world_gen.elevation.profiles import RoadProfiles
 from foretwin.world_gen.elevation.road_profiles import road_profiles
+from tests.orchestrator.trip import NOW
 from tests.sim_worker.faulty_standin import model_with
 from tests.sim_worker.standin_drives import estimate
 from tests.world_gen.elevation.hills import raster
@@ -202,3 +206,40 @@ def test_a_drive_s_stand_in_reads_the_heights_of_its_path(tmp_path: Path) -> Non
     assert read.altitude_m is not None
     assert np.ptp(read.altitude_m) > 15.0
     assert "altitude_m" not in standin_path(inputs.osm, inputs.graph, inputs.routes[0]).as_json()
+
+
+def tiles(folder: Path) -> Path:
+    """Write the SRTM tiles that the drawn town lies across, climbing northwards by 5 %."""
+    folder.mkdir()
+    for name, south in (("N44W031", 0), ("N45W031", 1200), ("N44W030", 0), ("N45W030", 1200)):
+        rise = 0.05 * 92.66 * np.arange(1200, -1, -1) + 0.05 * 92.66 * south
+        heights = np.repeat(np.round(rise)[:, None], 1201, axis=1).astype(">i2")
+        (folder / f"{name}.hgt").write_bytes(heights.tobytes())
+    return folder
+
+
+def test_a_drive_over_an_elevation_model_tells_its_processes(tmp_path: Path) -> None:
+    dem = str(tiles(tmp_path / "dem"))
+    config = DriveConfig(view="none", dem=dem, tuning="report", out=str(tmp_path / "runs"))
+    plan = make_plan(read_inputs(config.validate()), NOW)
+
+    assert plan.slopes is not None
+    north = np.abs(plan.slopes.direction[:, 1])
+    # Its ring apart: over 30 m such cells tell nothing, and roads are level until told otherwise.
+    off = np.abs(np.abs(plan.slopes.grade) - 0.05 * north)
+    assert np.percentile(off, 90) < 0.02
+    assert read_slopes(plan.slopes_file).grade_std == pytest.approx(0.027, abs=0.001)
+    assert "altitude_m" in plan.standin_path_file.read_text()
+    setups = [row.setup(plan, name) for row in PROCESSES for name in process_ids(row, plan)]
+    assert [one.dem for one in setups if isinstance(one, BuilderSetup)] == [dem]
+    told = [one.slopes for one in setups if isinstance(one, TuningSetup)]
+    assert told == [str(plan.slopes_file)]
+
+
+def test_an_elevation_model_of_elsewhere_ends_the_drive_before_it_begins(tmp_path: Path) -> None:
+    (tiles(tmp_path / "dem") / "N44W031.hgt").rename(tmp_path / "N10E010.hgt")
+    config = DriveConfig(view="none", dem=str(tmp_path / "N10E010.hgt"), out=str(tmp_path / "runs"))
+
+    with pytest.raises(UserError, match="knows no height between"):
+        read_inputs(config)
+    assert not (tmp_path / "runs").exists()

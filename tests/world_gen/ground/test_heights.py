@@ -130,3 +130,14 @@ def test_what_the_map_joins_at_different_heights_is_named_and_has_no_heights() -
     known = {profile.id for profile in elevation_of(world).connections}
     assert apart
     assert len(known) == len(world.connections) - len(apart)
+
+
+def test_where_the_model_ends_inside_a_world_the_world_says_so() -> None:
+    def half(x: Array, y: Array) -> Array:
+        return np.where(y > 10.0, 50.0, np.nan)
+
+    notes = world_on(half).notes
+
+    (told,) = [note for note in notes if "knows no height of" in note]
+    assert 40 < int(told.split()[7]) < 60
+    assert not any("knows no height" in note for note in world_on(east).notes)
