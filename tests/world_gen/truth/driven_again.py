@@ -1,8 +1,8 @@
-"""Lanes corrected by one earlier pass, scored on passes of other recordings along the same road."""
+"""Lanes corrected by one earlier pass, scored on other passes along the same road."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,12 +14,14 @@ from foretwin.contracts.tracks import DrivenTrack
 from tests.world_gen.truth.generators import by_foretwin
 from tests.world_gen.truth.hd_map import HdMap, Track
 from tests.world_gen.truth.lane_model import Nearby
+from tests.world_gen.truth.shifted_map import routes, shifted, wandering
 from tests.world_gen.truth.tracks import beside, driven
 
 _SAME_ROAD_M = 5.0
 _SAME_SHARE = 0.8
 _EARLIER = 24
 """So many tracks, evenly among all, are taken as the one that was driven earlier."""
+_ROUTES, _ROUTE_M = 16, 600.0
 
 
 class Again(NamedTuple):
@@ -28,6 +30,11 @@ class Again(NamedTuple):
     before_m: Array
     after_m: Array
     turning: np.ndarray
+
+    def medians_m(self, *, turning: bool) -> tuple[float, float]:
+        """Return the medians before and after, where both have a lane near."""
+        known = ~np.isnan(self.before_m) & ~np.isnan(self.after_m) & (self.turning == turning)
+        return float(np.median(self.before_m[known])), float(np.median(self.after_m[known]))
 
 
 def as_track(frame: LocalFrame, key: str, xy_m: Array) -> DrivenTrack:
@@ -41,19 +48,33 @@ def as_track(frame: LocalFrame, key: str, xy_m: Array) -> DrivenTrack:
 
 def driven_again(hd: HdMap, map_file: Path) -> Again:
     """Score every pair of an earlier track and one of another recording along the same road."""
-    base = by_foretwin(map_file, hd.frame)
-    parts: list[Again] = []
     step = max(len(hd.tracks) // _EARLIER, 1)
-    for earlier in hd.tracks[::step]:
-        later = list(_along(earlier, hd.tracks))
-        if not later:
-            continue
-        known = as_track(hd.frame, earlier.id, earlier.xy_m)
-        after = by_foretwin(map_file, hd.frame, tracks=(known,))
-        one, two = beside(base, later), beside(after, later)
-        parts.append(Again(one.away_m, two.away_m, one.turning))
-    joined = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Again(*joined)
+    pairs = ((one.xy_m, list(_along(one, hd.tracks))) for one in hd.tracks[::step])
+    return _scored(map_file, hd.frame, pairs)
+
+
+def simulated_again(map_file: Path, frame: LocalFrame, work: Path) -> Again:
+    """Score simulated passes along a map whose nodes were moved; what is true is the map itself."""
+    truth = by_foretwin(map_file, frame)
+    moved_map = work / f"shifted-{map_file.name}"
+    moved_map.write_text(
+        shifted(map_file.read_text(encoding="utf-8"), frame, seed=1), encoding="utf-8"
+    )
+    lines = routes(truth, count=_ROUTES, length_m=_ROUTE_M, seed=3)
+    pairs = ((wandering(r, seed=i), [wandering(r, seed=-1 - i)]) for i, r in enumerate(lines))
+    return _scored(moved_map, frame, pairs)
+
+
+def _scored(map_file: Path, frame: LocalFrame, pairs: Iterable[tuple[Array, list[Array]]]) -> Again:
+    base = by_foretwin(map_file, frame)
+    parts: list[Again] = []
+    for i, (earlier, later) in enumerate(pairs):
+        if later:
+            known = as_track(frame, f"{i:012x}", earlier)
+            after = by_foretwin(map_file, frame, tracks=(known,))
+            one, two = beside(base, later), beside(after, later)
+            parts.append(Again(one.away_m, two.away_m, one.turning))
+    return Again(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _along(earlier: Track, tracks: tuple[Track, ...]) -> Iterator[Array]:

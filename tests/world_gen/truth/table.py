@@ -13,10 +13,12 @@ from foretwin.contracts.frames import LocalFrame
 from tests.benchmarks.measuring import UnavailableError
 from tests.world_gen.truth.argoverse import argoverse_maps
 from tests.world_gen.truth.berlin import berlin_truth
+from tests.world_gen.truth.driven_again import Again, driven_again, simulated_again
 from tests.world_gen.truth.generators import RECOMMENDED, by_foretwin, by_netconvert
 from tests.world_gen.truth.hd_map import HdMap
 from tests.world_gen.truth.karlsruhe import karlsruhe_map
 from tests.world_gen.truth.lane_model import LaneModel, of_hd_map
+from tests.world_gen.truth.mcity import drawn_map, mcity_passes
 from tests.world_gen.truth.reduced_map import reduced
 from tests.world_gen.truth.scores import map_score
 from tests.world_gen.truth.tracks import beside, corner_radius_m, extended
@@ -48,6 +50,32 @@ def rows(data: Path, work: Path) -> Iterator[Row]:
     berlin = berlin_truth(data)
     models = list(_models(berlin.map_file, berlin.frame, work))
     yield from _track_rows("berlin", models, berlin.tracks, berlin.within_m)
+    for name, again in once_driven(data, work).items():
+        yield from _again_rows(name, again)
+
+
+def once_driven(data: Path, work: Path) -> dict[str, Again]:
+    """Return how lanes corrected by one earlier pass fit other passes of the same road."""
+    mcity = mcity_passes(data / "traffic-mcity-rtk")
+    drawn = work / "mcity.osm"
+    drawn.write_text(drawn_map(), encoding="utf-8")
+    karlsruhe = karlsruhe_map(data / "traffic-karlsruhe-k729")
+    file = work / "karlsruhe-again.osm"
+    file.write_text(reduced(karlsruhe), encoding="utf-8")
+    berlin = berlin_truth(data)
+    return {
+        "karlsruhe": driven_again(karlsruhe, file),
+        "mcity": driven_again(mcity, drawn),
+        "berlin, simulated": simulated_again(berlin.map_file, berlin.frame, work),
+    }
+
+
+def _again_rows(truth: str, again: Again) -> Iterator[Row]:
+    known = ~np.isnan(again.before_m) & ~np.isnan(again.after_m)
+    for word, asked in (("straight", ~again.turning), ("turning", again.turning)):
+        for name, away_m in (("foretwin", again.before_m), ("driven once", again.after_m)):
+            text = quartiles(away_m[known & asked])
+            yield Row(truth, f"other pass, {word}, m", name, text)
 
 
 def _models(map_file: Path, frame: LocalFrame, work: Path) -> Iterator[LaneModel]:
