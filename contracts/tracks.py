@@ -30,6 +30,8 @@ class DrivenTrack(msgspec.Struct, frozen=True, kw_only=True):
     lat_deg: Array
     lon_deg: Array
     speed_mps: Array
+    position_std_m: float = 0.0
+    """Standard deviation of its places, in each direction, as far as it is known."""
 
     def validate(self) -> DrivenTrack:
         """Return self; raises UserError where columns do not fit each other or Earth."""
@@ -42,6 +44,8 @@ class DrivenTrack(msgspec.Struct, frozen=True, kw_only=True):
             )
         if not all(np.isfinite(column).all() for column in columns):
             raise UserError(f"track {self.id}: holds values that are not finite")
+        if not 0.0 <= self.position_std_m < np.inf:
+            raise UserError(f"track {self.id}: a standard deviation of {self.position_std_m} m")
         if np.abs(self.lat_deg).max() > 90.0 or np.abs(self.lon_deg).max() > 180.0:
             raise UserError(f"track {self.id}: lies outside latitude ±90, longitude ±180")
         return self

@@ -30,6 +30,14 @@ def add(
     log: Annotated[Path, typer.Argument(help="recorded drive, such as RUN/drive.mcap")],
     store: StoreOption = None,
     name: Annotated[str | None, typer.Option(help="what it is called [default: the file]")] = None,
+    std_m: Annotated[
+        float | None,
+        typer.Option(
+            "--std",
+            help="metres that its positions are off, as a standard deviation, where the "
+            "log does not tell: a phone in a town 3, RTK 0.02",
+        ),
+    ] = None,
     declaration: Annotated[
         Path | None, typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml")
     ] = None,
@@ -37,7 +45,7 @@ def add(
     """Keep where a recorded drive went."""
     from foretwin.orchestrator.commands.tracks import add_track
 
-    add_track(log, store=store, name=name, declaration=declaration)
+    add_track(log, store=store, name=name, std_m=std_m, declaration=declaration)
 
 
 @tracks.command()

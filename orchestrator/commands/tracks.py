@@ -31,10 +31,15 @@ def list_tracks(*, store: str | None) -> None:
 
 
 def add_track(
-    log: Path, *, store: str | None, name: str | None = None, declaration: Path | None = None
+    log: Path,
+    *,
+    store: str | None,
+    name: str | None = None,
+    std_m: float | None = None,
+    declaration: Path | None = None,
 ) -> None:
     """Put where a recorded drive went into the store."""
-    track = track_of_log(log, name=name or log.name, declaration=declaration)
+    track = track_of_log(log, name=name or log.name, std_m=std_m, declaration=declaration)
     kept = TrackStore(store_folder(store))
     new = kept.add(track)
     said = f"{_length_m(track):.0f} m of {log}" if new else f"{log} is there already"
@@ -52,10 +57,13 @@ def delete_tracks(names: list[str], *, everything: bool, store: str | None) -> N
     say(f"{found.folder}: {len(doomed)} tracks deleted, {len(found.ids())} left")
 
 
-def track_of_log(log: Path, *, name: str, declaration: Path | None = None) -> DrivenTrack:
+def track_of_log(
+    log: Path, *, name: str, std_m: float | None = None, declaration: Path | None = None
+) -> DrivenTrack:
     """Return where a recorded drive went, as the estimator saw it without the help of a map.
 
-    Raises UserError where it went nowhere, or its positions are too rough to tell lanes.
+    `std_m` is how well its places are known where the log does not say. Raises UserError where it
+    went nowhere, or its positions are too rough to tell lanes.
     """
     from foretwin.telemetry.estimator.estimator import StateEstimator
     from foretwin.telemetry.logs.opening import open_log
@@ -76,10 +84,11 @@ def track_of_log(log: Path, *, name: str, declaration: Path | None = None) -> Dr
             last = here
     if len(kept) < _LEAST_M / _STEP_M:
         raise UserError(f"{log}: drives less than {_LEAST_M:g} m with a known heading; no track")
-    rough = [s.position_std_m for s in kept if s.position_std_m is not None]
-    if rough and float(np.median(rough)) > _ROUGH_M:
+    told = [s.position_std_m for s in kept if s.position_std_m is not None]
+    rough_m = float(np.median(told)) if told and std_m is None else std_m or 0.0
+    if not 0.0 <= rough_m <= _ROUGH_M:
         raise UserError(
-            f"{log}: positions are known to {np.median(rough):.1f} m alone; "
+            f"{log}: positions are known to {rough_m:.1f} m alone; "
             f"{_ROUGH_M:g} m or better tell one lane from the next"
         )
     lat_deg = np.array([s.position.lat_deg for s in kept])
@@ -93,6 +102,7 @@ def track_of_log(log: Path, *, name: str, declaration: Path | None = None) -> Dr
         lat_deg=lat_deg,
         lon_deg=lon_deg,
         speed_mps=np.array([s.speed_mps for s in kept]),
+        position_std_m=round(rough_m, 3),
     )
 
 

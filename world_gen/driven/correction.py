@@ -26,6 +26,8 @@ _LEAD = round(8.0 / STEP_M)
 _SWUNG_OUT_M = 0.3
 """So far beside where they drove in their lane, drivers are turning."""
 _MOST_SWUNG_M = 12.0
+_FINE_M = 0.8
+"""A rougher pass tells no turn from the next wider one."""
 _LOOK = round(20.0 / STEP_M)
 
 
@@ -80,6 +82,8 @@ def driven(
         told = np.flatnonzero(match.clear & ~turning).tolist()
         on_lanes = [i for i in told if ids[i] in lanes.lanes]
         seen += [_seen(lanes.lanes[ids[i]], one, match, i) for i in on_lanes]
+        if one.std_m > _FINE_M:
+            continue
         for key, begin, end in _through(ids, match, links):
             through.setdefault(key, []).append(one.xy_m[max(begin - _LEAD, 0) : end + _LEAD])
             if _turns(links[key]):
@@ -121,7 +125,9 @@ def _near_turns(turning: Sequence[bool]) -> np.ndarray:
 def _seen(lane: LaneDraft, one: Pass, match: PassMatch, i: int) -> Seen:
     across = left_of(one.along[i])
     place = one.xy_m[i] - (match.left_m[i] + _left_of_road_m(lane)) * across
-    return Seen(lane.key.edge, locate(lane.edge.xy_m, place), across, float(match.left_m[i]))
+    return Seen(
+        lane.key.edge, locate(lane.edge.xy_m, place), across, float(match.left_m[i]), one.std_m
+    )
 
 
 def _left_of_road_m(lane: LaneDraft) -> float:

@@ -82,7 +82,9 @@ class Lines:
         Forward and backward probabilities of a hidden Markov model (Rabiner, 1989), with what is
         alike in errors along a road counted once.
         """
-        places = [self._places(xy, along) for xy, along in zip(one.xy_m, one.along, strict=True)]
+        error_m = math.hypot(MAP_ERROR_M, one.std_m)
+        points = zip(one.xy_m, one.along, strict=True)
+        places = [self._places(xy, along, error_m) for xy, along in points]
         steps = [self._steps(a.line, b.line) for a, b in pairwise(places)]
         forward = [places[0].weight]
         for step, place in zip(steps, places[1:], strict=True):
@@ -100,7 +102,7 @@ class Lines:
             clear.append(bool(share[best] >= CLEAR) and place.line[best] != UNKNOWN)
         return PassMatch(np.array(line), np.array(left), np.array(clear))
 
-    def _places(self, xy_m: Array, along: Array) -> _Places:
+    def _places(self, xy_m: Array, along: Array, error_m: float) -> _Places:
         rows = np.array(self._tree.query_ball_point(xy_m, _REACH_M), dtype=np.intp)
         cos = self._along[rows] @ along
         gap = xy_m - self._xy[rows]
@@ -112,7 +114,7 @@ class Lines:
         kept = order[np.unique(self._line[rows[order]], return_index=True)[1]]
         turned = np.arccos(np.clip(cos[kept], -1.0, 1.0)) / _HEADING_RAD
         error = self._error[self._line[rows[kept]]]
-        squares = ((left[kept] / MAP_ERROR_M) ** 2 + turned**2) / error**2
+        squares = ((left[kept] / error_m) ** 2 + turned**2) / error**2
         share = -0.5 * STEP_M / ALIKE_M
         return _Places(
             np.append(self._line[rows[kept]], UNKNOWN),

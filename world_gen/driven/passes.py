@@ -26,10 +26,12 @@ _HEADING_M = 4.0
 
 
 class Pass(NamedTuple):
-    """One piece of a track at every 2 m: places (N, 2), unit directions (N, 2)."""
+    """One piece of a track at every 2 m: places (N, 2), unit directions (N, 2), and how far off
+    its places are, as a standard deviation."""
 
     xy_m: Array
     along: Array
+    std_m: float
 
 
 def passes_within(tracks: Iterable[DrivenTrack], frame: LocalFrame, extent: Extent) -> list[Pass]:
@@ -41,13 +43,13 @@ def passes_within(tracks: Iterable[DrivenTrack], frame: LocalFrame, extent: Exte
         far = np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > _JUMP_M])
         piece_of = np.cumsum(far | np.concatenate([[True], inside[1:] != inside[:-1]]))
         for number in np.unique(piece_of[inside]).tolist():
-            piece = pass_along(xy_m[piece_of == number])
+            piece = pass_along(xy_m[piece_of == number], std_m=track.position_std_m)
             if piece is not None:
                 found.append(piece)
     return found
 
 
-def pass_along(xy_m: Array) -> Pass | None:
+def pass_along(xy_m: Array, *, std_m: float = 0.0) -> Pass | None:
     """Return places (N, 2) in driving order as a pass; None where they are no 20 m."""
     line = xy_m[apart(xy_m, tolerance_m=0.0)]
     kept = [0]
@@ -62,4 +64,4 @@ def pass_along(xy_m: Array) -> Pass | None:
     ahead = points_at(line, np.minimum(at_m + _HEADING_M, length_m))
     step = ahead - points_at(line, np.maximum(at_m - _HEADING_M, 0.0))
     along = step / np.maximum(np.hypot(*step.T), 1e-9)[:, None]
-    return Pass(points_at(line, at_m), along)
+    return Pass(points_at(line, at_m), along, std_m)

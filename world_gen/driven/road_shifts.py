@@ -20,11 +20,13 @@ MAP_ERROR_M, MAP_ALIKE_M = 1.2, 40.0
 """Standard deviation of a way's place, and how far along a road its error stays. Chosen, after
 `matching.MAP_ERROR_M`."""
 PASS_ERROR_M, PASS_ALIKE_M = 0.4, 10.0
-"""The same of how a driver keeps the middle of a lane, and of the receiver. Chosen."""
+"""The same of how a driver keeps the middle of a lane. Chosen."""
+RECEIVER_ALIKE_M = 60.0
+"""How far along a road the error of a receiver stays. Chosen: some seconds in a town."""
 _SMOOTH_M = 10.0
 """Shorter waves of a pass are the driver's, not the road's."""
 _ROBUST_M = 0.5
-"""Residuals beyond this count linearly (Huber, 1964): glitches and swerves."""
+"""Residuals beyond this, or the receiver's own error, count linearly (Huber, 1964): swerves."""
 _ROUNDS = 5
 _SPACING_M = 6.0
 LEAST_M = 0.02
@@ -32,12 +34,14 @@ LEAST_M = 0.02
 
 
 class Seen(NamedTuple):
-    """At (2,), on an edge's line, its road lies `away_m` to the side `across` (2,)."""
+    """At metres along an edge, its road lies `away_m` to the side `across` (2,), as was seen by a
+    receiver with a standard deviation of `std_m`."""
 
     edge: int
     at_m: float
     across: Array
     away_m: float
+    std_m: float = 0.0
 
 
 class _Grid(NamedTuple):
@@ -60,7 +64,8 @@ def moved_roads(edges: Mapping[int, RoadEdge], seen: Iterable[Seen]) -> dict[int
     if not seen:
         return {}
     grid = _grid(edges)
-    shift = _shifts(grid, _rows(grid, edges, seen), np.array([s.away_m for s in seen]))
+    away_m, std_m = np.array([(s.away_m, s.std_m) for s in seen]).T
+    shift = _shifts(grid, _rows(grid, edges, seen), away_m, std_m)
     moved = {}
     for index, points in grid.of_edge.items():
         if np.hypot(*shift[points].T).max() > LEAST_M:
@@ -114,17 +119,17 @@ def _rows(grid: _Grid, edges: Mapping[int, RoadEdge], seen: list[Seen]) -> scipy
     return scipy.sparse.csr_matrix((values, (rows, columns)), (len(seen), 2 * len(grid.xy_m)))
 
 
-def _shifts(grid: _Grid, seen: scipy.sparse.csr_matrix, away_m: Array) -> Array:
+def _shifts(grid: _Grid, seen: scipy.sparse.csr_matrix, away_m: Array, std_m: Array) -> Array:
     """Return (P, 2) how far the points lie from where the map has them."""
     stiff = scipy.sparse.kron(_stiffness(grid), scipy.sparse.eye(2), format="csc")
-    each = STEP_M / (PASS_ALIKE_M * PASS_ERROR_M**2)
-    weight = np.full(len(away_m), each)
+    each = STEP_M / (PASS_ALIKE_M * PASS_ERROR_M**2 + RECEIVER_ALIKE_M * std_m**2)
+    weight = each
     shift = np.zeros(seen.shape[1])
     for _ in range(_ROUNDS):
         scaled = seen.T.multiply(weight[None, :]).tocsr()
         shift = scipy.sparse.linalg.spsolve((scaled @ seen + stiff).tocsc(), scaled @ away_m)
         rest = np.abs(seen @ shift - away_m)
-        weight = each * np.minimum(1.0, _ROBUST_M / np.maximum(rest, 1e-9))
+        weight = each * np.minimum(1.0, np.maximum(_ROBUST_M, std_m) / np.maximum(rest, 1e-9))
     return np.asarray(shift.reshape(-1, 2))
 
 

@@ -58,6 +58,15 @@ def test_what_names_no_track_is_refused(arguments: list[str], tmp_path: Path) ->
     assert run(["tracks", *arguments, "--store", str(tmp_path)]) == 2
 
 
+def test_a_drive_too_rough_to_tell_lanes_is_refused(tmp_path: Path) -> None:
+    drive = str(gpx(tmp_path / "drive.gpx"))
+    store = TrackStore(tmp_path / "store")
+
+    assert run(["tracks", "add", drive, "--store", str(store.folder), "--std", "8"]) == 2
+    assert run(["tracks", "add", drive, "--store", str(store.folder), "--std", "1.5"]) == 0
+    assert [one.position_std_m for one in store.all()] == [1.5]
+
+
 def test_worlds_lie_where_their_roads_were_driven_by_choice_alone(tmp_path: Path) -> None:
     crossing().read(tmp_path)
     TrackStore(tmp_path / "store").add(track(LINE_M))

@@ -111,12 +111,25 @@ def test_a_turn_follows_the_pass_and_stays_joined_to_its_lanes(tmp_path: Path) -
     found = next(c for c in after.connections if c.id == turn.id)
 
     assert found.path_source == "driven"
+    rough = msgspec.structs.replace(track(driven), position_std_m=1.5)
+    beside = next(c for c in world_of(crossing(), tmp_path, rough).connections if c.id == turn.id)
+    assert beside.path_source is msgspec.UNSET
     path = shapely.LineString(moved(after, found.centerline))
     seen = drawn[middle] + 0.4 * inward / np.hypot(*inward)
     assert path.distance(shapely.Point(seen)) < 0.1
     ends = {lane.id: lane.centerline for lane in after.lanes}
     assert np.array_equal(found.centerline[0], ends[found.from_lane_id][-1])
     assert np.array_equal(found.centerline[-1], ends[found.to_lane_id][0])
+
+
+def test_a_rough_pass_moves_a_street_less_than_a_good_one(tmp_path: Path) -> None:
+    lane_m = height_at(world_of(street(), tmp_path), ".f0", 0.0)
+    good = track(line((-290.0, lane_m + 0.9), (290.0, lane_m + 0.9)))
+    rough = msgspec.structs.replace(good, position_std_m=2.0)
+
+    shift_m = height_at(world_of(street(), tmp_path, rough), ".f0", 0.0) - lane_m
+
+    assert 0.0 < shift_m < 0.5
 
 
 def test_the_order_in_which_tracks_are_given_changes_no_byte(tmp_path: Path) -> None:
