@@ -30,6 +30,8 @@ def lanes_chosen(
     A lane that no movement takes up, since its arrow points where the map has no road, leads
     where it turns least from what its arrow says: no lane ends before a junction.
     """
+    if len(starts) == 1 and not middle and not _tagged(starts[0]):
+        return [starts for _ in ways]
     order = {lane.id: i for i, lane in enumerate((*middle, *starts))}
     found: list[list[LaneDraft]] = []
     for way, its_room in zip(ways, room, strict=True):
@@ -138,8 +140,6 @@ def _starting_lanes(
     driving_side: DrivingSide,
 ) -> list[LaneDraft]:
     """Return the lanes that a movement begins from where a road leads to more than one."""
-    if len(starts) == 1 and not _tagged(starts[0]):
-        return list(starts)
     turn = movement.turn
     far: Turn = "left" if driving_side == "right" else "right"
     cars = [lane for lane in starts if lane.kind == "driving"] or starts

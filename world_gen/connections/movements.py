@@ -93,8 +93,11 @@ def _ways_through(
                 continue
             if restrictions.path_allowed((toward, *path, leg)):
                 best[leg.key] = (leg, path)
+        steps = inner.get(last.end_node)
+        if not steps:
+            continue
         passed = {toward.end_node, *(part.end_node for part in path)}
-        for step in inner.get(last.end_node, ()):
+        for step in steps:
             # Around an island and back to the same node nobody means to go.
             if step.end_node in passed or not restrictions.step_allowed(last, step):
                 continue
