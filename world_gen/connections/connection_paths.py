@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.bends import rounded_through
-from foretwin.geometry.polyline import cross, offset, turn_rad, without_repeats
+from foretwin.geometry.back_turns import back_turns
+from foretwin.geometry.polyline import (
+    cross,
+    offset,
+    turn_rad,
+    without_repeats,
+)
 from foretwin.geometry.polyline_batch import Polylines
+from foretwin.geometry.splines import through_corners
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.inner_lanes import paths_along_inner_lanes
@@ -18,9 +26,13 @@ from foretwin.world_gen.lanes.clusters import Surroundings
 _LONG_PATH_M = 25.0
 _MAX_DETOUR_M = 9.0
 _GUIDED_RADIUS_M = 12.0
+_LONGEST_CHORD_M = 8.0
+"""Lanes with longer pieces at an end are straight there."""
+_LANE_BENDS_PM = 0.02, 0.12
+"""Lanes that bend less are all but straight; what bends more is a kink of the map."""
+_BACK_RAD = math.radians(165.0)
 _GRID_SHARE = 0.95
-_LONGEST_CHORD_M, _SHARPEST_LANE_PM = 8.0, 0.12
-"""Lanes with longer pieces at an end are straight there; what bends more is a kink of the map."""
+"""Points on the millimetre grid bend a little more than the curves that they stand for."""
 
 
 def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
@@ -38,30 +50,33 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     bends = _bends([c.start.centerline[-3:] for c in connections])
     end_bends = _bends([c.end.centerline[:3] for c in connections])
     turns = turn_curves(begins, headings, ends, end_headings, bend_pm=bends, end_bend_pm=end_bends)
-    for c, path in zip(connections, turns.lines.split(), strict=True):
-        c.centerline = path
-    fits = turns.radius_m > 0.0
-    if not fits.all():
+    paths = turns.lines.split()
+    least_m = _GRID_SHARE * LEAST_RADIUS_M
+    back = np.abs(turn_rad(headings, end_headings)) > _BACK_RAD
+    back &= np.array([c.turn == "u_turn" for c in connections])
+    tight = np.nonzero(back & (turns.radius_m < least_m))[0]
+    poses = (begins, headings, ends, end_headings)
+    drawn = dict(zip(tight.tolist(), back_turns(*(a[tight] for a in poses)).split(), strict=True))
+    drawn |= paths_along_inner_lanes(connections, around)
+    long = [i for i, c in enumerate(connections) if i not in drawn and _inner_m(c) > _LONG_PATH_M]
+    guided = [
+        through_corners(
+            _along_path(begins[i], headings[i], ends[i], end_headings[i], connections[i], around),
+            radius_m=_GUIDED_RADIUS_M,
+        )
+        for i in long
+    ]
+    far = shapely.hausdorff_distance(_line_strings([paths[i] for i in long]), _line_strings(guided))
+    drawn |= {i: p for i, p, m in zip(long, guided, far.tolist(), strict=True) if m > _MAX_DETOUR_M}
+    for i, c in enumerate(connections):
+        c.centerline = drawn.get(i, paths[i])
+    fits = [i in drawn or radius_m > 0.0 for i, radius_m in enumerate(turns.radius_m.tolist())]
+    if not all(fits):
         _leave_out([c for c, ok in zip(connections, fits, strict=True) if not ok], notes)
         connections[:] = [c for c, ok in zip(connections, fits, strict=True) if ok]
-        begins, ends = begins[fits], ends[fits]
-        headings, end_headings = headings[fits], end_headings[fits]
-    inside = paths_along_inner_lanes(connections, around)
-    for i, path in inside.items():
-        connections[i].centerline = path
-    long = [i for i, c in enumerate(connections) if i not in inside and _inner_m(c) > _LONG_PATH_M]
-    poses = list(zip(begins, headings, ends, end_headings, connections, strict=True))
-    guided = _guided([_along_path(*poses[i], around) for i in long])
-    straight = [connections[i].centerline for i in long]
-    far = shapely.hausdorff_distance(_line_strings(straight), _line_strings(guided))
-    for i, path, detour_m in zip(long, guided, far.tolist(), strict=True):
-        if detour_m > _MAX_DETOUR_M:
-            connections[i].centerline = path
-    # Points on the millimetre grid bend a little more than the arcs that they stand for.
-    least = _GRID_SHARE * LEAST_RADIUS_M
     tightest_m = _tightest_m([c.centerline for c in connections]).tolist()
     for c, radius_m in zip(connections, tightest_m, strict=True):
-        if radius_m < least:
+        if radius_m < least_m:
             notes.append(
                 f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
                 f"into way {c.end.edge.way_id} ({c.turn})"
@@ -80,7 +95,8 @@ def _bends(lines: list[Array]) -> Array:
         steps = np.diff(np.array([lines[i] for i in known]), axis=1)
         length = np.hypot(steps[..., 0], steps[..., 1])
         bend = turn_rad(steps[:, 0], steps[:, 1]) / np.maximum(length.mean(axis=1), 1e-3)
-        curved = (length.max(axis=1) < _LONGEST_CHORD_M) & (np.abs(np.abs(bend) - 0.07) < 0.05)
+        curved = (length.max(axis=1) < _LONGEST_CHORD_M) & (np.abs(bend) < _LANE_BENDS_PM[1])
+        curved &= np.abs(bend) > _LANE_BENDS_PM[0]
         found[known] = np.where(curved, bend, 0.0)
     return found
 
@@ -119,19 +135,6 @@ def _units(vectors: Array) -> Array:
 
 def _line_strings(lines: list[Array]) -> np.ndarray:
     return np.array([shapely.LineString(line) for line in lines], dtype=object)
-
-
-def _guided(lines: list[Array]) -> list[Array]:
-    """Return lines with their corners rounded, on the millimetre grid but for their ends."""
-    if not lines:
-        return []
-    nothing = np.full((len(lines), 2), np.nan)
-    wide = np.full(len(lines), _GUIDED_RADIUS_M)
-    rounded = rounded_through(Polylines.of(lines), wide, nothing, nothing).lines.split()
-    return [
-        np.concatenate([line[:1], np.round(path[1:-1], 3), line[-1:]])
-        for line, path in zip(lines, rounded, strict=True)
-    ]
 
 
 def _along_path(

@@ -1,0 +1,48 @@
+"""Turns back between lanes near to one another are wide enough for a car."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.geometry.back_turns import back_turns
+from tests.world_gen.path_shape import bend_rad, tightest_radius_m
+
+
+@given(
+    yaw=st.floats(-math.pi, math.pi),
+    aside_m=st.floats(-8.0, 8.0),
+    ahead_m=st.floats(-5.0, 5.0),
+)
+def test_whatever_the_gap_a_turn_back_has_a_radius_of_4_m_and_no_jump(yaw, aside_m, ahead_m):
+    heading = np.array([math.cos(yaw), math.sin(yaw)])
+    start = np.array([2.0, 3.0])
+    end = start + ahead_m * heading + aside_m * np.array([-heading[1], heading[0]])
+    (path,) = back_turns(start[None], heading[None], end[None], -heading[None]).split()
+    np.testing.assert_array_equal(path[0], start)
+    np.testing.assert_array_equal(path[-1], end)
+    assert bend_rad(path[1] - path[0], heading) < math.radians(1.0)
+    assert bend_rad(path[-1] - path[-2], -heading) < math.radians(1.0)
+    assert tightest_radius_m(path) > 0.93 * 4.0
+    steps = np.diff(path, axis=0)
+    length = np.hypot(*steps.T)
+    yaws = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    bends = np.diff(yaws) / ((length[1:] + length[:-1]) / 2.0)
+    assert np.abs(np.diff(bends)).max() < 0.25
+
+
+def test_both_halves_are_mirror_images():
+    ahead = np.array([[1.0, 0.0]])
+    (path,) = back_turns(np.zeros((1, 2)), ahead, np.array([[0.0, 3.5]]), -ahead).split()
+    np.testing.assert_allclose(path[::-1] * [1.0, -1.0] + [0.0, 3.5], path, atol=1.5e-3)
+
+
+def test_a_turn_back_may_end_at_a_small_angle_to_the_lane_it_left():
+    out = np.array([[-math.cos(0.2), math.sin(0.2)]])
+    lines = back_turns(np.zeros((1, 2)), np.array([[1.0, 0.0]]), np.array([[0.0, 3.5]]), out)
+    (path,) = lines.split()
+    assert bend_rad(path[-1] - path[-2], out[0]) < math.radians(1.0)
+    assert tightest_radius_m(path) > 3.0
