@@ -6,14 +6,13 @@ from typing import Literal, get_args
 
 import msgspec
 
-Provenance = Literal["tagged", "inferred", "default"]
-"""Said by the map, following from what it says, or neither."""
-PROVENANCES: tuple[Provenance, ...] = get_args(Provenance)
-"""From the best known to the least."""
-
-
+_OfMaps = Literal["tagged", "inferred", "default"]
 PlaceSource = Literal["driven"]
 """Of a lane, or of a path, that lies where the car's own passes were; else it is not told."""
+Provenance = Literal["tagged", "inferred", "default", "driven"]
+"""Said by the map, following from what it says, neither, or learnt from the car's own passes."""
+PROVENANCES: tuple[_OfMaps, ...] = get_args(_OfMaps)
+"""What a map alone gives, from the best known to the least."""
 
 
 class Quantity(msgspec.Struct, frozen=True):

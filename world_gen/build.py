@@ -109,11 +109,11 @@ def _corrected(
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, [])
     found = driven(around.edges, lanes, connections, passes, around.trims_m)
-    if not (found.roads or found.passes):
+    if not (found.roads or found.passes or found.widths):
         return around, None
     again = surroundings(
         index, around.frame, around.extent, made_for,
-        moved=found.roads, least_trims_m=found.trims_m,
+        moved=found.roads, least_trims_m=found.trims_m, widths=found.widths,
     )  # fmt: skip
     return again, found
 

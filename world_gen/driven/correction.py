@@ -38,6 +38,8 @@ class Driven(msgspec.Struct, frozen=True):
     passes: Mapping[str, Sequence[Array]]
     trims_m: Mapping[tuple[int, bool], float]
     """How much of roads drivers need for their turns, by (edge index, at its end node)."""
+    widths: Mapping[int, float]
+    """How many times as wide lanes are, by edge index."""
 
     def hold(self, lanes: LaneSet, connections: Iterable[ConnectionDraft]) -> list[str]:
         """Lay connections along their passes where a car can keep to these, and say what moved.
@@ -53,10 +55,14 @@ class Driven(msgspec.Struct, frozen=True):
             if path is not None:
                 c.centerline, c.path_source = path, "driven"
                 followed += 1
-        if not (self.roads or followed):
-            return []
-        roads = f"{len(self.roads)} roads and {followed} turns"
-        return [f"{roads} lie where the car's own passes were"]
+        notes = []
+        if self.roads or followed:
+            roads = f"{len(self.roads)} roads and {followed} ways through junctions"
+            notes.append(f"{roads} lie where the car's own passes were")
+        wide = {x.key.edge for x in lanes.lanes.values() if x.width_m.source == "driven"}
+        if wide:
+            notes.append(f"lanes of {len(wide)} roads are as wide as passes were apart")
+        return notes
 
 
 def driven(
@@ -90,7 +96,8 @@ def driven(
                 for lane, before_m in _swung_out(links[key], ids, match, begin, end):
                     place = (lane.key.edge, lane.plan.reverse == before_m.at_begin)
                     asked[place] = max(asked.get(place, 0.0), trims_m[place] + before_m.along_m)
-    return Driven(moved_roads(edges, seen), through, asked)
+    shifted = moved_roads(edges, seen)
+    return Driven(shifted.roads, through, asked, shifted.widths)
 
 
 def _lines(
@@ -126,7 +133,13 @@ def _seen(lane: LaneDraft, one: Pass, match: PassMatch, i: int) -> Seen:
     across = left_of(one.along[i])
     place = one.xy_m[i] - (match.left_m[i] + _left_of_road_m(lane)) * across
     return Seen(
-        lane.key.edge, locate(lane.edge.xy_m, place), across, float(match.left_m[i]), one.std_m
+        edge=lane.key.edge,
+        at_m=locate(lane.edge.xy_m, place),
+        across=across,
+        away_m=float(match.left_m[i]),
+        lane=lane.plan.label,
+        lane_m=_left_of_road_m(lane),
+        std_m=one.std_m,
     )
 
 

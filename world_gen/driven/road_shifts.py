@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -29,19 +29,36 @@ _ROBUST_M = 0.5
 """Residuals beyond this, or the receiver's own error, count linearly (Huber, 1964): swerves."""
 _ROUNDS = 5
 _SPACING_M = 6.0
+WIDTH_ERROR = 0.1
+"""Standard deviation of a lane's width by class, as a share: 0.3 m of 3 m. Chosen."""
+_MOST_WIDER = 0.25
+_WIDTH_ROUNDS = 3
+_LANE_SEEN_M = 40.0
 LEAST_M = 0.02
 """Roads that would move less stay where the map has them."""
 
 
 class Seen(NamedTuple):
-    """At metres along an edge, its road lies `away_m` to the side `across` (2,), as was seen by a
-    receiver with a standard deviation of `std_m`."""
+    """At metres along an edge, its road lies `away_m` to the side `across` (2,).
+
+    It was seen from a lane that lies `lane_m` to that side of the road's line, by a receiver with a
+    standard deviation of `std_m`.
+    """
 
     edge: int
     at_m: float
     across: Array
     away_m: float
+    lane: str = ""
+    lane_m: float = 0.0
     std_m: float = 0.0
+
+
+class Shifted(NamedTuple):
+    """Roads that lie elsewhere, and how many times as wide lanes are, by edge index."""
+
+    roads: dict[int, RoadEdge]
+    widths: dict[int, float]
 
 
 class _Grid(NamedTuple):
@@ -53,19 +70,29 @@ class _Grid(NamedTuple):
     nodes: dict[int, tuple[int, ...]]
 
 
-def moved_roads(edges: Mapping[int, RoadEdge], seen: Iterable[Seen]) -> dict[int, RoadEdge]:
+def moved_roads(edges: Mapping[int, RoadEdge], seen: Iterable[Seen]) -> Shifted:
     """Return, where they were driven, those roads that lie elsewhere than the map has them.
 
     The shift is the likeliest one: that of the passes where there are some, and smoothly less
     beyond, with the map's error a process of Ornstein and Uhlenbeck along roads and nodes common
-    to their roads. Points are added to long pieces, so that they can bend.
+    to their roads. Points are added to long pieces, so that they can bend. Where several lanes of
+    a way were driven, what the shift leaves tells how wide they are.
     """
     seen = list(seen)
     if not seen:
-        return {}
+        return Shifted({}, {})
     grid = _grid(edges)
-    away_m, std_m = np.array([(s.away_m, s.std_m) for s in seen]).T
-    shift = _shifts(grid, _rows(grid, edges, seen), away_m, std_m)
+    rows = _rows(grid, edges, seen)
+    away_m, lane_m, std_m = np.array([(s.away_m, s.lane_m, s.std_m) for s in seen]).T
+    ways = np.array([edges[s.edge].way_id for s in seen])
+    wider: dict[int, float] = {}
+    for _ in range(_WIDTH_ROUNDS):
+        by_width = np.array([wider.get(way, 0.0) for way in ways.tolist()]) * lane_m
+        shift = _shifts(grid, rows, away_m - by_width, std_m)
+        rest_m = away_m - rows @ shift.ravel()
+        wider = _wider(ways, [s.lane for s in seen], rest_m, lane_m)
+        if not wider:
+            break
     moved = {}
     for index, points in grid.of_edge.items():
         if np.hypot(*shift[points].T).max() > LEAST_M:
@@ -73,7 +100,28 @@ def moved_roads(edges: Mapping[int, RoadEdge], seen: Iterable[Seen]) -> dict[int
             moved[index] = msgspec.structs.replace(
                 edges[index], xy_m=line, node_ids=grid.nodes[index], length_m=length(line)
             )
-    return moved
+    widths = {i: 1.0 + wider[edge.way_id] for i, edge in edges.items() if edge.way_id in wider}
+    return Shifted(moved, widths)
+
+
+def _wider(
+    ways: np.ndarray, lanes: Sequence[str], rest_m: Array, lane_m: Array
+) -> dict[int, float]:
+    """Return by which share the lanes of ways are wider, of those with two lanes driven or more.
+
+    Least squares, shrunk by what is known of widths by class.
+    """
+    found = {}
+    for way in np.unique(ways).tolist():
+        mine = ways == way
+        seen_m = STEP_M * np.unique(np.array(lanes)[mine], return_counts=True)[1]
+        if (seen_m >= _LANE_SEEN_M).sum() < 2:
+            continue  # it is as likely the road that lies elsewhere
+        weight = STEP_M / (PASS_ALIKE_M * PASS_ERROR_M**2)
+        square = weight * (lane_m[mine] ** 2).sum() + 1.0 / WIDTH_ERROR**2
+        share = weight * float(rest_m[mine] @ lane_m[mine]) / square
+        found[way] = float(np.clip(share, -_MOST_WIDER, _MOST_WIDER))
+    return found
 
 
 def _grid(edges: Mapping[int, RoadEdge]) -> _Grid:

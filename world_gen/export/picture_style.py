@@ -41,8 +41,14 @@ LINE_COLOUR: Mapping[str, str] = {
     "none": "#6b7280",
 }
 SIGNAL, CROSSING_CONFLICT, MERGING_CONFLICT, WAITS = "#d62728", "#c2185b", "#7b1fa2", "#b26a00"
-HATCH: Mapping[Provenance, str | None] = {"tagged": None, "inferred": "//", "default": "xxx"}
+HATCH: Mapping[Provenance, str | None] = {
+    "driven": None,
+    "tagged": None,
+    "inferred": "//",
+    "default": "xxx",
+}
 DASH: Mapping[Provenance, Any] = {
+    "driven": "-",
     "tagged": "-",
     "inferred": (0, (5, 2.5)),
     "default": (0, (1, 1.6)),

@@ -19,7 +19,7 @@ from foretwin.world_gen.extent import Extent
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex
 from foretwin.world_gen.lanes.cluster import Cluster
-from foretwin.world_gen.lanes.cross_section import cross_section
+from foretwin.world_gen.lanes.cross_section import cross_section, widened
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
@@ -86,12 +86,14 @@ def surroundings(
     *,
     moved: Mapping[int, RoadEdge] = MappingProxyType({}),
     least_trims_m: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+    widths: Mapping[int, float] = MappingProxyType({}),
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
 
     Roads of the junctions in `made_for` are kept even where they lie beyond. `moved` are roads
     that lie elsewhere than the map has them, by edge index, in this frame already;
-    `least_trims_m` are metres that lanes end at least before a place, as in `trims_m`.
+    `least_trims_m` are metres that lanes end at least before a place, as in `trims_m`;
+    `widths` are how many times as wide lanes are where no tag tells, by edge index.
     """
     graph = index.graph
     area = in_map(extent, frame, graph.frame)
@@ -103,6 +105,7 @@ def surroundings(
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
     edges.update(moved)
     sections = _sections(index, edges)
+    sections |= {i: widened(sections[i], factor) for i, factor in widths.items()}
     clusters = _clusters(index, made_for, edges, extent)
     whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
     inner = {i for junction in whole.values() for i in junction.inner}

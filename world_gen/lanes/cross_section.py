@@ -62,6 +62,28 @@ def cross_section(edge: RoadEdge, *, centre_reverse: bool = False) -> CrossSecti
     return CrossSection(lanes=tuple(lanes), left_m=edge_left, right_m=left, notes=tuple(notes))
 
 
+def widened(section: CrossSection, factor: float) -> CrossSection:
+    """Return a section whose lanes are so many times as wide, as passes say they are.
+
+    It stays as it is where a width is tagged, where other lanes than those of cars lie in it, and
+    where lanes would become too wide or narrow.
+    """
+    wider = [
+        msgspec.structs.replace(
+            lane,
+            width_m=Quantity(round(lane.width_m.value * factor, 3), "driven"),
+            left_m=lane.left_m * factor,
+        )
+        for lane in section.lanes
+        if lane.counted and lane.width_m.source == "default"
+    ]
+    fits = all(MIN_WIDTH_M <= lane.width_m.value <= MAX_WIDTH_M for lane in wider)
+    if len(wider) < len(section.lanes) or not fits:
+        return section
+    left_m, right_m = section.left_m * factor, section.right_m * factor
+    return CrossSection(lanes=tuple(wider), left_m=left_m, right_m=right_m, notes=section.notes)
+
+
 def _lane_count(lanes: Quantity) -> int:
     return int(min(max(round(lanes.value), 1), MAX_LANES))
 

@@ -6,6 +6,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SubjectReport
 
 if TYPE_CHECKING:
@@ -82,7 +84,7 @@ def subject_table(
     return [
         f"{head:{width}}{'tagged':>8}{'inferred':>10}{'default':>9}{'confidence':>12}",
         *(
-            f"{indent + s.subject:{width}}{s.tagged:8}{s.inferred:10}{s.default:9}"
+            f"{indent + s.subject:{width}}{_known(s):8}{s.inferred:10}{s.default:9}"
             f"{_figure(s.confidence):>12}"
             for s in subjects
         ),
@@ -101,7 +103,7 @@ def _sentences(subject: SubjectReport) -> list[str]:
 def _markdown(subjects: Sequence[SubjectReport]) -> list[str]:
     lines = ["| subject | tagged | inferred | default | confidence |", "|---|---:|---:|---:|---:|"]
     lines += [
-        f"| {s.subject} | {s.tagged} | {s.inferred} | {s.default} | {_figure(s.confidence)} |"
+        f"| {s.subject} | {_known(s)} | {s.inferred} | {s.default} | {_figure(s.confidence)} |"
         for s in subjects
     ]
     guessed = [f"- {s.subject}: {_escaped(words)}" for s in subjects for words in s.guessed]
@@ -127,3 +129,8 @@ def _escaped(text: str) -> str:
     for mark in "\\`*_[]<>|#":
         text = text.replace(mark, f"\\{mark}")
     return text
+
+
+def _known(subject: SubjectReport) -> int:
+    """Return how many values are told outright: by tags, or by the car's own passes."""
+    return subject.tagged + (0 if subject.driven is msgspec.UNSET else subject.driven)

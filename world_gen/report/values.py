@@ -15,6 +15,8 @@ SOURCE_CONFIDENCE: Mapping[Provenance, float] = {"tagged": 1.0, "inferred": 0.7,
 What the map says outright counts in full. What follows from other tags is usually right, and a
 default is right where a place is ordinary; the two figures say no more than that.
 """
+_GUESSED: tuple[Provenance, ...] = PROVENANCES[:0:-1]
+"""From the least known on."""
 SUBJECT_WEIGHT: Mapping[str, float] = {
     "kind": 2.0,
     "lane counts": 3.0,
@@ -41,6 +43,8 @@ class SubjectReport(msgspec.Struct, frozen=True, kw_only=True):
     tagged: int
     inferred: int
     default: int
+    driven: int | msgspec.UnsetType = msgspec.UNSET
+    """How many were learnt from the car's own passes, where some were; they count in full."""
     confidence: float | None
     guessed: tuple[str, ...]
     """One sentence for each road and value that the map does not say outright."""
@@ -57,12 +61,13 @@ class Value(msgspec.Struct, frozen=True):
 def subject_report(subject: str, values: Sequence[Value]) -> SubjectReport:
     """Count values by source, and put those that were guessed into sentences."""
     count = Counter(value.source for value in values)
-    worth = sum(SOURCE_CONFIDENCE[source] * n for source, n in count.items())
-    alike = Counter((v.of, v.words, v.source) for v in values if v.source != "tagged")
-    order = sorted(alike, key=lambda key: (-PROVENANCES.index(key[2]), *key[:2]))
+    worth = sum(SOURCE_CONFIDENCE.get(source, 1.0) * n for source, n in count.items())
+    alike = Counter((v.of, v.words, v.source) for v in values if v.source in _GUESSED)
+    order = sorted(alike, key=lambda key: (_GUESSED.index(key[2]), *key[:2]))
     return SubjectReport(
         subject=subject,
         **{source: count[source] for source in PROVENANCES},
+        driven=count["driven"] or msgspec.UNSET,
         confidence=round(worth / len(values), 2) if values else None,
         guessed=tuple(
             f"{of}: {words}, {source}" + (f" ({n} times)" if n > 1 else "")

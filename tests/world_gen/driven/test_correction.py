@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 import shapely
 
+from foretwin.contracts.tracks import DrivenTrack
+from foretwin.world_gen.export.formats import FORMATS, ExportOptions
+from foretwin.world_gen.report.report import report_of
 from tests.world_gen.driven.drives import crossing, height_at, moved, street, track, world_of
 
 COVERS = ("foretwin.world_gen.driven.passes",)
@@ -29,7 +32,7 @@ def test_a_street_moves_to_where_it_was_driven(tmp_path: Path) -> None:
         0.9, abs=0.05
     )
     assert {lane.position_source for lane in after.lanes} == {"driven"}
-    assert "1 roads and 0 turns lie where the car's own passes were" in after.notes
+    assert "1 roads and 0 ways through junctions lie where the car's own passes were" in after.notes
 
 
 def test_a_street_of_several_lanes_stays_where_the_lane_is_not_clear(tmp_path: Path) -> None:
@@ -130,6 +133,56 @@ def test_a_rough_pass_moves_a_street_less_than_a_good_one(tmp_path: Path) -> Non
     shift_m = height_at(world_of(street(), tmp_path, rough), ".f0", 0.0) - lane_m
 
     assert 0.0 < shift_m < 0.5
+
+
+def both_ways(y_m: float) -> tuple[DrivenTrack, DrivenTrack]:
+    """Drives in both directions, each so far right of the middle of the street."""
+    there = track(line((-290.0, -y_m), (290.0, -y_m)))
+    return there, track(line((290.0, y_m), (-290.0, y_m)))
+
+
+@pytest.mark.parametrize("wider", [0.85, 1.15])
+def test_lanes_are_as_wide_as_they_are_driven_apart(wider: float, tmp_path: Path) -> None:
+    before = world_of(street(), tmp_path)
+    middle_m = abs(height_at(before, ".f0", 0.0))
+
+    after = world_of(street(), tmp_path, *both_ways(wider * middle_m))
+
+    for label, side in ((".f0", -1.0), (".b0", 1.0)):
+        assert height_at(after, label, 0.0) == pytest.approx(side * wider * middle_m, abs=0.06)
+    assert {lane.width_m.source for lane in after.lanes} == {"driven"}
+    assert "lanes of 1 roads are as wide as passes were apart" in after.notes
+    assert after.lanes[0].width_m.value == pytest.approx(
+        wider * before.lanes[0].width_m.value, rel=0.04
+    )
+
+
+def test_a_corrected_world_is_written_in_every_form_and_reported(tmp_path: Path) -> None:
+    world = world_of(crossing(), tmp_path, *both_ways(1.9), ground=True)
+
+    for name, form in FORMATS.items():
+        out = tmp_path / f"{name}{form.suffix}"
+        form.write(world, out, ExportOptions())
+        assert out.stat().st_size > 1000
+    widths = next(s for s in report_of(world).junctions[0].subjects if s.subject == "lane widths")
+    assert widths.driven == 4
+    assert not any("Long Street" in text for text in widths.guessed)
+
+
+def test_a_tagged_width_is_kept_whatever_was_driven(tmp_path: Path) -> None:
+    tags = {"width:lanes:forward": "3.1", "width:lanes:backward": "3.1", "lanes": "2"}
+    before = world_of(street(**tags), tmp_path)
+
+    after = world_of(street(**tags), tmp_path, *both_ways(1.9))
+
+    assert [lane.width_m for lane in after.lanes] == [lane.width_m for lane in before.lanes]
+    assert {lane.width_m.source for lane in after.lanes} == {"tagged"}
+
+
+def test_one_direction_alone_tells_no_width(tmp_path: Path) -> None:
+    after = world_of(street(), tmp_path, both_ways(1.9)[0])
+
+    assert {lane.width_m.source for lane in after.lanes} == {"default"}
 
 
 def test_the_order_in_which_tracks_are_given_changes_no_byte(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def along_main(edges: dict[int, RoadEdge], away_m: float) -> list[Seen]:
 def test_roads_move_by_what_was_seen_and_stay_joined(away_m: float) -> None:
     edges = roads()
 
-    moved = moved_roads(edges, along_main(edges, away_m))
+    moved = moved_roads(edges, along_main(edges, away_m)).roads
 
     ends: dict[int, list[np.ndarray]] = {}
     for index, edge in {**edges, **moved}.items():
@@ -53,16 +53,16 @@ def test_roads_move_by_what_was_seen_and_stay_joined(away_m: float) -> None:
 def test_what_was_not_seen_stays() -> None:
     edges = roads()
 
-    assert moved_roads(edges, []) == {}
+    assert moved_roads(edges, []) == ({}, {})
     moved = moved_roads(edges, [Seen(s.edge, s.at_m, LEFT, 0.001) for s in along_main(edges, 0.0)])
-    assert moved == {}
+    assert moved.roads == {}
 
 
 def test_a_line_bends_no_faster_than_a_road_does() -> None:
     edges = roads()
     seen = [s._replace(away_m=0.5 * (s.at_m > 100.0)) for s in along_main(edges, 0.0)]
 
-    moved = moved_roads(edges, seen)
+    moved = moved_roads(edges, seen).roads
 
     for edge in moved.values():
         step = np.diff(edge.xy_m, axis=0)
