@@ -10,11 +10,14 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.futures import Future
+from foretwin.contracts.roles import FollowLimits
 from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.driver_model import HOLD_MPS2
 from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.mirror.member import GroupMember
 from foretwin.sim_worker.mirror.mirror import Mirror
+from foretwin.sim_worker.mirror.vehicle_group import VehicleGroup
 from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2, load_vehicle
 from tests.sim_worker.driving import altered, drive, seed
@@ -138,3 +141,14 @@ def test_slopes_are_asked_with_the_heading_that_is_known() -> None:
     found = climb_mps2(slopes, row)
     assert found == pytest.approx([-LOST_MPS2])
     assert climb_mps2(slopes, row, np.array([[1.0], [0.0]])) == pytest.approx([LOST_MPS2])
+
+
+def test_another_vehicle_s_twin_climbs_by_its_motion_as_well() -> None:
+    group = VehicleGroup(hilly(GRADE), FRAME, (GroupMember("van", CAR),), limits=FollowLimits())
+    group.set_roles({"van": "twin"})
+    for k in range(251):
+        t = k / 50.0
+        group.take_state("van", state_at(10.0 + 8.0 * t, -1.5, stamp_ns=k * 20_000_000))
+        group.advance(k * 20_000_000)
+
+    assert group.members["van"].twin().pose[0] == pytest.approx(50.0, abs=0.3)
