@@ -15,6 +15,7 @@ from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge, recover, repeat
 from foretwin.orchestrator.commands.cli_options import (
     DemOption,
+    DialectOption,
     EndpointOption,
     InsecureOption,
     LeastFuturesOption,
@@ -172,6 +173,7 @@ def world(
     opendrive_version: Annotated[
         str | None, typer.Option(help="opendrive: 1.8, or 1.4 for CARLA [default: 1.8]")
     ] = None,
+    lanelet2_dialect: DialectOption = None,
     simulator: Annotated[
         str | None,
         typer.Option(

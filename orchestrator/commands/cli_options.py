@@ -12,6 +12,14 @@ ServiceRoadsOption = Annotated[
     bool,
     typer.Option("--service-roads", help="driveways and parking aisles count as roads everywhere"),
 ]
+DialectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--lanelet2-dialect",
+        help="lanelet2: lanelet2, or autoware, which has rules of crosswalks "
+        "[default: autoware for lanelet2_map.osm, else lanelet2]",
+    ),
+]
 DemOption = Annotated[
     Path | None,
     typer.Option("--dem", help="heights: .hgt, .hgt.zip, GeoTIFF, or a folder [default: flat]"),

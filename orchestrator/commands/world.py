@@ -18,6 +18,7 @@ from foretwin.orchestrator.worlds.opening import OpenMap, open_map, region_on_ma
 from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.world_gen.build import build_region, build_world
 from foretwin.world_gen.export.choices import (
+    LANELET2_DIALECTS,
     OPENDRIVE_VERSIONS,
     SIMULATORS,
     VEHICLE_KINDS,
@@ -56,6 +57,7 @@ class WorldRequest:
     """None goes by the suffix of `out`."""
     radius_m: float = 150.0
     opendrive_version: str | None = None
+    lanelet2_dialect: str | None = None
     simulator: str | None = None
     vehicles: str | None = None
     vehicle: Path | None = None
@@ -177,6 +179,7 @@ def _format(name: str | None, file: Path | None) -> Format:
 def _options(request: WorldRequest, format_: Format) -> ExportOptions:
     given = {
         "--opendrive-version": (request.opendrive_version, "opendrive"),
+        "--lanelet2-dialect": (request.lanelet2_dialect, "lanelet2"),
         "--simulator": (request.simulator, "sdf"),
         "--vehicles": (request.vehicles, "sdf"),
         "--vehicle": (request.vehicle, "sdf"),
@@ -191,7 +194,10 @@ def _options(request: WorldRequest, format_: Format) -> ExportOptions:
     simulator = _one_of("--simulator", request.simulator, SIMULATORS)
     vehicles = _vehicles(DEFAULT_VEHICLES if request.vehicles is None else request.vehicles)
     if format_.name != "sdf":
-        return ExportOptions(opendrive_version=version)
+        if request.lanelet2_dialect is None:
+            return ExportOptions(opendrive_version=version)
+        dialect = _one_of("--lanelet2-dialect", request.lanelet2_dialect, LANELET2_DIALECTS)
+        return ExportOptions(lanelet2_dialect=dialect)
     if not vehicles:
         if request.vehicle is not None:
             raise UserError(f"--vehicle {request.vehicle}: there is none, by --vehicles none")

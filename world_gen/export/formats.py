@@ -9,7 +9,12 @@ from pathlib import Path
 
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.world_gen.export.choices import OpenDriveVersion, Simulator, VehicleKind
+from foretwin.world_gen.export.choices import (
+    Lanelet2Dialect,
+    OpenDriveVersion,
+    Simulator,
+    VehicleKind,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,6 +22,8 @@ class ExportOptions:
     """What only some formats ask for."""
 
     opendrive_version: OpenDriveVersion = "1.8"
+    lanelet2_dialect: Lanelet2Dialect | None = None
+    """None: Autoware's where the file has the name that Autoware looks for."""
     simulator: Simulator = "classic"
     vehicles: tuple[tuple[str, VehicleKind], ...] = ()
     """Vehicles of an SDFormat world, name and kind; they need `vehicle`."""
@@ -61,13 +68,19 @@ def _opendrive(world: World, path: Path, options: ExportOptions) -> None:
     write_opendrive(world, path, version=options.opendrive_version)
 
 
+def _lanelet2(world: World, path: Path, options: ExportOptions) -> None:
+    from foretwin.world_gen.export.lanelet2 import write_lanelet2
+
+    write_lanelet2(world, path, dialect=options.lanelet2_dialect)
+
+
 FORMATS: dict[str, Format] = {
     format_.name: format_
     for format_ in (
         Format("mjcf", ".xml", _plain("mjcf", "write_mjcf")),
         Format("sdf", ".sdf", _sdf),
         Format("opendrive", ".xodr", _opendrive),
-        Format("lanelet2", ".osm", _plain("lanelet2", "write_lanelet2")),
+        Format("lanelet2", ".osm", _lanelet2),
         Format("commonroad", ".xml", _plain("commonroad", "write_commonroad")),
         Format("geojson", ".geojson", _plain("geojson", "write_geojson")),
         Format("svg", ".svg", _plain("picture", "write_picture"), True),

@@ -16,6 +16,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Crossing, Lane, LaneKind, World
 from foretwin.geometry.world_heights import heights_of
 from foretwin.world_gen.export import lanelets
+from foretwin.world_gen.export.choices import Lanelet2Dialect
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lanelet2_orientation import oriented
 from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
@@ -44,14 +45,16 @@ _BORDER_TYPES = {
 }
 
 
-def write_lanelet2(world: World, path: Path, *, crosswalk_rules: bool = False) -> Path:
+def write_lanelet2(world: World, path: Path, *, dialect: Lanelet2Dialect | None = None) -> Path:
     """Write the World as a Lanelet2 map; return the path of Autoware's projector file beside it.
 
     That is `map_projector_info.yaml` beside a `lanelet2_map.osm`, else it is named as the map is.
-    `crosswalk_rules` adds the regulatory elements of subtype `crosswalk` that Autoware supports and
-    the Lanelet2 library alone refuses. Raises OSError where a file cannot be written.
+    The dialect `autoware`, that of a `lanelet2_map.osm` unless another is asked for, has the
+    regulatory elements of subtype `crosswalk` that Autoware's validator asks for (vm-05-01) and
+    that the Lanelet2 library alone refuses. Raises OSError where a file cannot be written.
     """
-    drawn = lanelet2_map(world, crosswalk_rules=crosswalk_rules)
+    dialect = dialect or ("autoware" if path.name == AUTOWARE_MAP_NAME else "lanelet2")
+    drawn = lanelet2_map(world, crosswalk_rules=dialect == "autoware")
     drawn.write(world, path)
     projector = _projector_path(path)
     projector.write_text(_projector_info(world), encoding="utf-8")

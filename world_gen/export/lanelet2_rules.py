@@ -18,6 +18,8 @@ from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, MemberKin
 
 LIGHT_WIDTH_M = 0.35
 LIGHT_HEIGHT_M = 0.9
+STOP_BEFORE_M = 10.0
+"""A stop line farther from a crossing is not that crossing's."""
 _BULBS = (("red", 0.75), ("yellow", 0.45), ("green", 0.15))
 """Colours and heights over the light's lower edge."""
 
@@ -193,23 +195,47 @@ class _Rules:
             self._add("right_of_way", members, [name, *winners], **tags)
 
     def add_crosswalk_rules(self, crosswalks: Mapping[str, int]) -> None:
-        """Add Autoware's rule for each crosswalk, named by the lanelets that it lies across."""
+        """Add Autoware's rule for each crosswalk, named by the lanelets that it lies across.
+
+        Its lines are the stop lines close before it: lines at which one gives way are no
+        stop lines to Autoware.
+        """
         every: list[Lane | Connection] = [*self._world.lanes, *self._world.connections]
         parts = [part for part in every if part.id in self._ids]
-        tree = shapely.STRtree([shapely.LineString(part.centerline) for part in parts])
+        middles = [shapely.LineString(part.centerline) for part in parts]
+        widths = [part.width_m.value / 2 for part in parts]
+        middle_tree = shapely.STRtree(middles)
+        ground_tree = shapely.STRtree(shapely.buffer(middles, widths, cap_style="flat"))
         for crossing in self._world.crossings:
             line = shapely.LineString(crossing.line)
-            met = tree.query(line, predicate="intersects")
-            names = [parts[int(i)].id for i in sorted(met.tolist())]
             band = line.buffer(crossing.width_m.value / 2, cap_style="flat")
-            if not names or band.is_empty:
-                continue
-            corners = self._drawn.ground_nodes(shapely.get_coordinates(band.exterior)[:-1])
-            outline = self._drawn.way(corners, {"type": "crosswalk_polygon", "area": "yes"})
+            met = middle_tree.query(line, predicate="intersects").tolist()
+            # A crossing of a cycle lane, or one drawn short, may reach no lane's middle.
+            met = met or ground_tree.query(band, predicate="intersects").tolist()
+            named = [parts[i] for i in sorted(met)]
             members = _members("relation", "refers", [crosswalks[crossing.id]])
-            members += _members("way", "crosswalk_polygon", [outline])
-            members += _members("way", "ref_line", [self._lines.way(names)])
-            self._add("crosswalk", members, names)
+            if not band.is_empty:
+                corners = self._drawn.ground_nodes(shapely.get_coordinates(band.exterior)[:-1])
+                outline = self._drawn.way(corners, {"type": "crosswalk_polygon", "area": "yes"})
+                members += _members("way", "crosswalk_polygon", [outline])
+            members += _members("way", "ref_line", self._stop_lines_before(line, named))
+            self._add("crosswalk", members, [part.id for part in named])
+
+    def _stop_lines_before(
+        self, crossing: shapely.LineString, parts: Iterable[Lane | Connection]
+    ) -> list[int | None]:
+        """Return the stop lines close to a crossing, of the lanes that lead over it."""
+        lanes = dict.fromkeys(
+            part.from_lane_id if isinstance(part, Connection) else part.id for part in parts
+        )
+        near = [
+            name
+            for name in lanes
+            if (line := self._lines.of_lane.get(name)) is not None
+            and line.control.value != "give_way"
+            and shapely.distance(crossing, shapely.LineString(line.ends)) <= STOP_BEFORE_M
+        ]
+        return list(dict.fromkeys(self._lines.way((name,)) for name in near))
 
 
 def _members(kind: MemberKind, role: str, refs: Iterable[int | None]) -> list[RelationMember]:

@@ -43,6 +43,8 @@ WRONG = [
     (["--id", "n4", "--vehicles", "none"], "world.xml is written as mjcf"),
     (["--id", "n4", "--vehicle", "bmw_320i"], "--vehicle bmw_320i: goes with the format sdf"),
     (["--id", "n4", "--opendrive-version", "1.4"], "goes with the format opendrive alone"),
+    (["--id", "n4", "--lanelet2-dialect", "autoware"], "goes with the format lanelet2 alone"),
+    (["--all", "--format", "lanelet2", "--lanelet2-dialect", "apollo"], "lanelet2, autoware"),
     (
         ["--all", "--format", "sdf", "--vehicles", "none", "--vehicle", "bmw_320i"],
         "--vehicle bmw_320i: there is none, by --vehicles none",

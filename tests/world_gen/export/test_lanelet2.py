@@ -35,7 +35,7 @@ COVERS = (
 
 @pytest.mark.parametrize("drawn", [signalled_crossing(), world_of(roundabout())], ids=["x", "o"])
 def test_ids_are_unique_and_references_closed(drawn: World, tmp_path: Path) -> None:
-    found = written(drawn, tmp_path, crosswalk_rules=True)
+    found = written(drawn, tmp_path, dialect="autoware")
     assert_closed(found)
     lanelets = [tags for _, tags in found.relations.values() if tags["type"] == "lanelet"]
     roads = [tags for tags in lanelets if tags["subtype"] != "crosswalk"]

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import Signal
-from foretwin.contracts.world import WorldJunction
+from foretwin.contracts.world import Crossing, WorldJunction
+from foretwin.geometry.polyline import unit
+from foretwin.world_gen.export.choices import Lanelet2Dialect
+from foretwin.world_gen.export.lanelet2 import write_lanelet2
 from tests.world_gen.drawn_maps import crossing, world_of
 from tests.world_gen.export.drawn_world import ZEBRA, road, world
-from tests.world_gen.export.lanelet2_file import written
+from tests.world_gen.export.lanelet2_file import read, written
 from tests.world_gen.export.signalled import signalled_crossing
+
+WIDE, SIGNALLED = Quantity(4.0, "default"), Choice("traffic_signals", "tagged")
 
 
 def test_lights_stand_at_height_and_name_their_stop_line(tmp_path: Path) -> None:
@@ -110,7 +117,47 @@ def test_a_crosswalk_is_a_lanelet_as_wide_as_it_is(tmp_path: Path) -> None:
     xs = [{float(found.nodes[n]["local_x"]) for n in found.ways[ref][0]} for _, ref, _ in members]
     assert xs == [{18.0}, {22.0}]  # walking north, the left side lies in the west
     assert not found.rules("crosswalk")  # the Lanelet2 library knows none
-    with_rules = written(drawn, tmp_path, crosswalk_rules=True)
-    ((rule, _, _),) = with_rules.rules("crosswalk")
+    with_rules = written(drawn, tmp_path, dialect="autoware")
+    ((rule, members, _),) = with_rules.rules("crosswalk")
+    roles = Counter(role for _, _, role in members)
+    assert roles == {"refers": 1, "crosswalk_polygon": 1}, "and no stop line 20 m before it"
     for lane in ("a.f0", "a.b0"):
         assert ("relation", rule, "regulatory_element") in with_rules.lanelet(lane)[0]
+
+
+def test_every_crosswalk_has_a_rule_with_the_stop_lines_close_to_it(tmp_path: Path) -> None:
+    """One crosswalk lies just behind the lights' lines, one ends before the lane's middle."""
+    drawn = signalled_crossing()
+    stop = next(line for line in drawn.stop_lines if line.control.value == "signal")
+    lane = next(lane for lane in drawn.lanes if lane.id == stop.lane_id)
+    ahead = unit(lane.centerline[-1] - lane.centerline[-2]) * 3.0
+    short = np.array([stop.ends[1], stop.ends[1] + (stop.ends[0] - stop.ends[1]) / 4]) - 10 * ahead
+    drawn = msgspec.structs.replace(
+        drawn,
+        crossings=(
+            Crossing(id="at line", line=stop.ends + ahead, width_m=WIDE, kind=SIGNALLED),
+            Crossing(id="short", line=short, width_m=WIDE, kind=SIGNALLED),
+        ),
+    )
+    found = written(drawn, tmp_path, dialect="autoware")
+    rules = {members[0][1]: (rule, members) for rule, members, _ in found.rules("crosswalk")}
+    assert rules.keys() == {found.id_of("at line"), found.id_of("short")}
+    lines = [ref for _, ref, role in rules[found.id_of("at line")][1] if role == "ref_line"]
+    assert [found.ways[ref][1]["type"] for ref in lines] == ["stop_line"]
+    rule, members = rules[found.id_of("short")]
+    assert "ref_line" not in {role for _, _, role in members}
+    assert ("relation", rule, "regulatory_element") in found.lanelet(lane.id)[0]
+
+
+def test_a_map_by_autoware_s_name_is_in_its_dialect(tmp_path: Path) -> None:
+    one = road("a", [(0.0, 0.0), (50.0, 0.0)], ahead=[3.0], against=[3.0])
+    drawn = world(one, crossings=(ZEBRA,))
+    cases: list[tuple[str, Lanelet2Dialect | None, int]] = [
+        ("lanelet2_map.osm", None, 1),
+        ("lanelet2_map.osm", "lanelet2", 0),
+        ("map.osm", None, 0),
+        ("map.osm", "autoware", 1),
+    ]
+    for name, dialect, rules in cases:
+        write_lanelet2(drawn, tmp_path / name, dialect=dialect)
+        assert len(read(tmp_path / name).rules("crosswalk")) == rules, (name, dialect)
