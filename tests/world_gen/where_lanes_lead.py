@@ -35,6 +35,8 @@ class LaneEnds(msgspec.Struct, frozen=True, kw_only=True):
     """Lanes of roads that none of their lanes leads out of: a real dead end."""
     reserved: tuple[str, ...]
     """Lanes for all that go on as a lane for buses: drivers change lanes before."""
+    no_room: tuple[str, ...]
+    """Lanes whose only ways on were left out since no path could be drawn, as a note says."""
 
 
 def lane_ends(world: World) -> LaneEnds:
@@ -46,6 +48,8 @@ def lane_ends(world: World) -> LaneEnds:
     dead: list[str] = []
     closed: list[str] = []
     reserved: list[str] = []
+    no_room: list[str] = []
+    left_out = [note for note in world.notes if "no room at all" in note]
     for road in world.roads:
         for reverse, place in ((False, road.to_place), (True, road.from_place)):
             mine = [lanes[i] for i in road.lane_ids if i in lanes and lanes[i].reverse == reverse]
@@ -55,14 +59,20 @@ def lane_ends(world: World) -> LaneEnds:
             stuck = [lane for lane in mine if not lane.successor_ids]
             for lane in stuck:
                 gaps_m = np.hypot(*(begins - lane.centerline[-1]).T)
-                if len(stuck) == len(mine):
+                if any(note.startswith(f"way {lane.osm_way}:") for note in left_out):
+                    no_room.append(lane.id)
+                elif len(stuck) == len(mine):
                     closed.append(lane.id)
                 elif lane.kind == "driving" and (gaps_m < GOES_ON_M).any():
                     reserved.append(lane.id)
                 else:
                     dead.append(lane.id)
     return LaneEnds(
-        ends=tuple(ends), dead=tuple(dead), closed=tuple(closed), reserved=tuple(reserved)
+        ends=tuple(ends),
+        dead=tuple(dead),
+        closed=tuple(closed),
+        reserved=tuple(reserved),
+        no_room=tuple(no_room),
     )
 
 
