@@ -23,7 +23,7 @@ LIGHT = {"highway": "traffic_signals"}
 
 def _two(apart_m: float, *, third_arm: bool = True) -> World:
     """Return Main Road (ways 11, 12, 13 from west to east) with lights where Left Street (14, 15)
-    and Right Street (16) meet it."""
+    and Right Street (6, 7: first by number) meet it."""
     nodes = {0: (0.0, 0.0), 1: (apart_m, 0.0), 2: (-120.0, 0.0), 3: (apart_m + 120.0, 0.0)}
     nodes |= {4: (0.0, 120.0), 5: (0.0, -120.0), 6: (apart_m, 120.0), 7: (apart_m, -120.0)}
     main = {"highway": "primary", "name": "Main Road"}
@@ -34,10 +34,10 @@ def _two(apart_m: float, *, third_arm: bool = True) -> World:
         (13, [1, 3], main),
         (14, [4, 0], side),
         (15, [5, 0], side),
-        (16, [6, 1], side | {"name": "Right Street"}),
+        (6, [6, 1], side | {"name": "Right Street"}),
     ]
     if third_arm:
-        ways.append((17, [7, 1], side | {"name": "Right Street"}))
+        ways.append((7, [7, 1], side | {"name": "Right Street"}))
     osm = drawn_map(nodes, ways, node_tags={0: LIGHT, 1: LIGHT})
     graph = build_road_graph(osm)
     junctions = find_intersections(osm, graph)
@@ -78,7 +78,9 @@ def test_near_junctions_change_together_and_let_go_on_who_was_let_go(third_arm: 
         here, there = _group(world, *before), _group(world, *after)
         phases = zip(left.phases, right.phases, strict=True)
         both = [(*a.green_group_ids, *b.green_group_ids) for a, b in phases]
-        assert any(here in names and there in names for names in both)
+        let_go = [there in names for names in both if here in names]
+        assert let_go
+        assert all(let_go)
     assert check_plans(world) == 2
     assert green_together(world).found == ()
 

@@ -140,6 +140,22 @@ def test_red_and_amber_come_before_green_where_a_plan_has_them():
     assert colours_at(later, step_s + 9.5) == colours_at(plan, step_s - 0.5)
 
 
+def test_a_lane_in_the_middle_for_turns_has_the_light_of_its_road():
+    street = {
+        "highway": "primary",
+        "name": "Street",
+        "lanes": "3",
+        "lanes:both_ways": "1",
+        "turn:lanes:both_ways": "left",
+    }
+    world = world_of(crossing(street=street, node_tags={0: LIGHT}))
+    (turning,) = [c for c in world.connections if c.from_lane_id.endswith("w13.3.0.centre")]
+    assert turning.control == "signal"
+    assert turning.signal_group_id is not None
+    assert f"{turning.from_lane_id}:stop" in {line.id for line in world.stop_lines}
+    assert green_together(world).found == ()
+
+
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     ("name", "junction", "lit", "entries"),
