@@ -18,7 +18,7 @@ from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.sdformat_shapes import shaped
 from foretwin.world_gen.export.solids import Rgba
-from foretwin.world_gen.export.terrain import Terrain, draped, ground_mesh, write_obj
+from foretwin.world_gen.export.terrain import Terrain, draped, ground_mesh, road_mesh, write_obj
 from foretwin.world_gen.export.xml_tree import Element, child
 
 _Outline = tuple[Array, tuple[Array, ...]]
@@ -51,8 +51,8 @@ def add_hills(made: Element, world: World, hills: WorldHeights, path: Path) -> N
 
 def _layers(world: World, hills: WorldHeights) -> Iterator[_Layer]:
     yield _Layer("ground", ground_mesh(world, hills), solids.GROUND, True)
-    road = [(area.outline, area.holes) for area in world.road_surface]
-    yield _Layer("road", draped(road, hills, above_m=solids.ROAD_TOP_M), solids.ROAD, True)
+    road = road_mesh(world, hills, above_m=solids.ROAD_TOP_M)
+    yield _Layer("road", road, solids.ROAD, True)
     walks = [(area.outline, area.holes) for area in world.sidewalks]
     walked = draped(walks, hills, above_m=solids.SIDEWALK_TOP_M)
     yield _Layer("sidewalks", walked, solids.SIDEWALK)

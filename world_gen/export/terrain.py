@@ -9,11 +9,16 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import World
+from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import left_of
 from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.export.xml_tree import in_comment
 
+_SLIVER_M2 = 1e-3
+"""Twice the area of triangles that are left out: they would stand upright."""
+_ASIDE_M = 0.75
+"""Paved ground reaches so far beyond lanes."""
 EDGE_M = 5.0
 """Outlines are cut into pieces no longer: roads bend over hills."""
 BELOW_ROAD_M = 0.3
@@ -24,7 +29,7 @@ class Terrain(NamedTuple):
     """Points (N, 3) in the World's frame and triangles (M, 3), seen from above."""
 
     points: Array
-    triangles: Array
+    triangles: Indices
 
 
 def ground_mesh(world: World, hills: WorldHeights) -> Terrain:
@@ -44,22 +49,73 @@ def ground_mesh(world: World, hills: WorldHeights) -> Terrain:
     return Terrain(points, np.concatenate([lower, upper]))
 
 
+def road_mesh(world: World, hills: WorldHeights, *, above_m: float) -> Terrain:
+    """Return what is driven on: on the ground the paved areas, over and under it lanes alone.
+
+    Paved areas do not say whether they are a bridge's: what only lanes of other layers cover is.
+    """
+    parts: list[Lane | Connection] = [*world.lanes, *world.connections]
+    spans = [part for part in parts if part.layer]
+    paved = [_polygon(area.outline, area.holes) for area in world.road_surface]
+    if spans:
+        grounded = [_ribbon(part, _ASIDE_M) for part in parts if not part.layer]
+        lifted = shapely.union_all([_ribbon(part, _ASIDE_M) for part in spans])
+        lifted = lifted.difference(shapely.union_all(grounded))
+        paved = [area.difference(lifted) for area in paved]
+    meshes = [_draped(paved, hills, above_m=above_m)]
+    meshes += [_strip(part, hills, above_m=above_m) for part in spans]
+    first = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    return Terrain(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.triangles + i for mesh, i in zip(meshes, first, strict=False)]),
+    )
+
+
+def _ribbon(part: Lane | Connection, aside_m: float) -> shapely.Geometry:
+    half_m = part.width_m.value / 2.0 + aside_m
+    return shapely.LineString(part.centerline).buffer(half_m, cap_style="flat")
+
+
+def _strip(part: Lane | Connection, hills: WorldHeights, *, above_m: float) -> Terrain:
+    """Return a lane as a strip of its own at its own height."""
+    line = shapely.get_coordinates(shapely.segmentize(shapely.LineString(part.centerline), EDGE_M))
+    ahead = np.gradient(line, axis=0)
+    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    aside = left_of(ahead) * (part.width_m.value / 2.0)
+    high = hills.along(part, line) + above_m
+    points = np.column_stack([np.concatenate([line + aside, line - aside]), np.tile(high, 2)])
+    count = len(line)
+    left = np.arange(count - 1)
+    right = left + count
+    one = np.column_stack([left, right, right + 1])
+    other = np.column_stack([left, right + 1, left + 1])
+    return _upward(points, np.concatenate([one, other]))
+
+
 def draped(
     outlines: Iterable[tuple[Array, tuple[Array, ...]]], hills: WorldHeights, *, above_m: float
 ) -> Terrain:
     """Return areas (outline and holes) as they lie on the ground, lifted by `above_m`."""
-    areas = [_polygon(*outline) for outline in outlines]
+    return _draped([_polygon(*outline) for outline in outlines], hills, above_m=above_m)
+
+
+def _draped(areas: list[shapely.Geometry], hills: WorldHeights, *, above_m: float) -> Terrain:
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(areas)) if areas else []
     corners = [shapely.get_coordinates(part)[:3] for part in parts]
     if not corners:
         return Terrain(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
     flat = np.concatenate(corners)
     xy, which = np.unique(np.round(flat, 4), axis=0, return_inverse=True)
-    triangles = which.reshape(-1, 3)
-    a, b, c = (xy[triangles[:, k]] for k in range(3))
+    points = np.column_stack([xy, hills.surface_at(xy) + above_m])
+    return _upward(points, which.reshape(-1, 3))
+
+
+def _upward(points: Array, triangles: Indices) -> Terrain:
+    """Turn triangles (M, 3) to be seen from above, and leave out what is none."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
     across = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    triangles = np.where((across < 0.0)[:, None], triangles[:, ::-1], triangles)[across != 0.0]
-    return Terrain(np.column_stack([xy, hills.surface_at(xy) + above_m]), triangles)
+    turned = np.where((across < 0.0)[:, None], triangles[:, ::-1], triangles)
+    return Terrain(points, turned[np.abs(across) > _SLIVER_M2])
 
 
 def _polygon(outline: Array, holes: tuple[Array, ...] = ()) -> shapely.Geometry:

@@ -21,7 +21,8 @@ from foretwin.world_gen.export.geojson import geojson_of
 from foretwin.world_gen.export.opendrive import write_opendrive
 from foretwin.world_gen.export.opendrive_cubics import Cubic, Rise
 from foretwin.world_gen.export.sdformat import write_sdf
-from foretwin.world_gen.export.terrain import draped, ground_mesh
+from foretwin.world_gen.export.terrain import draped, ground_mesh, road_mesh
+from tests.world_gen.drawn_maps import drawn_map
 from tests.world_gen.export.lanelet2_file import written
 from tests.world_gen.export.read_opendrive import FileRoad, OpenDriveFile
 from tests.world_gen.ground.test_heights import world_on
@@ -167,6 +168,34 @@ def test_the_ground_nowhere_looks_through_the_road() -> None:
     )
     middles = roads.points[roads.triangles].mean(axis=1)
     assert (middles[:, 2] > lowered.ground_at(middles[:, :2])).all()
+
+
+def test_tunnels_and_bridges_are_strips_at_their_own_height() -> None:
+    def ridge(x: Array, y: Array) -> Array:
+        return 100.0 + 60.0 * np.exp(-np.square(x - 90.0) / 40.0**2)
+
+    street, tunnel = {"highway": "residential"}, {"highway": "residential", "tunnel": "yes"}
+    nodes = {i: (100.0 * i - 700.0, 0.0) for i in range(15)} | {20: (0.0, -400.0), 21: (0.0, 400.0)}
+    ways = [
+        (1, [0, 1, 2, 3, 4, 5, 6, 7], street),
+        (2, [7, 8, 9], tunnel),
+        (3, list(range(9, 15)), street),
+        (4, [20, 7, 21], street),
+    ]
+    world = world_on(ridge, drawn_map(nodes, ways))
+    own = heights_of(world)
+    assert own is not None
+    mesh = road_mesh(world, own, above_m=0.0)
+    ground = ground_mesh(world, own)
+
+    inside = (np.abs(mesh.points[:, 0] - 90.0) < 10.0) & (np.abs(mesh.points[:, 1]) < 5.0)
+    above = np.hypot(*(ground.points[:, :2] - (90.0, 0.0)).T) < 10.0
+    assert inside.any()
+    assert mesh.points[inside, 2].max() < ground.points[above, 2].min() - 10.0
+    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    assert (normal[:, 2] > 0.0).all()
+    assert (np.hypot(*normal[:, :2].T) / normal[:, 2]).max() < 0.5
 
 
 def _area(ring: Array) -> float:
