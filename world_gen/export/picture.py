@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -16,6 +17,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import plain
 from foretwin.contracts.world import World
 from foretwin.world_gen.export import picture_marks as marks
+from foretwin.world_gen.export.picture_fonts import LEFT_OUT, PLAIN, fonts_for
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_style import View, view_around
 from foretwin.world_gen.export.picture_traffic import draw_traffic
@@ -68,8 +70,11 @@ def _figure(world: World, report: WorldReport) -> Figure:
         _draw(figure.add_axes(_WHOLE_BOX), world, view)
         top = 0.57
     title = plain(_title(world, report))
+    fonts = fonts_for(title)
+    title = fonts.drawable(title)
     size = min(18.0, 1550.0 / len(title))
-    figure.text(0.01, 0.972, title, fontsize=size, weight="bold", va="center", parse_math=False)
+    look: dict[str, Any] = {"fontsize": size, "weight": "bold", "family": fonts.families(PLAIN)}
+    figure.text(0.01, 0.972, title, va="center", parse_math=False, **look)
     figure.text(
         0.01,
         0.945,
@@ -105,7 +110,10 @@ def _title(world: World, report: WorldReport) -> str:
         what = f"{words}, {place.driving_side}-hand traffic"
         sure = report.junctions[0].confidence if report.junctions else report.confidence
     trust = "" if sure is None else f"   confidence {sure:.2f}"
-    return f"{place.name or place.id}   ({what}){trust}"
+    name = place.name or place.id
+    if LEFT_OUT in fonts_for(name).drawable(name):
+        name = f"{name} {place.id}"
+    return f"{name}   ({what}){trust}"
 
 
 def _subtitle(world: World) -> str:

@@ -16,6 +16,7 @@ from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.terminal import visible
 from foretwin.contracts.world import World, WorldJunction
 from foretwin.world_gen.export import picture_style as style
+from foretwin.world_gen.export.picture_fonts import FIXED, fonts_for
 from foretwin.world_gen.export.picture_style import Look, View
 from foretwin.world_gen.report.report import JunctionReport, WorldReport
 from foretwin.world_gen.report.text import subject_table
@@ -159,9 +160,10 @@ def draw_panel(figure: Figure, world: World, report: WorldReport, *, top: float)
     for note in report.notes:
         lines += _wrapped(f"note: {note.kind} ({note.count})", 6)
     room = _PANEL_LINES if world.bounds_m is None else 2 * _PANEL_LINES - 8
-    look = Look(fontsize=9.2, color="#222222", family="monospace")
-    text = "\n".join(_at_most(room, lines))
-    figure.text(0.612, top, visible(text), va="top", linespacing=1.25, parse_math=False, **look)
+    text = visible("\n".join(_at_most(room, lines)))
+    fonts = fonts_for(text)
+    look = Look(fontsize=9.2, color="#222222", family=fonts.families(FIXED), linespacing=1.25)
+    figure.text(0.612, top, fonts.drawable(text), va="top", parse_math=False, **look)
 
 
 def _wrapped(text: str, indent: int) -> list[str]:
