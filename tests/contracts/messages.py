@@ -50,6 +50,7 @@ def messages(kind: Any) -> st.SearchStrategy[Any]:
         str: st.text(max_size=8),
         bool: st.booleans(),
         bytes: st.binary(max_size=8),
+        msgspec.UnsetType: st.just(msgspec.UNSET),
         msgspec.Raw: INTS.map(lambda value: msgspec.Raw(msgspec.msgpack.encode(value))),
     }
     return st.none() if kind is type(None) else plain[kind]
