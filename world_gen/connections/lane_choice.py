@@ -47,7 +47,7 @@ def lanes_chosen(
             found.append(_starting_lanes(way, starts, ways, its_room, beside, driving_side))
     # A movement that the arrows leave no lane is none, even where lanes are left over.
     open_ways = [i for i, lanes in enumerate(found) if lanes and room[i]]
-    taken = {lane.id for i in open_ways for lane in found[i]}
+    taken = {lane.id for lanes in found for lane in lanes}
     for lane in (*middle, *starts):
         if open_ways and lane.id not in taken:
             found[_nearest(lane, order, ways, found, open_ways)].append(lane)

@@ -9,6 +9,11 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import GERMANY, IRELAND, crossing, drawn_map, world_of
 from tests.world_gen.where_lanes_lead import lane_ends, maps_in, whole_world
 
@@ -141,3 +146,19 @@ def test_no_lane_of_a_real_map_ends_before_a_junction(data_dir: Path, name: str)
     found = lane_ends(whole_world(path))
     assert len(found.ends) > 50
     assert found.dead == ()
+
+
+@pytest.mark.real_data
+def test_a_lane_whose_road_lies_beyond_the_edge_is_led_nowhere_else(data_dir: Path):
+    (path,) = [path for path in maps_in(data_dir) if "austin" in str(path)]
+    osm = read_map(path)
+    graph = build_road_graph(osm)
+    junctions = find_intersections(osm, graph)
+    (here,) = [j for j in junctions if j.summary.id == "n152456636"]
+    index = index_map(osm, graph, junctions)
+    wide, narrow = (
+        _leads(build_world(osm, graph, here, index=index, radius_m=radius_m), 655283348)
+        for radius_m in (150.0, 60.0)
+    )
+    assert wide["f2"] == {(366244289, "b1")}
+    assert narrow == {lane: to for lane, to in wide.items() if lane != "f2"}
