@@ -47,7 +47,6 @@ def driven_path(drawn: Array, passes: Sequence[Array]) -> Array | None:
         # What was drawn has corners between its points: they are no bends of the path.
         path = _smooth(line + shift * left_of(along), np.ones(count + 1), count / length_m)
         path[1:-1] = np.round(path[1:-1], 3)
-        path[[0, -1]] = drawn[[0, -1]]
         if _drivable(path, drawn):
             return path
     return None

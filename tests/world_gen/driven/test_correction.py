@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 import shapely
 
-from foretwin.contracts.tracks import DrivenTrack
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.tracks import DrivenTrack, TrackSet
+from foretwin.world_gen.driven.passes import passes_within
 from foretwin.world_gen.export.formats import FORMATS, ExportOptions
+from foretwin.world_gen.extent import Disc
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.report.report import report_of
-from tests.world_gen.driven.drives import crossing, height_at, moved, street, track, world_of
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.world_store import WorldStore, cached_build
+from tests.world_gen.driven.drives import FRAME, crossing, height_at, moved, street, track, world_of
 
 COVERS = ("foretwin.world_gen.driven.passes",)
 
@@ -95,6 +102,44 @@ def test_glitches_of_single_fixes_move_nothing_far(tmp_path: Path) -> None:
 
     found = [height_at(after, ".f0", x_m) - lane_m for x_m in np.arange(-250.0, 250.0, 5.0)]
     assert np.abs(np.array(found) - 0.3).max() < 0.25
+
+
+def test_one_swerve_around_a_van_counts_less_than_two_straight_passes(tmp_path: Path) -> None:
+    lane_m = height_at(world_of(street(), tmp_path), ".f0", 0.0)
+    x = np.arange(-290.0, 290.0)
+    swerve = np.stack([x, lane_m + 2.5 * np.exp(-((x / 20.0) ** 4))], axis=1)
+    straight = (track(line((-290.0, lane_m + i / 100), (290.0, lane_m))) for i in (0, 1))
+
+    after = world_of(street(), tmp_path, *straight, track(swerve))
+
+    assert abs(height_at(after, ".f0", 0.0) - lane_m) < 0.5
+
+
+def test_who_was_not_seen_for_a_while_is_two_passes() -> None:
+    x = np.concatenate([np.arange(-290.0, -150.0), np.arange(0.0, 290.0)])
+    geo = geo_from_local(FRAME, np.stack([x, np.zeros(len(x))], axis=1))
+    one = msgspec.structs.replace(
+        track(line((0.0, 0.0), (len(x), 0.0))), lat_deg=geo[:, 0], lon_deg=geo[:, 1]
+    )
+
+    first, second = passes_within([one], FRAME, Disc(400.0))
+
+    assert first.xy_m[-1, 0] < -150.0
+    assert second.xy_m[0, 0] > -1.0
+
+
+def test_a_cached_world_is_that_of_its_tracks(tmp_path: Path) -> None:
+    osm = crossing().read(tmp_path)
+    graph = build_road_graph(osm)
+    junctions = find_intersections(osm, graph)
+    plain = index_map(osm, graph, junctions)
+    driven = index_map(osm, graph, junctions, tracks=TrackSet.of(both_ways(1.9)))
+    store = WorldStore(tmp_path / "cache")
+
+    built = [cached_build(store, index, junctions[0]) for index in (plain, driven, plain, driven)]
+
+    assert [one.cached for one in built] == [False, False, True, True]
+    assert built[0].world.id == built[2].world.id != built[1].world.id == built[3].world.id
 
 
 def test_a_turn_follows_the_pass_and_stays_joined_to_its_lanes(tmp_path: Path) -> None:
