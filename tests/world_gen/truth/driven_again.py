@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
 from foretwin.contracts.tracks import DrivenTrack
+from foretwin.geometry.polyline import arc_lengths, points_at
 from tests.world_gen.truth.generators import by_foretwin
 from tests.world_gen.truth.hd_map import HdMap, Track
-from tests.world_gen.truth.lane_model import Nearby
+from tests.world_gen.truth.lane_model import LaneModel, Nearby
 from tests.world_gen.truth.shifted_map import routes, shifted, wandering
 from tests.world_gen.truth.tracks import beside, driven
 
@@ -22,6 +24,7 @@ _SAME_SHARE = 0.8
 _EARLIER = 24
 """So many tracks, evenly among all, are taken as the one that was driven earlier."""
 _ROUTES, _ROUTE_M = 16, 600.0
+_MOVED_M = 0.1
 
 
 class Again(NamedTuple):
@@ -53,8 +56,11 @@ def driven_again(hd: HdMap, map_file: Path) -> Again:
     return _scored(map_file, hd.frame, pairs)
 
 
-def simulated_again(map_file: Path, frame: LocalFrame, work: Path) -> Again:
-    """Score simulated passes along a map whose nodes were moved; what is true is the map itself."""
+def simulated_again(map_file: Path, frame: LocalFrame, work: Path) -> tuple[Again, Array]:
+    """Score simulated passes along a map whose nodes were moved; what is true is the map itself.
+
+    Also returns (L, 2) how far lanes that moved lay from their true place, before and after.
+    """
     truth = by_foretwin(map_file, frame)
     moved_map = work / f"shifted-{map_file.name}"
     moved_map.write_text(
@@ -62,16 +68,45 @@ def simulated_again(map_file: Path, frame: LocalFrame, work: Path) -> Again:
     )
     lines = routes(truth, count=_ROUTES, length_m=_ROUTE_M, seed=3)
     pairs = ((wandering(r, seed=i), [wandering(r, seed=-1 - i)]) for i, r in enumerate(lines))
-    return _scored(moved_map, frame, pairs)
+    errors: list[tuple[float, float]] = []
+    again = _scored(
+        moved_map,
+        frame,
+        pairs,
+        lambda base, after: errors.extend(_lane_errors(truth, base, after)),
+    )
+    return again, np.array(errors)
 
 
-def _scored(map_file: Path, frame: LocalFrame, pairs: Iterable[tuple[Array, list[Array]]]) -> Again:
+def _lane_errors(
+    truth: LaneModel, base: LaneModel, after: LaneModel
+) -> Iterator[tuple[float, float]]:
+    for key in truth.lanes.keys() & base.lanes.keys() & after.lanes.keys():
+        before, moved = base.lanes[key].line, after.lanes[key].line
+        if len(before) != len(moved) or np.abs(before - moved).max() > _MOVED_M:
+            true = shapely.LineString(truth.lanes[key].line)
+            yield _error_m(before, true), _error_m(moved, true)
+
+
+def _error_m(line: Array, true: shapely.LineString) -> float:
+    # Not at the ends: where a lane ends is another matter.
+    at_m = np.linspace(0.15, 0.85, 9) * arc_lengths(line)[-1]
+    return float(np.mean(shapely.distance(shapely.points(points_at(line, at_m)), true)))
+
+
+def _scored(
+    map_file: Path,
+    frame: LocalFrame,
+    pairs: Iterable[tuple[Array, list[Array]]],
+    look: Callable[[LaneModel, LaneModel], None] = lambda base, after: None,
+) -> Again:
     base = by_foretwin(map_file, frame)
     parts: list[Again] = []
     for i, (earlier, later) in enumerate(pairs):
         if later:
             known = as_track(frame, f"{i:012x}", earlier)
             after = by_foretwin(map_file, frame, tracks=(known,))
+            look(base, after)
             one, two = beside(base, later), beside(after, later)
             parts.append(Again(one.away_m, two.away_m, one.turning))
     return Again(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -50,11 +50,25 @@ def rows(data: Path, work: Path) -> Iterator[Row]:
     berlin = berlin_truth(data)
     models = list(_models(berlin.map_file, berlin.frame, work))
     yield from _track_rows("berlin", models, berlin.tracks, berlin.within_m)
-    for name, again in once_driven(data, work).items():
+    once = once_driven(data, work)
+    for name, again in once.passes.items():
         yield from _again_rows(name, again)
+    for column, name in enumerate(("foretwin", "driven once")):
+        text = quartiles(once.lanes_m[:, column])
+        yield Row("berlin, simulated", "lanes that moved, m", name, text)
+    away_m = once.lanes_m[:, 1] - once.lanes_m[:, 0]
+    text = f"by more than 0.5 m {(away_m > 0.5).sum()}, 1 m {(away_m > 1.0).sum()}"
+    yield Row("berlin, simulated", "lanes moved away", "driven once", text)
 
 
-def once_driven(data: Path, work: Path) -> dict[str, Again]:
+class OnceDriven(NamedTuple):
+    """Other passes by name, and (L, 2) how far simulated lanes lay from their true place."""
+
+    passes: dict[str, Again]
+    lanes_m: Array
+
+
+def once_driven(data: Path, work: Path) -> OnceDriven:
     """Return how lanes corrected by one earlier pass fit other passes of the same road."""
     mcity = mcity_passes(data / "traffic-mcity-rtk")
     drawn = work / "mcity.osm"
@@ -63,11 +77,13 @@ def once_driven(data: Path, work: Path) -> dict[str, Again]:
     file = work / "karlsruhe-again.osm"
     file.write_text(reduced(karlsruhe), encoding="utf-8")
     berlin = berlin_truth(data)
-    return {
+    simulated, lanes_m = simulated_again(berlin.map_file, berlin.frame, work)
+    passes = {
         "karlsruhe": driven_again(karlsruhe, file),
         "mcity": driven_again(mcity, drawn),
-        "berlin, simulated": simulated_again(berlin.map_file, berlin.frame, work),
+        "berlin, simulated": simulated,
     }
+    return OnceDriven(passes, lanes_m)
 
 
 def _again_rows(truth: str, again: Again) -> Iterator[Row]:

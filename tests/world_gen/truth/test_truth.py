@@ -131,7 +131,7 @@ def test_foretwin_stands_beside_netconvert_on_every_truth(data_dir: Path, tmp_pa
 def test_one_earlier_pass_brings_lanes_to_where_others_drive(
     data_dir: Path, tmp_path: Path
 ) -> None:
-    again = once_driven(data_dir, tmp_path)
+    again, lanes_m = once_driven(data_dir, tmp_path)
 
     for name, share in (("mcity", 0.6), ("berlin, simulated", 0.5)):
         for turning in (False, True):
@@ -142,3 +142,6 @@ def test_one_earlier_pass_brings_lanes_to_where_others_drive(
     # Its tracks of 35 m tell no lane of a straight road for sure: what moves must not be worse.
     before_m, after_m = again["karlsruhe"].medians_m(turning=False)
     assert after_m < 1.02 * before_m
+    # Of a wrong lane it would be three metres.
+    assert (lanes_m[:, 1] - lanes_m[:, 0]).max() < 1.0
+    assert np.median(lanes_m[:, 1]) < 0.75 * np.median(lanes_m[:, 0])
