@@ -139,13 +139,13 @@ def test_the_car_drives_over_the_hillside_as_it_really_is() -> None:
 
 
 def test_gains_by_altitude_are_those_of_a_level_town_within_three_per_cent() -> None:
-    level = gains(identified(driven(climbs=False), slopes(_flat())))
+    level = gains(identified(driven(climbs=False), slopes(flat())))
     climbing = gains(identified(driven(climbs=True), slopes(seen())))
 
     assert climbing == pytest.approx(level, rel=0.03)
 
 
-def _flat() -> RoadProfiles:
+def flat() -> RoadProfiles:
     graph = town().graph
     level = raster(lambda x, y: 0.0 * x, graph.frame.origin, reach_deg=0.012)
     return road_profiles(graph, [e.index for e in graph.edges if e.drivable], level)
@@ -156,7 +156,7 @@ def test_the_roads_own_grade_tells_gains_where_no_altitude_is_measured() -> None
     samples = without_altitude(driven(climbs=True))
     by_truth = identified(samples, slopes(real()))
     by_srtm = identified(samples, slopes(seen()))
-    believed_level = identified(samples, slopes(_flat()))
+    believed_level = identified(samples, slopes(flat()))
 
     car = read_parameters().car
     truth = np.array([car.drive_gain, car.brake_gain])
