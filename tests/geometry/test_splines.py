@@ -25,6 +25,8 @@ def test_ends_and_their_directions_stay():
     assert bend_rad(path[1] - path[0], np.array([1.0, 0.0])) < math.radians(1.0)
     assert bend_rad(path[-1] - path[-2], np.array([1.0, 0.0])) < math.radians(1.0)
     assert abs(_bends(path)[0]) < 0.02
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    assert steps[:4].max() < 1.2 * steps[:4].min()
 
 
 def test_corners_are_rounded_without_a_jump_of_the_curvature():

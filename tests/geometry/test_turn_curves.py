@@ -146,6 +146,13 @@ def test_a_u_turn_is_one_bow(beyond_m):
     assert (np.diff(path[:, 1]) >= 0.0).all()
 
 
+def test_a_gentler_path_that_leaves_the_angle_farther_is_not_taken():
+    # The end lies to the right, where its lane leads to the left: some way back is needed.
+    path, _ = _turn((0.0, 0.0), 0.0, (14.0, -3.0), 0.6)
+    step = np.diff(path, axis=0)
+    assert np.arctan2(step[:, 1], step[:, 0]).min() > math.radians(-28.0)
+
+
 def test_many_paths_are_what_each_alone_is():
     rng = np.random.default_rng(5)
     start, end = rng.uniform(-3, 3, (20, 2)), rng.uniform(8, 14, (20, 2))

@@ -7,6 +7,7 @@ prints one row for each map, one for all, and one for the tracks, which are meas
   those of them that leave it so far beyond the direction from their start to their end, which some
   piece of any path has, as where two arms of a crossing lie aside of one another; then those at
   places of one node, without roads inside to drive along; then U-turns;
+- `loops`: connections that turn by more than 270° from their lane, U-turns counted after them;
 - `radius`: quartiles of the least radius of near-side turns at lights, as `least_radius_m` has it,
   of those that turn by 45 to 135°, then of those by 50 to 85° as the tracks do;
 - `step`: 50 %, 90 % and 99 % of the greatest change of curvature in 0.5 m along a turn, in 1/m,
@@ -62,6 +63,7 @@ STEP_M = 0.25
 NEAR_SIDE_RAD = math.radians(45.0), math.radians(135.0)
 TRACKED_RAD = math.radians(50.0), math.radians(85.0)
 ALLOWED_RAD = math.radians(30.0)
+LOOP_RAD = math.radians(270.0)
 
 
 class Turn(NamedTuple):
@@ -70,6 +72,7 @@ class Turn(NamedTuple):
     name: str
     kind: str
     roads_inside: bool
+    turned_rad: float
     left_rad: float
     left_needlessly_rad: float
     radius_m: float
@@ -103,6 +106,13 @@ def left_interval_rad(path: np.ndarray, *directions: np.ndarray) -> float:
     turns = [math.remainder(_yaw(d) - yaw[0], math.tau) for d in directions]
     low, high = min(turns), max(turns)
     return float(max(yaw[0] + low - yaw.min(), yaw.max() - yaw[0] - high, 0.0))
+
+
+def turned_rad(path: np.ndarray) -> float:
+    """Return how far a path's heading comes from that of its first piece at most."""
+    steps = np.diff(path, axis=0)
+    yaw = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    return float(np.abs(yaw - yaw[0]).max())
 
 
 def curvature_changes(path: np.ndarray) -> tuple[float, float]:
@@ -144,6 +154,7 @@ def turns_of(world: World) -> Iterator[Turn]:
             name=c.id,
             kind=_kind(c, angle),
             roads_inside=c.junction_id in wide,
+            turned_rad=turned_rad(whole),
             left_rad=left_interval_rad(c.centerline, before, behind),
             left_needlessly_rad=left_interval_rad(c.centerline, before, behind, end[0] - start[-1]),
             radius_m=least_radius_m(longer),
@@ -201,7 +212,9 @@ def row_of(turns: list[Turn]) -> str:
     )
     step = np.percentile([t.step_pm for t in turns], [50, 90, 99])
     rate = np.percentile([t.rate_pm2 for t in turns], [50, 90, 99])
-    counts = f"{len(turned):4d} {len(needless):4d} {len(alone):3d} + {len(u_turned):3d} U"
+    looped = [t.kind for t in turns if t.turned_rad > LOOP_RAD]
+    loops = f"loops {looped.count('turn')} + {looped.count('u_turn')} U"
+    counts = f"{len(turned):4d} {len(needless):4d} {len(alone):3d} + {len(u_turned):3d} U  {loops}"
     shape = f"step {_words(step)}  rate {_words(rate)}"
     return f"{len(turns):7d} turned {counts}  radius {radii}  {shape}"
 
@@ -232,7 +245,7 @@ def main() -> None:
         for t in [t for t in worst if t.kind == "turn"][: chosen.worst]:
             print(f"    {math.degrees(t.left_needlessly_rad):5.0f}°  {t.radius_m:5.1f} m  {t.name}")
     print(f"{'all':14}{row_of(every)}")
-    print(f"{'tracks':14}{'':46}radius {_quartiles(tracked_radii_m(data / TRACKS))}")
+    print(f"{'tracks':14}{'':62}radius {_quartiles(tracked_radii_m(data / TRACKS))}")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 from tests.world_gen.road_edges import road as straight_road
 
 COVERS = (
-    "foretwin.world_gen.connections.connection_paths",
     "foretwin.world_gen.lanes.legs",
     "foretwin.world_gen.lanes.trims",
 )

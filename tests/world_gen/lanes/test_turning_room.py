@@ -72,7 +72,7 @@ def test_a_line_that_the_map_has_goes_before_a_wide_corner():
 
 
 def test_short_roads_keep_a_lane_between_their_corners():
-    nodes = CROSS | {5: (20.0, 0.0), 6: (20.0, 100.0), 7: (20.0, -100.0)}
+    nodes = CROSS | {5: (34.0, 0.0), 6: (34.0, 100.0), 7: (34.0, -100.0)}
     ways = [
         (11, [0, 5], MAIN),
         (12, [0, 2], MAIN),
@@ -85,8 +85,9 @@ def test_short_roads_keep_a_lane_between_their_corners():
     for junction in find_intersections(osm, graph):
         world = build_world(osm, graph, junction)
         between = [lane for lane in world.lanes if lane.osm_way == 11]
+        assert len(between) == 2
         for lane in between:
-            assert np.hypot(*(lane.centerline[-1] - lane.centerline[0])) > 3.9
+            assert np.hypot(*(lane.centerline[-1] - lane.centerline[0])) > 0.39 * 34.0
 
 
 @settings(max_examples=25, deadline=None)
