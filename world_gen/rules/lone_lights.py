@@ -15,6 +15,7 @@ from foretwin.geometry.polyline import length, locate, points_at
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
 from foretwin.world_gen.lanes.stopping import BEFORE_CROSSING_M, NodeTags, faces
+from foretwin.world_gen.lanes.trims import MAX_TRIM_M
 from foretwin.world_gen.rules.control_devices import is_light
 from foretwin.world_gen.rules.signal_heads import (
     BESIDE_HEIGHT_M,
@@ -78,7 +79,8 @@ def lone_lights(
         for index, i in found:
             for lane in on_edge.get(index, ()):
                 if faces(node_tags[node], not lane.key.reverse) is not False:
-                    line = _line(lane, node, around.edges[index].xy_m[i], node_tags)
+                    on_way = 0 < i < len(around.edges[index].node_ids) - 1
+                    line = _line(lane, node, around.edges[index].xy_m[i], node_tags, on_way)
                     if line is not None:
                         stopped.append((lane, line))
         if not stopped:
@@ -90,11 +92,20 @@ def lone_lights(
 
 
 def _line(
-    lane: LaneDraft, node: int, at_xy: np.ndarray[tuple[int], np.dtype[np.float64]], tags: NodeTags
+    lane: LaneDraft,
+    node: int,
+    at_xy: np.ndarray[tuple[int], np.dtype[np.float64]],
+    tags: NodeTags,
+    on_way: bool,
 ) -> StopLine | None:
+    """Return the line of a light; `on_way` tells that it stands between the ends of its edge.
+
+    There a lane may begin behind it, where a junction took the room: the line is at its beginning.
+    """
     at_m = locate(lane.centerline, at_xy)
-    reach = abs(lane.plan.left_m) + _REACH_M
-    if at_m <= 0.5 or math.hypot(*(points_at(lane.centerline, at_m) - at_xy)) > reach:
+    cut = at_m <= 0.5
+    reach = abs(lane.plan.left_m) + (MAX_TRIM_M if cut else _REACH_M)
+    if (cut and not on_way) or math.hypot(*(points_at(lane.centerline, at_m) - at_xy)) > reach:
         return None  # the lane begins here or does not come this way
     if "crossing" in tags[node]:
         at_m -= BEFORE_CROSSING_M

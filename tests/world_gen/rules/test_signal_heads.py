@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from foretwin.world_gen.build import build_world
@@ -129,3 +130,15 @@ def test_the_light_of_a_junction_beyond_the_edge_is_not_one_for_walkers():
     world = build_world(osm, graph, near, index=index)
     assert world.signals == ()
     assert world.crossing_plans == ()
+
+
+def test_a_light_behind_a_junction_whose_turns_take_its_place_stops_cars_where_lanes_begin():
+    light = LIGHT | {"traffic_signals:direction": "forward"}
+    wide = {"highway": "primary", "name": "Street", "lanes": "6"}
+    ways = [(11, [0, 20, 1], wide), (13, [3, 0], wide), (12, [0, 2], AVENUE), (14, [4, 0], AVENUE)]
+    world = world_of(drawn_map(CROSS | {20: (8.0, 0.0)}, ways, node_tags={20: light}))
+    lines = [line for line in world.stop_lines if line.id.endswith(":light20")]
+    begins = {lane.id: lane.centerline[0] for lane in world.lanes}
+    assert len(lines) == 3
+    for line in lines:
+        assert np.hypot(*(line.ends.mean(axis=0) - begins[line.lane_id])) < 0.6
