@@ -7,7 +7,7 @@ import pytest
 
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.countries.outlines import OUTLINES
+from foretwin.world_gen.countries.outlines import OUTLINES, place_at
 from foretwin.world_gen.countries.rules import COUNTRIES, rules_of
 from foretwin.world_gen.roads.road_classes import ROAD_CLASSES
 from tests.world_gen.drawn_maps import crossing, world_of
@@ -78,3 +78,17 @@ def test_a_sign_on_the_node_itself_stops_all_in_north_america_alone() -> None:
     assert control[LEEDS].control == "stop"
     lesser = crossing(origin=AUSTIN, node_tags={0: {"highway": "stop", "stop": "minor"}})
     assert world_of(lesser).intersection.control == "stop"
+
+
+def test_roads_on_both_sides_of_a_border_are_each_as_their_country_s() -> None:
+    """The south of Avenue begins in the USA, 100 m from a crossing in Canada."""
+    lon = -121.9
+    south, north = 48.9, 49.1
+    for _ in range(30):
+        middle = (south + north) / 2
+        south, north = (south, middle) if place_at(middle, lon).code == "CA" else (middle, north)
+    world = world_of(crossing(origin=GeoPoint(north + 50.0 / 111_000.0, lon)))
+    widths = {lane.osm_way: lane.width_m.value for lane in world.lanes}
+    assert widths == {11: 3.0, 12: 3.0, 13: 3.0, 14: 3.05}
+    speeds = {lane.osm_way: round(lane.speed_limit_mps.value * 3.6) for lane in world.lanes}
+    assert speeds == {11: 50, 12: 50, 13: 50, 14: 40}

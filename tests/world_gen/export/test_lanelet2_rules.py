@@ -161,3 +161,19 @@ def test_a_map_by_autoware_s_name_is_in_its_dialect(tmp_path: Path) -> None:
     for name, dialect, rules in cases:
         write_lanelet2(drawn, tmp_path / name, dialect=dialect)
         assert len(read(tmp_path / name).rules("crosswalk")) == rules, (name, dialect)
+
+
+def test_a_line_at_which_one_gives_way_is_no_stop_line_of_a_crosswalk(tmp_path: Path) -> None:
+    drawn = signalled_crossing()
+    lines = tuple(
+        msgspec.structs.replace(line, control=Choice("give_way", "tagged"))
+        for line in drawn.stop_lines
+    )
+    crossings = tuple(
+        Crossing(id=f"at {i}", line=line.ends, width_m=WIDE, kind=SIGNALLED)
+        for i, line in enumerate(lines)
+    )
+    drawn = msgspec.structs.replace(drawn, stop_lines=lines, signals=(), crossings=crossings)
+    rules = written(drawn, tmp_path, dialect="autoware").rules("crosswalk")
+    assert len(rules) == len(lines) == 4
+    assert not any(role == "ref_line" for _, members, _ in rules for _, _, role in members)

@@ -264,3 +264,19 @@ def test_real_junctions_close(data_dir: Path, tmp_path: Path, map_file: str, nod
     check_links(file)
     assert len(list(file.root.iter("object"))) >= len(world.buildings)
     assert len(list(file.root.iter("controller"))) >= len({s.group_id for s in world.signals})
+
+
+def test_crosswalks_have_the_outline_that_carla_reads(tmp_path: Path) -> None:
+    """One of the object itself, which ends with its first corner, in both versions."""
+    tags = {"highway": "crossing", "crossing": "zebra"}
+    way = [(15, [1, 5], STREET)]
+    osm = crossing(extra_nodes={5: (140.0, 0.0)}, extra_ways=way, node_tags={1: tags})
+    world = world_of(osm)
+    assert len(world.crossings) == 1
+    for version in ("1.8", "1.4"):
+        file = written(world, tmp_path, version)
+        (made,) = file.root.iterfind("road/objects/object[@type='crosswalk']")
+        assert made.find("outlines") is None
+        corners = [(c.get("u"), c.get("v")) for c in made.iterfind("outline/cornerLocal")]
+        assert len(corners) == 5
+        assert corners[0] == corners[-1]
