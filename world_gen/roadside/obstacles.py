@@ -12,8 +12,9 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.world import Obstacle
+from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.extent import Extent, box_deg
-from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import OsmMap, boxes_deg
 from foretwin.world_gen.polygon_areas import GRID_M
 from foretwin.world_gen.roadside.obstacle_kinds import (
     SHELTER_LENGTH_M,
@@ -50,11 +51,13 @@ class ObstacleIndex:
 
     @cached_property
     def _boxes_deg(self) -> Array:
-        boxes = [(*one.points_deg.min(axis=0), *one.points_deg.max(axis=0)) for one in self._all]
-        return np.array(boxes, dtype=np.float64).reshape(-1, 4)
+        first = np.cumsum([0, *(len(one.points_deg) for one in self._all)])
+        return boxes_deg(np.concatenate([one.points_deg for one in self._all]), first)
 
     def within(self, area: shapely.Geometry) -> tuple[_Standing, ...]:
         """Return what may reach into `area`, a shape in the map's frame."""
+        if not self._all:
+            return ()
         west, south, east, north = box_deg(area, self._osm.frame).bounds
         boxes = self._boxes_deg
         apart = (boxes[:, :2] > (north, east)) | (boxes[:, 2:] < (south, west))
@@ -62,15 +65,17 @@ class ObstacleIndex:
 
 
 def _standing(osm: OsmMap) -> Iterator[_Standing]:
-    for node, tags in osm.node_tags.items():
-        if (what := standing_at(tags)) is not None and node in osm.locations:
-            yield _Standing(f"n{node}", osm.locations.of([node]), closed=False, what=what)
+    found = ((node, standing_at(tags)) for node, tags in osm.node_tags.items())
+    nodes = [(node, what) for node, what in found if what is not None and node in osm.locations]
+    at_deg = osm.locations.of([node for node, _ in nodes])
+    for k, (node, what) in enumerate(nodes):
+        yield _Standing(f"n{node}", at_deg[k : k + 1], closed=False, what=what)
     for way in osm.ways.values():
-        if len(way.nodes) > 1 and (what := standing_along(way.tags)) is not None:
+        if len(way.nodes) > 1 and (along := standing_along(way.tags)) is not None:
             ring = way.nodes[0] == way.nodes[-1] and len(way.nodes) > 3
-            filled = what.kind == "shelter" or way.tags.get("area") == "yes"
-            area = ring and filled and what.kind != "fence"  # a fence goes around its area
-            yield _Standing(f"w{way.id}", osm.locations.of(way.nodes), closed=area, what=what)
+            filled = along.kind == "shelter" or way.tags.get("area") == "yes"
+            area = ring and filled and along.kind != "fence"  # a fence goes around its area
+            yield _Standing(f"w{way.id}", osm.locations.of(way.nodes), closed=area, what=along)
 
 
 def obstacles_in_frame(
@@ -88,20 +93,21 @@ def obstacles_in_frame(
     if not near:
         return (), ()
     shapes = _shapes(near, frame, lines)
+    which, lane = shapely.STRtree(driven).query(shapes, "dwithin", CLEAR_OF_LANES_M)
+    first = np.searchsorted(which, np.arange(len(near) + 1))
     inside = shapely.intersects(shapes, extent.polygon)
+    whole = shapely.contains_properly(extent.polygon, shapes)
     left_out, cut = [], []
-    tree = shapely.STRtree(driven)
     found: list[Obstacle] = []
     for k in np.flatnonzero(inside).tolist():
-        one, shape = near[k], shapes[k]
-        close = driven[tree.query(shape, predicate="dwithin", distance=CLEAR_OF_LANES_M)]
+        one, shape, close = near[k], shapes[k], driven[lane[first[k] : first[k + 1]]]
         if len(close):
             if len(one.points_deg) == 1:
                 left_out.append(one.name)
                 continue
             cut.append(one.name)
             shape = shape.difference(shapely.union_all(close).buffer(CLEAR_OF_LANES_M))
-        found.extend(_obstacles(one, shape.intersection(extent.polygon)))
+        found.extend(_obstacles(one, shape if whole[k] else shape.intersection(extent.polygon)))
     notes = []
     if left_out:
         notes.append(f"beside the road, left out where a lane passes: {', '.join(left_out)}")
@@ -111,30 +117,34 @@ def obstacles_in_frame(
 
 
 def _shapes(near: Sequence[_Standing], frame: LocalFrame, lines: Sequence[Array]) -> np.ndarray:
-    found = []
-    for one in near:
-        xy = local_from_geo(frame, one.points_deg[:, 0], one.points_deg[:, 1])
-        half_m = one.what.width_m / 2.0
+    lat_lon = np.concatenate([one.points_deg for one in near])
+    ends = np.cumsum([len(one.points_deg) for one in near])
+    points = np.split(local_from_geo(frame, lat_lon[:, 0], lat_lon[:, 1]), ends[:-1])
+    half_m = np.array([one.what.width_m / 2.0 for one in near])
+    at = np.array([xy[0] for xy in points])
+    low, high = at - half_m[:, None], at + half_m[:, None]
+    found: np.ndarray = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    roads = Polylines.of(lines) if lines else None
+    for k, (one, xy) in enumerate(zip(near, points, strict=True)):
         if one.closed:
-            found.append(shapely.make_valid(shapely.Polygon(xy)))
+            found[k] = shapely.make_valid(shapely.Polygon(xy))
         elif len(xy) > 1:
             line = shapely.LineString(xy).simplify(_SIMPLIFIED_M)
-            found.append(line.buffer(half_m, cap_style="flat", join_style="mitre", mitre_limit=2.0))
+            ends_flat = {"cap_style": "flat", "join_style": "mitre", "mitre_limit": 2.0}
+            found[k] = line.buffer(half_m[k], **ends_flat)
         elif one.what.kind == "shelter":
-            found.append(_shelter(xy[0], half_m, lines))
-        else:
-            found.append(shapely.box(*(xy[0] - half_m), *(xy[0] + half_m)))
-    return np.array(found, dtype=object)
+            found[k] = _shelter(xy[0], float(half_m[k]), roads)
+    return found
 
 
-def _shelter(at: Array, half_m: float, lines: Sequence[Array]) -> shapely.Polygon:
-    """Return its outline, along the nearest line."""
+def _shelter(at: Array, half_m: float, roads: Polylines | None) -> shapely.Polygon:
+    """Return its outline, along the nearest piece of a road."""
     ahead = np.array([1.0, 0.0])
-    if lines:
-        steps = np.concatenate([np.diff(line, axis=0) for line in lines])
-        middles = np.concatenate([(line[1:] + line[:-1]) / 2.0 for line in lines])
-        ahead = steps[np.hypot(*(middles - at).T).argmin()]
-        ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)
+    if roads is not None:
+        step, length = roads.steps
+        away = np.hypot(*(roads.xy_m + step / 2.0 - at).T)
+        k = int(np.where(length > 0.0, away, np.inf).argmin())
+        ahead = step[k] / length[k]
     along, aside = SHELTER_LENGTH_M / 2.0 * ahead, half_m * np.array([-ahead[1], ahead[0]])
     return shapely.Polygon(
         [at - along - aside, at + along - aside, at + along + aside, at - along + aside]
