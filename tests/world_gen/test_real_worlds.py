@@ -20,6 +20,7 @@ from foretwin.world_gen.export.mjcf import world_spec
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+from foretwin.world_gen.lanes.cross_section import LEAST_HALF_M
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
@@ -72,7 +73,7 @@ def _check(world: World, junction: Junction) -> None:
         if (found := re.match(r"way (\d+): room for a radius of .* into way (\d+) ", note))
     }
     for lane in world.lanes:
-        assert lane.width_m.value >= (0.8 if lane.kind == "bicycle" else 1.5)
+        assert lane.width_m.value >= (0.8 if lane.kind == "bicycle" else LEAST_HALF_M)
         assert len(lane.centerline) >= 2
         assert np.isfinite(lane.centerline).all()
         assert set(lane.successor_ids) <= lanes.keys() | connections

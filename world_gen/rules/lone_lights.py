@@ -101,10 +101,12 @@ def _line(
     """Return the line of a light; `on_way` tells that it stands between the ends of its edge.
 
     There a lane may begin behind it, where a junction took the room: the line is at its beginning.
+    Where it stands at a fork, whose turns take room as well, it is at the lane's end.
     """
     at_m = locate(lane.centerline, at_xy)
     cut = at_m <= 0.5
-    reach = abs(lane.plan.left_m) + (MAX_TRIM_M if cut else _REACH_M)
+    short = cut or at_m >= length(lane.centerline) - 0.5
+    reach = abs(lane.plan.left_m) + (MAX_TRIM_M if short else _REACH_M)
     if (cut and not on_way) or math.hypot(*(points_at(lane.centerline, at_m) - at_xy)) > reach:
         return None  # the lane begins here or does not come this way
     if "crossing" in tags[node]:

@@ -142,3 +142,18 @@ def test_a_light_behind_a_junction_whose_turns_take_its_place_stops_cars_where_l
     assert len(lines) == 3
     for line in lines:
         assert np.hypot(*(line.ends.mean(axis=0) - begins[line.lane_id])) < 0.6
+
+
+def test_a_light_at_a_corner_whose_turns_take_room_stops_cars_where_lanes_end():
+    nodes = CROSS | {30: (-90.0, 50.0), 31: (-20.0, 50.0), 32: (-20.0, 110.0)}
+    ways = [
+        (11, [0, 1], STREET), (13, [3, 0], STREET), (12, [0, 2], AVENUE), (14, [4, 0], AVENUE),
+        (21, [30, 31], {"highway": "primary", "name": "Main Road"}),
+        (22, [31, 32], {"highway": "primary", "name": "Other Road"}),
+    ]  # fmt: skip
+    world = world_of(drawn_map(nodes, ways, node_tags={31: LIGHT}))
+    lines = [line for line in world.stop_lines if line.id.endswith(":light31")]
+    ends = {lane.id: lane.centerline[-1] for lane in world.lanes}
+    assert len(lines) == 2
+    for line in lines:
+        assert np.hypot(*(line.ends.mean(axis=0) - ends[line.lane_id])) < 0.6
