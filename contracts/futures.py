@@ -13,6 +13,7 @@ import msgspec
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
+from foretwin.contracts.forecast import ProgressForecast
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.signals import LearntSignal
 
@@ -157,6 +158,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """Name of what ties the simulation to reality; None for nothing."""
     model: dict[str, float] = {}
     """Numbers of a learnt model of the car; none without one."""
+    progress: ProgressForecast | msgspec.UnsetType = msgspec.UNSET
+    """How far the car itself is expected to get; a job without it has the bytes that it had before
+    there was one."""
     schema_version: int = JOB_SCHEMA_VERSION
 
 

@@ -1,0 +1,96 @@
+"""How far the car will get: quantiles of the distance that it will have travelled, by instant.
+
+Between two quantiles a share grows in a straight line; beyond the outermost ones it falls off
+exponentially, as fast as between the two nearest to it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+
+PROGRESS_TIMES_S = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+"""Instants of a forecast, from the state that it begins with."""
+PROGRESS_LEVELS = tuple(k / 20 for k in range(1, 20))
+"""Of its quantiles: evenly spaced, so that the mean of their pinball losses is half the CRPS."""
+LEAST_APART_M = 0.01
+"""Two neighbouring quantiles never coincide: a car is not known to a centimetre."""
+
+
+class ProgressForecast(msgspec.Struct, frozen=True, kw_only=True):
+    """Quantiles of the distance travelled along whatever way the car takes.
+
+    `time_s` (T,) from the state that it begins with, `levels` (Q,) rising between 0 and 1,
+    `distance_m` (T, Q) rising along Q.
+    """
+
+    time_s: Array
+    levels: Array
+    distance_m: Array
+
+    def at(self, level: float) -> Array:
+        """Return (T,) the distance that is not exceeded with this probability."""
+        shares = np.full((len(self.time_s), 1), level)
+        return value_at(self.levels, self.distance_m, shares)[:, 0]
+
+    @property
+    def median_m(self) -> Array:
+        """(T,) as likely exceeded as not."""
+        return self.at(0.5)
+
+
+def rising(quantiles_m: Array) -> Array:
+    """Return quantiles (..., Q) in order, and apart."""
+    spread = LEAST_APART_M * np.arange(quantiles_m.shape[-1])
+    ordered: Array = np.sort(quantiles_m, axis=-1)
+    return np.asarray(np.maximum.accumulate(ordered - spread, axis=-1) + spread)
+
+
+def share_below(levels: Array, quantiles: Array, values: Array) -> Array:
+    """Return which share of each of T distributions lies below its values (T, V).
+
+    `levels` (Q,) or (T, Q) rise between 0 and 1, exclusively, and `quantiles` (T, Q) rise.
+    """
+    levels = np.broadcast_to(levels, quantiles.shape)
+    found = np.empty(values.shape)
+    for row, (level, quantile, value) in enumerate(zip(levels, quantiles, values, strict=True)):
+        short = np.minimum(value - quantile[0], 0.0) / _tail(level, quantile)
+        far = np.maximum(value - quantile[-1], 0.0) / _tail(1.0 - level[::-1], -quantile[::-1])
+        found[row] = np.interp(value, quantile, level)
+        found[row][short < 0.0] = (level[0] * np.exp(short))[short < 0.0]
+        found[row][far > 0.0] = (1.0 - (1.0 - level[-1]) * np.exp(-far))[far > 0.0]
+    return found
+
+
+def value_at(levels: Array, quantiles: Array, shares: Array) -> Array:
+    """Return the value below which `shares` (T, V) of each of T distributions lie.
+
+    Undoes `share_below`; shares lie between 0 and 1, exclusively.
+    """
+    levels = np.broadcast_to(levels, quantiles.shape)
+    found = np.empty(shares.shape)
+    for row, (level, quantile, share) in enumerate(zip(levels, quantiles, shares, strict=True)):
+        upper = _tail(1.0 - level[::-1], -quantile[::-1])
+        low, high = share < level[0], share > level[-1]
+        found[row] = np.interp(share, level, quantile)
+        found[row][low] = quantile[0] + _tail(level, quantile) * np.log(share[low] / level[0])
+        found[row][high] = quantile[-1] - upper * np.log((1.0 - share[high]) / (1.0 - level[-1]))
+    return found
+
+
+def pinball(levels: Array, quantiles: Array, values: Array) -> Array:
+    """Return the loss (T, Q) of quantiles (T, Q) where (T,) `values` came.
+
+    Twice its mean over evenly spaced levels is the CRPS (Gneiting, Raftery 2007, 4.2).
+    """
+    over = values[:, None] - quantiles
+    return np.asarray(np.where(over >= 0.0, levels * over, (levels - 1.0) * over))
+
+
+def _tail(level: Any, quantile: Any) -> float:
+    """Return after how much of the value the share below falls by e, at the low end."""
+    return float((quantile[1] - quantile[0]) / np.log(level[1] / level[0]))

@@ -1,0 +1,74 @@
+"""Quantiles of how far the car gets: shares, values, tails, and what a forecast costs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.contracts.forecast import (
+    LEAST_APART_M,
+    PROGRESS_LEVELS,
+    ProgressForecast,
+    pinball,
+    rising,
+    share_below,
+    value_at,
+)
+
+LEVELS = np.array(PROGRESS_LEVELS)
+
+
+def even(low_m: float, high_m: float) -> ProgressForecast:
+    """One instant, whose quantiles lie evenly from low to high."""
+    return ProgressForecast(
+        time_s=np.array([1.0]),
+        levels=LEVELS,
+        distance_m=np.linspace(low_m, high_m, len(LEVELS))[None],
+    )
+
+
+def test_a_median_lies_in_the_middle_and_other_levels_where_they_are() -> None:
+    forecast = even(10.0, 28.0)
+
+    assert forecast.median_m == pytest.approx([19.0])
+    assert forecast.at(0.1) == pytest.approx([11.0])
+    assert forecast.at(0.125) == pytest.approx([11.5])
+
+
+@given(share=st.floats(1e-6, 1.0 - 1e-6), width_m=st.floats(0.5, 80.0))
+def test_a_share_and_its_value_undo_each_other_in_the_tails_too(
+    share: float, width_m: float
+) -> None:
+    distance_m = even(3.0, 3.0 + width_m).distance_m
+    value = value_at(LEVELS, distance_m, np.array([[share]]))
+
+    assert share_below(LEVELS, distance_m, value) == pytest.approx(share, rel=1e-6, abs=1e-9)
+
+
+def test_shares_rise_from_nothing_to_all_however_far_away_a_value_is() -> None:
+    values = np.linspace(-1e5, 1e5, 2001)[None]
+    shares = share_below(LEVELS, even(0.0, 1.0).distance_m, values)[0]
+
+    assert (np.diff(shares) >= 0.0).all()
+    assert shares[0] == pytest.approx(0.0, abs=1e-12)
+    assert shares[-1] == pytest.approx(1.0, abs=1e-12)
+
+
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=3, max_size=20).map(lambda found: np.array([found]))
+)
+def test_quantiles_that_cross_are_put_in_order_and_apart(crossed: np.ndarray) -> None:
+    found = rising(crossed)
+
+    assert (np.diff(found) >= LEAST_APART_M - 1e-9).all()
+    assert found[0, 0] == crossed.min()
+
+
+def test_twice_the_mean_loss_is_the_crps() -> None:
+    """Of a uniform distribution over a metre whose middle comes: 1/12 m."""
+    fine = (np.arange(2000) + 0.5) / 2000
+    loss = pinball(fine, fine[None], np.array([0.5]))
+
+    assert 2.0 * loss.mean() == pytest.approx(1.0 / 12.0, abs=1e-4)
