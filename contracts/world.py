@@ -11,6 +11,7 @@ from typing import Literal, get_args
 import msgspec
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building, Obstacle
 from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.provenance import Choice, PlaceSource, Provenance, Quantity
@@ -215,42 +216,6 @@ class Area(msgspec.Struct, frozen=True, kw_only=True):
     outline: Array
     holes: tuple[Array, ...] = ()
     source: Provenance = "inferred"
-
-
-class Building(msgspec.Struct, frozen=True, kw_only=True):
-    """A building: footprint and vertical extent above the road."""
-
-    id: str
-    outline: Array
-    holes: tuple[Array, ...]
-    height_m: Quantity
-    min_height_m: float = 0.0
-
-
-ObstacleKind = Literal[
-    "tree", "lamp", "pole", "bollard", "block", "wall", "fence", "hedge", "guard_rail", "shelter"
-]
-SEEN_OVER_BELOW_M = 1.4
-"""What is lower hides nobody who stands: a driver's eyes are at 1.08 m (AASHTO Green Book, 2018,
-3.2.6), and who walks is higher."""
-SEEN_THROUGH: frozenset[ObstacleKind] = frozenset(
-    ("tree", "lamp", "pole", "bollard", "fence", "guard_rail")
-)
-
-
-class Obstacle(msgspec.Struct, frozen=True, kw_only=True):
-    """What stands beside the road and is no building: outline as of `Area`, from the road up."""
-
-    id: str
-    kind: ObstacleKind
-    outline: Array
-    holes: tuple[Array, ...] = ()
-    height_m: Quantity
-
-    @property
-    def opaque(self) -> bool:
-        """Whether it hides who stands behind it from a driver."""
-        return self.kind not in SEEN_THROUGH and self.height_m.value >= SEEN_OVER_BELOW_M
 
 
 class WorldJunction(msgspec.Struct, frozen=True, kw_only=True):

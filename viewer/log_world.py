@@ -8,9 +8,10 @@ import numpy as np
 import rerun as rr
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building, Obstacle
 from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_source
 from foretwin.contracts.provenance import Provenance
-from foretwin.contracts.world import Area, Building, Obstacle, World
+from foretwin.contracts.world import Area, World
 from foretwin.geometry.polyline import left_of
 from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
 from foretwin.viewer.rows import Row, path_part, raised

@@ -6,7 +6,8 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import ObstacleKind, World
+from foretwin.contracts.beside_road import ObstacleKind
+from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 
 _WALLS: frozenset[ObstacleKind] = frozenset(("wall", "fence", "hedge", "shelter", "guard_rail"))

@@ -7,8 +7,9 @@ import math
 import msgspec
 import numpy as np
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.futures import Job, SeenRoadUser
-from foretwin.contracts.world import Building, World
+from foretwin.contracts.world import World
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.metrics.table import METRICS
 from tests.benchmarks import scenes

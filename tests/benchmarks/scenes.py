@@ -8,11 +8,12 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.futures import Future, Job, PathAhead
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import Area, Building, IntersectionSummary, World
+from foretwin.contracts.world import Area, IntersectionSummary, World
 
 FUTURES = 64
 HORIZON_S = 8.0

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.futures import Future, Job, PathAhead
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import (
     Area,
-    Building,
     Connection,
     IntersectionSummary,
     Lane,

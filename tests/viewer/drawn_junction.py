@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import Signal
 from foretwin.contracts.world import (
     Area,
-    Building,
     Connection,
     Crossing,
     IntersectionSummary,

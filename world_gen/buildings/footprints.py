@@ -10,8 +10,8 @@ import numpy.typing as npt
 import shapely
 from shapely import GeometryType
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
-from foretwin.contracts.world import Building
 from foretwin.world_gen.buildings.outlines import (
     MIN_PIECE_M2,
     Indices,
@@ -21,6 +21,7 @@ from foretwin.world_gen.buildings.outlines import (
     valid_polygons,
 )
 from foretwin.world_gen.buildings.parts import Footprint, resolve_parts
+from foretwin.world_gen.buildings.roofs import roof_over, roof_tags
 from foretwin.world_gen.buildings.tags import HEADROOM_M, building_extent
 from foretwin.world_gen.extent import box_deg
 from foretwin.world_gen.osm.osm_map import OsmMap
@@ -115,8 +116,9 @@ class BuildingIndex:
                 note = f"{kind} {name[1:]}: building {'; '.join(filter(None, (note, unclear)))}"
                 if not len(polygons):
                     self._lost[k] = note
+            roof = roof_tags(table.tags[k])
             self._raw[k] = tuple(
-                Footprint(name if i == 0 else f"{name}.{i}", polygon, height, low, part, note)
+                Footprint(name if i == 0 else f"{name}.{i}", polygon, height, low, part, note, roof)
                 for i, polygon in enumerate(polygons)
             )
 
@@ -201,6 +203,12 @@ def _buildings(of: Sequence[Footprint], pieces: npt.NDArray[np.object_]) -> tupl
                 holes=tuple(holes),
                 height_m=footprint.height_m,
                 min_height_m=footprint.min_height_m,
+                roof=roof_over(
+                    outline,
+                    footprint.roof,
+                    height_m=footprint.height_m.value,
+                    min_height_m=footprint.min_height_m,
+                ),
             )
         )
     return tuple(found)

@@ -12,6 +12,7 @@ from shapely.geometry import Polygon
 
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.world_gen.buildings.outlines import valid_polygons
+from foretwin.world_gen.buildings.roofs import RoofTags
 from foretwin.world_gen.polygon_areas import GRID_M
 
 _OWN_SHARE = 0.5
@@ -30,6 +31,7 @@ class Footprint(NamedTuple):
     min_height_m: float
     is_part: bool
     note: str = ""
+    roof: RoofTags | None = None
 
 
 def resolve_parts(
@@ -87,6 +89,8 @@ def _remainder(outline: Footprint, parts: list[Polygon]) -> list[Footprint]:
     opened = shapely.buffer(core, _SLIVER_M / 2, join_style="mitre")
     pieces = valid_polygons(shapely.intersection(opened, free, grid_size=GRID_M))
     return [
-        outline._replace(id=outline.id if n == 0 else f"{outline.id}.rest{n}", polygon=piece)
+        outline._replace(
+            id=outline.id if n == 0 else f"{outline.id}.rest{n}", polygon=piece, roof=None
+        )
         for n, piece in enumerate(pieces)
     ]

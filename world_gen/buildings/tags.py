@@ -1,6 +1,6 @@
 """What a building's tags say: whether it stands in the way at all, and from where up to where.
 
-Roofs are taken as flat blocks up to the ridge, whatever `roof:shape` says: a car meets walls.
+Heights reach up to the ridge, whatever `roof:shape` says (`roofs.py`): a car meets walls.
 Keys as in https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 """
 
@@ -121,14 +121,14 @@ def _height(tags: Mapping[str, str], default_m: float) -> tuple[Quantity, str]:
     note = f"{given[0]}={tags[given[0]]} is not understood" if given else ""
     if value := height_in_m(tags.get("est_height")):
         return Quantity(value, "inferred"), note
-    levels = _count(tags.get("building:levels"))
+    levels = count_of(tags.get("building:levels"))
     if levels is None:
         if "building:levels" in tags and not note:
             note = f"building:levels={tags['building:levels']} is not understood"
         return Quantity(default_m, "default"), note
     roof = height_in_m(tags.get("roof:height"))
     if roof is None:
-        roof = (_count(tags.get("roof:levels")) or 0.0) * LEVEL_HEIGHT_M
+        roof = (count_of(tags.get("roof:levels")) or 0.0) * LEVEL_HEIGHT_M
     value = levels * LEVEL_HEIGHT_M + roof
     if value <= 0.0:
         return Quantity(default_m, "default"), note
@@ -140,7 +140,7 @@ def _underside(tags: Mapping[str, str]) -> float | None:
         if (value := height_in_m(tags.get(key))) is not None:
             return value
     for key in _UNDERSIDE_LEVEL:
-        if (level := _count(tags.get(key))) is not None:
+        if (level := count_of(tags.get(key))) is not None:
             return level * LEVEL_HEIGHT_M
     return None
 
@@ -154,7 +154,8 @@ def _canopy_height(tags: Mapping[str, str]) -> float | None:
     return None
 
 
-def _count(text: str | None) -> float | None:
+def count_of(text: str | None) -> float | None:
+    """Return a number such as of levels, None where it is none or beyond belief."""
     found = _COUNT.match(text) if text else None
     if found is None:
         return None

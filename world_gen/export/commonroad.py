@@ -18,16 +18,8 @@ from lxml import etree
 from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import (
-    ROUNDABOUT_KINDS,
-    Building,
-    Connection,
-    Crossing,
-    Lane,
-    LaneKind,
-    ObstacleKind,
-    World,
-)
+from foretwin.contracts.beside_road import Building, ObstacleKind
+from foretwin.contracts.world import ROUNDABOUT_KINDS, Connection, Crossing, Lane, LaneKind, World
 from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import commonroad_controls as controls
 from foretwin.world_gen.export import lanelets

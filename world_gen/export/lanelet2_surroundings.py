@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import shapely
 from shapely.geometry import Polygon
 
-from foretwin.contracts.world import Area, Building, Obstacle, ObstacleKind, World
+from foretwin.contracts.beside_road import Building, Obstacle, ObstacleKind
+from foretwin.contracts.world import Area, World
 from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
 
 _EDGES: Mapping[ObstacleKind, str] = {"wall": "wall", "fence": "fence", "guard_rail": "guard_rail"}

@@ -19,9 +19,12 @@ import shapely
 from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Area, Building, Obstacle, World
+from foretwin.contracts.beside_road import Building, Obstacle
+from foretwin.contracts.world import Area, World
 from foretwin.world_gen.buildings.convex_parts import convex_cover, sound_polygons
 from foretwin.world_gen.export import solids
+from foretwin.world_gen.export.roofs import eaves_m, roofs_mesh
+from foretwin.world_gen.export.terrain import Terrain
 from foretwin.world_gen.export.xml_tree import in_comment, in_section
 from foretwin.world_gen.polygon_areas import polygons_from
 
@@ -61,10 +64,14 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
     )
     if visual:
         _add_road(spec, world)
+        roofs = roofs_mesh((building, 0.0) for building in world.buildings)
+        if len(roofs.triangles):
+            _add_seen(spec, "roofs", roofs, solids.ROOF)
         spec.worldbody.add_light(pos=[0, 0, 200], dir=[0.3, 0.2, -1], castshadow=False)
     near = (lambda things: things) if visual else _near_road(world)
     buildings, obstacles = near(world.buildings), near(world.obstacles)
-    extents = [(f"building:{b.id}", b.min_height_m, b.height_m.value) for b in buildings]
+    top_m = eaves_m if visual else (lambda building: building.height_m.value)
+    extents = [(f"building:{b.id}", b.min_height_m, top_m(b)) for b in buildings]
     _add_blocks(spec, "building", solids.BUILDING, buildings, extents, solid=True)
     if obstacles:
         extents = [(f"{o.kind}:{o.id}", 0.0, o.height_m.value) for o in obstacles]
@@ -202,13 +209,16 @@ def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     a, b, c = (corners[faces[:, k]] for k in range(3))
     cross = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     faces = np.where(cross[:, None] < 0.0, faces[:, ::-1], faces)[np.abs(cross) > 1e-4]
+    surface = np.column_stack([corners, np.full(len(corners), solids.ROAD_TOP_M)])
+    _add_seen(spec, "road", Terrain(surface, faces), solids.ROAD)
+
+
+def _add_seen(spec: mujoco.MjSpec, name: str, seen: Terrain, rgba: solids.Rgba) -> None:
+    """Add a mesh that is seen and never touched."""
     mesh = spec.add_mesh()
-    mesh.name = "road"
-    mesh.uservert = (
-        np.column_stack([corners, np.full(len(corners), solids.ROAD_TOP_M)]).ravel().tolist()
-    )
-    mesh.userface = faces.ravel().tolist()
+    mesh.name = name
+    mesh.uservert, mesh.userface = seen.points.ravel().tolist(), seen.triangles.ravel().tolist()
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    look = {"meshname": "road", "rgba": solids.ROAD, "group": VISUAL_GROUP}
+    look = {"meshname": name, "rgba": rgba, "group": VISUAL_GROUP}
     shape = mujoco.mjtGeom.mjGEOM_MESH
-    spec.worldbody.add_geom(name="road", type=shape, **look, **UNTOUCHED)
+    spec.worldbody.add_geom(name=name, type=shape, **look, **UNTOUCHED)

@@ -15,7 +15,8 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import ObstacleKind, StopLine, World
+from foretwin.contracts.beside_road import ObstacleKind
+from foretwin.contracts.world import StopLine, World
 from foretwin.geometry.polyline import left_of, unit
 from foretwin.geometry.world_heights import WorldHeights, heights_of
 from foretwin.world_gen.export.choices import OpenDriveVersion

@@ -13,8 +13,9 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.path import Path as Outline
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building, Obstacle
 from foretwin.contracts.provenance import PROVENANCES, Provenance
-from foretwin.contracts.world import Area, Building, Crossing, Obstacle, Road, World
+from foretwin.contracts.world import Area, Crossing, Road, World
 from foretwin.geometry.polyline import left_of, offset
 from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import picture_style as style

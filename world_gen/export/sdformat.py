@@ -16,11 +16,13 @@ import numpy as np
 from lxml import etree
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.world import Area, World
 from foretwin.geometry.world_heights import WorldHeights, heights_of
 from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.choices import SIMULATORS, Simulator
-from foretwin.world_gen.export.sdformat_hills import add_hills
+from foretwin.world_gen.export.roofs import eaves_m, roofs_mesh
+from foretwin.world_gen.export.sdformat_hills import MeshModel, add_hills, add_mesh_model
 from foretwin.world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
 from foretwin.world_gen.export.sdformat_shapes import StaticLink, extrusions, numbers, shaped
 from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
@@ -66,7 +68,7 @@ def write_sdf(
     """Write a World, and vehicles in it, for Gazebo Classic with ROS 2 or for Gazebo.
 
     Where the World has heights, ground, roads and what is painted on them lie beside the file as
-    meshes of their own, which it names.
+    meshes of their own, which it names; so do roofs that are not flat.
     Coordinates are the World's; `<spherical_coordinates>` has its origin. Raises ValueError for
     an unknown simulator and for vehicles whose names are not their own.
     """
@@ -90,7 +92,7 @@ def write_sdf(
     else:
         add_hills(made, world, hills, path)
     _signals(made, world, hills)
-    _buildings(made, world, hills)
+    _buildings(made, world, hills, path)
     _obstacles(made, world, hills)
     for vehicle in vehicles:
         add_vehicle(made, vehicle, simulator)
@@ -99,7 +101,7 @@ def write_sdf(
 
 
 def _check_names(vehicles: Sequence[SdfVehicle], *, hilly: bool) -> None:
-    taken = {"ground", "road", "markings", "signals", "buildings", "obstacles"}
+    taken = {"ground", "road", "markings", "signals", "buildings", "roofs", "obstacles"}
     if hilly:
         taken |= {"sidewalks", "mounds", "islands", "crossings"}
     for vehicle in vehicles:
@@ -191,10 +193,11 @@ def _signals(made: Element, world: World, hills: WorldHeights | None) -> None:
             link.box(f"{signal.id}.{lamp}", at, (0.03, 0.2, 0.2), rgba)
 
 
-def _buildings(made: Element, world: World, hills: WorldHeights | None) -> None:
+def _buildings(made: Element, world: World, hills: WorldHeights | None, path: Path) -> None:
     link = StaticLink(made, "buildings")
+    lifted: list[tuple[Building, float]] = []
     for building in world.buildings:
-        low, high = building.min_height_m, building.height_m.value
+        low, high, top = building.min_height_m, eaves_m(building), 0.0
         if high - low < solids.THINNEST_M:
             continue
         if hills is not None:
@@ -202,9 +205,11 @@ def _buildings(made: Element, world: World, hills: WorldHeights | None) -> None:
             ground = hills.surface_at(building.outline)
             top = float(ground.max())
             low, high = low + (top if low else float(ground.min())), high + top
+        lifted.append((building, top))
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
             link.prism(f"{building.id}.{number}", ring, (low, high), solids.BUILDING, solid=True)
+    add_mesh_model(made, MeshModel("roofs", roofs_mesh(lifted), solids.ROOF), world, path)
 
 
 def _obstacles(made: Element, world: World, hills: WorldHeights | None) -> None:

@@ -24,7 +24,7 @@ from foretwin.world_gen.export.xml_tree import Element, child
 _Outline = tuple[Array, tuple[Array, ...]]
 
 
-class _Layer(NamedTuple):
+class MeshModel(NamedTuple):
     """What has one colour, and whether cars drive on it or run into it."""
 
     name: str
@@ -36,36 +36,41 @@ class _Layer(NamedTuple):
 def add_hills(made: Element, world: World, hills: WorldHeights, path: Path) -> None:
     """Write the meshes of a World beside its file `path`, and add models that name them."""
     for layer in _layers(world, hills):
-        if not len(layer.mesh.triangles):
-            continue
-        file = path.with_name(f"{path.stem}.{layer.name}.obj")
-        write_obj(layer.mesh, file, world.attribution)
-        model = child(made, "model", name=layer.name)
-        child(model, "static", "1")
-        link = child(model, "link", name="link")
-        uri = [("uri", file.name)]
-        if layer.solid:
-            shaped(child(link, "collision", name=f"{layer.name}.collision"), "mesh", uri)
-        shaped(child(link, "visual", name=layer.name), "mesh", uri, rgba=layer.rgba)
+        add_mesh_model(made, layer, world, path)
 
 
-def _layers(world: World, hills: WorldHeights) -> Iterator[_Layer]:
-    yield _Layer("ground", ground_mesh(world, hills), solids.GROUND, True)
+def add_mesh_model(made: Element, layer: MeshModel, world: World, path: Path) -> None:
+    """Write a mesh, unless it is empty, beside the World's file, and add a model that names it."""
+    if not len(layer.mesh.triangles):
+        return
+    file = path.with_name(f"{path.stem}.{layer.name}.obj")
+    write_obj(layer.mesh, file, world.attribution)
+    model = child(made, "model", name=layer.name)
+    child(model, "static", "1")
+    link = child(model, "link", name="link")
+    uri = [("uri", file.name)]
+    if layer.solid:
+        shaped(child(link, "collision", name=f"{layer.name}.collision"), "mesh", uri)
+    shaped(child(link, "visual", name=layer.name), "mesh", uri, rgba=layer.rgba)
+
+
+def _layers(world: World, hills: WorldHeights) -> Iterator[MeshModel]:
+    yield MeshModel("ground", ground_mesh(world, hills), solids.GROUND, True)
     road = road_mesh(world, hills, above_m=solids.ROAD_TOP_M)
-    yield _Layer("road", road, solids.ROAD, True)
+    yield MeshModel("road", road, solids.ROAD, True)
     walks = [(area.outline, area.holes) for area in world.sidewalks]
     walked = draped(walks, hills, above_m=solids.SIDEWALK_TOP_M)
-    yield _Layer("sidewalks", walked, solids.SIDEWALK)
+    yield MeshModel("sidewalks", walked, solids.SIDEWALK)
     for solid, name in ((True, "mounds"), (False, "islands")):
         mine = [(i.outline, i.holes) for i in world.islands if solids.stops_cars(i) == solid]
         top = draped(mine, hills, above_m=solids.island_height_m(solid=solid))
-        yield _Layer(name, top, solids.ISLAND, solid)
+        yield MeshModel(name, top, solids.ISLAND, solid)
     lines = [_stripe(line.ends, wide) for line, wide in _painted(world)]
     paint = draped(lines, hills, above_m=solids.MARKING_TOP_M)
-    yield _Layer("markings", paint, solids.PAINT)
+    yield MeshModel("markings", paint, solids.PAINT)
     stripes = [_stripe(c.line, c.width_m.value) for c in world.crossings if _long(c.line)]
     crossed = draped(stripes, hills, above_m=solids.MARKING_TOP_M)
-    yield _Layer("crossings", crossed, solids.CROSSING)
+    yield MeshModel("crossings", crossed, solids.CROSSING)
 
 
 def _painted(world: World) -> Iterator[tuple[StopLine, float]]:

@@ -7,7 +7,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Area, Building, Obstacle
+from foretwin.contracts.beside_road import Building, Obstacle
+from foretwin.contracts.world import Area
 from foretwin.world_gen.buildings.footprints import buildings_in_frame
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.ground.islands import mapped_islands

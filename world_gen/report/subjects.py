@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import msgspec
 import numpy as np
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.signals import Signal
 from foretwin.contracts.world import (
     ROUNDABOUT_KINDS,
-    Building,
     Conflict,
     Connection,
     Crossing,

@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from foretwin.contracts.beside_road import ObstacleKind
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import ObstacleKind
 from foretwin.world_gen.buildings.tags import height_in_m
 
 

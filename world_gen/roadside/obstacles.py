@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Obstacle
 from foretwin.contracts.frames import LocalFrame, local_from_geo
-from foretwin.contracts.world import Obstacle
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.extent import Extent, box_deg
 from foretwin.world_gen.osm.osm_map import OsmMap, boxes_deg

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.futures import Future
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import Building
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.nearness import NearStatics
 from foretwin.sim_worker.futures.future_mix import plan_futures

@@ -9,7 +9,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.world import Building, Obstacle, Quantity, World
+from foretwin.contracts.beside_road import Building, Obstacle
+from foretwin.contracts.world import Quantity, World
 from foretwin.sim_worker.road_users.sight_lines import CELL_M, OpaqueGrid, hidden, opaque_grid
 from tests.orchestrator.trip import town_world
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import Building
 from foretwin.world_gen.buildings.footprints import (
     FOOTPRINT_TOLERANCE_M,
     BuildingIndex,

@@ -15,9 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from foretwin.contracts.world import ATTRIBUTION, Building, StopLine, World
+from foretwin.contracts.world import ATTRIBUTION, StopLine, World
 from foretwin.world_gen.export.commonroad import write_commonroad
 from foretwin.world_gen.export.commonroad_controls import cycle
 from tests.world_gen.drawn_maps import roundabout, world_of

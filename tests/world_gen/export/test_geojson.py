@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 import shapely
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.frames import GeoPoint, local_from_geo
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import Signal
-from foretwin.contracts.world import ATTRIBUTION, Area, Building, Conflict, Crossing, World
+from foretwin.contracts.world import ATTRIBUTION, Area, Conflict, Crossing, World
 from foretwin.world_gen.export.geojson import write_geojson
 from tests.world_gen.drawn_maps import crossing, world_of
 

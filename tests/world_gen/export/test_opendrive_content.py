@@ -10,9 +10,10 @@ import numpy as np
 import pyproj
 import pytest
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import ATTRIBUTION, Area, Building
+from foretwin.contracts.world import ATTRIBUTION, Area
 from foretwin.world_gen.export.opendrive import proj_of, write_opendrive
 from tests.world_gen.drawn_maps import (
     AVENUE,

@@ -15,10 +15,11 @@ from lxml import etree
 from shapely import union_all
 from shapely.geometry import Point, Polygon
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import Signal
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
-from foretwin.contracts.world import ATTRIBUTION, Building, StopLine, World
+from foretwin.contracts.world import ATTRIBUTION, StopLine, World
 from foretwin.world_gen.export.choices import VehicleKind
 from foretwin.world_gen.export.sdformat import write_sdf
 from foretwin.world_gen.export.sdformat_shapes import extrusions

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import shapely
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import Building
 from foretwin.world_gen.export.sdformat import write_sdf
 from foretwin.world_gen.export.sdformat_vehicles import place_vehicles
 from tests.world_gen.drawn_maps import crossing, world_of

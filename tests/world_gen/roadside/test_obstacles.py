@@ -8,7 +8,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.world import Obstacle, World
+from foretwin.contracts.beside_road import Obstacle
+from foretwin.contracts.world import World
 from foretwin.world_gen.polygon_areas import polygons_from
 from foretwin.world_gen.roadside.obstacles import CLEAR_OF_LANES_M
 from tests.world_gen.drawn_maps import Tags, drawn_map, world_of
