@@ -1,0 +1,141 @@
+"""Other receivers of the same drives: what was recorded beside the reference, as logs.
+
+Odometry and pseudoranges of smartLoc, the u-blox receiver of comma2k19, cars at Mcity, and the
+positions of a log alone.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, ImuSample, SpeedSample, VehicleInfo
+from foretwin.contracts.frames import GeoPoint, geo_from_ecef
+from foretwin.telemetry.logs import Log
+from foretwin.telemetry.logs.log import Sample
+
+_SLOW_CLOCK_ROUNDS = 8
+
+
+def positions_alone(log: Callable[[], Log]) -> Log:
+    """Return a log with nothing but its positions."""
+    opened = log()
+    return _log(opened.info, [s for s in opened.samples() if s[0] == "gnss"])
+
+
+def with_odometry(truth: Callable[[], Log], measured: Path) -> Log:
+    """Return smartLoc's positions with the wheels' speed and the yaw rate of its odometry."""
+    opened = truth()
+    beside: list[Sample] = []
+    for row in _rows(measured, "odom3"):
+        stamp_ns = round(row[0] * 1e9)
+        beside.append(("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=row[1])))
+        beside.append(
+            (
+                "imu",
+                ImuSample(
+                    stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.81), rate_radps=(0.0, 0.0, row[6])
+                ),
+            )
+        )
+    return _log(opened.info, [*opened.samples(), *beside])
+
+
+def with_pseudoranges(truth: Callable[[], Log], measured: Path) -> Log:
+    """Return fixes computed from smartLoc's pseudoranges, epoch by epoch, with its odometry.
+
+    Least squares for the place and a clock for each satellite system; the standard deviation
+    stated is the formal one, which knows nothing of reflected signals.
+    """
+    epochs: dict[float, list[list[float]]] = {}
+    for row in _rows(measured, "pseudorange3"):
+        epochs.setdefault(row[0], []).append(row)
+    fixes: list[Sample] = []
+    for time_s, rows in epochs.items():
+        fix = _single_point(np.array(rows), round(time_s * 1e9))
+        if fix is not None:
+            fixes.append(("gnss", fix))
+    beside = [s for s in with_odometry(truth, measured).samples() if s[0] != "gnss"]
+    return _log(truth().info, [*fixes, *beside])
+
+
+def with_ublox(pose: Callable[[], Log], segment: Path) -> Log:
+    """Return a comma2k19 segment with its u-blox receiver's positions in place of the pose."""
+    folder = segment / "processed_log" / "GNSS" / "live_gnss_ublox"
+    times, values = np.load(folder / "t"), np.load(folder / "value")
+    fixes: list[Sample] = [
+        (
+            "gnss",
+            GnssFix(
+                stamp_ns=round(time_s * 1e9),
+                position=GeoPoint(float(row[0]), float(row[1]), float(row[4])),
+            ),
+        )
+        for time_s, row in zip(times.tolist(), values, strict=True)
+    ]
+    opened = pose()
+    kept = [s for s in opened.samples() if s[0] in ("imu", "speed", "steering")]
+    return _log(opened.info, [*fixes, *kept])
+
+
+def mcity_car(path: Path, *, car: int = 0) -> Log:
+    """Return the positions of one car of a trial at Mcity."""
+    fixes: list[Sample] = []
+    for instant in json.loads(path.read_text(encoding="utf-8")):
+        for one in instant["objs"]:
+            if one["id"] == car:
+                place = GeoPoint(one["lat"], one["lon"])
+                stamp_ns = round(instant["timestamp"] * 1e9)
+                fixes.append(("gnss", GnssFix(stamp_ns=stamp_ns, position=place)))
+    first = fixes[0][1].stamp_ns  # type: ignore[attr-defined]
+    info = VehicleInfo(vehicle_id="car", time_base="utc", start_stamp_ns=first, sends=("gnss",))
+    return _log(info, fixes)
+
+
+def _log(info: VehicleInfo, samples: Iterable[Sample]) -> Log:
+    ordered = sorted(samples, key=_stamp_ns)
+    sends = tuple(sorted({channel for channel, _ in ordered}))
+    return Log(info=msgspec.structs.replace(info, sends=sends), read=lambda _skipped: iter(ordered))
+
+
+def _stamp_ns(sample: Sample) -> Any:
+    return sample[1].stamp_ns  # type: ignore[attr-defined]
+
+
+def _rows(path: Path, keyword: str) -> Iterator[list[float]]:
+    with gzip.open(path, "rt", encoding="utf-8") as text:
+        for line in text:
+            words = line.split()
+            if words[:1] == [keyword]:
+                yield [float(word) for word in words[1:]]
+
+
+def _single_point(rows: Array, stamp_ns: int) -> GnssFix | None:
+    ranges, variances, satellites, systems = rows[:, 1], rows[:, 2], rows[:, 3:6], rows[:, 7]
+    kinds = np.unique(systems)
+    if len(rows) < 3 + len(kinds):
+        return None
+    clocks = (systems[:, None] == kinds).astype(np.float64)
+    place = np.zeros(3)
+    for _ in range(_SLOW_CLOCK_ROUNDS):
+        away = place - satellites
+        distance = np.linalg.norm(away, axis=1)
+        design = np.hstack([away / distance[:, None], clocks]) / np.sqrt(variances)[:, None]
+        step, *_, rank, _ = np.linalg.lstsq(
+            design, (ranges - distance) / np.sqrt(variances), rcond=None
+        )
+        if rank < design.shape[1]:
+            return None
+        place = place + step[:3]
+    lat_deg, lon_deg, alt_m = geo_from_ecef(place).tolist()
+    spread = np.linalg.inv(design.T @ design)[:3, :3]
+    up = place / np.linalg.norm(place)
+    std_m = float(np.sqrt((np.trace(spread) - up @ spread @ up) / 2.0))
+    return GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat_deg, lon_deg, alt_m), std_m=std_m)

@@ -1,0 +1,90 @@
+"""The measures of trust themselves: what counts as a slip, a false standstill, an honest error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from tests.telemetry.position_track import FRAME, info
+from tests.trust.consistency import consistency_of
+from tests.trust.drives import given_drives
+from tests.trust.states import States, states_of
+from tests.trust.truth import Truth, slips_of, smoothed, truth_of
+
+STAMPS = (np.arange(0.0, 40.0, 0.2) * 1e9).astype(np.int64)
+
+
+def driven(*, speed_mps: float = 8.0) -> Array:
+    """A bend of 20 m radius, as (N, 2)."""
+    angle = speed_mps / 20.0 * STAMPS * 1e-9
+    noise = np.random.default_rng(1).normal(0.0, 0.005, (len(STAMPS), 2))
+    return 20.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1) + noise
+
+
+def perfect(truth: Truth, frame: LocalFrame = FRAME) -> States:
+    """States that are the truth, and say 0.1 m, 0.02 rad and 0.1 m/s of themselves."""
+    track, ones = truth.track, np.ones(len(STAMPS))
+    estimator = StateEstimator(info())
+    return States(
+        STAMPS, track.xy_m.copy(), track.yaw_rad.copy(), track.speed_mps.copy(),
+        0.1 * ones, 0.02 * ones, 0.1 * ones, estimator, estimator.skipped, len(ones), 0.0,
+    )  # fmt: skip
+
+
+def test_a_lasting_slip_and_a_single_wrong_fix_are_found_and_a_bend_is_none() -> None:
+    clean = driven()
+    slipped = clean.copy()
+    slipped[60:] += [0.6, -0.4]
+    slipped[120] += [0.0, 1.0]
+    assert not slips_of(STAMPS, clean, position_std_m=0.01).any()
+    slip = slips_of(STAMPS, slipped, position_std_m=0.01)
+    assert slip[60] == pytest.approx([0.6, -0.4], abs=0.1)
+    assert slip[120] - slip[119] == pytest.approx([0.0, 1.0], abs=0.1)
+    assert slip[-1] == pytest.approx([0.6, -0.4], abs=0.15)
+
+
+def test_slips_leave_the_true_speed_alone() -> None:
+    slipped = driven()
+    slipped[60:] += [0.6, -0.4]
+    truth = smoothed(FRAME, STAMPS, slipped, position_std_m=0.01)
+    assert truth.track.speed_mps[5:-5] == pytest.approx(8.0, abs=0.15)
+    assert truth.track.xy_m[5:-5] == pytest.approx(slipped[5:-5], abs=0.1)
+
+
+def test_states_that_are_true_are_found_faultless_and_others_not() -> None:
+    truth = smoothed(FRAME, STAMPS, driven(), position_std_m=0.01)
+    states = perfect(truth)
+    good = consistency_of(states, truth)
+    assert good.false_standstills_s == good.yaw_losses_s == ()
+    assert (good.position_within, good.yaw_within, good.speed_within) == (1.0, 1.0, 1.0)
+    states.speed_mps[100:103] = 0.0
+    states.speed_mps[150] = 0.0
+    states.yaw_rad[120] += np.radians(25.0)
+    states.xy_m[:] += [0.3, 0.0]
+    bad = consistency_of(states, truth)
+    assert bad.false_standstills_s == (pytest.approx(20.0),)
+    assert bad.yaw_losses_s == (pytest.approx(24.0),)
+    assert bad.position_within == 0.0
+    assert bad.position_rms_m == pytest.approx(0.3)
+    assert bad.speed_rms_mps > 0.5
+
+
+@pytest.mark.real_data
+def test_a_survey_receivers_slips_are_found_on_a_real_drive(data_dir: Path) -> None:
+    drive = next(d for d in given_drives(data_dir) if d.name == "potsdamer-platz")
+    truth = truth_of(drive)
+    seconds = (truth.slips - truth.track.stamp_ns[0]) * 1e-9
+    for known_s in (152.9, 241.9, 276.9):
+        assert np.abs(seconds - known_s).min() < 0.31
+    beside = next(d for d in given_drives(data_dir) if d.name == "potsdamer-platz-odometry")
+    wheels = [m for channel, m in beside.log().samples() if channel == "speed"]
+    at = np.array([sample.stamp_ns for sample in wheels])
+    measured = np.array([sample.speed_mps for sample in wheels])
+    off = truth.at(at, "speed_mps") - measured
+    assert np.sqrt(np.mean(off**2)) < 0.3
+    assert len(states_of(drive.log(), truth.frame).stamp_ns) > 1300

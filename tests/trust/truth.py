@@ -1,0 +1,115 @@
+"""What a whole log says a car did: smoothed, looking ahead, and proof against a receiver's slips.
+
+A survey receiver's positions are good to centimetres but for slips: from one fix to the next they
+step by 0.3 to 2 m and go on as before. The car did not. So the slips are found, the track without
+them is smoothed, which gives motion and heading, and the slips are put back, which gives the place
+as the receiver means it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, HeadingSample
+from foretwin.contracts.frames import LocalFrame, grid_convergence, local_from_geo
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
+from tests.trust.drives import RealDrive
+
+_REACH = 4
+"""Intervals before and after one that say what it should have been."""
+_LEAST_SLIP_M = 0.12
+_CAR_MPS2 = 5.0
+"""What a car's motion may differ from its neighbours' straight line: jerk and curvature."""
+JERK_DENSITY = 4.0
+
+
+class Truth(NamedTuple):
+    """A car's motion in a frame at N stamps; `slip_m` (N, 2) is what the receiver has slipped.
+
+    `track.xy_m` holds the slips. Headings come from the course; `moving` (N,) tells where it says
+    something. `still_reference_s` (K,) are the seconds since the start of each slip.
+    """
+
+    frame: LocalFrame
+    track: SmoothedTrack
+    slip_m: Array
+
+    def at(self, stamp_ns: npt.NDArray[np.int64], name: str) -> Array:
+        """Return a field of the track, interpolated at (M,) stamps; positions are (M, 2)."""
+        base = self.track.stamp_ns
+        values = np.asarray(getattr(self.track, name))
+        shape = (len(stamp_ns), *values.shape[1:])
+        columns = values.reshape(len(base), -1).T
+        since = (stamp_ns - base[0]) * 1e-9
+        return np.stack(
+            [np.interp(since, (base - base[0]) * 1e-9, column) for column in columns], axis=1
+        ).reshape(shape)
+
+    @property
+    def slips(self) -> npt.NDArray[np.int64]:
+        """The stamps (K,) of fixes that slipped."""
+        stepped = np.hypot(*np.diff(self.slip_m, axis=0).T) > 0.0
+        return self.track.stamp_ns[1:][stepped]
+
+
+def truth_of(drive: RealDrive) -> Truth:
+    """Return the truth that a drive's reference gives."""
+    samples = [message for _, message in drive.reference().samples()]
+    fixes = [message for message in samples if isinstance(message, GnssFix)]
+    frame = LocalFrame(fixes[0].position)
+    stamps = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
+    lat, lon = (
+        np.array([getattr(f.position, name) for f in fixes]) for name in ("lat_deg", "lon_deg")
+    )
+    truth = smoothed(
+        frame, stamps, local_from_geo(frame, lat, lon), position_std_m=drive.position_std_m
+    )
+    if not drive.true_heading:
+        return truth
+    said = [message for message in samples if isinstance(message, HeadingSample)]
+    yaw = np.unwrap([one.yaw_rad for one in said])
+    measured = np.interp(stamps, [one.stamp_ns for one in said], yaw)
+    yaw = measured + np.asarray(grid_convergence(frame, lat, lon))
+    return truth._replace(track=truth.track._replace(yaw_rad=yaw))
+
+
+def smoothed(
+    frame: LocalFrame, stamp_ns: npt.NDArray[np.int64], xy_m: Array, *, position_std_m: float
+) -> Truth:
+    """Return the truth of N increasing stamps and (N, 2) positions."""
+    slip = slips_of(stamp_ns, xy_m, position_std_m=position_std_m)
+    track = smooth_positions(
+        stamp_ns, xy_m - slip, position_std_m=position_std_m, jerk_density=JERK_DENSITY
+    )
+    return Truth(frame, track._replace(xy_m=track.xy_m + slip), slip)
+
+
+def slips_of(stamp_ns: npt.NDArray[np.int64], xy_m: Array, *, position_std_m: float) -> Array:
+    """Return (N, 2) how far each position has slipped since the first.
+
+    An interval has slipped where its velocity lies further off what its neighbours' medians say
+    than a car could go in it; two that undo each other are a single wrong fix.
+    """
+    step_s = np.diff(stamp_ns) * 1e-9
+    velocity = np.diff(xy_m, axis=0) / step_s[:, None]
+    middle = (stamp_ns[1:] + stamp_ns[:-1]) * 0.5e-9
+    count = len(velocity)
+    slip = np.zeros_like(xy_m)
+    if count < 2 * _REACH + 1:
+        return slip
+    index = np.arange(count)
+    before = np.clip(index[:, None] - np.arange(1, _REACH + 1), 0, count - 1)
+    after = np.clip(index[:, None] + np.arange(1, _REACH + 1), 0, count - 1)
+    left, right = np.median(velocity[before], axis=1), np.median(velocity[after], axis=1)
+    left_t, right_t = np.median(middle[before], axis=1), np.median(middle[after], axis=1)
+    share = np.clip((middle - left_t) / np.maximum(right_t - left_t, 1e-9), 0.0, 1.0)
+    expected = left + share[:, None] * (right - left)
+    excess = (velocity - expected) * step_s[:, None]
+    allowed = _LEAST_SLIP_M + 4.0 * position_std_m + _CAR_MPS2 * step_s * np.median(step_s)
+    slipped = np.hypot(*excess.T) > allowed
+    slip[1:] = np.cumsum(np.where(slipped[:, None], excess, 0.0), axis=0)
+    return slip
