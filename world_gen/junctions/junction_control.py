@@ -38,7 +38,8 @@ def control_of(
 
     A light or sign counts for the nearer junction of the road it stands on, or the one that it
     faces; signs on every road in make an all-way stop, in countries of `all_way_stops` one on
-    the junction's own node, too, unless it says which roads it stops.
+    the junction's own node, too, unless it says which roads it stops. Lights on a crossing of one
+    road in alone stop cars for those on foot, and leave the junction to signs and rules.
     """
     inner = [node_tags[node] for node in core if node in node_tags]
     inner += [mark.tags for chain in inside for mark in chain.marks]
@@ -49,9 +50,11 @@ def control_of(
         for mark in _marks_on(ring_edges, node_tags)
         if _is_light(mark.tags, mark.distance_m)
     )
-    for chain in incoming:
-        met = facing(chain, SIGNALS_WITHIN_M, "traffic_signals")
-        found.update(mark.node for mark in met if _is_light(mark.tags, mark.distance_m))
+    faced = [list(facing(chain, SIGNALS_WITHIN_M, "traffic_signals")) for chain in incoming]
+    lights = [mark for marks in faced for mark in marks if _is_light(mark.tags, mark.distance_m)]
+    for_cars = any(not _for_walkers(mark.tags) for mark in lights)
+    if found or for_cars or len(incoming) == 1 or sum(map(bool, faced)) > 1:
+        found.update(mark.node for mark in lights)
     if found:
         return JunctionControl("signals", frozenset(found))
     return JunctionControl(
@@ -94,8 +97,11 @@ def _sign(chain: Chain, word: str) -> Tags | None:
 def _is_light(tags: Tags, distance_m: float) -> bool:
     if tags.get("highway") != "traffic_signals":
         return False
-    pedestrians = "crossing" in tags or tags.get("traffic_signals") == "pedestrian_crossing"
-    return distance_m <= PEDESTRIAN_LIGHT_M or not pedestrians
+    return distance_m <= PEDESTRIAN_LIGHT_M or not _for_walkers(tags)
+
+
+def _for_walkers(tags: Tags) -> bool:
+    return "crossing" in tags or tags.get("traffic_signals") == "pedestrian_crossing"
 
 
 def facing(chain: Chain, within_m: float, word: str) -> Iterator[Mark]:
