@@ -15,7 +15,7 @@ from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.other_turns import OtherTurns
 from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
 from foretwin.orchestrator.routing.route import Route, extend_most_probable
-from foretwin.orchestrator.routing.turning import TURNING_RAD, route_with_turn
+from foretwin.orchestrator.routing.turning import TURNING_RAD, route_with_turn, turns_back
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
@@ -111,15 +111,12 @@ class RouteFollower:
                 self._rejoin(match)
             if not self._on_given:
                 self._turn_with(match)
-        elif self._leaving(match):
+        elif not self._turns_back(match) and self._leaving(match):
             self._leave(match)
         self._direction_known = match.direction_known
         self._extend()
-        return RouteProgress(
-            self._s_m,
-            bool(self._given) and not self._on_given,
-            self._take_passed(),
-        )
+        off_route = bool(self._given) and not self._on_given
+        return RouteProgress(self._s_m, off_route, self._take_passed())
 
     def upcoming(self, horizon_m: float) -> tuple[UpcomingJunction, ...]:
         """Return the junctions ahead on the route within `horizon_m`, nearest first."""
@@ -156,9 +153,8 @@ class RouteFollower:
 
     def _begin(self, match: Match) -> None:
         edge = match.directed_edge
-        place = self._given.find(
-            edge, direction_matters=match.direction_known, start=self._looked_for_from
-        )
+        start = max(self._looked_for_from, self.place.given_place)
+        place = self._given.find(edge, direction_matters=match.direction_known, start=start)
         s_on_edge = match.s_on_edge_m
         if place is not None:
             edges = self._given.edges_from(place)
@@ -200,6 +196,10 @@ class RouteFollower:
             found = (abs(s_m - self._s_m), place, s_m)
             best = found if best is None else min(best, found)
         return None if best is None else (best[1], best[2])
+
+    def _turns_back(self, match: Match) -> bool:
+        assert self._route is not None
+        return self._on_given and turns_back(self._route, self._place, self._s_m, match)
 
     def _leaving(self, match: Match) -> bool:
         """Whether the car has left its route: the match is sure, or stays off for a while."""

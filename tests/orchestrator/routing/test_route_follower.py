@@ -3,6 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from foretwin.contracts.frames import geo_from_local
+from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.map_matching import MapMatcher
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
@@ -145,6 +147,47 @@ def test_leaving_a_given_route_is_told_and_rejoining_it_too() -> None:
     assert off.off_route
     assert not back.off_route
     assert driver.names == ["n102", "n103", "n203"]
+
+
+def route_of(corners: list[tuple[float, float]]) -> tuple[Route, ...]:
+    lat_lon_deg = np.asarray(geo_from_local(TOWN.frame, drive(corners)))
+    return match_line(TOWN, lat_lon_deg, index=INDEX).routes
+
+
+@pytest.mark.parametrize(
+    "there",
+    [
+        [(150, 98), (150, 104)],
+        [(200, 98), (206, 100), (200, 104)],
+        [(190, 98), (193, 100), (190, 104)],
+        [(196, 98), (200, 92), (204, 98), (204, 104)],
+        [(196, 98), (202, 90), (202, 84), (198, 84), (198, 104)],
+    ],
+    ids=["on the road", "at a node", "before a node", "round a corner", "by a side street"],
+)
+def test_a_car_that_turns_back_as_its_log_did_never_leaves_its_route(
+    there: list[tuple[float, float]],
+) -> None:
+    corners = [(20.0, 98.0), *there, (20.0, 103.0)]
+    driver = Driver(route_of(corners)).go(corners)
+
+    assert [now for now in driver.progress if now is None or now.off_route] == []
+    assert driver.names[-1] == "n102"
+
+
+def test_a_car_that_drives_on_where_its_route_turns_back_has_left_it() -> None:
+    driver = Driver(route_of([(20, 98), (200, 98), (206, 100), (200, 104), (20, 103)]))
+    driver.go([(20, 98), (240, 98)])
+
+    assert driver.progress[-1] is not None
+    assert driver.progress[-1].off_route
+
+
+def test_of_a_road_driven_three_times_the_next_time_is_foreseen() -> None:
+    corners = [(20, 98), (150, 98), (150, 104), (60, 103), (60, 98), (300, 98), (300, 180)]
+    driver = Driver(route_of(corners)).go([*corners[:5], (80, 98)])
+
+    assert [name for name, _ in driver.ahead(330.0)] == ["n102", "n103", "n104", "n204"]
 
 
 def test_other_turns_within_reach_are_told_for_building_worlds_ahead() -> None:
