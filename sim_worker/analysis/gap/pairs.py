@@ -28,9 +28,9 @@ BLOCK_S = BLOCK * PERIOD_S
 _LAG = round(0.1 / PERIOD_S)
 """With which a car follows its command, give or take as much."""
 _NOISE_MPS2, _UNEVEN = 0.15, 0.6
+"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _ALIKE = 2.0
 """Root of how many blocks in a row a map's grade errs alike: it does over some 80 m. Chosen."""
-"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 """A run lasts a second, the end of which is compared: where it began is forgotten by then."""
 _SETTLED = round(0.4 / PERIOD_S)
