@@ -36,11 +36,18 @@ def identify(
     out: Annotated[
         Path | None, typer.Option(help="folder for plots and a vehicle file with what was taken")
     ] = None,
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml"),
+    ] = None,
 ) -> None:
     """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
     from foretwin.orchestrator.commands.identify import identify_log
 
-    raise typer.Exit(identify_log(log, vehicle_file=vehicle, as_json=as_json, out=out))
+    code = identify_log(
+        log, vehicle_file=vehicle, as_json=as_json, out=out, declaration=declaration
+    )
+    raise typer.Exit(code)
 
 
 def judge(

@@ -49,7 +49,12 @@ _SHOWN = {
 
 
 def identify_log(
-    log_file: Path, *, vehicle_file: str | None, as_json: bool, out: Path | None
+    log_file: Path,
+    *,
+    vehicle_file: str | None,
+    as_json: bool,
+    out: Path | None,
+    declaration: Path | None = None,
 ) -> int:
     """Print what the log says; write plots and a vehicle file with what is taken to `out`.
 
@@ -58,7 +63,7 @@ def identify_log(
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     vehicle = load_vehicle(vehicle_file)
-    record, vehicle_id = read_record(log_file)
+    record, vehicle_id = read_record(log_file, declaration=declaration)
     told = identify(record, vehicle, vehicle_id=vehicle_id)
     if out is not None:
         changed, _ = accepted(told, vehicle, source=f"identified from {log_file.name}")
@@ -79,13 +84,13 @@ def identify_log(
     return 0
 
 
-def read_record(log_file: Path) -> tuple[MotionRecord, str]:
-    """Return a log's signals on a grid and its vehicle's id.
+def read_record(log_file: Path, *, declaration: Path | None = None) -> tuple[MotionRecord, str]:
+    """Return a log's signals on a grid and its vehicle's id; `declaration` is that of `open_log`.
 
     Raises UserError for a log of less than a second, of a vehicle that stands or without a sample
     that identification could use, and what `open_log` raises.
     """
-    log = open_log(log_file)
+    log = open_log(log_file, declaration=declaration)
     recorder: MotionRecorder | None = None
     waiting: list[tuple[str, Any]] = []
     for channel, message in log.samples():

@@ -67,6 +67,20 @@ def test_the_table_is_read_at_80_columns(
     assert lines[base + 1].startswith("    no tyre angle was measured: ")
 
 
+def test_a_declaration_that_lies_elsewhere_is_named(
+    log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, declared = tmp_path / "drive.csv", tmp_path / "other" / "units.toml"
+    assert run(["convert", str(log_file), str(table)]) == 0
+    declared.parent.mkdir()
+    table.with_name("drive.csv.toml").rename(declared)
+    assert run(["identify", str(table)]) == 2
+    capsys.readouterr()
+    assert run(["identify", str(table), "--json", "--declaration", str(declared)]) == 0
+    ratio = json.loads(capsys.readouterr().out)["steering_ratio"]
+    assert ratio["value"] == pytest.approx(15.3, rel=0.05)
+
+
 def _empty(folder: Path) -> list[str]:
     file = folder / "empty.mcap"
     with create(file, info=whole_drive().source.info):
