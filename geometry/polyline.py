@@ -77,6 +77,23 @@ def unit(vector: Array) -> Array:
     return vector / norm if norm > 1e-9 else np.array([1.0, 0.0])
 
 
+def units(vectors: Array) -> Array:
+    """Return vectors (..., 2) with length 1, but for those shorter than a nanometre."""
+    norm = np.hypot(vectors[..., 0], vectors[..., 1])
+    return np.asarray(vectors / np.maximum(norm, 1e-9)[..., None])
+
+
+def tangents(xy_m: Array) -> Array:
+    """Return the unit directions (N, 2) at a polyline's points, from those on either side."""
+    return units(np.gradient(xy_m, axis=0))
+
+
+def headings_rad(xy_m: Array) -> Array:
+    """Return the angle (N,) of a polyline's directions at its points, as `tangents` has them."""
+    step = np.gradient(xy_m, axis=0)
+    return np.asarray(np.arctan2(step[:, 1], step[:, 0]))
+
+
 def left_of(direction: Array) -> Array:
     """Return the direction (..., 2) turned 90° counter-clockwise."""
     return np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
@@ -103,8 +120,7 @@ class Mitres(NamedTuple):
 
 def mitres(xy_m: Array, *, before: Array | None = None, after: Array | None = None) -> Mitres:
     """Return the rays at the points (N, 2) of a polyline, as `offset` continues its ends."""
-    d = np.diff(xy_m, axis=0)
-    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
+    d = units(np.diff(xy_m, axis=0))
     incoming = np.concatenate([d[:1] if before is None else before[None], d])
     outgoing = np.concatenate([d, d[-1:] if after is None else after[None]])
     return Mitres(d, *rays_between(incoming, outgoing, left_of(d[[0]])))

@@ -9,6 +9,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
+from foretwin.geometry.polyline import headings_rad
 from foretwin.orchestrator.routing.road_hypotheses import (
     Hypothesis,
     first_hypotheses,
@@ -102,8 +103,7 @@ class _Piece:
 
 
 def _match_pieces(roads: RoadIndex, xy: Array) -> list[_Piece]:
-    heading = np.gradient(xy, axis=0)
-    yaw = np.arctan2(heading[:, 1], heading[:, 0])
+    yaw = headings_rad(xy)
     layers: list[list[Hypothesis]] = []
     pieces: list[_Piece] = []
     first = 0

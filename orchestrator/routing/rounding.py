@@ -9,7 +9,7 @@ import shapely
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, left_of, tangents
 from foretwin.geometry.turn_curves import turn_curves
 
 FINE_M = 0.5
@@ -130,9 +130,7 @@ def curvature_pm(points: Array) -> Array:
 
 def normals(points: Array) -> Array:
     """Return unit normals (N, 2) to the left of a path."""
-    tangent = np.gradient(points, axis=0)
-    tangent /= np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)[:, None]
-    return np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+    return left_of(tangents(points))
 
 
 def drivable(points: Array) -> Array:
@@ -172,8 +170,7 @@ def with_driven_turns(
     apart = (np.diff(tight) * FINE_M > ONE_TURN_M) | (np.diff(np.sign(bend[tight])) != 0.0)
     turn = np.split(tight, np.flatnonzero(apart) + 1)
     ends = [0, *(place for inner in turn for place in (inner[0], inner[-1])), len(points) - 1]
-    tangent = np.gradient(points, axis=0)
-    tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
+    tangent = tangents(points)
     for number in reversed(range(len(turn))):  # from behind, so that what is before keeps its place
         before, low, high, after = ends[2 * number : 2 * number + 4]
         room = min(low - before, after - high, round(TURN_ROOM_M / FINE_M))

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
 from foretwin.contracts.world import World
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, headings_rad
 from foretwin.orchestrator.routing.driving_path import turn_radii
 from foretwin.orchestrator.routing.rounding import FINE_M
 from foretwin.orchestrator.routing.route import Route
@@ -97,7 +97,7 @@ class WorldLanes:
 
     def beside(self, route: Route, xy_m: Array, s_m: Array) -> list[Followed]:
         """Return the lanes and connections along a path (N, 2) of `route`, with its s (N,)."""
-        tree, heading = cKDTree(xy_m), _headings(xy_m)
+        tree, heading = cKDTree(xy_m), headings_rad(xy_m)
         first, last = route.index_at(float(s_m[0])), route.index_at(float(s_m[-1]))
         spans: dict[tuple[int, bool], list[tuple[float, float]]] = {}
         for number in range(first, last + 1):
@@ -126,11 +126,6 @@ def inside(world: World, xy_m: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(((xy_m > (west, south)) & (xy_m < (east, north))).all(axis=1))
 
 
-def _headings(xy_m: Array) -> Array:
-    tangent = np.gradient(xy_m, axis=0)
-    return np.asarray(np.arctan2(tangent[:, 1], tangent[:, 0]))
-
-
 def _followed(
     piece: Piece,
     tree: cKDTree,
@@ -143,7 +138,7 @@ def _followed(
     along = (nearest > 0) & (nearest < len(s_m) - 1)
     nearest = np.minimum(nearest, len(s_m) - 1)
     if spans is not None:
-        turned = _headings(piece.xy_m) - heading[nearest]
+        turned = headings_rad(piece.xy_m) - heading[nearest]
         along &= np.cos(turned) > math.cos(AHEAD_RAD)
         at = s_m[nearest]
         along &= np.any(

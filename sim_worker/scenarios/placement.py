@@ -14,6 +14,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import headings_rad
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places, place_in
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
@@ -198,9 +199,7 @@ def _match(
     entry, exit_ = float(place.arc_m[0]), float(place.arc_m[-1])
     if exit_ <= max(entry, ego_arc_m + 1.0) or exit_ > path.length_m + 1.0:
         return None
-    step = np.gradient(line, axis=0)
-    heading = np.arctan2(step[:, 1], step[:, 0])
-    turned = np.abs(wrap_angle(heading - path.pose_at(place.arc_m).yaw_rad))
+    turned = np.abs(wrap_angle(headings_rad(line) - path.pose_at(place.arc_m).yaw_rad))
     off = float(np.abs(place.offset_m).mean())
     if off > _ON_CONNECTION_M or float(turned.mean()) > _HEADS_ALIKE_RAD:
         return None

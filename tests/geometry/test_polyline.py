@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 
 from foretwin.geometry.polyline import (
     cut,
+    headings_rad,
     length,
     locate,
     offset,
     points_at,
+    tangents,
+    units,
 )
 
 
@@ -26,6 +29,34 @@ def test_an_offset_keeps_its_distance(left, bend):
         point = points_at(shifted, at)
         gap = np.hypot(*(point - points_at(line, locate(line, point))))
         assert gap == pytest.approx(abs(left), abs=1e-6)
+
+
+@given(yaw=st.floats(-3.2, 3.2), left_m=st.floats(-4.0, 4.0))
+def test_a_straight_line_moves_to_its_left(yaw, left_m):
+    along = np.array([math.cos(yaw), math.sin(yaw)])
+    line = np.linspace(0.0, 20.0, 5)[:, None] * along
+    left = np.array([-along[1], along[0]])
+    np.testing.assert_allclose(offset(line, left_m), line + left_m * left, atol=1e-9)
+
+
+def test_an_arc_to_the_left_moves_inward():
+    angle = np.linspace(0.0, np.pi, 60)
+    arc = 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    np.testing.assert_allclose(np.hypot(*offset(arc, 2.0).T), 8.0, atol=0.01)
+
+
+def test_directions_along_an_arc_are_those_of_its_tangents():
+    angle = np.linspace(0.0, np.pi, 61)
+    arc = 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    square = np.column_stack([-np.sin(angle), np.cos(angle)])
+    np.testing.assert_allclose(tangents(arc)[1:-1], square[1:-1], atol=1e-9)
+    turned = np.unwrap(headings_rad(arc))[1:-1]
+    np.testing.assert_allclose(turned, angle[1:-1] + math.pi / 2.0, atol=1e-9)
+
+
+def test_vectors_of_any_shape_get_length_one_and_none_stays_none():
+    found = units(np.array([[[3.0, 4.0], [0.0, 0.0]]]))
+    np.testing.assert_allclose(found, [[[0.6, 0.8], [0.0, 0.0]]])
 
 
 def test_shifted_pieces_of_one_road_meet_where_directions_beyond_are_given():

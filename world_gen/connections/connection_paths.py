@@ -13,6 +13,7 @@ from foretwin.geometry.polyline import (
     cross,
     offset,
     turn_rad,
+    units,
     without_repeats,
 )
 from foretwin.geometry.polyline_batch import Polylines
@@ -45,8 +46,8 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
         return
     begins = np.array([c.start.centerline[-1] for c in connections])
     ends = np.array([c.end.centerline[0] for c in connections])
-    headings = _units(begins - np.array([c.start.centerline[-2] for c in connections]))
-    end_headings = _units(np.array([c.end.centerline[1] for c in connections]) - ends)
+    headings = units(begins - np.array([c.start.centerline[-2] for c in connections]))
+    end_headings = units(np.array([c.end.centerline[1] for c in connections]) - ends)
     bends = _bends([c.start.centerline[-3:] for c in connections])
     end_bends = _bends([c.end.centerline[:3] for c in connections])
     turns = turn_curves(begins, headings, ends, end_headings, bend_pm=bends, end_bend_pm=end_bends)
@@ -126,11 +127,6 @@ def _tightest_m(paths: list[Array]) -> Array:
 
 def _inner_m(connection: ConnectionDraft) -> float:
     return sum(part.edge.length_m for part in connection.movement.inside)
-
-
-def _units(vectors: Array) -> Array:
-    norm = np.hypot(vectors[:, 0], vectors[:, 1])
-    return np.asarray(vectors / np.maximum(norm, 1e-9)[:, None])
 
 
 def _line_strings(lines: list[Array]) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths, cross, left_of, points_at, turn_rad
+from foretwin.geometry.polyline import arc_lengths, cross, left_of, points_at, tangents, turn_rad
 from foretwin.geometry.steering import LEAST_RADIUS_M
 
 _SPACING_M = 0.5
@@ -33,8 +33,7 @@ def driven_path(drawn: Array, passes: Sequence[Array]) -> Array | None:
     length_m = float(arc_lengths(drawn)[-1])
     count = max(round(length_m / _SPACING_M), 6)
     line = points_at(drawn, np.linspace(0.0, length_m, count + 1))
-    along = np.gradient(line, axis=0)
-    along /= np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    along = tangents(line)
     aside = np.array([_aside_m(line, along, one) for one in passes])
     seen = ~np.isnan(aside)
     if not seen.any():

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.geometry.polyline import arc_lengths, points_at, tangents
 from foretwin.world_gen.driven.passes import STEP_M, Pass
 
 MAP_ERROR_M = 1.2
@@ -68,7 +68,7 @@ class Lines:
         dense = [_dense(line.xy_m) for line in lines.values()]
         self._line = np.repeat(np.arange(len(dense)), [len(xy) for xy in dense])
         self._xy = np.concatenate(dense)
-        self._along = np.concatenate([_units(xy) for xy in dense])
+        self._along = np.concatenate([tangents(xy) for xy in dense])
         self._tree = cKDTree(self._xy)
         self._error = np.array([_DRAWN_ERRORS if one.drawn else 1.0 for one in lines.values()])
         self._next = [{number[k] for k in one.next_ids if k in number} for one in lines.values()]
@@ -142,11 +142,6 @@ class Lines:
 def _dense(line: Array) -> Array:
     length_m = float(arc_lengths(line)[-1])
     return points_at(line, np.linspace(0.0, length_m, max(math.ceil(length_m / _SPACING_M), 1) + 1))
-
-
-def _units(line: Array) -> Array:
-    d = np.gradient(line, axis=0)
-    return np.asarray(d / np.maximum(np.hypot(*d.T), 1e-9)[:, None])
 
 
 def _log_sum(values: Array, axis: int) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.tracks import DrivenTrack
-from foretwin.geometry.polyline import apart, arc_lengths, points_at
+from foretwin.geometry.polyline import apart, arc_lengths, points_at, units
 from foretwin.world_gen.extent import Extent
 
 STEP_M = 2.0
@@ -62,6 +62,5 @@ def pass_along(xy_m: Array, *, std_m: float = 0.0) -> Pass | None:
         return None
     at_m = np.arange(0.0, length_m, STEP_M)
     ahead = points_at(line, np.minimum(at_m + _HEADING_M, length_m))
-    step = ahead - points_at(line, np.maximum(at_m - _HEADING_M, 0.0))
-    along = step / np.maximum(np.hypot(*step.T), 1e-9)[:, None]
-    return Pass(points_at(line, at_m), along, std_m)
+    behind = points_at(line, np.maximum(at_m - _HEADING_M, 0.0))
+    return Pass(points_at(line, at_m), units(ahead - behind), std_m)

@@ -16,7 +16,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Lane, World
-from foretwin.geometry.polyline import apart, arc_lengths, left_of, unit
+from foretwin.geometry.polyline import apart, arc_lengths, mitres, unit
 from foretwin.world_gen.export.parallels import filled, parallel, untangled
 
 BLEND_M = 10.0
@@ -223,16 +223,13 @@ def _connection_borders(
 
 def _beside(middle: Array, first: Array, last: Array, side: float) -> Array:
     """Return the line from `first` to `last` beside a path, its distance changing evenly."""
-    d = np.diff(middle, axis=0)
-    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
-    normal = left_of(np.concatenate([d[:1], d]) + np.concatenate([d, d[-1:]]))
-    normal /= np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 0.2)[:, None]
+    ray = mitres(middle)
     s = arc_lengths(middle)
     share = (s / s[-1] if s[-1] > 1e-6 else np.linspace(0.0, 1.0, len(s)))[:, None]
     from_m, to_m = np.hypot(*(first - middle[0])), np.hypot(*(last - middle[-1]))
-    line = middle + normal * (side * ((1.0 - share) * from_m + share * to_m))
+    line = middle + ray.normal * (side * ((1.0 - share) * from_m + share * to_m))
     line += (1.0 - share) * (first - line[0]) + share * (last - line[-1])
-    line = np.round(untangled(line, d), 3)
+    line = np.round(untangled(line, ray.directions), 3)
     line[0], line[-1] = first, last
     return line
 

@@ -11,7 +11,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Road, World
-from foretwin.geometry.polyline import left_of, length, points_at
+from foretwin.geometry.polyline import left_of, length, points_at, units
 
 _BESIDE = re.compile(r"sidewalk:(?P<road>.+):(?P<side>left|right)(?:-\d+)?")
 """How the World names a sidewalk that belongs to a road, and the pieces that it is cut into."""
@@ -62,8 +62,7 @@ def _width_m(road: Road, left: bool, areas: list[Area]) -> float | None:
     total = length(line)
     at = total * (np.arange(20) + 0.5) / 20
     ahead = points_at(line, np.minimum(at + 0.1, total)) - points_at(line, np.maximum(at - 0.1, 0))
-    ahead /= np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
-    out = left_of(ahead) * (1.0 if left else -1.0)
+    out = left_of(units(ahead)) * (1.0 if left else -1.0)
     edge = points_at(line, at) + out * (road.left_m if left else -road.right_m)
     steps = np.arange(_STEP_M / 2.0, _WIDEST_M, _STEP_M)
     across: Array = edge[:, None] + out[:, None] * steps[None, :, None]

@@ -11,7 +11,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.world import Connection, Lane, World
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import left_of, tangents
 from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.export.xml_tree import in_comment
 
@@ -79,9 +79,7 @@ def _ribbon(part: Lane | Connection, aside_m: float) -> shapely.Geometry:
 def _strip(part: Lane | Connection, hills: WorldHeights, *, above_m: float) -> Terrain:
     """Return a lane as a strip of its own at its own height."""
     line = shapely.get_coordinates(shapely.segmentize(shapely.LineString(part.centerline), EDGE_M))
-    ahead = np.gradient(line, axis=0)
-    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
-    aside = left_of(ahead) * (part.width_m.value / 2.0)
+    aside = left_of(tangents(line)) * (part.width_m.value / 2.0)
     high = hills.along(part, line) + above_m
     points = np.column_stack([np.concatenate([line + aside, line - aside]), np.tile(high, 2)])
     count = len(line)

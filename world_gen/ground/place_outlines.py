@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import left_of, units
 from foretwin.geometry.polyline_batch import Polylines, points_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
@@ -117,11 +117,9 @@ def _polygons(mouths: _Mouths, count: np.ndarray) -> np.ndarray:
     after = np.arange(1, first[-1] + 1)
     after[first[1:] - 1] = first[:-1]
     right, a = mouths.right, mouths.left
-    u = a - mouths.left_next
-    v = (right - mouths.right_next)[after]
+    u = units(a - mouths.left_next)
+    v = units((right - mouths.right_next)[after])
     b = right[after]
-    u /= np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
-    v /= np.maximum(np.hypot(v[:, 0], v[:, 1]), 1e-9)[:, None]
     cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     gap = b - a
     safe = np.where(np.abs(cross) > PARALLEL, cross, 1.0)
@@ -159,9 +157,7 @@ def _left_by_a_path(
     which = np.repeat(np.arange(len(mine)), len(SAMPLES))
     at_m = (lines.length_m[:, None] * np.array(SAMPLES)).ravel()
     here = points_at(lines, which, at_m)
-    step = points_at(lines, which, at_m + 0.1) - here
-    step /= np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
-    side = left_of(step) * CAR_HALF_WIDTH_M
+    side = left_of(units(points_at(lines, which, at_m + 0.1) - here)) * CAR_HALF_WIDTH_M
     at = np.stack([here + side, here - side], axis=1).reshape(-1, 2)
     owner = np.array([place[c.cluster.key] for c in mine])
     owner = np.repeat(owner, 2 * len(SAMPLES))

@@ -11,7 +11,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.bends import Rounded, rounded_through, thinned, without_end_kinks
-from foretwin.geometry.polyline import cut, left_of, points_at
+from foretwin.geometry.polyline import cut, left_of, points_at, units
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.polyline_batch import cut as cut_all
 from foretwin.world_gen.extent import stretches_inside
@@ -109,8 +109,7 @@ def _evenly(line: Array, before: Array, after: Array) -> tuple[Array, Array]:
     total, first, last = steps.sum(), min(_STUB_M, steps[0] / 3), min(_STUB_M, steps[-1] / 3)
     at_m = np.linspace(first, total - last, max(int(total), 2) + 1)
     points = points_at(line, np.concatenate([[0.0], at_m, [total]]))
-    ahead = np.diff(points, axis=0)
-    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    ahead = units(np.diff(points, axis=0))
     into = np.concatenate([[ahead[0] if np.isnan(before[0]) else before], ahead])
     out = np.concatenate([ahead, [ahead[-1] if np.isnan(after[0]) else after]])
     # Square to the first and last piece, as the road beside them is.

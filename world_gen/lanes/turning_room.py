@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import Flags, cross, left_of, turn_rad
+from foretwin.geometry.polyline import Flags, cross, left_of, turn_rad, units
 from foretwin.geometry.polyline_batch import Polylines, points_at, without_repeats
 from foretwin.geometry.turn_curves import REACH_PER_RADIUS
 from foretwin.world_gen.lanes.cluster import Cluster
@@ -105,8 +105,7 @@ def _missing_m(legs: _Legs, trim: Array) -> Array:
     which = np.arange(trim.size)
     at_m = np.minimum(trim.ravel(), legs.ways.length_m - _LOOK_M)
     at = points_at(legs.ways, which, at_m).reshape(*trim.shape, 2)
-    head = points_at(legs.ways, which, at_m + _LOOK_M).reshape(*trim.shape, 2) - at
-    head /= np.maximum(np.hypot(head[..., 0], head[..., 1]), 1e-9)[..., None]
+    head = units(points_at(legs.ways, which, at_m + _LOOK_M).reshape(*trim.shape, 2) - at)
     # From leg i into leg j; an angle above 0 is a turn to the left.
     own, other = head[:, :, None], head[:, None, :]
     angle = turn_rad(-own, other)

@@ -9,7 +9,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame
-from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.geometry.polyline import arc_lengths, cross, points_at, tangents
 
 _POINTS = 24
 
@@ -36,11 +36,8 @@ class HdLane:
     @property
     def width_m(self) -> float:
         """The median distance between both edges, across the lane."""
-        middle = self.centerline
-        along = np.gradient(middle, axis=0)
-        along /= np.maximum(np.hypot(*along.T), 1e-9)[:, None]
         across = resampled(self.left, _POINTS) - resampled(self.right, _POINTS)
-        return float(np.median(np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0])))
+        return float(np.median(np.abs(cross(tangents(self.centerline), across))))
 
 
 @dataclass(frozen=True, kw_only=True)

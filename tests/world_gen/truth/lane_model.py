@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.world import World
-from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.geometry.polyline import arc_lengths, points_at, tangents
 from tests.world_gen.truth.hd_map import HdMap
 from tests.world_gen.truth.junction_ways import movements
 
@@ -63,7 +63,7 @@ class Nearby:
         dense = [densified(line) for line in lines]
         self._which = np.repeat(np.arange(len(dense)), [len(line) for line in dense])
         self._xy = np.concatenate(dense)
-        self._along = np.concatenate([units(line) for line in dense])
+        self._along = np.concatenate([tangents(line) for line in dense])
         self._tree = cKDTree(self._xy)
 
     def lateral(self, xy_m: Array, along: Array) -> tuple[Array, np.ndarray]:
@@ -88,12 +88,6 @@ def densified(line: Array, step_m: float = STEP_M) -> Array:
     """Return points along a line no farther apart than `step_m`."""
     length_m = arc_lengths(line)[-1]
     return points_at(line, np.linspace(0.0, length_m, max(int(np.ceil(length_m / step_m)), 1) + 1))
-
-
-def units(line: Array) -> Array:
-    """Return the unit directions (N, 2) at a line's points."""
-    d = np.gradient(line, axis=0)
-    return np.asarray(d / np.maximum(np.hypot(*d.T), 1e-9)[:, None])
 
 
 def of_world(world: World, frame: LocalFrame) -> LaneModel:

@@ -8,11 +8,11 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import length, unit
+from foretwin.geometry.polyline import length, tangents, unit
 from tests.world_gen.truth.carriageways import carriageways
 from tests.world_gen.truth.hd_map import HdMap
 from tests.world_gen.truth.junction_ways import movements
-from tests.world_gen.truth.lane_model import LaneModel, Nearby, densified, units
+from tests.world_gen.truth.lane_model import LaneModel, Nearby, densified
 
 _SAMPLE_M = 2.0
 _LOOK_M = 24.0
@@ -90,7 +90,7 @@ class _Seen:
 
     def along(self, line: Array) -> tuple[Array, list[str]]:
         """Return how far the nearest lane lies beside each point, and which it is ("" for none)."""
-        away, which = self._nearby.lateral(line, units(line))
+        away, which = self._nearby.lateral(line, tangents(line))
         return away, [self._keys[i] if i >= 0 else "" for i in which]
 
     def beside(self, line: Array) -> list[str]:

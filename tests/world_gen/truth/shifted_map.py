@@ -14,8 +14,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, local_from_geo
-from foretwin.geometry.polyline import arc_lengths, left_of, points_at, without_repeats
-from tests.world_gen.truth.lane_model import LaneModel, units
+from foretwin.geometry.polyline import arc_lengths, left_of, points_at, tangents, without_repeats
+from tests.world_gen.truth.lane_model import LaneModel
 
 ERROR_M, ALIKE_M = 1.0, 60.0
 """Standard deviation of a node's place in each direction, and how far nodes err alike."""
@@ -75,4 +75,4 @@ def wandering(line: Array, *, seed: int) -> Array:
     even = points_at(line, np.arange(0.0, arc_lengths(line)[-1], 1.0))
     noise = gaussian_filter1d(random.normal(size=len(even) + 200), WANDER_ALIKE_M)[100:-100]
     noise *= WANDER_M * np.sqrt(2.0 * np.sqrt(np.pi) * WANDER_ALIKE_M)
-    return np.asarray(even + noise[:, None] * left_of(units(even)))
+    return np.asarray(even + noise[:, None] * left_of(tangents(even)))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths, points_at, unit
+from foretwin.geometry.polyline import arc_lengths, headings_rad, points_at, unit
 from tests.world_gen.truth.lane_model import LaneModel, Nearby
 
 STEP_M = 0.5
@@ -47,16 +47,11 @@ def driven(xy_m: Array) -> Driven:
     smooth = np.stack(
         [gaussian_filter1d(even[:, k], _SMOOTH_M / STEP_M, mode="nearest") for k in (0, 1)], axis=1
     )
-    yaw = _yaw(smooth)
+    yaw = np.unwrap(headings_rad(smooth))
     ahead = round(_TURN_WINDOW_M / 2.0 / STEP_M)
     padded = np.pad(yaw, ahead, mode="edge")
     turning = np.abs(padded[2 * ahead :] - padded[: -2 * ahead]) > _TURN_RAD
     return Driven(even, np.stack([np.cos(yaw), np.sin(yaw)], axis=1), turning)
-
-
-def _yaw(line: Array) -> Array:
-    d = np.gradient(line, axis=0)
-    return np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
 
 
 class Beside(NamedTuple):
