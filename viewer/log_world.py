@@ -12,7 +12,7 @@ from foretwin.contracts.beside_road import Building, Obstacle
 from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_source
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import Area, World
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import offset
 from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
 from foretwin.viewer.rows import Row, path_part, raised
 
@@ -67,7 +67,7 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
         *flat("roads/junction", _polygons(junction), JUNCTION_HEIGHT_M, JUNCTION),
     ]
     edges = [
-        offset_left(lane.centerline, side * lane.width_m.value / 2.0)
+        offset(lane.centerline, side * lane.width_m.value / 2.0)
         for lane in world.lanes
         for side in (1.0, -1.0)
     ]
@@ -122,22 +122,6 @@ def world_centre(world: World, *, drive_frame: LocalFrame) -> Array:
     """Return (2,) metres of the junction's centre, the World's origin, in `drive_frame`."""
     moved = target_from_source(drive_frame, world.frame, np.zeros((1, 2)), np.zeros(1))
     return moved.xy_m.reshape(2)
-
-
-def offset_left(line: Array, distance_m: float) -> Array:
-    """Return the polyline (N, 2) moved to its left; negative distances move it to the right.
-
-    Corners are mitred, at most twice as far as `distance_m`.
-    """
-    line = np.asarray(line, dtype=np.float64)
-    along: Array = np.diff(line, axis=0)
-    along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
-    left = left_of(along)
-    before, after = np.vstack([left[:1], left]), np.vstack([left, left[-1:]])
-    # The mitre is (before + after) / (1 + cos of the bend).
-    scale = np.maximum(1.0 + np.sum(before * after, axis=1), 0.5)
-    mitre: Array = (before + after) / scale[:, None]
-    return line + distance_m * mitre
 
 
 def zebra_stripes(line: Array, *, width_m: float) -> list[Array]:

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from foretwin.contracts.frames import target_from_source
 from foretwin.viewer.log_world import (
     BUILDING,
-    offset_left,
     rows_of_world,
     world_centre,
     zebra_stripes,
@@ -67,20 +66,6 @@ def test_every_face_of_a_prism_looks_outward(
     # The divergence theorem: walls and roof (the missing floor lies at z = 0) enclose the volume.
     volume = np.sum(normals * faces.mean(axis=1)) / 6.0
     assert volume == pytest.approx(shapely.Polygon(outline).area * height_m, rel=1e-4)
-
-
-@given(yaw=st.floats(-3.2, 3.2), distance_m=st.floats(-4.0, 4.0))
-def test_a_straight_line_moves_to_its_left(yaw: float, distance_m: float) -> None:
-    along = np.array([np.cos(yaw), np.sin(yaw)])
-    line = np.linspace(0.0, 20.0, 5)[:, None] * along
-    left = np.array([-along[1], along[0]])
-    np.testing.assert_allclose(offset_left(line, distance_m), line + distance_m * left, atol=1e-9)
-
-
-def test_an_arc_to_the_left_moves_inward() -> None:
-    angle = np.linspace(0.0, np.pi, 60)
-    arc = 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    np.testing.assert_allclose(np.hypot(*offset_left(arc, 2.0).T), 8.0, atol=0.01)
 
 
 def test_a_crossing_eight_metres_long_has_eight_stripes_inside_it() -> None:
