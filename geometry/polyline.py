@@ -41,8 +41,43 @@ def apart(xy_m: Array, *, tolerance_m: float) -> Flags:
 
 def points_at(xy_m: Array, at_m: Array | float) -> Array:
     """Return the points (M, 2), or (2,), at arc lengths `at_m` (clamped to the ends)."""
-    s = arc_lengths(xy_m)
-    return np.stack([np.interp(at_m, s, xy_m[:, 0]), np.interp(at_m, s, xy_m[:, 1])], axis=-1)
+    return interpolated(at_m, arc_lengths(xy_m), xy_m)
+
+
+def interpolated(at: Array | float, known: Array, rows: Array) -> Array:
+    """Return the rows (M, K), or (K,), between `rows` (N, K) known at rising numbers (N,).
+
+    They are asked for at `at`, which is clamped to the ends.
+    """
+    return np.stack([np.interp(at, known, column) for column in rows.T], axis=-1)
+
+
+def evenly(length_m: float, *, spacing_m: float) -> Array:
+    """Return arc lengths (M,) from 0 to `length_m`, even and at most `spacing_m` apart."""
+    return np.linspace(0.0, length_m, max(math.ceil(length_m / spacing_m), 1) + 1)
+
+
+def densified(xy_m: Array, *, spacing_m: float) -> Array:
+    """Return points (M, 2) along the polyline, even and at most `spacing_m` apart."""
+    return points_at(xy_m, evenly(length(xy_m), spacing_m=spacing_m))
+
+
+class Stretches(NamedTuple):
+    """Even pieces of a polyline: where their middles lie, as arc lengths (M,) and points (M, 2),
+    and the unit directions (M, 2) there."""
+
+    at_m: Array
+    xy_m: Array
+    direction: Array
+
+
+def stretches(xy_m: Array, *, spacing_m: float) -> Stretches:
+    """Cut a polyline into even pieces of at most `spacing_m`."""
+    arc = arc_lengths(xy_m)
+    count = max(math.ceil(arc[-1] / spacing_m), 1)
+    at = (np.arange(count) + 0.5) * (arc[-1] / count)
+    piece = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(xy_m) - 2)
+    return Stretches(at, interpolated(at, arc, xy_m), units(np.diff(xy_m, axis=0)[piece]))
 
 
 def direction_at(xy_m: Array, at_m: float) -> Array:

@@ -13,7 +13,7 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.elevation import Elevation, HeightProfile
 from foretwin.contracts.world import Connection, Lane, World
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import stretches
 
 _BESIDE_M, _SAMPLES_M = 8.0, 4.0
 """Beyond this from a lane's middle the ground begins to be its own, and is at twice of it."""
@@ -93,17 +93,10 @@ class WorldHeights:
 
     def slope(self, part: Lane | Connection, *, spacing_m: float) -> LaneSlope:
         """Return how a lane or connection climbs, at places at most `spacing_m` apart."""
-        xy = part.centerline
-        arc = arc_lengths(xy)
-        count = max(int(np.ceil(arc[-1] / spacing_m)), 1)
-        at = (np.arange(count) + 0.5) * (arc[-1] / count)
-        points = np.column_stack([np.interp(at, arc, xy[:, k]) for k in (0, 1)])
-        piece = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(xy) - 2)
-        step = np.diff(xy, axis=0)[piece]
-        direction = step / np.maximum(np.hypot(*step.T), 1e-9)[:, None]
+        at, points, direction = stretches(part.centerline, spacing_m=spacing_m)
         profile, line = self._of(part)
         if profile is None:
-            return LaneSlope(points, direction, np.zeros(count))
+            return LaneSlope(points, direction, np.zeros(len(at)))
         grade = profile.grade_at(_along(line, points))
         back = isinstance(part, Lane) and part.reverse
         return LaneSlope(points, direction, -grade if back else grade)

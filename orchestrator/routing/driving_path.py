@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, interpolated
 from foretwin.orchestrator.routing.rounding import (
     FINE_M,
     clip,
@@ -193,7 +193,7 @@ def _resampled(route: Route, xy: Array, place: Array, begin: float, end: float) 
     arc = arc_lengths(xy)
     low, high = np.interp([begin, end], place, arc)
     even = np.linspace(low, high, max(2, round((high - low) / SPACING_M) + 1))
-    points = np.stack([np.interp(even, arc, xy[:, k]) for k in (0, 1)], axis=-1)
+    points = interpolated(even, arc, xy)
     s = np.interp(even, arc, place)
     limits = np.array([directed.edge.speed_limit_mps.value for directed in route.edges])
     edge = np.clip(np.searchsorted(route.start_m, s, side="right") - 1, 0, len(route.edges) - 1)

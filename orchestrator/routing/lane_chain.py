@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import interpolated
 from foretwin.orchestrator.routing.rounding import (
     TURN_ROOM_M,
     evenly_spaced,
@@ -180,7 +181,7 @@ def on_lanes(xy_m: Array, s_m: Array, runs: Sequence[LaneRun], *, car_s_m: float
     for number, run in enumerate(runs):
         begin, end = float(run.s_m[0]), float(run.s_m[-1])
         upto_m = float(runs[number + 1].s_m[0]) if number + 1 < len(runs) else math.inf
-        lane = np.stack([np.interp(s_m, run.s_m, run.xy_m[:, k]) for k in (0, 1)], axis=-1)
+        lane = interpolated(s_m, run.s_m, run.xy_m)
         weight = ((s_m >= begin) & (s_m <= end)).astype(np.float64)
         if begin < until_m:
             change_m = max(begin, car_s_m, until_m - 2.0 * BLEND_M)

@@ -9,7 +9,7 @@ import shapely
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths, left_of, tangents
+from foretwin.geometry.polyline import arc_lengths, interpolated, left_of, tangents
 from foretwin.geometry.turn_curves import turn_curves
 
 FINE_M = 0.5
@@ -37,7 +37,7 @@ def clip(line: Array, s: Array, window: tuple[float, float]) -> tuple[Array, Arr
     low, high = max(window[0], s[0]), min(window[1], s[-1])
     inside = (s > low) & (s < high)
     ends = np.array([low, high])
-    end_xy = np.stack([np.interp(ends, s, line[:, 0]), np.interp(ends, s, line[:, 1])], axis=-1)
+    end_xy = interpolated(ends, s, line)
     return (
         np.concatenate([end_xy[:1], line[inside], end_xy[1:]]),
         np.concatenate([ends[:1], s[inside], ends[1:]]),
@@ -48,8 +48,7 @@ def evenly_spaced(line: Array, s: Array) -> tuple[Array, Array]:
     """Return a polyline and its s resampled at even spacing."""
     arc = arc_lengths(line)
     even = np.linspace(0.0, arc[-1], max(3, round(arc[-1] / FINE_M) + 1))
-    points = np.stack([np.interp(even, arc, line[:, k]) for k in (0, 1)], axis=-1)
-    return points, np.interp(even, arc, s)
+    return interpolated(even, arc, line), np.interp(even, arc, s)
 
 
 def turns(line: Array) -> Array:

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
 from foretwin.contracts.world import World
-from foretwin.geometry.polyline import arc_lengths, headings_rad
+from foretwin.geometry.polyline import densified, headings_rad
 from foretwin.orchestrator.routing.driving_path import turn_radii
 from foretwin.orchestrator.routing.rounding import FINE_M
 from foretwin.orchestrator.routing.route import Route
@@ -71,9 +71,7 @@ class WorldLanes:
     def __init__(self, world: World, frame: LocalFrame) -> None:
         def line(xy_m: Array) -> Array:
             moved = target_from_source_m(frame, world.frame, xy_m)
-            arc = arc_lengths(moved)
-            at = np.linspace(0.0, arc[-1], max(2, math.ceil(arc[-1] / FINE_M) + 1))
-            return np.stack([np.interp(at, arc, moved[:, k]) for k in (0, 1)], axis=-1)
+            return densified(moved, spacing_m=FINE_M)
 
         self.world_id = world.id
         self.turn_radii_m = turn_radii(world.intersection.driving_side)

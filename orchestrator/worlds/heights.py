@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.elevation import RoadSlopes
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import length, stretches
 from foretwin.geometry.slopes import SPACING_M
 from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.world_gen.elevation.dem import DemSet
@@ -48,14 +48,12 @@ def slopes_in(frame: LocalFrame, graph: RoadGraph, profiles: RoadProfiles) -> Ro
     places, directions, grades = [], [], []
     for index, profile in profiles.of_edge.items():
         xy = target_from_source_m(frame, graph.frame, graph.edges[index].xy_m)
-        arc = arc_lengths(xy)
-        count = max(int(np.ceil(arc[-1] / SPACING_M)), 1)
-        at = (np.arange(count) + 0.5) * (arc[-1] / count)
-        piece = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(xy) - 2)
-        step = np.diff(xy, axis=0)[piece]
-        places.append(np.column_stack([np.interp(at, arc, xy[:, k]) for k in (0, 1)]))
-        directions.append(step / np.maximum(np.hypot(*step.T), 1e-9)[:, None])
-        grades.append(profile.grade_at(at * (profile.along_m[-1] / max(arc[-1], 1e-9))))
+        pieces = stretches(xy, spacing_m=SPACING_M)
+        places.append(pieces.xy_m)
+        directions.append(pieces.direction)
+        # The edge's length in the map's frame and in this one differ by parts in a million.
+        scale = profile.along_m[-1] / max(length(xy), 1e-9)
+        grades.append(profile.grade_at(pieces.at_m * scale))
     return RoadSlopes(
         xy_m=np.concatenate(places),
         direction=np.concatenate(directions),

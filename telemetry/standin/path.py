@@ -12,7 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, interpolated
 from foretwin.geometry.speed_profile import braked, speed_in_bends_mps
 from foretwin.telemetry.standin.parameters import DriverParameters
 
@@ -70,7 +70,7 @@ class DrivenPath:
         fresh = np.concatenate([[True], np.diff(given_s) > 1e-6])
         count = max(11, int(given_s[-1] / _SPACING_M) + 1)
         even_s = np.linspace(0.0, given_s[-1], count)
-        dense = np.stack([np.interp(even_s, given_s[fresh], xy[fresh, k]) for k in (0, 1)], axis=1)
+        dense = interpolated(even_s, given_s[fresh], xy[fresh])
         for sigma_m in _SMOOTHING_M:
             self.xy_m = _smoothed(dense, sigma_m / (even_s[1] - even_s[0]))
             self.s_m: Array = arc_lengths(self.xy_m)
@@ -101,7 +101,7 @@ class DrivenPath:
 
     def at(self, s_m: float) -> PathPoint:
         """Return the point at a distance along the path, held at its ends."""
-        x, y = (float(np.interp(s_m, self.s_m, self.xy_m[:, k])) for k in (0, 1))
+        x, y = interpolated(s_m, self.s_m, self.xy_m).tolist()
         yaw = float(np.interp(s_m, self.s_m, self.yaw_rad))
         return PathPoint(x, y, yaw, float(np.interp(s_m, self.s_m, self.curvature_pm)))
 

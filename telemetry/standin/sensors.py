@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import (
     GnssFix,
     ImuSample,
@@ -16,6 +15,7 @@ from foretwin.contracts.drive import (
     VehicleStatus,
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.geometry.polyline import interpolated, left_of
 from foretwin.geometry.steering import SteeringColumn
 from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
 from foretwin.telemetry.standin.car import CarMotion
@@ -112,8 +112,8 @@ def planned_trajectory(
     """Return the driver's plan on its path, moved by `shift_m` to the left."""
     s = np.array([point.s_m for point in points])
     yaw = np.interp(s, path.s_m, path.yaw_rad)
-    xy: Array = np.stack([np.interp(s, path.s_m, path.xy_m[:, k]) for k in (0, 1)], axis=1)
-    xy = xy + shift_m * np.stack([-np.sin(yaw), np.cos(yaw)], axis=1)
+    aside = left_of(np.stack([np.cos(yaw), np.sin(yaw)], axis=1))
+    xy = interpolated(s, path.s_m, path.xy_m) + shift_m * aside
     geo = geo_from_local(path.frame, xy)
     return PlannedTrajectory(
         stamp_ns=stamp_ns,

@@ -11,11 +11,15 @@ from hypothesis import strategies as st
 
 from foretwin.geometry.polyline import (
     cut,
+    densified,
+    evenly,
     headings_rad,
+    interpolated,
     length,
     locate,
     offset,
     points_at,
+    stretches,
     tangents,
     units,
 )
@@ -52,6 +56,35 @@ def test_directions_along_an_arc_are_those_of_its_tangents():
     np.testing.assert_allclose(tangents(arc)[1:-1], square[1:-1], atol=1e-9)
     turned = np.unwrap(headings_rad(arc))[1:-1]
     np.testing.assert_allclose(turned, angle[1:-1] + math.pi / 2.0, atol=1e-9)
+
+
+@given(length_m=st.floats(0.0, 200.0), spacing_m=st.floats(0.3, 20.0))
+def test_pieces_are_even_and_no_longer_than_asked_for(length_m, spacing_m):
+    bent = np.array([[0.0, 0.0], [0.4 * length_m, 0.0], [0.4 * length_m, 0.6 * length_m]])
+    at_m = evenly(length(bent), spacing_m=spacing_m)
+    steps = np.diff(at_m)
+    assert at_m[-1] == length(bent)
+    assert steps.max() <= spacing_m * (1.0 + 1e-9)
+    assert steps == pytest.approx(steps[0])
+    np.testing.assert_array_equal(densified(bent, spacing_m=spacing_m), points_at(bent, at_m))
+    pieces = stretches(bent, spacing_m=spacing_m)
+    assert pieces.at_m == pytest.approx((at_m[1:] + at_m[:-1]) / 2.0)
+    np.testing.assert_array_equal(pieces.xy_m, points_at(bent, pieces.at_m))
+
+
+def test_stretches_head_as_the_piece_that_holds_their_middle():
+    corner = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 20.0]])
+    found = stretches(corner, spacing_m=10.0)
+    np.testing.assert_allclose(found.direction, [[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
+
+
+def test_rows_between_known_ones_are_held_at_the_ends():
+    rows = np.array([[0.0, 1.0, 8.0], [2.0, 1.0, 4.0]])
+    known = np.array([10.0, 20.0])
+    np.testing.assert_allclose(
+        interpolated(np.array([0.0, 15.0, 30.0]), known, rows), [rows[0], [1.0, 1.0, 6.0], rows[1]]
+    )
+    np.testing.assert_allclose(interpolated(15.0, known, rows), [1.0, 1.0, 6.0])
 
 
 def test_vectors_of_any_shape_get_length_one_and_none_stays_none():

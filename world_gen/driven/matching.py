@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.geometry.polyline import arc_lengths, points_at, tangents
+from foretwin.geometry.polyline import densified, tangents
 from foretwin.world_gen.driven.passes import STEP_M, Pass
 
 MAP_ERROR_M = 1.2
@@ -65,7 +65,7 @@ class Lines:
     def __init__(self, lines: Mapping[str, LaneLine]) -> None:
         self.ids = tuple(lines)
         number = {key: i for i, key in enumerate(self.ids)}
-        dense = [_dense(line.xy_m) for line in lines.values()]
+        dense = [densified(line.xy_m, spacing_m=_SPACING_M) for line in lines.values()]
         self._line = np.repeat(np.arange(len(dense)), [len(xy) for xy in dense])
         self._xy = np.concatenate(dense)
         self._along = np.concatenate([tangents(xy) for xy in dense])
@@ -137,11 +137,6 @@ class Lines:
         if b in self._beside[a]:
             return _LANE_CHANGE
         return _NOT_JOINED
-
-
-def _dense(line: Array) -> Array:
-    length_m = float(arc_lengths(line)[-1])
-    return points_at(line, np.linspace(0.0, length_m, max(math.ceil(length_m / _SPACING_M), 1) + 1))
 
 
 def _log_sum(values: Array, axis: int) -> Array:

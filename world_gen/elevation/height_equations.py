@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, evenly, length, points_at
 from foretwin.world_gen.elevation.crossings import Overpass
 from foretwin.world_gen.roads.road_graph import RoadEdge
 from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge
@@ -65,9 +65,8 @@ def sampled(edges: Sequence[RoadEdge], spacing_m: float) -> Samples:
     unknown, along = [], []
     levels = _levels(edges)
     for edge in edges:
-        arc = arc_lengths(edge.xy_m)
-        at = np.linspace(0.0, arc[-1], max(math.ceil(arc[-1] / spacing_m), 1) + 1)
-        xy = np.column_stack([np.interp(at, arc, edge.xy_m[:, k]) for k in (0, 1)])
+        at = evenly(length(edge.xy_m), spacing_m=spacing_m)
+        xy = points_at(edge.xy_m, at)
         ends = []
         for level, place in zip(levels(edge), (xy[0], xy[-1]), strict=True):
             if level not in numbers:

@@ -14,7 +14,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.elevation import Elevation, HeightProfile
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.world import Connection, Lane, Road
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import evenly, length, points_at
 from foretwin.world_gen.elevation.profiles import RoadProfiles
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.roads.road_graph import RoadEdge
@@ -90,10 +90,9 @@ def world_elevation(
 def _along_edge(road: Road, edge: RoadEdge, profile: HeightProfile) -> HeightProfile:
     """Return the heights of a road, which is a part of an edge, above the sea."""
     line = road.reference_line
-    arc = arc_lengths(line)
-    at = np.linspace(0.0, arc[-1], max(math.ceil(arc[-1] / _KNOTS_M), 1) + 1)
-    points = np.column_stack([np.interp(at, arc, line[:, k]) for k in (0, 1)])
-    on_edge = shapely.line_locate_point(shapely.LineString(edge.xy_m), shapely.points(points))
+    at = evenly(length(line), spacing_m=_KNOTS_M)
+    points = shapely.points(points_at(line, at))
+    on_edge = shapely.line_locate_point(shapely.LineString(edge.xy_m), points)
     # The edge's length in the map's frame and in the World's differ by parts in a million.
     on_edge *= profile.along_m[-1] / max(edge.length_m, 1e-9)
     height, grade = profile.height_at(on_edge), profile.grade_at(on_edge)
@@ -138,7 +137,7 @@ def _connections(
         end = ends.get((connection.to_lane_id, False))
         if begin is None or end is None:
             continue
-        along = round(float(arc_lengths(connection.centerline)[-1]), 3)
+        along = round(length(connection.centerline), 3)
         rise_m = end.height_m - begin.height_m
         if abs(rise_m) > STEEPEST * max(along, 1.0):
             notes.append(
@@ -188,10 +187,8 @@ def _ground(
     places, above = [np.zeros((0, 2))], [np.zeros(0)]
     for road in roads:
         if road.id in known and not (road.bridge or road.tunnel):
-            arc = arc_lengths(road.reference_line)
-            at = np.linspace(0.0, arc[-1], max(math.ceil(arc[-1] / (step_m / 2)), 1) + 1)
-            line = [np.interp(at, arc, road.reference_line[:, k]) for k in (0, 1)]
-            places.append(np.column_stack(line))
+            at = evenly(length(road.reference_line), spacing_m=step_m / 2)
+            places.append(points_at(road.reference_line, at))
             above.append(known[road.id].height_at(at))
     points, road_m = np.concatenate(places), np.concatenate(above)
     if len(points):

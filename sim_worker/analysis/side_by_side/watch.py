@@ -16,6 +16,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
+from foretwin.geometry.polyline import interpolated
 from foretwin.sim_worker.analysis.side_by_side.departure import (
     Limits,
     departure,
@@ -142,7 +143,7 @@ class SideBySide:
             Waiting(
                 stamp_ns=plan.stamp_ns,
                 stamps_ns=plan.stamp_ns + np.round(time_s * 1e9),
-                planned=_at(time_s, plan.time_from_stamp_s, rows),
+                planned=interpolated(time_s, plan.time_from_stamp_s, rows),
                 place=self._place(),
             )
         )
@@ -230,7 +231,7 @@ class SideBySide:
         if (np.diff(known[first : last + 1]) > _LONGEST_HOLE_NS).any():
             return None
         rows[:, 2] = np.unwrap(rows[:, 2])
-        return _at(stamps_ns, known, rows)
+        return interpolated(stamps_ns, known, rows)
 
     def _clock_stepped_back(self) -> list[Disagreement]:
         """Nothing of before can be compared any more: a new segment by the new clock."""
@@ -253,7 +254,3 @@ class SideBySide:
         segment.disagreements += len(found)
         self._ended.append(segment.record())
         return found
-
-
-def _at(at: Array, known: Array, rows: Array) -> Array:
-    return np.column_stack([np.interp(at, known, column) for column in rows.T])

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.world import World
-from foretwin.geometry.polyline import arc_lengths, points_at, tangents
+from foretwin.geometry.polyline import densified, length, tangents
 from tests.world_gen.truth.hd_map import HdMap
 from tests.world_gen.truth.junction_ways import movements
 
@@ -60,7 +60,7 @@ class Nearby:
     """Finds the line that runs past a point in its direction."""
 
     def __init__(self, lines: Sequence[Array]) -> None:
-        dense = [densified(line) for line in lines]
+        dense = [densified(line, spacing_m=STEP_M) for line in lines]
         self._which = np.repeat(np.arange(len(dense)), [len(line) for line in dense])
         self._xy = np.concatenate(dense)
         self._along = np.concatenate([tangents(line) for line in dense])
@@ -82,12 +82,6 @@ class Nearby:
                 best = int(np.argmin(np.abs(across)))
                 offset[i], which[i] = across[best], self._which[rows[beside][best]]
         return offset, which
-
-
-def densified(line: Array, step_m: float = STEP_M) -> Array:
-    """Return points along a line no farther apart than `step_m`."""
-    length_m = arc_lengths(line)[-1]
-    return points_at(line, np.linspace(0.0, length_m, max(int(np.ceil(length_m / step_m)), 1) + 1))
 
 
 def of_world(world: World, frame: LocalFrame) -> LaneModel:
@@ -171,7 +165,7 @@ def of_sumo(net: Path) -> LaneModel:
             via = after.get(via)
         parts.append(shapes[end][:1])
         line = np.concatenate(parts)
-        if arc_lengths(line)[-1] > 0.1:
+        if length(line) > 0.1:
             found.append(ModelConnection(from_lane=begin, to_lane=end, line=_apart(line)))
     return LaneModel(name="netconvert", lanes=lanes, connections=found)
 

@@ -8,11 +8,11 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import length, tangents, unit
+from foretwin.geometry.polyline import densified, length, tangents, unit
 from tests.world_gen.truth.carriageways import carriageways
 from tests.world_gen.truth.hd_map import HdMap
 from tests.world_gen.truth.junction_ways import movements
-from tests.world_gen.truth.lane_model import LaneModel, Nearby, densified
+from tests.world_gen.truth.lane_model import LaneModel, Nearby
 
 _SAMPLE_M = 2.0
 _LOOK_M = 24.0
@@ -44,7 +44,7 @@ def map_score(hd: HdMap, model: LaneModel) -> MapScore:
     lanes = {k: v for k, v in hd.lanes.items() if not v.inside and v.kind != "bicycle"}
     offset, width = [], []
     for lane in lanes.values():
-        away, which = seen.along(densified(lane.centerline, _SAMPLE_M))
+        away, which = seen.along(_sampled(lane.centerline))
         offset.append(np.abs(away))
         width += [model.lanes[key].width_m - lane.width_m for key in which if key]
     road_of = {key: i for i, road in enumerate(carriageways(hd)) for key in road.lane_ids}
@@ -67,7 +67,7 @@ def map_score(hd: HdMap, model: LaneModel) -> MapScore:
     extra = {(key, road) for key, road in have - wanted if road in near[key]}
     path = [np.empty(0)]
     for m in found:
-        line = densified(np.concatenate([hd.lanes[k].centerline for k in m.inside]), _SAMPLE_M)
+        line = _sampled(np.concatenate([hd.lanes[k].centerline for k in m.inside]))
         path.append(_path_error(line, ways.get(m.from_lane, {}), exits[road_of[m.to_lane]]))
     return MapScore(
         offset_m=np.concatenate(offset),
@@ -104,13 +104,13 @@ class _Seen:
         ahead = unit(line[-1] - line[-3])
         ends = {
             key: float((self._model.lanes[key].line[-1] - line[-1]) @ ahead)
-            for key in self.beside(densified(line, _SAMPLE_M)[-round(_LOOK_M / _SAMPLE_M) :])
+            for key in self.beside(_sampled(line)[-round(_LOOK_M / _SAMPLE_M) :])
         }
         return min(ends.items(), key=lambda item: abs(item[1])) if ends else None
 
 
 def _first(line: Array) -> Array:
-    return densified(line, _SAMPLE_M)[: round(_LOOK_M / _SAMPLE_M)]
+    return _sampled(line)[: round(_LOOK_M / _SAMPLE_M)]
 
 
 def _ways(model: LaneModel, start: str) -> dict[str, list[Array]]:
@@ -153,3 +153,7 @@ def _path_error(line: Array, ways: dict[str, list[Array]], exits: set[str]) -> A
     points = shapely.points(line)
     each = [shapely.distance(points, shapely.LineString(way)) for way in mine]
     return np.asarray(min(each, key=lambda away: float(np.mean(away))))
+
+
+def _sampled(line: Array) -> Array:
+    return densified(line, spacing_m=_SAMPLE_M)
