@@ -19,7 +19,7 @@ from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import NodeClip, open_map
 from foretwin.sim_worker.world_file import load_world
 from foretwin.world_gen.build import with_id
-from foretwin.world_gen.elevation.read_dem import read_dem
+from foretwin.world_gen.elevation.read_dem import dem_digest
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
@@ -55,7 +55,7 @@ def source_digest(spec: SweepSpec) -> str:
         if not path.is_file():
             raise FileNotFoundError(f"map {path}: no such file")
         return (
-            _digest(path) if spec.dem is None else f"{_digest(path)} {read_dem(Path(spec.dem)).key}"
+            _digest(path) if spec.dem is None else f"{_digest(path)} {dem_digest(Path(spec.dem))}"
         )
     folder = worlds_folder(spec)
     assert folder is not None

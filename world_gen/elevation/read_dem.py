@@ -23,6 +23,8 @@ SUFFIXES = (".hgt", ".hgt.zip", ".hgt.gz", ".tif", ".tiff")
 _TILE = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
 _SIDES = (1201, 3601)
 """Samples on a side of SRTM tiles of 3 and of 1 arc second."""
+_TILE_MARGIN_DEG = 0.001
+"""So far beyond its corners a tile may still hold: more than half a cell."""
 _VOID = -32768
 _MOST_BYTES = 2 * 3601 * 3601
 _MOST_CELLS = 400_000_000
@@ -37,14 +39,17 @@ _LIKE_WGS84 = (4326, 4979, 4258, 4269)
 def read_dem(path: Path, *, around: LatLonBounds | None = None) -> DemSet:
     """Read an elevation file, or those of a folder that reach into bounds `around`.
 
+    Tiles whose names say that they lie elsewhere are not opened.
     Raises UserError, in one line, for what is none, says not where it lies, or lies elsewhere.
     """
-    found = _read_all(path)
+    files = _files(path)
     if around is None:
-        return found
+        return DemSet(tuple(_read(file) for file in files))
     lat, lon = np.linspace(around.south, around.north, 9), np.linspace(around.west, around.east, 9)
-    corners = [grid.ravel() for grid in np.meshgrid(lat, lon)]
-    tiles = tuple(tile for tile in found.tiles if not np.isnan(tile.at(*corners)).all())
+    lat, lon = (grid.ravel() for grid in np.meshgrid(lat, lon))
+    # One by one: a continent's tiles do not fit into memory.
+    near = (_read(file) for file in files if not _elsewhere(file, lat, lon))
+    tiles = tuple(tile for tile in near if not np.isnan(tile.at(lat, lon)).all())
     if not tiles:
         raise UserError(
             f"dem {path}: knows no height between {around.south:g}, {around.west:g} and "
@@ -53,15 +58,28 @@ def read_dem(path: Path, *, around: LatLonBounds | None = None) -> DemSet:
     return DemSet(tiles)
 
 
-def _read_all(path: Path) -> DemSet:
+def dem_digest(path: Path) -> str:
+    """Return what an elevation file, or those of a folder, are: the same for the same bytes.
+
+    It is the `key` of all that `read_dem` can read there; raises UserError where nothing is.
+    """
+    return " ".join(_digest(file) for file in _files(path))
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
     if path.is_dir():
         files = sorted(p for p in path.iterdir() if p.name.lower().endswith(SUFFIXES))
         if not files:
             raise UserError(f"dem {path}: the folder holds no file that ends in {_words()}")
-        return DemSet(tuple(_read(file) for file in files))
+        return files
     if not path.is_file():
         raise UserError(f"dem {path}: no such file")
-    return DemSet((_read(path),))
+    return [path]
 
 
 def _words() -> str:
@@ -80,6 +98,26 @@ def _read(path: Path) -> Dem:
     raise UserError(f"dem {path}: ends in none of {_words()}")
 
 
+def _corner(name: str) -> tuple[int, int] | None:
+    """Return latitude and longitude of the south-western corner of the tile of that name."""
+    place = _TILE.match(name)
+    if place is None:
+        return None
+    south = int(place[2]) * (1 if place[1].upper() == "N" else -1)
+    return south, int(place[4]) * (1 if place[3].upper() == "E" else -1)
+
+
+def _elsewhere(path: Path, lat_deg: Array, lon_deg: Array) -> bool:
+    """Tell whether a file's name says that it is a tile that reaches none of the places."""
+    corner = _corner(path.name) if ".hgt" in path.name.lower() else None
+    if corner is None:
+        return False
+    south, west = (value - _TILE_MARGIN_DEG for value in corner)
+    side = 1.0 + 2.0 * _TILE_MARGIN_DEG
+    inside = (lat_deg >= south) & (lat_deg <= south + side)
+    return not bool((inside & (lon_deg >= west) & (lon_deg <= west + side)).any())
+
+
 def _hgt(path: Path) -> Dem:
     """Read a tile of big-endian heights from north to south; its name says where it lies."""
     data, inner = path.read_bytes(), path.name
@@ -95,8 +133,8 @@ def _hgt(path: Path) -> Dem:
     elif path.suffix.lower() == ".gz":
         with gzip.open(path) as file:
             data = file.read(_MOST_BYTES + 1)
-    place = _TILE.match(inner) or _TILE.match(path.name)
-    if place is None:
+    corner = _corner(path.name) or _corner(inner)
+    if corner is None:
         raise UserError(f"dem {path}: the name says not where it lies, as N43E007.hgt does")
     side = math.isqrt(len(data) // 2)
     if side not in _SIDES or len(data) != 2 * side * side:
@@ -105,8 +143,7 @@ def _hgt(path: Path) -> Dem:
             f"{' or '.join(str(2 * known * known) for known in _SIDES)}"
         )
     raw = np.frombuffer(data, dtype=">i2").reshape(side, side)
-    south = int(place[2]) * (1 if place[1].upper() == "N" else -1)
-    west = int(place[4]) * (1 if place[3].upper() == "E" else -1)
+    south, west = corner
     step = 1.0 / (side - 1)
     return Dem(
         name=path.name,
@@ -131,7 +168,6 @@ def _geotiff(path: Path) -> Dem:
     """Read a GeoTIFF of one band (OGC 19-008r4), north up, geographic or by an EPSG number."""
     from PIL import Image
 
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of tags that nobody needs
         image = Image.open(path)
@@ -163,7 +199,7 @@ def _geotiff(path: Path) -> Dem:
     half = 0.0 if values.get(_RASTER_TYPE, 1) == 2 else 0.5
     return Dem(
         name=path.name,
-        sha256=digest,
+        sha256=_digest(path),
         heights_m=_known(heights, float(void) if void else None),
         first_x=float(x + (half - column) * scale_x),
         first_y=float(y - (half - row) * scale_y),

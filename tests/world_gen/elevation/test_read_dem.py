@@ -7,7 +7,7 @@ import pytest
 from PIL import Image, TiffImagePlugin
 
 from foretwin.contracts.errors import UserError
-from foretwin.world_gen.elevation.read_dem import read_dem
+from foretwin.world_gen.elevation.read_dem import dem_digest, read_dem
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 
@@ -95,6 +95,7 @@ def test_a_folder_gives_the_tiles_that_reach_the_map(tmp_path: Path) -> None:
     for name in ("N43E007.hgt", "N44E007.hgt"):
         (tmp_path / name).write_bytes(tile_bytes())
     (tmp_path / "SOURCE.txt").write_text("not asked")
+    (tmp_path / "N53E007.hgt").write_text("far away: not opened")
 
     near = read_dem(tmp_path, around=LatLonBounds(43.2, 7.2, 43.3, 7.3))
     assert near.name == "N43E007.hgt"
@@ -102,6 +103,13 @@ def test_a_folder_gives_the_tiles_that_reach_the_map(tmp_path: Path) -> None:
         read_dem(tmp_path, around=LatLonBounds(53.0, -2.0, 53.1, -1.9))
     with pytest.raises(UserError, match="no such file"):
         read_dem(tmp_path / "N99E000.hgt")
+
+
+def test_what_an_elevation_is_needs_no_heights(tmp_path: Path) -> None:
+    for name in ("N43E007.hgt", "N44E007.hgt"):
+        (tmp_path / name).write_bytes(tile_bytes())
+
+    assert dem_digest(tmp_path) == read_dem(tmp_path).key
 
 
 @pytest.mark.real_data
