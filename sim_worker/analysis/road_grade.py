@@ -10,6 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.identify.regression import smoothed_and_rate
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.gravity import lost_to_grade_mps2
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 
 _WAY_WIDTH_S, _MOVES_MPS = 0.5, 0.5
@@ -110,4 +111,4 @@ def climb_under(record: MotionRecord, roads: Slopes | None) -> Climb | None:
             grade = grade_from_roads(record, roads)
         except ValueError:
             grade = np.zeros(len(record.stamp_ns))
-    return Climb(GRAVITY_MPS2 * grade / np.sqrt(1.0 + np.square(grade)), std)
+    return Climb(lost_to_grade_mps2(grade), std)
