@@ -12,6 +12,9 @@ LEAST_RADIUS_M = 4.0
 12 m across from kerb to kerb, as the outer front wheel goes; those of base_link some 8 m."""
 MAX_CURVATURE_PM = 1.0 / LEAST_RADIUS_M
 """1/m, the same."""
+LEAST_GRID_RADIUS_M = 0.95 * LEAST_RADIUS_M
+"""The same of paths whose points lie on the millimetre grid: these bend a little more than the
+curves that they stand for."""
 
 _Angle = TypeVar("_Angle", float, Array)
 

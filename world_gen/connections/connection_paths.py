@@ -18,7 +18,7 @@ from foretwin.geometry.polyline import (
 )
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.splines import through_corners
-from foretwin.geometry.steering import LEAST_RADIUS_M
+from foretwin.geometry.steering import LEAST_GRID_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.inner_lanes import paths_along_inner_lanes
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
@@ -32,8 +32,6 @@ _LONGEST_CHORD_M = 8.0
 _LANE_BENDS_PM = 0.02, 0.12
 """Lanes that bend less are all but straight; what bends more is a kink of the map."""
 _BACK_RAD = math.radians(165.0)
-_GRID_SHARE = 0.95
-"""Points on the millimetre grid bend a little more than the curves that they stand for."""
 
 
 def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
@@ -52,10 +50,9 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     end_bends = _bends([c.end.centerline[:3] for c in connections])
     turns = turn_curves(begins, headings, ends, end_headings, bend_pm=bends, end_bend_pm=end_bends)
     paths = turns.lines.split()
-    least_m = _GRID_SHARE * LEAST_RADIUS_M
     back = np.abs(turn_rad(headings, end_headings)) > _BACK_RAD
     back &= np.array([c.turn == "u_turn" for c in connections])
-    tight = np.nonzero(back & (turns.radius_m < least_m))[0]
+    tight = np.nonzero(back & (turns.radius_m < LEAST_GRID_RADIUS_M))[0]
     poses = (begins, headings, ends, end_headings)
     drawn = dict(zip(tight.tolist(), back_turns(*(a[tight] for a in poses)).split(), strict=True))
     drawn |= paths_along_inner_lanes(connections, around)
@@ -77,7 +74,7 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
         connections[:] = [c for c, ok in zip(connections, fits, strict=True) if ok]
     tightest_m = _tightest_m([c.centerline for c in connections]).tolist()
     for c, radius_m in zip(connections, tightest_m, strict=True):
-        if radius_m < least_m:
+        if radius_m < LEAST_GRID_RADIUS_M:
             notes.append(
                 f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
                 f"into way {c.end.edge.way_id} ({c.turn})"

@@ -9,7 +9,7 @@ import scipy.linalg
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import arc_lengths, cross, left_of, points_at, tangents, turn_rad
-from foretwin.geometry.steering import LEAST_RADIUS_M
+from foretwin.geometry.steering import LEAST_GRID_RADIUS_M
 
 _SPACING_M = 0.5
 _SMOOTH_M = (1.5, 3.0, 6.0)
@@ -18,7 +18,6 @@ _MOST_AWAY_M = 5.0
 """A pass that lies farther off went another way."""
 _MOST_TURNED_RAD = np.radians(30.0)
 """So much more than its ends ask for a path may turn."""
-_GRID_SHARE = 0.95
 _UNSEEN = 0.01
 """How much less than a pass it counts that a path was drawn where it was."""
 
@@ -92,6 +91,5 @@ def _drivable(path: Array, drawn: Array) -> bool:
     bend = np.abs(turned) / ((length_m[:-1] + length_m[1:]) / 2.0)
     ends = abs(float(turn_rad(drawn[1] - drawn[0], drawn[-1] - drawn[-2])))
     return bool(
-        bend.max() < 1.0 / (_GRID_SHARE * LEAST_RADIUS_M)
-        and np.abs(turned).sum() < ends + _MOST_TURNED_RAD
+        bend.max() < 1.0 / (LEAST_GRID_RADIUS_M) and np.abs(turned).sum() < ends + _MOST_TURNED_RAD
     )

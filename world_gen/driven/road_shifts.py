@@ -13,12 +13,12 @@ import scipy.sparse.linalg
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import arc_lengths, length, points_at
+from foretwin.world_gen.driven.matching import MAP_ERROR_M
 from foretwin.world_gen.driven.passes import STEP_M
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
-MAP_ERROR_M, MAP_ALIKE_M = 1.2, 40.0
-"""Standard deviation of a way's place, and how far along a road its error stays. Chosen, after
-`matching.MAP_ERROR_M`."""
+MAP_ALIKE_M = 40.0
+"""How far along a road the error of a way's place, `MAP_ERROR_M`, stays. Chosen."""
 PASS_ERROR_M, PASS_ALIKE_M = 0.4, 10.0
 """The same of how a driver keeps the middle of a lane. Chosen."""
 RECEIVER_ALIKE_M = 60.0

@@ -9,9 +9,7 @@ import numpy as np
 import pyproj
 
 from foretwin.contracts.arrays import Array
-
-METRES_PER_DEG = 111_195.0
-"""Of latitude; how large a cell is need not be known better."""
+from foretwin.contracts.frames import METRES_PER_DEG
 
 
 class Trust(NamedTuple):
@@ -52,7 +50,7 @@ class Dem(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def cell_m(self) -> float:
-        """Length of a cell from north to south, in metres."""
+        """Length of a cell from north to south, in metres; it need not be known well."""
         return abs(self.step_y) * (METRES_PER_DEG if self.epsg is None else 1.0)
 
     @property
