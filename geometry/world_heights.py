@@ -107,6 +107,21 @@ class WorldHeights:
         return self._roads.get(part.road_id), self._lines.get(part.road_id, part.centerline)
 
 
+def standing(
+    hills: WorldHeights | None, outline: Array, low_m: float, high_m: float
+) -> tuple[float, float]:
+    """Return underside and top of what stands on its outline (N, 2), as high as it is on a plane.
+
+    On a slope it stands on its lowest corner, or above the highest where it leaves room below, and
+    reaches as high over the highest. On flat ground (None) nothing changes.
+    """
+    if hills is None:
+        return low_m, high_m
+    ground = hills.surface_at(outline)
+    most = float(ground.max())
+    return low_m + (most if low_m else float(ground.min())), high_m + most
+
+
 def heights_of(world: World) -> WorldHeights | None:
     """Return the heights of a World, None where it is flat."""
     if isinstance(world.elevation, msgspec.UnsetType):

@@ -18,7 +18,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.beside_road import ObstacleKind
 from foretwin.contracts.world import StopLine, World
 from foretwin.geometry.polyline import left_of, unit
-from foretwin.geometry.world_heights import WorldHeights, heights_of
+from foretwin.geometry.world_heights import heights_of, standing
 from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.lanelets import crosswalk_edges
 from foretwin.world_gen.export.opendrive_places import OdrNetwork
@@ -93,14 +93,14 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
     hills = heights_of(world)
     for building in world.buildings:
         rings, bottom = (building.outline, *building.holes), building.min_height_m
-        height = max(building.height_m.value - bottom, 0.0)
-        bottom, height = _on_ground(building.outline, bottom, height, hills)
-        yield _Thing("building", None, building.id, rings, bottom, height, grounded=True)
+        top = max(building.height_m.value, bottom)
+        low, high = standing(hills, building.outline, bottom, top)
+        yield _Thing("building", None, building.id, rings, low, high - low, grounded=True)
     for one in world.obstacles:
         kind, subtype = _OBSTACLES[one.kind]
-        rings, height = (one.outline, *one.holes), one.height_m.value
-        low, height = _on_ground(one.outline, 0.0, height, hills)
-        yield _Thing(kind, subtype, one.id, rings, low, height, grounded=True)
+        low, high = standing(hills, one.outline, 0.0, one.height_m.value)
+        rings = (one.outline, *one.holes)
+        yield _Thing(kind, subtype, one.id, rings, low, high - low, grounded=True)
     for area in world.islands:
         rings = (area.outline, *area.holes)
         yield _Thing("trafficIsland", None, area.id, rings, 0.0, ISLAND_HEIGHT_M)
@@ -116,18 +116,6 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
         road = network.road_across(line.across_id)
         if line.control.value != "none" and road is not None:
             yield _Thing("roadMark", "signalLines", line.id, (_painted(line),), road=road)
-
-
-def _on_ground(
-    outline: Array, bottom_m: float, height_m: float, hills: WorldHeights | None
-) -> tuple[float, float]:
-    """Return underside and height of what stands on a slope: on its lowest corner, as high over
-    its highest."""
-    if hills is None:
-        return bottom_m, height_m
-    ground = hills.surface_at(outline)
-    low, high = float(ground.min()), float(ground.max())
-    return (bottom_m + high, height_m) if bottom_m else (low, height_m + high - low)
 
 
 def _painted(line: StopLine) -> Array:

@@ -18,7 +18,7 @@ from lxml import etree
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.beside_road import Building
 from foretwin.contracts.world import Area, World
-from foretwin.geometry.world_heights import WorldHeights, heights_of
+from foretwin.geometry.world_heights import WorldHeights, heights_of, standing
 from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.choices import SIMULATORS, Simulator
 from foretwin.world_gen.export.roofs import eaves_m, roofs_mesh
@@ -197,15 +197,11 @@ def _buildings(made: Element, world: World, hills: WorldHeights | None, path: Pa
     link = StaticLink(made, "buildings")
     lifted: list[tuple[Building, float]] = []
     for building in world.buildings:
-        low, high, top = building.min_height_m, eaves_m(building), 0.0
-        if high - low < solids.THINNEST_M:
+        walls = eaves_m(building)
+        if walls - building.min_height_m < solids.THINNEST_M:
             continue
-        if hills is not None:
-            # A house on a slope stands on its lowest corner, and is as high over its highest.
-            ground = hills.surface_at(building.outline)
-            top = float(ground.max())
-            low, high = low + (top if low else float(ground.min())), high + top
-        lifted.append((building, top))
+        low, high = standing(hills, building.outline, building.min_height_m, walls)
+        lifted.append((building, high - walls))
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
             link.prism(f"{building.id}.{number}", ring, (low, high), solids.BUILDING, solid=True)
@@ -220,8 +216,5 @@ def _obstacles(made: Element, world: World, hills: WorldHeights | None) -> None:
         rings = extrusions(one.outline, one.holes, tolerance_m=solids.THINNEST_M)
         for number, ring in enumerate(rings):
             name = f"{one.kind}.{one.id}.{number}"
-            low, high = 0.0, one.height_m.value
-            if hills is not None:
-                ground = hills.surface_at(ring)
-                low, high = float(ground.min()), high + float(ground.max())
-            link.prism(name, ring, (low, high), solids.OBSTACLE, solid=True)
+            reach = standing(hills, ring, 0.0, one.height_m.value)
+            link.prism(name, ring, reach, solids.OBSTACLE, solid=True)

@@ -6,7 +6,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.world import World
-from foretwin.geometry.world_heights import heights_of
+from foretwin.geometry.world_heights import heights_of, standing
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
@@ -103,6 +103,21 @@ def test_the_ground_beside_a_road_is_as_high_as_the_road() -> None:
 
     assert on_road[0] == pytest.approx(on_road[1], abs=0.5)
     assert away[0] - on_road[0] > 10.0
+
+
+def test_what_stands_on_a_slope_is_as_high_over_its_highest_corner() -> None:
+    heights = heights_of(world_on(east))
+    house = np.array([[40.0, 15.0], [90.0, 15.0], [90.0, 45.0], [40.0, 45.0]])
+    assert heights is not None
+    ground = heights.surface_at(house)
+
+    assert standing(None, house, 0.0, 9.0) == (0.0, 9.0)
+    low, high = standing(heights, house, 0.0, 9.0)
+    assert (low, high) == (ground.min(), ground.max() + 9.0)
+    # A bridge between houses is as far over the street everywhere.
+    low, high = standing(heights, house, 5.0, 9.0)
+    assert (low, high) == (ground.max() + 5.0, ground.max() + 9.0)
+    assert ground.max() - ground.min() > 2.0
 
 
 def test_the_same_map_on_other_ground_is_another_world() -> None:
