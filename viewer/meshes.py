@@ -10,6 +10,8 @@ import numpy.typing as npt
 import shapely
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.reflex_cuts import polygons_of
+from foretwin.geometry.triangles import Triangles, triangulated
 
 Colour = tuple[int, int, int]
 
@@ -30,13 +32,6 @@ class Mesh(NamedTuple):
     triangles: npt.NDArray[np.uint32]
 
 
-class Triangles(NamedTuple):
-    """`corners_m` (T, 3, 2), counter-clockwise; `polygon` (T,) says which polygon each is from."""
-
-    corners_m: Array
-    polygon: npt.NDArray[np.intp]
-
-
 def triangulate(polygons: Sequence[Polygon]) -> Triangles:
     """Return the triangles that fill the polygons; parts without area are left out."""
     usable = [index for index, polygon in enumerate(polygons) if len(polygon.outline) >= 3]
@@ -51,22 +46,9 @@ def triangulate(polygons: Sequence[Polygon]) -> Triangles:
         ],
         dtype=object,
     )
-    parts, part_of = shapely.get_parts(shapely.make_valid(shapes), return_index=True)
-    # A repaired polygon may be a collection of multi-polygons and lines.
-    parts, inner_of = shapely.get_parts(parts, return_index=True)
-    part_of = part_of[inner_of]
-    is_area = (shapely.get_type_id(parts) == shapely.GeometryType.POLYGON) & (
-        shapely.area(parts) > 1e-6
-    )
-    parts, part_of = parts[is_area], part_of[is_area]
-    pieces, piece_of = shapely.get_parts(
-        shapely.constrained_delaunay_triangles(parts), return_index=True
-    )
-    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    clockwise = edge_a[:, 0] * edge_b[:, 1] - edge_a[:, 1] * edge_b[:, 0] < 0.0
-    corners[clockwise] = corners[clockwise][:, ::-1]
-    return Triangles(corners, np.asarray(usable, dtype=np.intp)[part_of[piece_of]])
+    parts, part_of = polygons_of(shapely.make_valid(shapes), np.array(usable))
+    found = triangulated(parts)
+    return found._replace(owner=part_of[found.owner])
 
 
 def _signed_area(ring: Array) -> float:
@@ -119,10 +101,10 @@ def prism_mesh(
     """Return upright prisms, walls and roofs, as one mesh; one height range and colour each."""
     heights, shades = np.asarray(high_m, dtype=np.float64), np.asarray(colours, dtype=np.uint8)
     roofs = triangulate(polygons)
-    roof_height = np.broadcast_to(heights[roofs.polygon][:, None, None], (len(roofs.polygon), 3, 1))
+    roof_height = np.broadcast_to(heights[roofs.owner][:, None, None], (len(roofs.owner), 3, 1))
     corners = [np.concatenate([roofs.corners_m, roof_height], axis=2)]
-    normals = [np.tile([0.0, 0.0, 1.0], (len(roofs.polygon), 1))]
-    faces = [shades[roofs.polygon]]
+    normals = [np.tile([0.0, 0.0, 1.0], (len(roofs.owner), 1))]
+    faces = [shades[roofs.owner]]
     for index, polygon in enumerate(polygons):
         for ring, is_hole in [(polygon.outline, False), *((hole, True) for hole in polygon.holes)]:
             if len(ring) < 3:

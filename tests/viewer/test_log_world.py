@@ -48,7 +48,7 @@ def test_a_self_crossing_outline_is_repaired_and_a_line_left_out() -> None:
     bow = np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]])
     line = np.array([[0.0, 0.0], [5.0, 0.0], [9.0, 0.0]])
     triangles = triangulate([Polygon(line), Polygon(bow), Polygon(line[:2])])
-    assert set(triangles.polygon.tolist()) == {1}
+    assert set(triangles.owner.tolist()) == {1}
     assert _areas(triangles.corners_m).sum() == pytest.approx(2.0)
 
 

@@ -14,13 +14,12 @@ from typing import TypeVar
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.beside_road import Building, Obstacle
 from foretwin.contracts.world import Area, World
+from foretwin.geometry.triangles import joined, triangulated, twice_areas_m2
 from foretwin.world_gen.buildings.convex_parts import convex_cover, sound_polygons
 from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.roofs import eaves_m, roofs_mesh
@@ -39,6 +38,8 @@ UNTOUCHED = {"contype": 0, "conaffinity": 0}
 TIMESTEP_S = 0.01
 WORKER_REACH_M = 20.0
 """Without visuals, what stands farther than this from the road is left out."""
+_SLIVER_M2 = 1e-4
+"""Smaller triangles are left out."""
 VISUAL_GROUP, COLLISION_GROUP = 2, 1
 
 _Block = TypeVar("_Block", Building, Obstacle)
@@ -187,28 +188,15 @@ def _prism_faces(n: int) -> list[int]:
     return faces
 
 
-def _distinct(points: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-    """Return points (N, 2) once each on a grid of 0.1 mm, and the row of each in these."""
-    steps = np.rint(points * 1e4).astype(np.int64)
-    keys = (steps[:, 0] << 32) + steps[:, 1]
-    _, first, rows = np.unique(keys, return_index=True, return_inverse=True)
-    return np.round(points[first], 4), rows
-
-
 def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     """Add the road surface as a mesh that is seen and never touched."""
     shapes = polygons_from([(area.outline, area.holes) for area in world.road_surface])
     sound, _ = sound_polygons(shapes)
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(sound))
-    triangles = triangles[shapely.area(triangles) > 1e-4]
-    if not len(triangles):
+    found = triangulated(sound).corners_m
+    found = found[twice_areas_m2(found) > 2.0 * _SLIVER_M2]
+    if not len(found):
         return
-    points = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
-    corners, rows = _distinct(points)
-    faces = rows.reshape(-1, 3)
-    a, b, c = (corners[faces[:, k]] for k in range(3))
-    cross = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces = np.where(cross[:, None] < 0.0, faces[:, ::-1], faces)[np.abs(cross) > 1e-4]
+    corners, faces = joined(found, sliver_m2=_SLIVER_M2)
     surface = np.column_stack([corners, np.full(len(corners), solids.ROAD_TOP_M)])
     _add_seen(spec, "road", Terrain(surface, faces), solids.ROAD)
 

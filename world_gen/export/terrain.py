@@ -12,6 +12,7 @@ import shapely
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.world import Connection, Lane, World
 from foretwin.geometry.polyline import left_of, tangents
+from foretwin.geometry.triangles import joined, triangulated, upward
 from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.export.xml_tree import in_comment
 
@@ -87,7 +88,8 @@ def _strip(part: Lane | Connection, hills: WorldHeights, *, above_m: float) -> T
     right = left + count
     one = np.column_stack([left, right, right + 1])
     other = np.column_stack([left, right + 1, left + 1])
-    return _upward(points, np.concatenate([one, other]))
+    faces = upward(points, np.concatenate([one, other]), sliver_m2=_SLIVER_M2)
+    return Terrain(points, faces)
 
 
 def draped(
@@ -98,22 +100,11 @@ def draped(
 
 
 def _draped(areas: list[shapely.Geometry], hills: WorldHeights, *, above_m: float) -> Terrain:
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(areas)) if areas else []
-    corners = [shapely.get_coordinates(part)[:3] for part in parts]
-    if not corners:
+    if not areas:
         return Terrain(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
-    flat = np.concatenate(corners)
-    xy, which = np.unique(np.round(flat, 4), axis=0, return_inverse=True)
-    points = np.column_stack([xy, hills.surface_at(xy) + above_m])
-    return _upward(points, which.reshape(-1, 3))
-
-
-def _upward(points: Array, triangles: Indices) -> Terrain:
-    """Turn triangles (M, 3) to be seen from above, and leave out what is none."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    across = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    turned = np.where((across < 0.0)[:, None], triangles[:, ::-1], triangles)
-    return Terrain(points, turned[np.abs(across) > _SLIVER_M2])
+    flat = joined(triangulated(np.array(areas)).corners_m, sliver_m2=_SLIVER_M2)
+    high = hills.surface_at(flat.xy_m) + above_m
+    return Terrain(np.column_stack([flat.xy_m, high]), flat.triangles)
 
 
 def _polygon(outline: Array, holes: tuple[Array, ...] = ()) -> shapely.Geometry:
