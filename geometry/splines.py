@@ -19,8 +19,7 @@ def through_corners(line: Array, *, radius_m: float) -> Array:
     """Return a line (N, 2) as a cubic B-spline, whose curvature has no jumps and no bend at an end.
 
     Its control points lie evenly on the line with its corners rounded to `radius_m` where there
-    is room. The ends stay to the last
-    bit, other points lie on the millimetre grid.
+    is room. The ends stay to the last bit, other points lie on the millimetre grid.
     """
     nothing = np.full((1, 2), np.nan)
     wide = np.array([radius_m])

@@ -75,6 +75,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     near = positions if positions is not None else given
     clip = None if near is None else Clip(near, CORRIDOR_M)
     opened = open_map(map_file, clip=clip)
+    # For its errors alone, before anything starts: the process that builds Worlds reads them.
     tracks_for(opened.osm.bounds, config.tracks)
     osm, graph, junctions = opened.osm, opened.graph, opened.junctions
     index = RoadIndex(graph)

@@ -233,7 +233,7 @@ class RoundRunner:
         order = done.order
         since("round", order.receipt_mono_ns, id=order.round_id, futures=len(order.futures))
         seed = self._seeds.pop(order.round_id)
-        self._seeds = {r: seed for r, seed in self._seeds.items() if r > order.round_id}
+        self._seeds = {r: later for r, later in self._seeds.items() if r > order.round_id}
         self._take_time(seed.pace, done.seconds, done.played_by)
         self.tally.run += 1
         world = self._world_of(order.world_id)

@@ -22,7 +22,7 @@ _LINE_NEAR_M = 25.0
 
 
 def stop_line_m(leg: DirectedEdge, cluster: Cluster, node_tags: NodeTags) -> float:
-    """Return how far along a leg the map has who drives in stop: his lanes reach so far.
+    """Return how far along a leg the map has cars stop that drive in: lanes must reach so far.
 
     That is at a light, or before a crossing where there are lights, else at a sign.
     """

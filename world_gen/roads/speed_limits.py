@@ -66,9 +66,13 @@ def _usual_kmph(tags: Mapping[str, str], rules: CountryRules) -> float:
     known = road_class(name).kmph
     if known is not None:
         return known
-    if name in ("motorway", "living_street", "residential"):
-        speeds = rules.motorway_kmph, rules.living_street_kmph, rules.local_kmph
-        return speeds[("motorway", "living_street", "residential").index(name)]
+    of_class = {
+        "motorway": rules.motorway_kmph,
+        "living_street": rules.living_street_kmph,
+        "residential": rules.local_kmph,
+    }
+    if name in of_class:
+        return of_class[name]
     if in_town(tags):
         return rules.town_kmph
     apart = tags.get("motorroad") == "yes" or (name == "trunk" and tags.get("oneway") == "yes")
