@@ -11,17 +11,14 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import METRES_PER_DEG
 from foretwin.world_gen.osm.osm_map import LatLonBounds
+from foretwin.world_gen.osm.read_osm import NODE_TAGS, WAY_KEYS, WAY_TAGS
 
-WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
-NODE_FILTERS = (
-    '["natural"="tree"]',
+_POST_FILTERS = (
     '["highway"="street_lamp"]',
-    '["power"="pole"]',
-    '["amenity"="shelter"]',
     '["highway"="bus_stop"]["shelter"]',
     '["barrier"~"^(bollard|block)$"]',
 )
-"""What stands beside roads at nodes of no way."""
+"""What stands beside roads at nodes of no way, by keys that nodes of roads have too."""
 SIMPLIFIED_M = 20.0
 """A route is asked for within its margin plus this, so that fewer points say where it runs."""
 MOST_POINTS = 2000
@@ -67,8 +64,9 @@ def overpass_query(area: str, *, timeout_s: int, max_bytes: int) -> str:
     restrictions that name one of the ways.
     """
     ways = "".join(f'way["{key}"]{area};' for key in WAY_KEYS)
-    ways += f'way["amenity"="shelter"]{area};'
-    nodes = "".join(f"node{tags}{area};" for tags in NODE_FILTERS)
+    ways += "".join(f"way{_tag_filter(tag)}{area};" for tag in WAY_TAGS)
+    posts = (*map(_tag_filter, NODE_TAGS), *_POST_FILTERS)
+    nodes = "".join(f"node{tags}{area};" for tags in posts)
     return (
         f"[out:xml][timeout:{timeout_s}][maxsize:{max_bytes}];"
         f"({ways})->.w;"
@@ -79,3 +77,8 @@ def overpass_query(area: str, *, timeout_s: int, max_bytes: int) -> str:
         f"(node(w.w);{nodes}.w;.r;);"
         "out body;"
     )
+
+
+def _tag_filter(tag: str) -> str:
+    key, value = tag.split("=")
+    return f'["{key}"="{value}"]'

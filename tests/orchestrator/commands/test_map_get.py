@@ -102,6 +102,9 @@ def test_a_box_becomes_a_map(endpoint: Endpoint, out: Path, tmp_path: Path) -> N
     assert list(read_map(out).ways) == [10]
     (query,) = endpoint.queries
     assert 'way["highway"](53.0000000,8.0000000,53.1000000,8.1000000)' in query
+    assert 'way["amenity"="shelter"](53.0000000' in query
+    for filters in ('["natural"="tree"]', '["highway"="bus_stop"]["shelter"]'):
+        assert f"node{filters}(53.0000000" in query
     assert query.startswith("[out:xml][timeout:180]")
     (agent,) = endpoint.agents
     assert agent.startswith("foretwin/")
