@@ -11,11 +11,11 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide, Lane, Road, World
 from foretwin.geometry.polyline import left_of
-from foretwin.geometry.world_heights import heights_of
+from foretwin.geometry.world_heights import WorldHeights, heights_of
 from foretwin.world_gen.export.opendrive_cubics import Cubic, Rise
 from foretwin.world_gen.export.opendrive_curve import Curve, fit_curve
 from foretwin.world_gen.export.opendrive_sidewalks import Sidewalk
-from foretwin.world_gen.export.road_heights import layer_heights, node_of
+from foretwin.world_gen.export.road_heights import Node, layer_heights, node_of
 
 GAP_M = 0.01
 """Lanes farther apart than this have a strip without traffic between them."""
@@ -151,12 +151,6 @@ def roads_of(
             continue
         start, end = headings.get((road.id, False)), headings.get((road.id, True))
         curve = fit_curve(road.reference_line, start=start, end=end)
-        profile = None if hills is None else hills.road(road.id)
-        if hills is None:
-            rise = heights[node_of(road, at_end=False)], heights[node_of(road, at_end=True)]
-        elif profile is None:
-            # A track of trams alone lies on the ground.
-            rise = tuple(hills.surface_at(road.reference_line[[0, -1]]).tolist())
         strips, centre_m = _strips(mine, side)
         strips = _with_sidewalks(strips, centre_m, road, sidewalks.get(road.id, ()))
         found.append(
@@ -168,14 +162,27 @@ def roads_of(
                 offset=Cubic(centre_m),
                 lanes=strips,
                 road_class=road.road_class,
-                height=Rise.between(*rise, curve.length_m)
-                if profile is None
-                else Rise.of(profile, curve.length_m),
+                height=_rise(road, heights, hills, curve.length_m),
                 road=road,
                 numbers={s.lane.id: s.number for s in strips if s.lane is not None},
             )
         )
     return found
+
+
+def _rise(
+    road: Road, layers: Mapping[Node, float], hills: WorldHeights | None, length_m: float
+) -> Rise:
+    """Return a road's heights: the hills', else those of the layers at its ends."""
+    if hills is None:
+        ends = layers[node_of(road, at_end=False)], layers[node_of(road, at_end=True)]
+        return Rise.between(*ends, length_m)
+    profile = hills.road(road.id)
+    if profile is not None:
+        return Rise.of(profile, length_m)
+    # A track of trams alone lies on the ground.
+    start, end = hills.surface_at(road.reference_line[[0, -1]]).tolist()
+    return Rise.between(start, end, length_m)
 
 
 def runs_along(number: int, side: DrivingSide) -> bool:
