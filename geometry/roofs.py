@@ -16,6 +16,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.beside_road import RoofForm
+from foretwin.geometry.triangles import TriangleMesh, joined, triangulated
 
 _CURVED_PIECES = 6
 """On each side of the middle: an arch of so many straight pieces is off by 1.2 % of its height."""
@@ -64,16 +65,12 @@ def roof_mesh(
     return _with_gables(np.column_stack([xy, high]), triangles, eaves_m)
 
 
-def _cut_into_triangles(shape: shapely.Geometry, creases: Sequence[Array]) -> tuple[Array, Indices]:
-    """Return points (N, 2) and triangles (M, 3), counter-clockwise, that no crease crosses."""
+def _cut_into_triangles(shape: shapely.Geometry, creases: Sequence[Array]) -> TriangleMesh:
+    """Return triangles that no crease crosses."""
     lines = [shapely.boundary(shape), *(shapely.LineString(line) for line in creases)]
     cells = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=_GRID_M)]))
     inside = shapely.contains(shapely.buffer(shape, _GRID_M), shapely.point_on_surface(cells))
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(cells[inside]))
-    parts = shapely.orient_polygons(parts[shapely.area(parts) > _SLIVER_M2])
-    corners = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
-    xy, which = np.unique(np.round(corners, 4), axis=0, return_inverse=True)
-    return xy, which.reshape(-1, 3)
+    return joined(triangulated(cells[inside]).corners_m, sliver_m2=2.0 * _SLIVER_M2)
 
 
 def _with_gables(points: Array, triangles: Indices, eaves_m: float) -> RoofMesh:
