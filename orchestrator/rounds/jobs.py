@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array32
@@ -29,6 +30,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
+from foretwin.orchestrator.rounds.path_from_car import led_from_car
 from foretwin.orchestrator.rounds.seen_users import near_car
 from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures
 from foretwin.sim_worker.metrics.table import ROW_METRICS
@@ -116,6 +118,7 @@ class RoundPlanner:
         users = near_car(reports.road_users, state, world.frame)
         signals = _signals(reports.signals, state)
         car_plan = _car_plan(reports.plan, state, world.frame)
+        path = _begun_by_car(intent.path, state, world.frame)
         jobs = []
         for index, mine in enumerate(self._cut(futures)):
             named = {future.scenario_id for future in mine}
@@ -125,7 +128,7 @@ class RoundPlanner:
                     job_index=index,
                     world_id=intent.world_id,
                     state=state,
-                    path=intent.path,
+                    path=path,
                     futures=mine,
                     horizon_s=config.horizon_s,
                     step_s=RESULT_STEP_S,
@@ -180,6 +183,17 @@ class RoundPlanner:
         if passage is None:
             return ()
         return tuple(s for s in self._scenarios if known.places(s, passage))
+
+
+def _begun_by_car(path: PathAhead, state: VehicleState, frame: LocalFrame) -> PathAhead:
+    lat, lon = state.position.lat_deg, state.position.lon_deg
+    led = led_from_car(
+        path.xy_m,
+        car_xy_m=np.asarray(local_from_geo(frame, lat, lon)),
+        car_yaw_rad=float(local_from_geo_yaw(frame, state.yaw_rad, lat, lon)),
+        speed_mps=state.speed_mps,
+    )
+    return msgspec.structs.replace(path, xy_m=led)
 
 
 def _signals(states: tuple[SignalState, ...], state: VehicleState) -> tuple[SignalState, ...]:
