@@ -153,6 +153,8 @@ class Connection(msgspec.Struct, frozen=True, kw_only=True):
     signal_group_id: str | None = None
     layer: int = 0
     path_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
+    red_after_stop: bool | msgspec.UnsetType = msgspec.UNSET
+    """Whether its driver may go on red after a stop; written where it is so."""
 
 
 class Conflict(msgspec.Struct, frozen=True, kw_only=True):

@@ -39,7 +39,7 @@ from foretwin.world_gen.rules.junction_rules import junction_rules
 if TYPE_CHECKING:
     from foretwin.world_gen.driven.correction import Driven
 
-GENERATOR_VERSION = 13
+GENERATOR_VERSION = 14
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
@@ -164,7 +164,13 @@ def _world(
     beside = index.beside.within(on_map)
     crossed = crossings(around, osm.node_tags, beside)
     rules = junction_rules(
-        around, osm.node_tags, lanes, connections, crossed, index.junction_lights
+        around,
+        osm.node_tags,
+        lanes,
+        connections,
+        crossed,
+        index.junction_lights,
+        index.restrictions.on_red,
     )
     tracks = tram_tracks(around, osm, beside)
     made = ground_around(index, around, lanes, connections, beside) if ground else Ground()

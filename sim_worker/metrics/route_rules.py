@@ -19,12 +19,16 @@ _APPROACH_M = 120.0
 
 
 class LineAhead(NamedTuple):
-    """A stop line on the path: `ends_m` (2, 2), and the group that governs it, None without."""
+    """A stop line on the path: `ends_m` (2, 2), and the group that governs it, None without.
+
+    `red_after_stop` says that the path turns where red lets who has stopped go on.
+    """
 
     line_id: str
     ends_m: Array
     control: LineControl
     group_id: str | None
+    red_after_stop: bool = False
 
 
 class PriorityConflict(NamedTuple):
@@ -54,14 +58,14 @@ class RouteRules:
         taken = connections_taken(world, path)
         self.connections = tuple(c.id for c in taken)
         # Of a lane's line the light of the connection counts; a sign on the way has none.
-        entered = {c.from_lane_id: c.signal_group_id for c in taken}
-        entered |= {c.id: None for c in taken}
+        entered = {c.from_lane_id: (c.signal_group_id, c.red_after_stop is True) for c in taken}
+        entered |= {c.id: (None, False) for c in taken}
         self.lines = tuple(
             LineAhead(
                 line.id,
                 np.asarray(line.ends),
                 _CONTROLS.get(line.control.value, "none"),
-                entered[line.across_id],
+                *entered[line.across_id],
             )
             for line in world.stop_lines
             if line.across_id in entered

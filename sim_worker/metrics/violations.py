@@ -15,6 +15,10 @@ HARD_BRAKING_MPS2 = 2.0
 """A road user with priority that must brake harder was not given way to."""
 NARROW_S = 1.0
 """Nor was one that reaches the shared ground sooner than this after the ego has left it."""
+STANDING_MPS = 0.3
+"""Who is slower has stopped: a driver's "stop" at a sign, not a measured one. Chosen."""
+STOPS_WITHIN_M = 6.0
+"""So near to a line's middle a front has stopped at it, not behind another car. Chosen."""
 _AT_POINT_M = 2.5
 _ON_WAY_M = 2.0
 STOPS = ("red", "red_amber")
@@ -25,7 +29,8 @@ def red_light_violations(view: RolloutView) -> Measure:
     """How many stop lines (S,) the ego's front crosses while their group shows red.
 
     Colours are those of the signal plans, or as heard, at the drive time of the crossing; amber is
-    no violation, red and amber together is. Between instants the front moves straight.
+    no violation, red and amber together is, and red is none for who has stopped before a turn that
+    may then go on. Between instants the front moves straight.
     """
     rules = _rules(view)
     count = np.zeros(len(view.valid))
@@ -34,8 +39,20 @@ def red_light_violations(view: RolloutView) -> Measure:
             continue
         future, time_s = line_crossings(view.front_m, line.ends_m, view.time_s)
         colours = _colours(view, line.group_id, time_s)
-        np.add.at(count, future, [colour in STOPS for colour in colours])
+        ran = np.array([colour in STOPS for colour in colours], dtype=bool)
+        if line.red_after_stop:
+            ran &= ~_has_stopped(view, line.ends_m, future, time_s)
+        np.add.at(count, future, ran)
     return view.measure(count)
+
+
+def _has_stopped(view: RolloutView, ends_m: Array, future: Indices, time_s: Array) -> Flags:
+    """Return whether (K,) each crossing of a line comes after a standstill close before it."""
+    middle = ends_m.mean(axis=0)
+    away_m = np.hypot(*(view.front_m[future] - middle).transpose(2, 0, 1))
+    stands = (np.abs(view.speed_mps[future]) < STANDING_MPS) & (away_m < STOPS_WITHIN_M)
+    before = view.time_s[None, :] <= time_s[:, None]
+    return np.asarray((stands & before).any(axis=1))
 
 
 def right_of_way_violations(view: RolloutView) -> Measure:

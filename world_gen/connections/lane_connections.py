@@ -38,6 +38,7 @@ class ConnectionDraft(msgspec.Struct):
     yields_to: tuple[str, ...] = ()
     signal_group_id: str | None = None
     path_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
+    red_after_stop: bool = False
 
     def finished(self) -> Connection:
         """Return the connection as the World holds it."""
@@ -57,6 +58,7 @@ class ConnectionDraft(msgspec.Struct):
             signal_group_id=self.signal_group_id,
             layer=self.start.edge.layer,
             path_source=self.path_source,
+            red_after_stop=self.red_after_stop or msgspec.UNSET,
         )
 
 

@@ -28,7 +28,7 @@ FIELDS = {
     "direction_source change change_source left_id right_id road_id layer successor_ids "
     "position_source",
     "connection": "from_lane_id to_lane_id turn width_m control conflicts_with yields_to "
-    "junction_id place_id signal_group_id layer path_source",
+    "junction_id place_id signal_group_id layer path_source red_after_stop",
     "stop_line": "lane_id connection_id control",
     "crossing": "kind:crossing_kind width_m osm_node island:refuge",
     "signal": "osm_node group_id lane_ids",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
+from itertools import groupby, product
 from typing import NamedTuple
 
 import msgspec
@@ -35,6 +35,8 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
 
     at_node: Mapping[int, tuple[TurnRule, ...]]
     over_ways: tuple[TurnRule, ...]
+    on_red: frozenset[tuple[int, int]] = frozenset()
+    """Ways from and to which signs forbid the turn on red alone."""
 
     def step_allowed(self, before: DirectedEdge, after: DirectedEdge) -> bool:
         """Return whether a car may go from one edge onto the next at their common node."""
@@ -71,6 +73,7 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
     """Return the map's restrictions that hold for cars at all times."""
     at_node: dict[int, list[TurnRule]] = {}
     over_ways: list[TurnRule] = []
+    on_red: set[tuple[int, int]] = set()
     for relation in sorted(osm.relations.values(), key=lambda r: r.id):
         tags = relation.tags
         if tags.get("type") != "restriction":
@@ -85,13 +88,18 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
         ends = frozenset(_members(relation, "to", "w"))
         if not ends:
             continue
+        if word.endswith("_on_red"):
+            on_red.update(product(_members(relation, "from", "w"), ends))
+            continue
         for start in _members(relation, "from", "w"):
             rule = TurnRule(relation.id, start, via_ways, ends, only, word.endswith("u_turn"))
             if via_ways:
                 over_ways.append(rule)
             for node in via_nodes:
                 at_node.setdefault(node, []).append(rule)
-    return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))
+    return TurnRestrictions(
+        {k: tuple(v) for k, v in at_node.items()}, tuple(over_ways), frozenset(on_red)
+    )
 
 
 def _members(relation: OsmRelation, role: str, kind: str) -> list[int]:

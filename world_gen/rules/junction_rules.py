@@ -24,6 +24,7 @@ from foretwin.world_gen.rules.signal_plan import signal_plans
 from foretwin.world_gen.rules.signal_systems import signal_systems
 from foretwin.world_gen.rules.signs_inside import SignsInside, signs_inside
 from foretwin.world_gen.rules.stop_lines import line_controls, lines_at_signs, stop_lines
+from foretwin.world_gen.rules.turns_on_red import allow_on_red
 
 
 class TrafficControl(NamedTuple):
@@ -46,10 +47,12 @@ def junction_rules(
     connections: Sequence[ConnectionDraft],
     crossings: Sequence[Crossing],
     junction_lights: Collection[int],
+    not_on_red: Collection[tuple[int, int]],
 ) -> TrafficControl:
     """Return the rules of every whole junction, and of every light away from one.
 
-    `junction_lights` are the nodes of the lights of all junctions of the map.
+    `junction_lights` are the nodes of the lights of all junctions of the map, `not_on_red` the
+    ways from and to which signs forbid the turn on red.
     Control, signal group and conflicts are entered into the connections.
     """
     signs = signs_inside(connections, node_tags, around)
@@ -61,6 +64,14 @@ def junction_rules(
     country = rules_of(around.country)
     conflicts, met = right_of_way(ruled, found, signs, around.driving_side, country.first_from)
     groups = lane_groups(found, around, lanes, ruled)
+    allow_on_red(
+        ruled,
+        found,
+        node_tags,
+        around.driving_side,
+        usual=country.turn_on_red,
+        forbidden=not_on_red,
+    )
     walks = walk_groups(groups, crossings, around)
     line_of = {line.lane_id: line for line in lines}
     heads = signal_heads(list(chain(*groups.values())), line_of, around)

@@ -16,9 +16,10 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import comfort
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
+from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.metrics.table import METRICS, computable, evaluate
 from foretwin.world_gen.rules.signal_state import HeardCycle
-from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
+from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context, junction
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
 from tests.sim_worker.places import box, crossroads, turning_path
 
@@ -150,6 +151,33 @@ def test_crossing_the_line_at_red_is_a_violation(start_s: float, violations: int
     given = context(lights=True, start_s=start_s)
 
     assert value(rollout(crossing_at(2.0)), "red_light_violations", given) == violations
+
+
+def test_red_lets_go_who_has_stopped_before_a_turn_that_may() -> None:
+    red_s = GREEN_S + AMBER_S
+    plain = context(lights=True, start_s=red_s)
+    world = junction(lights=True)
+    connections = [
+        msgspec.structs.replace(c, red_after_stop=True) if c.id == "east" else c
+        for c in world.connections
+    ]
+    allowed = msgspec.structs.replace(world, connections=tuple(connections))
+    assert plain.path is not None
+    given = plain._replace(rules=RouteRules(allowed, plain.path))
+    time_s = times()
+    rolls_m = np.maximum(0.0, 4.0 * (time_s - 3.0))
+
+    def driven(short_of_line_m: float) -> Rollout:
+        """An ego that stands for 3 s and then drives over the line."""
+        poses = np.zeros((len(time_s), 3))
+        poses[:, 0] = STOP_X - HALF_M - short_of_line_m + rolls_m
+        poses[:, 1] = -1.5
+        return rollout(poses)
+
+    assert value(driven(1.0), "red_light_violations", given) == 0
+    assert value(driven(1.0), "red_light_violations", plain) == 1
+    assert value(driven(9.0), "red_light_violations", given) == 1  # it stood behind another car
+    assert value(rollout(crossing_at(0.5)), "red_light_violations", given) == 1
 
 
 def test_a_learnt_cycle_goes_before_the_plan() -> None:

@@ -35,6 +35,7 @@ def _leaving_west(tags, ends=(12,)) -> set[int]:
         ({"restriction": "no_left_turn", "except": "bus;vehicle"}, {11, 12, 14}),
         ({"restriction": "no_left_turn", "except": "bicycle"}, {11, 14}),
         ({"restriction": "only_left_turn"}, {12}),
+        ({"restriction": "no_left_turn_on_red"}, {11, 12, 14}),  # the turn itself is free
         ({"restriction": "no_straight_on"}, {11, 14}),  # the word is wrong, the members count
     ],
 )
