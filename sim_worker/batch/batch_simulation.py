@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.slopes import Slopes, slopes_of
 from foretwin.sim_worker.batch.model import PREFIX, change_vehicle, compile_stage, world_spec
-from foretwin.sim_worker.batch.nearness import NearStatics
+from foretwin.sim_worker.batch.nearness import CarBox, NearStatics, most_drift_m
 from foretwin.sim_worker.batch.physics import Physics
 from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
@@ -20,13 +19,8 @@ from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
-from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m, cog_from_base
+from foretwin.sim_worker.vehicle.reference_points import cog_from_base
 
-_MAX_SPEED_MPS, _MAX_SLIDE_MPS, _MAX_YAW_RATE_RADPS = 25.0, 5.0, 3.0
-"""Within these, a car cannot come from beyond the reach of `NearStatics` in a tick."""
-_SLACK_M = 0.2
-"""What it may go farther by accelerating."""
-_OUTLINE = ("length_m", "width_m", "rear_overhang_m")
 _SANE = np.full((8, 1), np.inf)
 _SANE[[3, 5], 0] = 200.0, 50.0
 """Bounds of a state's columns: beyond them, a simulation has diverged."""
@@ -84,7 +78,8 @@ class BatchSimulation:
         self._threads = threads
         self._physics = Physics(self.model, vehicle, nsim=nsim, threads=threads)
         self._bind()
-        self._bound_reach()
+        self._near_statics = NearStatics(self.model)
+        self._box = CarBox.of(vehicle, tick_s=self.control_dt_s)
         self._ids: Any = None
         self._count = 0
         # Columns that lie together in memory: each is read far more often than a row.
@@ -93,12 +88,11 @@ class BatchSimulation:
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Change the vehicle's parameters; seed anew afterwards. Takes a few milliseconds."""
-        before, self.vehicle = self.vehicle, vehicle
+        self.vehicle = vehicle
         change_vehicle(self.model, vehicle)
         self._physics = Physics(self.model, vehicle, nsim=self.nsim, threads=self._threads)
         self._count = 0
-        if any(getattr(before, name) != getattr(vehicle, name) for name in _OUTLINE):
-            self._bound_reach()
+        self._box = CarBox.of(vehicle, tick_s=self.control_dt_s)
 
     def _bind(self) -> None:
         model = self.model
@@ -111,16 +105,6 @@ class BatchSimulation:
         first = int(model.actuator_historyadr[steer]) + 2 + samples
         self._steer_history = slice(first, first + samples)
         self._history_samples = samples
-
-    def _bound_reach(self) -> None:
-        vehicle = self.vehicle
-        self._centre_ahead_m = box_centre_from_base_m(vehicle)
-        own = math.hypot(vehicle.length_m.value, vehicle.width_m.value) / 2.0
-        fastest = math.hypot(_MAX_SPEED_MPS, _MAX_SLIDE_MPS)
-        fastest += abs(self._centre_ahead_m) * _MAX_YAW_RATE_RADPS
-        reach = own + fastest * self.control_dt_s + _SLACK_M
-        self._near_statics = NearStatics(self.model, reach_m=reach)
-        self._bounds = np.array([[_MAX_SPEED_MPS], [_MAX_SLIDE_MPS], [_MAX_YAW_RATE_RADPS]])
 
     def seed(
         self,
@@ -171,6 +155,7 @@ class BatchSimulation:
             accel_mps2=start[:, 7],
             backwards=backwards,
         )
+        self._drift_m = most_drift_m(self.vehicle, friction_factor, self._box)
         self.static_contact = np.zeros(count, dtype=bool)
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
         self.looked = False
@@ -202,6 +187,7 @@ class BatchSimulation:
         self._physics.delay[rows, self._actuators.steer] = steering_delay_s
         friction = self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
         self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
+        self._drift_m[rows] = most_drift_m(self.vehicle, friction_factor, self._box)
         self.static_contact[rows] = False
         self._feel_slope()
 
@@ -253,13 +239,7 @@ class BatchSimulation:
 
         `columns` (8, S) are those of the states.
         """
-        centre = self._heading * self._centre_ahead_m
-        centre += columns[:2]
-        near = self._near_statics.at(centre)
-        slow = np.abs(columns[3:6]) < self._bounds
-        if np.count_nonzero(slow) < slow.size:
-            near |= ~slow.all(axis=0)
-        return near
+        return self._near_statics.may_touch(self._box, columns, self._heading, self._drift_m)
 
     @property
     def states(self) -> Array:

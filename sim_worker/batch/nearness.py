@@ -7,65 +7,91 @@ changes no bit of a result, so every bound here errs towards looking.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array, Flags
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.batch import compiled
+from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
+from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.export.mjcf import VEHICLE
 
-_CELL_M = 1.0
+_BORDER_M = compiled.FAR * compiled.STEP_M + 2.0 * compiled.CELL_M
 _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(8, 3)
 
 
 class NearStatics:
-    """A grid of cells from whose points something static is at most `reach_m` away."""
+    """A grid of how far it is at least, from anywhere in a cell, to anything static."""
 
-    def __init__(self, model: mujoco.MjModel, *, reach_m: float) -> None:
-        """Take what stands still and a vehicle collides with, as outlines from above; no ground.
-
-        The distance to an outline is taken as that to the farthest line through its sides, which
-        is never more than the true one; half a cell's diagonal is added.
-        """
-        reach = reach_m + _CELL_M * math.sqrt(0.5)
+    def __init__(self, model: mujoco.MjModel) -> None:
+        """Take what stands still and a vehicle collides with, as outlines from above; no ground."""
         outlines = _outlines(model)
         self.empty = not outlines
         points = np.concatenate(outlines) if outlines else np.zeros((1, 2))
-        # A border of cells out of reach catches whatever lies outside.
-        self._low = np.floor(points.min(axis=0) - reach) - 2.0 * _CELL_M
-        size = np.ceil((points.max(axis=0) + reach - self._low) / _CELL_M).astype(int) + 3
-        cells = np.zeros(size, dtype=bool)
+        low = points.min(axis=0) - _BORDER_M
+        size = np.ceil((points.max(axis=0) + _BORDER_M - low) / compiled.CELL_M).astype(int)
+        self._corner = float(low[0]), float(low[1])
+        self._steps = np.full(size, compiled.FAR, dtype=np.uint8)
         for outline in outlines:
-            self._mark(cells, outline, reach)
-        self._last = size - 1.0
-        self._stride = int(size[1])
-        self._cells: Flags = cells.ravel()
+            compiled.come_near(np.ascontiguousarray(outline), self._corner, self._steps)
 
-    def _mark(self, cells: Flags, outline: Array, reach_m: float) -> None:
-        first = ((outline.min(axis=0) - reach_m - self._low) / _CELL_M).astype(int)
-        end = ((outline.max(axis=0) + reach_m - self._low) / _CELL_M).astype(int) + 1
-        x, y = (self._low[k] + (np.arange(first[k], end[k]) + 0.5) * _CELL_M for k in (0, 1))
-        side = np.diff(outline, axis=0)
-        side = side / np.maximum(np.hypot(side[:, 0], side[:, 1]), 1e-9)[:, None]
-        across = outline[:-1, 0] * side[:, 1] - outline[:-1, 1] * side[:, 0]
-        distance = np.full((len(x), len(y)), -np.inf)
-        for (along_x, along_y), offset in zip(side, across, strict=True):
-            out = x[:, None] * along_y - y * along_x - offset
-            np.maximum(distance, out, out=distance)
-        cells[first[0] : end[0], first[1] : end[1]] |= distance <= reach_m
+    def least_m(self, x_m: float, y_m: float) -> float:
+        """Return how far it is at least from a point to anything static."""
+        return compiled.least_m(self._steps, self._corner, x_m, y_m)
 
-    def at(self, xy_m: Array) -> Flags:
-        """Return (S,) bool: whether something static may be in reach of points (2, S), x and y."""
-        place = xy_m - self._low[:, None]
-        place /= _CELL_M
-        # fmax and fmin turn what is not a number into a place on the border.
-        np.fmax(place, 0.0, out=place)
-        np.fmin(place, self._last[:, None], out=place)
-        column, row = place.astype(np.intp)
-        column *= self._stride
-        column += row
-        return np.asarray(self._cells[column])
+    def may_touch(self, box: CarBox, states: Array, heading: Array, drift_m: Array) -> Flags:
+        """Return (S,) bool: whether a contact during the coming tick cannot be ruled out.
+
+        `states` (8, S) and `heading` (2, S), cosine and sine, are those at its begin; `drift_m`
+        (S,) is what `most_drift_m` returns.
+        """
+        found = np.empty(states.shape[1], dtype=bool)
+        box_numbers = tuple(box)  # the kernel knows no names
+        compiled.may_touch(self._steps, self._corner, states, heading, drift_m, box_numbers, found)
+        return found
+
+
+class CarBox(NamedTuple):
+    """A car's box, whose centre lies ahead of base_link, as does the centre of gravity."""
+
+    half_length_m: float
+    half_width_m: float
+    ahead_m: float
+    cog_ahead_m: float
+    corner_m: float
+    """How far its farthest corner lies from the centre of gravity."""
+    tick_s: float
+    """How long it moves for."""
+
+    @classmethod
+    def of(cls, vehicle: VehicleParameters, *, tick_s: float) -> CarBox:
+        """Return that of a vehicle."""
+        half_m, aside_m = vehicle.length_m.value / 2.0, vehicle.width_m.value / 2.0
+        ahead_m, cog_m = box_centre_from_base_m(vehicle), vehicle.cog_from_rear_axle_m.value
+        corner_m = math.hypot(half_m + abs(ahead_m - cog_m), aside_m)
+        return cls(half_m, aside_m, ahead_m, cog_m, corner_m, tick_s)
+
+
+def most_drift_m(vehicle: VehicleParameters, friction_factor: Array, box: CarBox) -> Array:
+    """Return (S,) how far at most a corner is, after a tick, from where no force would take it.
+
+    Braking shifts up to h μ / l of the weight to an axle. What axles bear, times their grip, pushes
+    the car aside and turns it; along the road it is the grip once more, and at most gravity where
+    that is steep. MuJoCo's steps let the same force act a step longer than a tick.
+    """
+    friction = vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
+    grip_mps2, wheelbase_m = friction * GRAVITY_MPS2, vehicle.wheelbase_m.value
+    shift = vehicle.cog_height_m.value / wheelbase_m * friction
+    behind_m, mass_kg = box.cog_ahead_m, vehicle.mass_kg.value
+    arm_m = 2.0 * behind_m * (wheelbase_m - behind_m) / wheelbase_m + shift * wheelbase_m
+    turn_radps2 = mass_kg * grip_mps2 * arm_m / vehicle.yaw_inertia_kgm2.value
+    accel_mps2 = grip_mps2 * (2.0 + shift) + GRAVITY_MPS2 + turn_radps2 * box.corner_m
+    return np.asarray(accel_mps2 * box.tick_s * (box.tick_s + TIMESTEP_S) / 2.0)
 
 
 def _outlines(model: mujoco.MjModel) -> list[Array]:

@@ -17,6 +17,7 @@ from foretwin.contracts.futures import Future
 from foretwin.geometry import compiled as compiled_geometry
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker import driver_model as driver
+from foretwin.sim_worker.batch import compiled as compiled_nearness
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.metrics import compiled_pairs
@@ -41,7 +42,7 @@ COVERS = (
 
 KERNELS: dict[str, Any] = {
     name: kernel
-    for module in (compiled_geometry, compiled, compiled_pursuit, compiled_pairs)
+    for module in (compiled_geometry, compiled, compiled_pursuit, compiled_pairs, compiled_nearness)
     for name, kernel in vars(module).items()
     if hasattr(kernel, "signatures")
 }
@@ -77,7 +78,7 @@ def signatures() -> dict[str, list[Any]]:
 def test_all_is_compiled_once_it_is_imported_and_nothing_later() -> None:
     assert set(KERNELS) == {
         "locate", "curve", "free_road", "forces", "ramp", "read_base", "all_sane", "cheapest_walks",
-        "least_until_touch", "find_leaders", "stays_on_strips",
+        "least_until_touch", "find_leaders", "stays_on_strips", "come_near", "least_m", "may_touch",
     }  # fmt: skip
     assert {name: len(found) for name, found in signatures().items()} == dict.fromkeys(KERNELS, 1)
     with pytest.raises(TypeError, match="No matching definition"):
