@@ -23,6 +23,8 @@ STATE_COLUMNS = (*_POSE, "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad",
 
 RESULT_STEP_S = 0.1
 """Between two instants of a result, wherever futures are recorded, shown or learnt from."""
+SPEED_AHEAD_STEP_S = 0.5
+"""Between two speeds that the nominal future aims at."""
 PATH_BEHIND_M = 10.0
 """How much of its path lies behind the car."""
 JOB_SCHEMA_VERSION = 1
@@ -160,6 +162,10 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """Numbers of a learnt model of the car; none without one."""
     progress: ProgressForecast | msgspec.UnsetType = msgspec.UNSET
     """How far the car itself is expected to get; a job without it has the bytes that it had before
+    there was one."""
+    speed_ahead_mps: Array | msgspec.UnsetType = msgspec.UNSET
+    """(K,) the speed that the nominal future aims at, `SPEED_AHEAD_STEP_S` apart from its start;
+    then it stays. A job without it aims at `cruise_speed_mps`, and has the bytes that it had before
     there was one."""
     schema_version: int = JOB_SCHEMA_VERSION
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.signals import LearntSignal
@@ -51,6 +52,8 @@ class RoundIntent:
     world_id: str
     path: PathAhead
     cruise_speed_mps: float
+    speed_ahead_mps: Array
+    """(K,) what the nominal future aims at from instant to instant; see `Job`."""
     off_lanes_m: float = 0.0
 
 

@@ -64,7 +64,8 @@ class PlannerView(NamedTuple):
     `stop_arc_m` (S,) where the front has to stand for a light, infinite without one; `users` and
     `ground` are None where there are none; `car_plan` where none was received; `heading` (2, S) is
     the cosine and sine of the states' yaw, where these are known already; `climb_mps2` (S,) is what
-    the slope takes of the acceleration that is commanded, None where the World is flat.
+    the slope takes of the acceleration that is commanded, None where the World is flat;
+    `target_accel_mps2` (S,) is how the target speed changes, None where it stays.
     """
 
     time_s: float
@@ -84,6 +85,7 @@ class PlannerView(NamedTuple):
     car_plan: KnownPlan | None = None
     heading: Array | None = None
     climb_mps2: Array | None = None
+    target_accel_mps2: Array | None = None
 
 
 class PlannerOutput(NamedTuple):
@@ -137,4 +139,5 @@ def rows_of(view: PlannerView, rows: Indices) -> PlannerView:
 _BY_CAR = (
     *("states", "arc_m", "offset_m", "desired_offset_m", "target_speed_mps", "speed_factor"),
     *("lead_gap_m", "lead_speed_mps", "stop_arc_m", "climb_mps2"),
+    "target_accel_mps2",
 )

@@ -187,6 +187,7 @@ class Mission:
             world_id=visit.world.id,
             path=path,
             cruise_speed_mps=self.way.cruise_speed_mps,
+            speed_ahead_mps=self.way.speeds_ahead(path, horizon_s=self._settings.horizon_s),
             off_lanes_m=self.way.off_lanes_m,
         )
 

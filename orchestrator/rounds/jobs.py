@@ -134,6 +134,7 @@ class RoundPlanner:
                     step_s=RESULT_STEP_S,
                     seed=config.seed,
                     cruise_speed_mps=intent.cruise_speed_mps,
+                    speed_ahead_mps=intent.speed_ahead_mps,
                     scenarios=tuple(s for s in scenarios if s.id in named),
                     road_users=users,
                     signals=signals,

@@ -47,6 +47,11 @@ class CruiseSpeed:
         self._samples.append((0.0, max(0.0, speed_mps)))
 
     @property
+    def speed_mps(self) -> float:
+        """The newest speed, 0 before the first."""
+        return self._samples[-1][1] if self._samples else 0.0
+
+    @property
     def acceleration_mps2(self) -> float:
         """The least-squares slope of the speeds of the last second, 0 while there are too few."""
         if len(self._samples) < 3 or self._samples[0][0] < _MIN_SPAN_S:
@@ -64,9 +69,7 @@ class CruiseSpeed:
 
         A limit keeps the aim from rising above it, and leaves a car that is faster at its speed.
         """
-        if not self._samples:
-            return 0.0
-        speed = self._samples[-1][1]
+        speed = self.speed_mps
         aim = max(0.0, speed + LEAD_S * self.acceleration_mps2)
         if speed_limit_mps is not None:
             aim = min(aim, max(speed, speed_limit_mps))

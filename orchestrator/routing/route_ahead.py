@@ -20,6 +20,7 @@ from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import PlaceOnRoute, RouteFollower, RouteProgress
+from foretwin.orchestrator.routing.speed_ahead import speeds_ahead
 from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
@@ -139,6 +140,17 @@ class WayAhead:
     def cruise_speed_mps(self) -> float:
         """The speed that the nominal future aims at."""
         return self._cruise.aim_mps(self.speed_limit_mps)
+
+    @traced("speeds of a round")
+    def speeds_ahead(self, path: PathAhead, *, horizon_s: float) -> Array:
+        """Return (K,) what the nominal future is to drive along a path, from instant to instant."""
+        return speeds_ahead(
+            path,
+            speed_mps=self._cruise.speed_mps,
+            acceleration_mps2=self._cruise.acceleration_mps2,
+            usual_share=self._pace.share,
+            horizon_s=horizon_s,
+        )
 
     @property
     def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:

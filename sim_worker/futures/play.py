@@ -128,7 +128,7 @@ class Play:
         heading: Array | None = None,
     ) -> PlannerView:
         scene = self.scene
-        target, stop, seen = scene.aims.target_speed_mps, None, None
+        (target, rising), stop, seen = scene.aims.at(time_s), None, None
         if scene.sight is not None and scene.traffic is not None:
             eyes = now[:, :2]
             if scene.sight.needs_eyes:
@@ -137,7 +137,8 @@ class Play:
             seen = scene.sight.look(tick, scene.traffic, eyes)
             self._lead = scene.sight.lead(seen, place)
         if scene.limit_share is not None:
-            target = target * scene.path.at_nodes(scene.limit_share, place.arc_m)
+            share = scene.path.at_nodes(scene.limit_share, place.arc_m)
+            target, rising = target * share, None if rising is None else rising * share
         if self._red.shape[-1]:
             lines = np.broadcast_to(self._red[..., 0, :], (len(now), self._red.shape[-1]))
             passed = lines < (place.arc_m + self.front_m)[:, None]
@@ -161,6 +162,7 @@ class Play:
             car_plan=scene.car_plan,
             heading=heading,
             climb_mps2=self.stage.climb_mps2,
+            target_accel_mps2=rising,
         )
 
 

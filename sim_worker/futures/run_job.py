@@ -166,6 +166,9 @@ def check_job(job: Job, stage: BatchSimulation) -> None:
         )
     if job.anchor is not None or job.model:
         raise ValueError("a job with an anchor or a learnt model; this foretwin knows neither")
+    ahead = job.speed_ahead_mps
+    if not isinstance(ahead, msgspec.UnsetType) and not (len(ahead) and np.isfinite(ahead).all()):
+        raise ValueError(f"speed_ahead_mps needs speeds, all of them finite: {ahead.tolist()}")
     if abs(job.control_hz * stage.control_dt_s - 1.0) > 1e-9:
         raise ValueError(
             f"a job of {job.control_hz:g} control ticks a second on a stage of "

@@ -6,11 +6,12 @@ import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import Future, Job
+from foretwin.contracts.futures import SPEED_AHEAD_STEP_S, Future, Job
 from foretwin.contracts.numbers import Quantity
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
@@ -49,11 +50,29 @@ _PERCEPTION: tuple[Quantity, ...] = (
 
 
 class Aims(NamedTuple):
-    """What each of S futures aims at; all (S,)."""
+    """What each of S futures aims at; all (S,).
+
+    `speed_ahead_mps` (K, S), `SPEED_AHEAD_STEP_S` apart, goes before `target_speed_mps` where the
+    job says how the nominal future's speed changes; None where it does not.
+    """
 
     target_speed_mps: Array
     speed_factor: Array
     offset_m: Array
+    speed_ahead_mps: Array | None = None
+
+    def at(self, time_s: float) -> tuple[Array, Array | None]:
+        """Return the speeds (S,) aimed at, and the accelerations (S,) with which these change,
+        None where they stay."""
+        ahead = self.speed_ahead_mps
+        if ahead is None:
+            return self.target_speed_mps, None
+        place = time_s / SPEED_AHEAD_STEP_S
+        node = int(place + 1e-9)  # ticks come a hair before their instants
+        if node >= len(ahead) - 1:
+            return ahead[-1], None
+        rise = ahead[node + 1] - ahead[node]
+        return ahead[node] + (place - node) * rise, rise / SPEED_AHEAD_STEP_S
 
 
 class JobScene(NamedTuple):
@@ -252,11 +271,15 @@ def _aims(job: Job, present_offset_m: Array, numbers: NumberColumns) -> Aims:
         cruise[[not future.place for future in job.futures]] = np.nan
     cruise = np.where(np.isfinite(cruise), cruise, job.cruise_speed_mps)
     target = numbers.applied("aim.target_speed_mps", cruise)
+    ahead = None
+    if not isinstance(job.speed_ahead_mps, msgspec.UnsetType):
+        speeds = [numbers.applied("aim.target_speed_mps", v) for v in job.speed_ahead_mps.tolist()]
+        ahead = np.maximum(speeds, 0.0)
     factor = numbers.factor("aim.target_speed_mps")
     factor = np.where(cruise > 1.0, target / np.maximum(cruise, 1.0), factor)
     # The future keeps the car's present offset, or one would measure the map's error.
     present = np.minimum(np.maximum(present_offset_m, -_MAX_OFFSET_M), _MAX_OFFSET_M)
-    return Aims(np.maximum(target, 0.0), factor, numbers.applied("aim.offset_m", present))
+    return Aims(np.maximum(target, 0.0), factor, numbers.applied("aim.offset_m", present), ahead)
 
 
 def _limit_share(path: FrenetPath, start_arc_m: float) -> Array | None:

@@ -210,7 +210,7 @@ def scene_of(pool: JobScene, cases: Indices) -> JobScene:
     return pool._replace(
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],
-        aims=Aims._make(column[cases] for column in pool.aims),
+        aims=Aims._make(None if column is None else column[..., cases] for column in pool.aims),
         planners=tuple(pool.planners[k] for k in cases),
         numbers=pool.numbers.of(cases),
         traffic=traffic,

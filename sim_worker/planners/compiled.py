@@ -74,16 +74,20 @@ def curve(
         angle[car] = wanted
 
 
-@kernel(types.void, IN_ROWS, IN, IN, IN, REAL, OUT)
+@kernel(types.void, IN_ROWS, IN, IN, IN, IN, REAL, OUT)
 def free_road(
     states: Array,
     wished_mps: Array,
+    change_mps2: Array,
     wished_mps2: Array,
     exponent: Array,
     comfort_mps2: float,
     accel: Array,
 ) -> None:
-    """Lower accelerations (S,) to those of the intelligent-driver model on a free road."""
+    """Lower accelerations (S,) to those of the intelligent-driver model on a free road.
+
+    Wished speeds (S,) that change, by `change_mps2` (S,), are kept up with.
+    """
     for car in range(len(accel)):
         ratio = max(states[3, car], 0.0) / wished_mps[car]
         if ratio < 1.0:
@@ -91,4 +95,4 @@ def free_road(
             free = wished_mps2[car] * (1.0 - square * square)
         else:
             free = comfort_mps2 * (ratio ** exponent[car] - 1.0)
-        accel[car] = min(accel[car], free)
+        accel[car] = min(accel[car], free + change_mps2[car])

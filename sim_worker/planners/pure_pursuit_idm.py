@@ -34,11 +34,13 @@ class _Wishes(NamedTuple):
     """What drivers want on a free road, each (S,), of `target_speed_mps` and `speed_factor`.
 
     To go at `speed_mps`, beginning with `accel_mps2`; `exponent` is of how they slow down to it.
+    `change_mps2` is how the wish itself changes.
     """
 
     target_speed_mps: Array
     speed_factor: Array
     speed_mps: Array
+    change_mps2: Array
     accel_mps2: Array
     exponent: Array
     stand: Flags | None
@@ -85,6 +87,7 @@ class PurePursuitIdm:
         compiled.free_road(
             states,
             wishes.speed_mps,
+            wishes.change_mps2,
             wishes.accel_mps2,
             wishes.exponent,
             driver.COMFORT_DECEL_MPS2,
@@ -102,23 +105,21 @@ class PurePursuitIdm:
         return PlannerOutput(command, angle)
 
     def _wishes(self, view: PlannerView) -> _Wishes:
-        """Return what drivers want; mostly, that stays the same from tick to tick."""
+        """Return what drivers want; some of that stays the same from tick to tick."""
         known, target, factor = self._wished, view.target_speed_mps, view.speed_factor
-        if (
-            known is None
-            or known.target_speed_mps is not target
-            or known.speed_factor is not factor
-        ):
+        if known is None or known.speed_factor is not factor:
             start = driver.MAX_ACCEL_MPS2 * np.minimum(
                 np.maximum(factor, driver.HASTE[0], dtype=np.float64), driver.HASTE[1]
             )
-            stand = target < 0.05
-            known = self._wished = _Wishes(
-                target,
-                factor,
+            exponent = -start * driver.ACCEL_EXPONENT / driver.COMFORT_DECEL_MPS2
+            none = np.zeros(len(start))
+            known = _Wishes(none, factor, none, none, start, exponent, None)
+        if known.target_speed_mps is not target:
+            stand, change = target < 0.05, view.target_accel_mps2
+            known = self._wished = known._replace(
+                target_speed_mps=target,
                 speed_mps=np.maximum(target, 0.1, dtype=np.float64),
-                accel_mps2=start,
-                exponent=-start * driver.ACCEL_EXPONENT / driver.COMFORT_DECEL_MPS2,
+                change_mps2=np.zeros(len(target)) if change is None else change,
                 stand=stand if stand.any() else None,
             )
         return known

@@ -1,0 +1,91 @@
+"""What the nominal future is to drive: the present acceleration, fading into the usual speed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.routing.speed_ahead import FADING_S, USUAL_S, speeds_ahead
+
+STRAIGHT = np.column_stack([np.arange(-10.0, 301.0), np.zeros(311)])
+
+
+def ahead(
+    speed_mps: float,
+    accel_mps2: float = 0.0,
+    *,
+    limit_mps: float = 14.0,
+    usual_share: float | None = None,
+    xy_m: np.ndarray = STRAIGHT,
+    horizon_s: float = 8.0,
+) -> np.ndarray:
+    """The speeds of a driver whose usual one is the present, unless a share of the limit is."""
+    return speeds_ahead(
+        PathAhead(xy_m=xy_m, speed_limit_mps=np.full(len(xy_m), limit_mps)),
+        speed_mps=speed_mps,
+        acceleration_mps2=accel_mps2,
+        usual_share=speed_mps / limit_mps if usual_share is None else usual_share,
+        horizon_s=horizon_s,
+    )
+
+
+def test_a_steady_driver_goes_on_as_usual() -> None:
+    np.testing.assert_allclose(ahead(9.0), 9.0)
+    assert len(ahead(9.0)) == 17
+    assert len(ahead(9.0, horizon_s=2.2)) == 6
+
+
+@given(accel=st.floats(-2.0, 2.0))
+def test_an_acceleration_fades(accel: float) -> None:
+    speeds = ahead(8.0, accel, limit_mps=1e3)
+    faded = 8.0 + accel * FADING_S * (1.0 - math.exp(-1.0 / FADING_S))
+
+    assert speeds[0] == 8.0
+    assert speeds[2] == pytest.approx(faded, abs=0.02)
+    assert abs(speeds[16] - 8.0) <= abs(accel) * FADING_S
+
+
+def test_a_driver_comes_back_to_the_usual_speed_slowly() -> None:
+    speeds = ahead(5.0, usual_share=0.75)
+
+    assert (np.diff(speeds) > 0.0).all()
+    assert speeds[-1] < 5.0 + 8.0 * (0.75 * 14.0 - 5.0) / USUAL_S
+
+
+def test_nobody_is_thought_to_exceed_the_limit_more_than_now() -> None:
+    assert ahead(13.0, 2.0).max() == 14.0
+    assert ahead(17.0, 2.0).max() == 17.0
+
+
+def test_without_a_limit_the_speed_is_what_acceleration_makes_of_it() -> None:
+    speeds = ahead(8.0, 1.0, limit_mps=math.inf, usual_share=0.75)
+
+    assert speeds[-1] == pytest.approx(8.0 + FADING_S * (1.0 - math.exp(-8.0 / FADING_S)), abs=0.03)
+
+
+def test_a_standing_car_stands_until_it_pulls_away() -> None:
+    np.testing.assert_array_equal(ahead(0.0, 0.1), 0.0)
+    assert ahead(0.4)[1:].max() == 0.0
+    assert ahead(0.3, 1.0)[-1] > 2.0
+
+
+def test_a_braking_car_comes_to_a_stop_and_does_not_go_back() -> None:
+    speeds = ahead(3.0, -2.0)
+
+    assert speeds.min() == 0.0
+
+
+def test_bends_ahead_are_braked_for() -> None:
+    turn = np.linspace(0.0, math.pi / 2.0, 16)
+    arc = np.column_stack([40.0 + 10.0 * np.sin(turn), 10.0 - 10.0 * np.cos(turn)])
+    rest = np.column_stack([np.full(100, 50.0), np.arange(11.0, 111.0)])
+    speeds = ahead(10.0, xy_m=np.concatenate([STRAIGHT[:50], arc, rest]))
+
+    assert speeds[2] == pytest.approx(10.0, abs=0.2)
+    assert speeds.min() == pytest.approx(math.sqrt(2.5 * 10.0), abs=0.6)
+    assert speeds.argmin() in range(9, 15)
