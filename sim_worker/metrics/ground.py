@@ -18,15 +18,20 @@ _MARGIN_M = 2.0
 class DrivableGround:
     """Road surface and junction areas of a World, without its islands, `TOLERANCE_M` wider.
 
+    `wider_m` (A,) is how much wider still each of `paved_areas` is: what is not known of its edges.
     Cells of half a metre are looked at once, when a point first falls into them; points of cells
     that an edge passes through are tested exactly. Answers do not depend on what was asked before.
     """
 
-    def __init__(self, world: World) -> None:
-        areas = [*world.road_surface, *(j.area for j in world.junctions if j.area is not None)]
-        paved = shapely.union_all([_polygon(area) for area in areas]).buffer(TOLERANCE_M)
-        islands = shapely.union_all([_polygon(area) for area in world.islands])
-        self.surface = shapely.difference(paved, islands.buffer(-TOLERANCE_M))
+    def __init__(self, world: World, *, wider_m: Array | None = None) -> None:
+        areas = paved_areas(world)
+        most_m = 0.0 if wider_m is None or not len(wider_m) else float(wider_m.max())
+        polygons = [polygon_of(area) for area in areas]
+        if wider_m is not None:
+            polygons = list(shapely.buffer(polygons, wider_m))
+        paved = shapely.union_all(polygons).buffer(TOLERANCE_M)
+        islands = shapely.union_all([polygon_of(area) for area in world.islands])
+        self.surface = shapely.difference(paved, islands.buffer(-TOLERANCE_M - most_m))
         shapely.prepare(self.surface)
         west, south, east, north = self.surface.bounds if areas else (0.0, 0.0, 0.0, 0.0)
         self._origin = np.array([west, south]) - _MARGIN_M
@@ -64,6 +69,12 @@ class DrivableGround:
         self._cells[cells] = kind
 
 
-def _polygon(area: Area) -> shapely.Polygon:
+def paved_areas(world: World) -> list[Area]:
+    """Return the road surface and the junction areas of a World."""
+    return [*world.road_surface, *(j.area for j in world.junctions if j.area is not None)]
+
+
+def polygon_of(area: Area) -> shapely.Polygon:
+    """Return an area as what shapely computes with, mended where its outline crosses itself."""
     polygon = shapely.Polygon(area.outline, area.holes)
     return polygon if polygon.is_valid else polygon.buffer(0.0)

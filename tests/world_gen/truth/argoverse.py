@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow.feather as feather
+import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame
@@ -24,10 +25,26 @@ def argoverse_maps(folder: Path) -> list[HdMap]:
     return [_read(path) for path in sorted(folder.glob("log_map_archive_*.json"))]
 
 
+def drivable_area(folder: Path) -> list[shapely.Geometry]:
+    """Return where cars can drive by each of the maps of `argoverse_maps`, in its metres."""
+    found = []
+    for path in sorted(folder.glob("log_map_archive_*.json")):
+        data = json.loads(path.read_text(encoding="utf-8"))
+        outlines = [_line(area["area_boundary"]) for area in data["drivable_areas"].values()]
+        rings = [shapely.Polygon(line - _middle(data)).buffer(0.0) for line in outlines]
+        found.append(shapely.union_all(rings))
+    return found
+
+
+def _middle(data: dict[str, Any]) -> Array:
+    segments = data["lane_segments"].values()
+    middle: Array = np.mean([_line(s["left_lane_boundary"]).mean(axis=0) for s in segments], axis=0)
+    return middle
+
+
 def _read(path: Path) -> HdMap:
     data = json.loads(path.read_text(encoding="utf-8"))
-    segments = data["lane_segments"].values()
-    middle = np.mean([_line(s["left_lane_boundary"]).mean(axis=0) for s in segments], axis=0)
+    segments, middle = data["lane_segments"].values(), _middle(data)
     name = path.stem.removeprefix("log_map_archive_")[:8]
     lanes = {
         str(s["id"]): HdLane(
