@@ -15,7 +15,7 @@ from foretwin.contracts.codec import SchemaMismatch, content_bytes, decode_conte
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.record.kept_rows import kept_rows
-from foretwin.sim_worker.analysis.agreement.criteria import Users, Window
+from foretwin.sim_worker.analysis.agreement.window import Users, Window
 
 MOST_WINDOWS = 120
 """When there are as many, every second one goes, and they are taken half as often from then on."""
@@ -102,6 +102,8 @@ def _is_one(window: Window) -> bool:
         and all(one.shape == (count, 8) for one in states)
         and all(bool(np.isfinite(one).all()) for one in (*states, path, window.time_s))
         and all(_are_users(one, count) for one in everybody)
+        and window.driven_std.shape == (count, 2)
+        and not bool(np.isnan(window.driven_std).any())
         and all(one.stamps_ns.shape == (len(one.colours),) for one in window.heard.values())
     )
 

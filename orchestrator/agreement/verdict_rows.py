@@ -20,9 +20,12 @@ def judged_row(one: Judged, *, start_stamp_ns: int) -> dict[str, Any]:
         "drive_time_s": (window.stamp_ns - start_stamp_ns) / 1e9,
         "intersection_id": window.junction_id,
         "outcome": one.outcome,
+        "simulated": both.simulated_word,
+        "driven": both.driven_word,
         "observable": _names(both.observable),
-        "simulated_fails": _names(both.simulated),
-        "driven_fails": _names(both.driven),
+        "simulated_fails": _names(both.simulated.fails),
+        "driven_fails": _names(both.driven.fails),
+        "not_observable": _names(both.asked & ~both.observable),
         "gap_along_m": one.gap_along_m,
         "gap_across_m": one.gap_across_m,
     }
@@ -41,7 +44,8 @@ def agreement_lines(found: dict[str, Any] | None) -> list[str]:
     lines = [
         f"  simulation against reality in {found['windows']} windows: agree on pass "
         f"{counts['agree_pass']}, on fail {counts['agree_fail']}; simulation too pessimistic "
-        f"{counts['too_pessimistic']}, too optimistic {counts['too_optimistic']}"
+        f"{counts['too_pessimistic']}, too optimistic {counts['too_optimistic']}; not observable "
+        f"{counts['not_observable']}"
     ]
     for direction, flip in found["flips"].items():
         if flip["flipped"]:

@@ -27,9 +27,10 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.agreement.known_windows import ThinnedWindows
 from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.runner.open_rounds import RoundDone
-from foretwin.sim_worker.analysis.agreement.criteria import CriteriaEvaluator, Heard, Users, Window
+from foretwin.sim_worker.analysis.agreement.criteria import CriteriaEvaluator
+from foretwin.sim_worker.analysis.agreement.doubt import WorldDoubt
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
-from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.analysis.agreement.window import Heard, Users, Window
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 
 MOST_KEPT = 32
@@ -37,6 +38,7 @@ MOST_KEPT = 32
 simulation meets half as many (`foretwin.orchestrator.rounds.seen_users`)."""
 _HOLE_NS, _SEEN_HOLE_NS = 1_500_000_000, 1_000_000_000
 _SPARE_NS = 3_000_000_000
+_NEVER_NS = -(1 << 62)
 
 Stamps = npt.NDArray[np.int64]
 
@@ -73,19 +75,27 @@ class OpenWindows:
         self._windows = ThinnedWindows()
         self._worlds: dict[str, World] = {}
         self._last_ns: int | None = None
+        self._closed_ns = _NEVER_NS
+        """When the car was last on a way that is closed to cars."""
+        self.antenna_known = False
+        """Whether the source tells where on the car its positions are of."""
         self.judged: list[Judged] = []
 
     @traced("agreement: take a state")
-    def take(self, said: LatestReports, state: VehicleState) -> None:
-        """Take where the car is, and what it newly saw and heard."""
+    def take(self, said: LatestReports, state: VehicleState, closed_road: bool = False) -> None:
+        """Take where the car is, what it newly saw and heard, and whether it is on a way that the
+        map has but gives to no car."""
         if self._states and state.stamp_ns < self._states[-1].stamp_ns - _SPARE_NS:
             for gone in (self._states, self._seen, self._waiting):
                 gone.clear()
             self._heard.clear()
             self._last_ns = None
+            self._closed_ns = _NEVER_NS
         if not state.yaw_valid or (self._states and state.stamp_ns <= self._states[-1].stamp_ns):
             return
         self._states.append(state)
+        if closed_road:
+            self._closed_ns = state.stamp_ns
         users = said.road_users
         if users is not None and (not self._seen or users.stamp_ns > self._seen[-1].stamp_ns):
             self._seen.append(_nearest(users, state))
@@ -177,6 +187,10 @@ class OpenWindows:
             },
             known_users=bool(seen) and bool((np.diff(np.sort(told)) <= _SEEN_HOLE_NS).all()),
             position_std_m=max((s for s in stds if s is not None), default=None),
+            driven_std=_driven_std(known, at, stamps),
+            state_period_s=float(np.diff(at[: np.searchsorted(at, stamps[-1]) + 1]).max()) / 1e9,
+            antenna_known=self.antenna_known,
+            closed_road=bool(self._closed_ns >= stamps[0]),
         )
 
     def _forget(self, now_ns: int) -> None:
@@ -203,11 +217,11 @@ def judge_all(
 
 def judge_in(world: World, windows: list[Window], vehicle: VehicleParameters) -> list[Judged]:
     """Judge the windows of one World."""
-    ground = DrivableGround(world)
+    doubt = WorldDoubt(world)
     found = []
     for window in windows:
         rules = RouteRules(world, FrenetPath(window.path_xy_m))
-        found.append(judged(window, CriteriaEvaluator(window, rules, ground, vehicle)))
+        found.append(judged(window, CriteriaEvaluator(window, rules, doubt, vehicle)))
     return found
 
 
@@ -235,6 +249,16 @@ def _driven(known: list[VehicleState], at: Stamps, stamps: Stamps, frame: LocalF
     columns = (xy[:, 0], xy[:, 1], heading, speed, np.zeros(len(at)), rate, tire, accel)
     since, wanted = at - stamps[0], stamps - stamps[0]
     return np.column_stack([np.interp(wanted, since, column) for column in columns])
+
+
+def _driven_std(known: list[VehicleState], at: Stamps, stamps: Stamps) -> Array:
+    """Return (N, 2) standard deviations of speed and yaw at stamps, infinite where unknown."""
+    told = [(s.speed_std_mps, s.yaw_std_rad) for s in known]
+    stds = np.array([[np.inf if one is None else one for one in both] for both in told])
+    # The nearest, since infinity times nothing is no number.
+    nearest = np.abs(at[None, :] - stamps[:, None]).argmin(axis=1)
+    found: Array = stds[nearest]
+    return found
 
 
 def _nearest(users: RoadUsers, state: VehicleState) -> RoadUsers:

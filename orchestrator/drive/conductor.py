@@ -14,7 +14,7 @@ from foretwin.contracts.simulation import ActiveWorld
 from foretwin.contracts.world import World
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.events import EventHandler
-from foretwin.orchestrator.drive.intake import Intake
+from foretwin.orchestrator.drive.intake import Intake, unplaced
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.drive.processes import (
@@ -127,10 +127,10 @@ class Conductor:
         self.intake.take_info(info)
         self.beside.begin(info)
         self.rounds.start_stamp_ns = info.start_stamp_ns
+        self.rounds.windows.antenna_known = info.body_from_antenna_m is not None
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
-            where = f"where on the car its reference point ({info.reference_point}) sits"
-            self.tell(Notice("warning", f"the source does not say {where}; taken as base_link"))
+            self.tell(unplaced(info.reference_point))
 
     # Messages.
 
@@ -180,7 +180,7 @@ class Conductor:
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.route.keep_up_with(state, self.intake.plan)
         self.rounds.take_state(state)
-        self.rounds.windows.take(self.intake.surroundings, state)
+        self.rounds.windows.take(self.intake.surroundings, state, self.mission.way.closed_to_cars)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
         if self.mission.road_line is not None and self.plan.config.map_aiding == "auto":
             self.intake.take_line(self.mission.road_line)

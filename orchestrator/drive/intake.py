@@ -22,7 +22,7 @@ from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
 from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
-from foretwin.orchestrator.instructions import LatestReports, LatestState
+from foretwin.orchestrator.instructions import LatestReports, LatestState, Notice
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
 from foretwin.orchestrator.rounds.learnt_signals import SignalLearner
 from foretwin.telemetry.estimator.estimator import StateEstimator, estimator_of
@@ -211,3 +211,9 @@ def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
         source="live telemetry",
         reference_point="antenna",
     )
+
+
+def unplaced(reference_point: str) -> Notice:
+    """Return what is told of a source that does not say where on the car its positions are of."""
+    where = f"where on the car its reference point ({reference_point}) sits"
+    return Notice("warning", f"the source does not say {where}; taken as base_link")

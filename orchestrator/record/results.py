@@ -66,7 +66,8 @@ _COLUMNS = {
     "driven_segments": columns_of(DrivenSegment),
     "agreement": columns(
         "round_id:int stamp_ns:int drive_time_s:float intersection_id:str outcome:str "
-        "observable:str simulated_fails:str driven_fails:str gap_along_m:float gap_across_m:float "
+        "simulated:str driven:str observable:str simulated_fails:str driven_fails:str "
+        "not_observable:str gap_along_m:float gap_across_m:float "
         + " ".join(_FLIP.format(direction) for direction in ("along", "across", "both"))
         + " flip_along_fails:str flip_across_fails:str flip_both_fails:str"
     ),

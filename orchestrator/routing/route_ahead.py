@@ -16,7 +16,7 @@ from foretwin.orchestrator.routing.driving_path import SPACING_M, driving_path
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
 from foretwin.orchestrator.routing.lane_chain import LaneGuide
 from foretwin.orchestrator.routing.map_matching import MapMatcher, Match, OffRoadStretch
-from foretwin.orchestrator.routing.road_index import RoadIndex
+from foretwin.orchestrator.routing.road_index import RoadIndex, legality
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import PlaceOnRoute, RouteFollower, RouteProgress
@@ -151,6 +151,11 @@ class WayAhead:
             usual_share=self._pace.share,
             horizon_s=horizon_s,
         )
+
+    @property
+    def closed_to_cars(self) -> bool:
+        """Whether the car is on a way that the map has, but gives to no car."""
+        return self._match is not None and legality(self._match.directed_edge) == "no_car_road"
 
     @property
     def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:

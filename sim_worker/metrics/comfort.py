@@ -75,6 +75,71 @@ def motion(view: RolloutView) -> EgoMotion:
     return EgoMotion._make(np.where(counts, values, values[:, :1]) for values in found)
 
 
+class Scatter(NamedTuple):
+    """How far samples of speed and yaw lie beside the quadratics that smooth them, (S, N)."""
+
+    speed_mps: Array
+    yaw_rad: Array
+
+
+def scatter(view: RolloutView) -> Scatter:
+    """Return the scatter of a motion about itself: standard deviations over the window of the
+    accelerations, whose quadratics use up three of its samples."""
+    step_s = float(np.diff(view.time_s).mean())
+    count = len(view.time_s)
+    smooth = _operator(count, step_s, _ACCEL_WINDOW_S, 0)
+    window = np.abs(np.arange(count)[:, None] - np.arange(count)) * step_s <= _ACCEL_WINDOW_S / 2
+    free = np.maximum(window.sum(axis=0) - _ORDER - 1, 1)
+    sides = view.driven[..., 3], np.unwrap(view.driven[..., 2], axis=1)
+    return Scatter(*(np.sqrt(np.square(x - x @ smooth) @ window / free) for x in sides))
+
+
+def motion_std(
+    view: RolloutView, speed_std_mps: Array, yaw_std_rad: Array, *, alike_s: float
+) -> EgoMotion:
+    """Return how uncertain `motion` is (S, N) where speed and yaw are: their standard deviations,
+    (N,) or (S, N).
+
+    Errors stay alike for `alike_s` and are then others: through the same sums as the values, by
+    first order. What slips sideways is left out.
+    """
+    step_s = float(np.diff(view.time_s).mean())
+    longer = max(1.0, alike_s / step_s)
+    through = _squares(len(view.time_s), step_s)
+    speed, yaw = longer * np.square(speed_std_mps), longer * np.square(yaw_std_rad)
+    vx = np.square(view.driven[..., 3])
+    turning = np.square(view.keep(motion).yaw_rate_radps)
+    lon_jerk = speed @ through.slope_rate
+    lat_jerk = vx * (yaw @ through.rate_rate) + turning * (speed @ through.rate)
+    variances = EgoMotion(
+        lon_accel_mps2=speed @ through.slope,
+        lat_accel_mps2=vx * (yaw @ through.rate) + turning * speed,
+        jerk_mps3=lon_jerk + lat_jerk,
+        lon_jerk_mps3=lon_jerk,
+        yaw_rate_radps=yaw @ through.rate,
+        yaw_accel_radps2=yaw @ through.curve,
+    )
+    return EgoMotion._make(np.broadcast_to(np.sqrt(one), vx.shape) for one in variances)
+
+
+class _Squares(NamedTuple):
+    """What a row of N variances is multiplied with, each (N, N), for those of its derivatives."""
+
+    slope: Array
+    rate: Array
+    curve: Array
+    slope_rate: Array
+    rate_rate: Array
+
+
+@functools.lru_cache(maxsize=32)
+def _squares(count: int, step_s: float) -> _Squares:
+    slope = _operator(count, step_s, _ACCEL_WINDOW_S, 1)
+    rate = _operator(count, step_s, _JERK_WINDOW_S, 1)
+    curve = _operator(count, step_s, _JERK_WINDOW_S, 2)
+    return _Squares(*(np.square(one) for one in (slope, rate, curve, slope @ rate, rate @ rate)))
+
+
 @functools.lru_cache(maxsize=32)
 def _operator(count: int, step_s: float, window_s: float, derivative: int) -> Array:
     """Return (N, N) what a row of N samples is multiplied with for its smoothed derivative."""

@@ -10,7 +10,8 @@ from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
-from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA, CriteriaEvaluator, Users
+from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA, CriteriaEvaluator
+from foretwin.sim_worker.analysis.agreement.window import Users
 
 DIRECTIONS = ("along", "across", "both")
 MOST_M = 10.0
@@ -100,11 +101,12 @@ def flips(
     simulated: Array,
     users: Users,
     gap: Gap,
-    observable: Flags,
+    asked: Flags,
     *,
-    passes: bool,
+    fails: bool,
 ) -> tuple[Flip, ...]:
-    """Return for each of `DIRECTIONS` the smallest growth of the gap that flips the verdict.
+    """Return for each of `DIRECTIONS` the smallest growth of the gap that flips the verdict: after
+    which the simulation fails for sure, or, where it `fails`, no longer does.
 
     Two sweeps, each of all directions at once: evenly up to `MOST_M`, then between the last
     factor that does not flip and the first that does. The result is `MOST_M` / 640 fine.
@@ -115,17 +117,18 @@ def flips(
     flipped = dict.fromkeys(there, True)
     failed: dict[str, tuple[str, ...]] = {}
     for count in (_COARSE, _FINE):
-        asked = [name for name in there if flipped[name]]
-        if not asked:
+        open_ = [name for name in there if flipped[name]]
+        if not open_:
             break
         factors = {
             name: low[name] + (high[name] - low[name]) * np.arange(1, count + 1) / count
-            for name in asked
+            for name in open_
         }
-        states = np.concatenate([grown(simulated, gap, factors[name], name) for name in asked])
-        fails = (evaluator.failures(states, users) & observable).reshape(len(asked), count, -1)
-        for name, mine in zip(asked, fails, strict=True):
-            other = mine.any(axis=1) == passes
+        states = np.concatenate([grown(simulated, gap, factors[name], name) for name in open_])
+        failed_now = evaluator.judge(states, users).fails & asked
+        found = failed_now.reshape(len(open_), count, -1)
+        for name, mine in zip(open_, found, strict=True):
+            other = mine.any(axis=1) != fails
             flipped[name] = bool(other.any())
             first = int(other.argmax())
             if flipped[name]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -12,13 +12,15 @@ from foretwin.sim_worker.analysis.agreement.criteria import (
     CRITERIA,
     CriteriaEvaluator,
     Verdicts,
-    Window,
     verdicts,
 )
 from foretwin.sim_worker.analysis.agreement.flip import DIRECTIONS, Flip, flips, gap_between
+from foretwin.sim_worker.analysis.agreement.judgement import Judgement, VerdictWord, word
+from foretwin.sim_worker.analysis.agreement.window import Window
 
-OUTCOMES = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic")
-"""Too pessimistic: the simulation fails, the drive passed; too optimistic the other way round."""
+OUTCOMES = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic", "not_observable")
+"""Too pessimistic: the simulation fails, the drive passed; too optimistic the other way round. Not
+observable: of one side it cannot be said."""
 
 
 class Judged(NamedTuple):
@@ -33,7 +35,7 @@ class Judged(NamedTuple):
     @property
     def outcome(self) -> str:
         """One of `OUTCOMES`."""
-        return outcome(self.verdicts.simulated_passes, self.verdicts.driven_passes)
+        return outcome(self.verdicts.simulated_word, self.verdicts.driven_word)
 
 
 def judged(window: Window, evaluator: CriteriaEvaluator) -> Judged:
@@ -45,17 +47,19 @@ def judged(window: Window, evaluator: CriteriaEvaluator) -> Judged:
         window.simulated,
         window.simulated_users,
         gap,
-        both.observable,
-        passes=both.simulated_passes,
+        both.asked,
+        fails=both.simulated_word == "failed",
     )
     return Judged(window, both, gap.peak_m("along"), gap.peak_m("across"), found)
 
 
-def outcome(simulated_passes: bool, driven_passes: bool) -> str:
+def outcome(simulated: VerdictWord, driven: VerdictWord) -> str:
     """Return which of `OUTCOMES` two verdicts make."""
-    if simulated_passes == driven_passes:
-        return "agree_pass" if driven_passes else "agree_fail"
-    return "too_pessimistic" if driven_passes else "too_optimistic"
+    if "not_observable" in (simulated, driven):
+        return "not_observable"
+    if simulated == driven:
+        return "agree_pass" if driven == "passed" else "agree_fail"
+    return "too_pessimistic" if driven == "passed" else "too_optimistic"
 
 
 def tally(windows: Sequence[Judged], *, start_stamp_ns: int) -> dict[str, Any]:
@@ -64,20 +68,28 @@ def tally(windows: Sequence[Judged], *, start_stamp_ns: int) -> dict[str, Any]:
     Times in it count from `start_stamp_ns`.
     """
     overall = Counter(one.outcome for one in windows)
+    driven = Counter(one.verdicts.driven_word for one in windows)
     by_criterion = {}
     for place, name in enumerate(CRITERIA):
-        mine = [one.verdicts for one in windows if one.verdicts.observable[place]]
-        found = Counter(outcome(not v.simulated[place], not v.driven[place]) for v in mine)
+        sides = [(one.verdicts.simulated, one.verdicts.driven) for one in windows]
+        found = Counter(
+            outcome(_at(simulated, place), _at(real, place)) for simulated, real in sides
+        )
         by_criterion[name] = {key: found[key] for key in OUTCOMES}
     return {
         "windows": len(windows),
         "overall": {key: overall[key] for key in OUTCOMES},
+        "driven": {key: driven[key] for key in get_args(VerdictWord)},
         "by_criterion": by_criterion,
         "flips": {
             name: _flip_record(windows, place, start_stamp_ns)
             for place, name in enumerate(DIRECTIONS)
         },
     }
+
+
+def _at(side: Judgement, place: int) -> VerdictWord:
+    return word(bool(side.passes[place]), bool(side.fails[place]))
 
 
 def _flip_record(windows: Sequence[Judged], place: int, start_stamp_ns: int) -> dict[str, Any]:

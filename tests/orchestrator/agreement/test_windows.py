@@ -27,10 +27,15 @@ FROM_X, Y = -60.0, -1.6
 
 
 def driven(
-    *, others: bool = False, until_s: float = 22.0, std_m: float | None = 0.05
+    *,
+    others: bool = False,
+    until_s: float = 22.0,
+    std_m: float | None = 0.05,
+    closed_at_s: float | None = None,
 ) -> OpenWindows:
     """Drive at 5 m/s for 22 s, each second with a round whose nominal future is right."""
     handler = OpenWindows(VEHICLE, horizon_s=8.0)
+    handler.antenna_known = True
     line = np.array([[FROM_X, Y], [FROM_X + 5.0 * until_s, Y]])
     path = PathAhead(xy_m=line, speed_limit_mps=np.full(2, 14.0))
     for number, plain in enumerate(states_along(WORLD.frame, line, speed_mps=5.0)):
@@ -41,7 +46,8 @@ def driven(
         )  # fmt: skip
         seen = RoadUsers(stamp_ns=state.stamp_ns, users=(lorry,)) if others else None
         light = SignalState(stamp_ns=state.stamp_ns, group_id="g", colour="green")
-        handler.take(LatestReports(None, seen, (light,)), state)
+        closed = number * 0.1 == closed_at_s
+        handler.take(LatestReports(None, seen, (light,)), state, closed)
         if number % 10 == 0:
             ahead = straight((FROM_X + 0.5 * number, Y), speed_mps=5.0)
             done = round_done(ahead, round_id=number, stamp_ns=state.stamp_ns)
@@ -82,9 +88,38 @@ def test_who_was_seen_and_what_was_heard_counts_for_reality() -> None:
         assert set(window.heard["g"].colours) == {"green"}
 
 
+def test_a_way_that_is_closed_to_cars_is_told_of_the_windows_that_hold_it() -> None:
+    judged = driven(closed_at_s=12.0).judged
+    closed = [one.window.round_id / 10 for one in judged if one.window.closed_road]
+    assert closed == [4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]
+
+
+def test_how_well_a_drive_was_known_goes_with_it() -> None:
+    handler = OpenWindows(VEHICLE, horizon_s=8.0)
+    line = np.array([[FROM_X, Y], [FROM_X + 55.0, Y]])
+    path = PathAhead(xy_m=line, speed_limit_mps=np.full(2, 14.0))
+    for number, plain in enumerate(states_along(WORLD.frame, line, speed_mps=5.0)):
+        std = 0.1 + 0.01 * number
+        known = {"position_std_m": 0.1, "speed_std_mps": std, "yaw_std_rad": None}
+        state = msgspec.structs.replace(
+            plain, **(known if number % 2 else known | {"yaw_std_rad": 0.02})
+        )
+        handler.take(LatestReports(None, None, ()), state)
+        if number == 10:
+            ahead = straight((FROM_X + 5.0, Y), speed_mps=5.0)
+            handler.take_round(round_done(ahead, round_id=1, stamp_ns=state.stamp_ns), path, WORLD)
+    (one,) = handler.finish()
+    speed_std, yaw_std = one.window.driven_std.T
+    assert one.window.state_period_s == pytest.approx(0.1)
+    assert not one.window.antenna_known
+    assert set(np.isinf(yaw_std).tolist()) == {True, False}
+    assert speed_std[0] == pytest.approx(0.2)
+    assert (np.diff(speed_std) > 0.0).sum() >= 40
+
+
 def test_positions_too_rough_do_not_say_whether_a_car_left_the_road() -> None:
     for std_m in (None, 3.0):
-        assert not any(one.verdicts.observable[1] for one in driven(std_m=std_m).judged)
+        assert not any(one.verdicts.asked[1] for one in driven(std_m=std_m).judged)
 
 
 def test_a_corrected_world_changes_the_verdict_of_a_recorded_drive() -> None:
@@ -98,7 +133,7 @@ def test_a_corrected_world_changes_the_verdict_of_a_recorded_drive() -> None:
     )
     again = judge_in(corrected, [one.window for one in judged], VEHICLE)
     assert outcomes(again) == {"agree_fail"}
-    assert all(one.verdicts.driven[1] for one in again)
+    assert all(one.verdicts.driven.fails[1] for one in again)
 
 
 def test_a_long_drive_keeps_no_more_windows_than_fit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,6 +36,19 @@ def driven(
     return way
 
 
+def test_a_street_closed_to_cars_is_told_while_the_car_is_on_it() -> None:
+    town = grid(4, 3, pedestrian=frozenset([1]))
+    way = WayAhead(town, junctions(town), ())
+    assert not way.closed_to_cars
+    told = []
+    for state in states_along(FRAME, drive([(10, 0), (290, 0)])):
+        way.take_speed(state)
+        way.locate(state)
+        told.append(way.closed_to_cars)
+    changes = np.flatnonzero(np.diff(told)) * 1.0  # at 10 m/s and 10 Hz a metre each
+    assert changes == pytest.approx([90.0, 190.0], abs=8.0)
+
+
 def test_junctions_come_in_order_with_distance_and_time() -> None:
     way = driven((110, 100), (150, 100))
     ids = [ahead.junction.summary.id for ahead in way.junctions[:2]]

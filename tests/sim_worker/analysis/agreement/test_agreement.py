@@ -11,19 +11,19 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Choice
+from foretwin.contracts.world import DRAWN_ATTRIBUTION
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.analysis.agreement.criteria import (
     CRITERIA,
     LEAST_CLEARANCE_M,
     CriteriaEvaluator,
-    Heard,
-    Users,
-    Window,
     verdicts,
 )
+from foretwin.sim_worker.analysis.agreement.doubt import WorldDoubt
 from foretwin.sim_worker.analysis.agreement.flip import MOST_M, flips, gap_between, grown
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
-from foretwin.sim_worker.metrics.ground import TOLERANCE_M, DrivableGround
+from foretwin.sim_worker.analysis.agreement.window import Heard, Users, Window
+from foretwin.sim_worker.metrics.ground import TOLERANCE_M
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from tests.sim_worker.metrics.junction import STOP_X, junction
 from tests.sim_worker.metrics.motions import (
@@ -41,11 +41,20 @@ COVERS = (
     "foretwin.sim_worker.analysis.agreement.criteria",
     "foretwin.sim_worker.analysis.agreement.flip",
     "foretwin.sim_worker.analysis.agreement.tally",
+    "foretwin.sim_worker.analysis.agreement.window",
 )
 
 TIME_S = times(8.0)
 NOBODY = Users(np.zeros((81, 0, 3)), np.zeros((81, 0)), np.zeros((0, 2)))
 FINE_M = MOST_M / 640
+KNOWN_WELL: dict[str, Any] = {
+    "known_users": True,
+    "position_std_m": 0.0,
+    "driven_std": np.full((81, 2), 0.001),
+    "state_period_s": 0.02,
+    "antenna_known": True,
+    "closed_road": False,
+}
 
 
 def along(mover: Mover, *, left_mps: float = 0.0) -> Array:
@@ -69,9 +78,13 @@ def case(
     lights: bool = False,
     sign: bool = False,
     heard: dict[str, Heard] | None = None,
+    drawn: bool = True,
     **known: Any,
 ) -> tuple[Window, CriteriaEvaluator]:
+    """A window in a World that is the very place, or, not `drawn`, a map of it."""
     world = junction(lights=lights)
+    if drawn:
+        world = msgspec.structs.replace(world, attribution=DRAWN_ATTRIBUTION)
     if sign:
         line = msgspec.structs.replace(world.stop_lines[0], control=Choice("stop", "tagged"))
         world = msgspec.structs.replace(world, stop_lines=(line,))
@@ -88,10 +101,10 @@ def case(
         driven_users=users if driven_users is None else driven_users,
         path_xy_m=path,
         heard=heard or {},
-        **{"known_users": True, "position_std_m": 0.02, **known},
+        **{**KNOWN_WELL, **known},
     )
     rules = RouteRules(world, FrenetPath(path))
-    return window, CriteriaEvaluator(window, rules, DrivableGround(world), VEHICLE)
+    return window, CriteriaEvaluator(window, rules, WorldDoubt(world), VEHICLE)
 
 
 def judge(**given: Any) -> Judged:
@@ -140,7 +153,7 @@ def test_the_growth_that_leaves_the_road_is_that_of_the_closed_form() -> None:
     edge_m = next(
         y
         for y in np.arange(0.0, 6.0, 0.001)
-        if not evaluator._ground.contains(np.array([-30.0]), np.array([-1.5 - y]))[0]
+        if not evaluator._doubt.drawn.contains(np.array([-30.0]), np.array([-1.5 - y]))[0]
     )
     assert edge_m > WIDTH_M / 2 + TOLERANCE_M
     one = judged(window, evaluator)
@@ -213,9 +226,9 @@ def test_a_line_crossed_at_a_red_that_was_heard() -> None:
     heard = Heard(stamps, ("green", "green", "amber", *(["red"] * 6)))  # type: ignore[arg-type]
     window, evaluator = case(simulated, driven, lights=True, heard={"ew": heard})
     found = verdicts(window, evaluator)
-    assert failed(found.simulated) == []
-    assert failed(found.driven) == ["red_light"]
-    assert failed(case(simulated, driven, lights=True)[1].observable) == [
+    assert failed(found.simulated.fails) == []
+    assert failed(found.driven.fails) == ["red_light"]
+    assert failed(case(simulated, driven, lights=True)[1].asked) == [
         "clearance",
         "drivable_area",
         "comfort",
@@ -230,8 +243,8 @@ def test_a_stop_sign_wants_a_car_to_stand() -> None:
     stops = states_of_centre(np.column_stack([x, 0.0 * x - 1.5, 0.0 * x]), TIME_S)
     assert x[-1] > front + 3.0
     found = verdicts(*case(stops, rolls, sign=True))
-    assert failed(found.simulated) == []
-    assert failed(found.driven) == ["stop_line"]
+    assert failed(found.simulated.fails) == []
+    assert failed(found.driven.fails) == ["stop_line"]
 
 
 def test_the_gap_as_measured_leads_from_the_simulation_to_the_drive() -> None:
@@ -252,13 +265,10 @@ def test_what_reality_does_not_show_is_not_judged() -> None:
         off, off, users=standing(-30.0, -6.0), known_users=False, position_std_m=2.0
     )
     found = verdicts(window, evaluator)
-    assert failed(found.observable) == ["comfort"]
-    assert found.simulated_passes
-    assert found.driven_passes
+    assert failed(found.asked) == ["comfort"]
+    assert (found.simulated_word, found.driven_word) == ("passed", "passed")
     gap = gap_between(window.simulated, along(Mover(-50.0, -5.0, 0.0, 5.0)))
-    told = flips(
-        evaluator, window.simulated, window.simulated_users, gap, found.observable, passes=True
-    )
+    told = flips(evaluator, window.simulated, window.simulated_users, gap, found.asked, fails=False)
     assert [one.factor for one in told] == [None, None, None]
 
 
@@ -269,4 +279,4 @@ def test_a_corrected_world_changes_the_verdict() -> None:
     assert judge(simulated=rolls, driven=rolls).outcome == "agree_pass"
     corrected = judge(simulated=rolls, driven=rolls, sign=True)
     assert corrected.outcome == "agree_fail"
-    assert failed(corrected.verdicts.driven) == ["stop_line"]
+    assert failed(corrected.verdicts.driven.fails) == ["stop_line"]

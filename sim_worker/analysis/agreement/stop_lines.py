@@ -1,0 +1,85 @@
+"""Stop lines crossed at red, or at a sign without standing: for wherever the line may lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array, Flags
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.sim_worker.analysis.agreement.judgement import Judgement
+from foretwin.sim_worker.analysis.agreement.window import Heard
+from foretwin.sim_worker.driver_model import STANDING_MPS
+from foretwin.sim_worker.metrics.rollout import RolloutView
+from foretwin.sim_worker.metrics.route_rules import LineAhead
+from foretwin.sim_worker.metrics.violations import STOPS, line_crossings
+
+_STOP_WITHIN_M = 6.0
+"""A car that stands within so much before a stop line has stopped for it."""
+_HEARD_FOR_NS = 2_000_000_000
+
+
+class Crossed(NamedTuple):
+    """Motions (K,) whose fronts cross a line, and when (K,)."""
+
+    motion: Array
+    at_s: Array
+
+
+def at_lights(
+    view: RolloutView,
+    lines: list[tuple[LineAhead, tuple[float, ...]]],
+    heard: Mapping[str, Heard],
+    stamp_ns: int,
+) -> Judgement:
+    """Judge (S,) crossings of lines whose groups were heard, each with how far ahead of where they
+    seem to be fronts may be at it."""
+
+    def at_red(front: Array, line: LineAhead) -> Flags:
+        red = np.zeros(len(front), dtype=bool)
+        said = heard.get(line.group_id or "")
+        if said is None:
+            return red
+        for row, at_s in zip(*line_crossings(front, line.ends_m, view.time_s), strict=True):
+            at_ns = stamp_ns + round(float(at_s) * 1e9)
+            last = int(np.searchsorted(said.stamps_ns, at_ns, side="right")) - 1
+            if last >= 0 and at_ns - said.stamps_ns[last] <= _HEARD_FOR_NS:
+                red[row] |= said.colours[last] in STOPS
+        return red
+
+    return _wherever(view, [one for one in lines if one[0].control == "signal"], at_red)
+
+
+def at_signs(view: RolloutView, lines: list[tuple[LineAhead, tuple[float, ...]]]) -> Judgement:
+    """Judge (S,) crossings of stop signs' lines: whether the car stood before, unless it began near
+    one; arguments as of `at_lights`."""
+
+    def without_stop(front: Array, line: LineAhead) -> Flags:
+        unstopped = np.zeros(len(front), dtype=bool)
+        for row, at_s in zip(*line_crossings(front, line.ends_m, view.time_s), strict=True):
+            gone_m = arc_lengths(front[row])
+            line_m = float(np.interp(at_s, view.time_s, gone_m))
+            before = (view.time_s <= at_s) & (gone_m >= line_m - _STOP_WITHIN_M)
+            if line_m >= _STOP_WITHIN_M:
+                slowest_mps = np.abs(view.speed_mps[row, before]).min()
+                unstopped[row] |= bool(slowest_mps > STANDING_MPS)
+        return unstopped
+
+    return _wherever(view, [one for one in lines if one[0].control == "stop"], without_stop)
+
+
+def _wherever(
+    view: RolloutView,
+    lines: list[tuple[LineAhead, tuple[float, ...]]],
+    broken_at: Callable[[Array, LineAhead], Flags],
+) -> Judgement:
+    """Return what holds (S,) for all places where fronts may be against each of the lines."""
+    passes, fails = (np.full(len(view.valid), value) for value in (True, False))
+    forward = np.stack(view.heading, axis=-1)
+    for line, ahead_m in lines:
+        places = [broken_at(view.front_m + away_m * forward, line) for away_m in ahead_m]
+        fails |= np.all(places, axis=0)
+        passes &= ~np.any(places, axis=0)
+    return Judgement(passes, fails)
