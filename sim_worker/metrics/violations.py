@@ -6,7 +6,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import SignalColour
-from foretwin.sim_worker.driver_model import ALONG_COS
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.route_rules import PriorityConflict, RouteRules
 from foretwin.world_gen.rules.signal_state import colours_at, parts_of_cycle
@@ -15,10 +16,8 @@ HARD_BRAKING_MPS2 = 2.0
 """A road user with priority that must brake harder was not given way to."""
 NARROW_S = 1.0
 """Nor was one that reaches the shared ground sooner than this after the ego has left it."""
-STANDING_MPS = 0.3
-"""Who is slower has stopped: a driver's "stop" at a sign, not a measured one. Chosen."""
-STOPS_WITHIN_M = 6.0
-"""So near to a line's middle a front has stopped at it, not behind another car. Chosen."""
+STOP_WITHIN_M = 6.0
+"""A car that stands within so much before a stop line has stopped for it. Chosen."""
 _AT_POINT_M = 2.5
 _ON_WAY_M = 2.0
 STOPS = ("red", "red_amber")
@@ -41,18 +40,20 @@ def red_light_violations(view: RolloutView) -> Measure:
         colours = _colours(view, line.group_id, time_s)
         ran = np.array([colour in STOPS for colour in colours], dtype=bool)
         if line.red_after_stop:
-            ran &= ~_has_stopped(view, line.ends_m, future, time_s)
+            ran &= [
+                not stood_before(view.front_m[row], view.speed_mps[row], view.time_s, at_s)
+                for row, at_s in zip(future, time_s.tolist(), strict=True)
+            ]
         np.add.at(count, future, ran)
     return view.measure(count)
 
 
-def _has_stopped(view: RolloutView, ends_m: Array, future: Indices, time_s: Array) -> Flags:
-    """Return whether (K,) each crossing of a line comes after a standstill close before it."""
-    middle = ends_m.mean(axis=0)
-    away_m = np.hypot(*(view.front_m[future] - middle).transpose(2, 0, 1))
-    stands = (np.abs(view.speed_mps[future]) < STANDING_MPS) & (away_m < STOPS_WITHIN_M)
-    before = view.time_s[None, :] <= time_s[:, None]
-    return np.asarray((stands & before).any(axis=1))
+def stood_before(front_m: Array, speed_mps: Array, time_s: Array, at_s: float) -> bool:
+    """Return whether a motion, fronts (N, 2) at (N,), stopped for the line that it crosses."""
+    gone_m = arc_lengths(front_m)
+    line_m = float(np.interp(at_s, time_s, gone_m))
+    near = (time_s <= at_s) & (gone_m >= line_m - STOP_WITHIN_M)
+    return bool(np.abs(speed_mps[near]).min(initial=np.inf) <= STANDING_MPS)
 
 
 def right_of_way_violations(view: RolloutView) -> Measure:

@@ -11,13 +11,15 @@ from foretwin.contracts.arrays import Array, Flags
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.analysis.agreement.judgement import Judgement
 from foretwin.sim_worker.analysis.agreement.window import Heard
-from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.metrics.rollout import RolloutView
 from foretwin.sim_worker.metrics.route_rules import LineAhead
-from foretwin.sim_worker.metrics.violations import STOPS, line_crossings
+from foretwin.sim_worker.metrics.violations import (
+    STOP_WITHIN_M,
+    STOPS,
+    line_crossings,
+    stood_before,
+)
 
-_STOP_WITHIN_M = 6.0
-"""A car that stands within so much before a stop line has stopped for it."""
 _HEARD_FOR_NS = 2_000_000_000
 
 
@@ -45,8 +47,12 @@ def at_lights(
         for row, at_s in zip(*line_crossings(front, line.ends_m, view.time_s), strict=True):
             at_ns = stamp_ns + round(float(at_s) * 1e9)
             last = int(np.searchsorted(said.stamps_ns, at_ns, side="right")) - 1
-            if last >= 0 and at_ns - said.stamps_ns[last] <= _HEARD_FOR_NS:
-                red[row] |= said.colours[last] in STOPS
+            if last < 0 or at_ns - said.stamps_ns[last] > _HEARD_FOR_NS:
+                continue
+            lets_go = line.red_after_stop and stood_before(
+                front[row], view.speed_mps[row], view.time_s, float(at_s)
+            )
+            red[row] |= said.colours[last] in STOPS and not lets_go
         return red
 
     return _wherever(view, [one for one in lines if one[0].control == "signal"], at_red)
@@ -59,12 +65,11 @@ def at_signs(view: RolloutView, lines: list[tuple[LineAhead, tuple[float, ...]]]
     def without_stop(front: Array, line: LineAhead) -> Flags:
         unstopped = np.zeros(len(front), dtype=bool)
         for row, at_s in zip(*line_crossings(front, line.ends_m, view.time_s), strict=True):
-            gone_m = arc_lengths(front[row])
-            line_m = float(np.interp(at_s, view.time_s, gone_m))
-            before = (view.time_s <= at_s) & (gone_m >= line_m - _STOP_WITHIN_M)
-            if line_m >= _STOP_WITHIN_M:
-                slowest_mps = np.abs(view.speed_mps[row, before]).min()
-                unstopped[row] |= bool(slowest_mps > STANDING_MPS)
+            line_m = float(np.interp(at_s, view.time_s, arc_lengths(front[row])))
+            if line_m >= STOP_WITHIN_M:
+                unstopped[row] |= not stood_before(
+                    front[row], view.speed_mps[row], view.time_s, float(at_s)
+                )
         return unstopped
 
     return _wherever(view, [one for one in lines if one[0].control == "stop"], without_stop)

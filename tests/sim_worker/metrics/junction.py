@@ -35,8 +35,11 @@ PLAN = SignalPlan(
 )
 
 
-def junction(*, lights: bool) -> World:
-    """From the west (connection `east`) one waits for `north` (driven northwards) and `south`."""
+def junction(*, lights: bool, red_after_stop: bool = False) -> World:
+    """From the west (connection `east`) one waits for `north` (driven northwards) and `south`.
+
+    With `red_after_stop` its driver may go on red once it has stopped.
+    """
     plain = crossroads()
     groups = {"east": "ew", "west": "ew", "north": "ns", "south": "ns"}
     connections = tuple(
@@ -44,6 +47,7 @@ def junction(*, lights: bool) -> World:
             c,
             signal_group_id=groups[c.id] if lights else None,
             control="signal" if lights else "none",
+            red_after_stop=(red_after_stop and c.id == "east") or msgspec.UNSET,
         )
         for c in plain.connections
     )

@@ -79,10 +79,11 @@ def case(
     sign: bool = False,
     heard: dict[str, Heard] | None = None,
     drawn: bool = True,
+    red_after_stop: bool = False,
     **known: Any,
 ) -> tuple[Window, CriteriaEvaluator]:
     """A window in a World that is the very place, or, not `drawn`, a map of it."""
-    world = junction(lights=lights)
+    world = junction(lights=lights, red_after_stop=red_after_stop)
     if drawn:
         world = msgspec.structs.replace(world, attribution=DRAWN_ATTRIBUTION)
     if sign:
@@ -235,14 +236,29 @@ def test_a_line_crossed_at_a_red_that_was_heard() -> None:
     ]
 
 
-def test_a_stop_sign_wants_a_car_to_stand() -> None:
+def stops_and_goes_on() -> Array:
+    """(N, 8) a car that stands 2 m before the line and then drives over it."""
     front = STOP_X - LENGTH_M / 2
-    rolls = along(Mover(front - 10.0, -1.5, 0.0, 4.0))
     braking, leaving = np.clip(TIME_S, 0.0, 4.0), np.clip(TIME_S - 5.0, 0.0, None)
     x = front - 10.0 + 4.0 * braking - 0.5 * braking**2 + 0.75 * leaving**2
-    stops = states_of_centre(np.column_stack([x, 0.0 * x - 1.5, 0.0 * x]), TIME_S)
     assert x[-1] > front + 3.0
-    found = verdicts(*case(stops, rolls, sign=True))
+    return states_of_centre(np.column_stack([x, 0.0 * x - 1.5, 0.0 * x]), TIME_S)
+
+
+@pytest.mark.parametrize(("may", "broken"), [(False, ["red_light"]), (True, [])])
+def test_red_lets_go_who_has_stopped_where_the_law_does(may: bool, broken: list[str]) -> None:
+    stamps = np.arange(9, dtype=np.int64) * 1_000_000_000 - 500_000_000
+    heard = Heard(stamps, ("red",) * 9)
+    rolls = along(Mover(STOP_X - LENGTH_M / 2 - 10.0, -1.5, 0.0, 4.0))
+    given = case(stops_and_goes_on(), rolls, lights=True, heard={"ew": heard}, red_after_stop=may)
+    found = verdicts(*given)
+    assert failed(found.simulated.fails) == broken
+    assert failed(found.driven.fails) == ["red_light"]
+
+
+def test_a_stop_sign_wants_a_car_to_stand() -> None:
+    rolls = along(Mover(STOP_X - LENGTH_M / 2 - 10.0, -1.5, 0.0, 4.0))
+    found = verdicts(*case(stops_and_goes_on(), rolls, sign=True))
     assert failed(found.simulated.fails) == []
     assert failed(found.driven.fails) == ["stop_line"]
 
