@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 
 Flags = npt.NDArray[np.bool_]
 MITRE_LIMIT = 2.0
@@ -37,6 +37,17 @@ def without_repeats(xy_m: Array, *, tolerance_m: float = 0.01) -> Array:
 def apart(xy_m: Array, *, tolerance_m: float) -> Flags:
     """Return (N,) whether points are farther than `tolerance_m` from the one before."""
     return np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > tolerance_m])
+
+
+def kept_apart(xy_m: Array, *, least_m: float) -> Indices:
+    """Return the rows of those points (N, 2) that lie so far from the last one that was kept."""
+    if len(xy_m) == 0 or (np.hypot(*np.diff(xy_m, axis=0).T) >= least_m).all():
+        return np.arange(len(xy_m))
+    kept = [0]
+    for row in range(1, len(xy_m)):
+        if np.hypot(*(xy_m[row] - xy_m[kept[-1]])) >= least_m:
+            kept.append(row)
+    return np.array(kept)
 
 
 def points_at(xy_m: Array, at_m: Array | float) -> Array:
@@ -137,6 +148,16 @@ def left_of(direction: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """Return the cross product of vectors (..., 2): positive where b points to the left of a."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def meeting(
+    a: Array, along_a: Array, b: Array, along_b: Array, *, parallel: float
+) -> tuple[Array, Array]:
+    """Return where lines through points (..., 2) along vectors cross: how many of each vector (...)
+    beyond its point; NaN where their cross product is no more than `parallel`."""
+    gap, product = b - a, cross(along_a, along_b)
+    product = np.where(np.abs(product) > parallel, product, np.nan)
+    return cross(gap, along_b) / product, cross(gap, along_a) / product
 
 
 def turn_rad(before: Array, after: Array) -> Array:

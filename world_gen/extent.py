@@ -12,7 +12,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
-from foretwin.geometry.polyline import Flags, arc_lengths, points_at
+from foretwin.geometry.polyline import Flags, arc_lengths, length, points_at
 
 MIN_PIECE_M = 0.5
 """Shorter pieces of road at the World's edge are left out."""
@@ -100,7 +100,7 @@ Extent = Disc | Rectangle
 
 def stretches_inside(xy_m: Array, extent: Extent) -> list[tuple[float, float]]:
     """Return the arc lengths (from, to) between which a polyline (N, 2) lies inside, in order."""
-    total = float(arc_lengths(xy_m)[-1])
+    total = length(xy_m)
     if extent.holds(xy_m).all():  # both extents are convex
         return [(0.0, total)]
     cuts = [0.0, *sorted(extent.crossings(xy_m)), total]

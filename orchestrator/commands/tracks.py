@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.contracts.terminal import say
 from foretwin.contracts.tracks import DrivenTrack, track_id
+from foretwin.geometry.polyline import length
 from foretwin.orchestrator.worlds.track_store import TrackStore, store_folder
 
 _STEP_M = 1.0
@@ -108,5 +108,4 @@ def track_of_log(
 
 def _length_m(track: DrivenTrack) -> float:
     frame = LocalFrame(GeoPoint(float(track.lat_deg[0]), float(track.lon_deg[0])))
-    xy_m: Array = local_from_geo(frame, track.lat_deg, track.lon_deg)
-    return float(np.hypot(*np.diff(xy_m, axis=0).T).sum())
+    return length(local_from_geo(frame, track.lat_deg, track.lon_deg))

@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide
-from foretwin.geometry.polyline import arc_lengths, interpolated
+from foretwin.geometry.polyline import apart, arc_lengths, interpolated
 from foretwin.orchestrator.routing.rounding import (
     FINE_M,
     clip,
@@ -124,8 +124,8 @@ def _centre_line(route: Route, first: int, last: int) -> tuple[Array, Array]:
         points.append(line[keep])
         places.append(float(route.start_m[number]) + arc[keep])
     line, s = np.concatenate(points), np.concatenate(places)
-    apart = np.concatenate([[True], np.hypot(*np.diff(line, axis=0).T) > 0.05])
-    line, s = line[apart], s[apart]
+    kept = apart(line, tolerance_m=0.05)
+    line, s = line[kept], s[kept]
     bends = without_straight(line, s)
     return line[bends], s[bends]
 

@@ -9,6 +9,7 @@ import shapely
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.polyline import arc_lengths, interpolated, left_of, tangents
 from foretwin.geometry.turn_curves import turn_curves
 
@@ -54,8 +55,7 @@ def evenly_spaced(line: Array, s: Array) -> tuple[Array, Array]:
 def turns(line: Array) -> Array:
     """Return the turn in radians at each inner vertex, positive to the left."""
     legs = np.diff(line, axis=0)
-    turn = np.diff(np.arctan2(legs[:, 1], legs[:, 0]))
-    return np.asarray((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    return np.asarray(wrap_angle(np.diff(np.arctan2(legs[:, 1], legs[:, 0]))))
 
 
 def without_straight(line: Array, s: Array) -> list[int]:

@@ -10,6 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoutePose
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.geometry.polyline import locate, points_at
 from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, key_of, legality
 from foretwin.orchestrator.routing.route import Route, RouteError
@@ -90,10 +91,7 @@ class WayFinder:
 def away_m(route: Route, xy_m: Array) -> float:
     """Return how far a point (2,) lies from a route."""
     line = route.line(0, len(route.edges) - 1)
-    start, leg = line[:-1], np.diff(line, axis=0)
-    along = ((xy_m - start) * leg).sum(axis=1) / np.maximum((leg**2).sum(axis=1), 1e-9)
-    off = xy_m - (start + np.clip(along, 0.0, 1.0)[:, None] * leg)
-    return float(np.hypot(*off.T).min())
+    return float(np.hypot(*(xy_m - points_at(line, locate(line, xy_m)))))
 
 
 def _text(pose: RoutePose) -> str:

@@ -18,6 +18,7 @@ from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.placement import RecordedStart
 from foretwin.contracts.segments import first_left
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.polyline import kept_apart, length
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
 from foretwin.telemetry.estimator.estimator import estimator_of
@@ -146,10 +147,6 @@ def _line(states: list[VehicleState], stamps: list[int], place: int) -> Array | 
     )
     here = LocalFrame(states[place].position)
     xy = np.asarray(local_from_geo(here, degrees[:, 0], degrees[:, 1]))
-    kept = [0]
-    for index in range(1, len(xy)):
-        if np.hypot(*(xy[index] - xy[kept[-1]])) >= _STEP_M:
-            kept.append(index)
-    onward = xy[[place - first, *(index for index in kept if index > place - first)]]
-    ahead_m = float(np.hypot(*np.diff(onward, axis=0).T).sum())
-    return degrees[kept] if ahead_m >= _LEAST_M else None
+    kept = kept_apart(xy, least_m=_STEP_M)
+    onward = xy[[place - first, *kept[kept > place - first]]]
+    return degrees[kept] if length(onward) >= _LEAST_M else None

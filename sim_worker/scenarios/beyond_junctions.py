@@ -14,7 +14,7 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import Lane
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.geometry.polyline import arc_lengths, length, points_at
 from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
@@ -104,7 +104,7 @@ def place_in(
 
 def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
     """Yield the way along each lane, the longest lanes first, to be driven up to its end."""
-    order = sorted(lanes, key=lambda lane: (-arc_lengths(lane.centerline)[-1], lane.id))
+    order = sorted(lanes, key=lambda lane: (-length(lane.centerline), lane.id))
     for lane in order:
         way = network.lane_way(lane)
         yield way._replace(entry_m=max(way.entry_m, way.last_m - DEPARTURE_M))
@@ -174,7 +174,7 @@ def _no_bay(lane: Lane, network: RoadNetwork) -> str:
     if network.beside(lane, near=True) is not None:
         return "another lane lies between"
     half = _LEAST_M["parking_bay"] / 2.0
-    middle = float(arc_lengths(lane.centerline)[-1]) / 2.0
+    middle = length(lane.centerline) / 2.0
     if middle < half:
         return f"shorter than {_LEAST_M['parking_bay']:g} m"
     steps = np.diff(points_at(lane.centerline, middle + np.linspace(-half, half, 9)), axis=0)
@@ -197,7 +197,7 @@ class _Bay:
         self.shift_m = max(float(lane.width_m.value) / 2.0, 1.3) + _BAY_WIDTH_M / 2.0
         self._angle_rad = math.acos(1.0 - self.shift_m / (2.0 * _BAY_RADIUS_M))
         self.reach_m = 2.0 * _BAY_RADIUS_M * math.sin(self._angle_rad)
-        self._middle_m = float(arc_lengths(lane.centerline)[-1]) / 2.0
+        self._middle_m = length(lane.centerline) / 2.0
         ends = self._middle_m + _BAY_LENGTH_M / 2.0 * np.array([-1.0, 1.0])
         half = _BAY_WIDTH_M / 2.0
         sides = self._to_near * (self.shift_m + half * np.array([-1.0, 1.0]))

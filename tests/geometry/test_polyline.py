@@ -15,8 +15,10 @@ from foretwin.geometry.polyline import (
     evenly,
     headings_rad,
     interpolated,
+    kept_apart,
     length,
     locate,
+    meeting,
     offset,
     points_at,
     stretches,
@@ -85,6 +87,21 @@ def test_rows_between_known_ones_are_held_at_the_ends():
         interpolated(np.array([0.0, 15.0, 30.0]), known, rows), [rows[0], [1.0, 1.0, 6.0], rows[1]]
     )
     np.testing.assert_allclose(interpolated(15.0, known, rows), [1.0, 1.0, 6.0])
+
+
+def test_points_of_a_car_that_stands_are_left_out():
+    line = np.array([[0.0, 0.0], [0.3, 0.1], [0.6, 0.0], [0.9, 0.1], [5.0, 0.0]])
+    np.testing.assert_array_equal(kept_apart(line, least_m=0.5), [0, 2, 4])
+    np.testing.assert_array_equal(kept_apart(line[[0, 2, 4]], least_m=0.5), [0, 1, 2])
+
+
+@given(yaw=st.floats(0.1, 3.0), ahead=st.floats(-9.0, 9.0), behind=st.floats(0.5, 9.0))
+def test_lines_meet_where_both_of_them_pass(yaw, ahead, behind):
+    a, along = np.array([1.0, 2.0]), np.array([1.0, 0.0])
+    other = np.array([math.cos(yaw), math.sin(yaw)])
+    b = a + ahead * along - behind * other
+    assert meeting(a, along, b, other, parallel=1e-9) == pytest.approx((ahead, behind), abs=1e-6)
+    assert np.isnan(meeting(a, along, b, along, parallel=1e-9)).all()
 
 
 def test_vectors_of_any_shape_get_length_one_and_none_stays_none():

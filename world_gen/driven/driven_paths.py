@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths, cross, left_of, points_at, tangents, turn_rad
+from foretwin.geometry.polyline import cross, left_of, length, points_at, tangents, turn_rad
 from foretwin.geometry.steering import LEAST_GRID_RADIUS_M
 
 _SPACING_M = 0.5
@@ -29,7 +29,7 @@ def driven_path(drawn: Array, passes: Sequence[Array]) -> Array | None:
     of passes along it. How far aside they went is smoothed by a spline: least bend, and least
     distance from their mean.
     """
-    length_m = float(arc_lengths(drawn)[-1])
+    length_m = length(drawn)
     count = max(round(length_m / _SPACING_M), 6)
     line = points_at(drawn, np.linspace(0.0, length_m, count + 1))
     along = tangents(line)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.geometry.polyline import densified, tangents
+from foretwin.geometry.polyline import cross, densified, tangents
 from foretwin.world_gen.driven.passes import STEP_M, Pass
 
 MAP_ERROR_M = 1.2
@@ -107,7 +107,7 @@ class Lines:
         cos = self._along[rows] @ along
         gap = xy_m - self._xy[rows]
         d = self._along[rows]
-        ahead, left = (gap * d).sum(axis=1), d[:, 0] * gap[:, 1] - d[:, 1] * gap[:, 0]
+        ahead, left = (gap * d).sum(axis=1), cross(d, gap)
         fits = (np.abs(ahead) <= _SPACING_M) & (cos > _SAME_WAY_COS)
         rows, left, cos, ahead = rows[fits], left[fits], cos[fits], ahead[fits]
         order = np.lexsort((np.abs(ahead), self._line[rows]))

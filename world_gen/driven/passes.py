@@ -10,7 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.tracks import DrivenTrack
-from foretwin.geometry.polyline import apart, arc_lengths, points_at, units
+from foretwin.geometry.polyline import apart, kept_apart, length, points_at, units
 from foretwin.world_gen.extent import Extent
 
 STEP_M = 2.0
@@ -52,12 +52,8 @@ def passes_within(tracks: Iterable[DrivenTrack], frame: LocalFrame, extent: Exte
 def pass_along(xy_m: Array, *, std_m: float = 0.0) -> Pass | None:
     """Return places (N, 2) in driving order as a pass; None where they are no 20 m."""
     line = xy_m[apart(xy_m, tolerance_m=0.0)]
-    kept = [0]
-    for i in range(1, len(line)):
-        if np.hypot(*(line[i] - line[kept[-1]])) >= _STILL_M:
-            kept.append(i)
-    line = line[kept]
-    length_m = float(arc_lengths(line)[-1])
+    line = line[kept_apart(line, least_m=_STILL_M)]
+    length_m = length(line)
     if length_m < _LEAST_M:
         return None
     at_m = np.arange(0.0, length_m, STEP_M)

@@ -16,7 +16,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Lane, World
-from foretwin.geometry.polyline import apart, arc_lengths, mitres, unit
+from foretwin.geometry.polyline import apart, arc_lengths, length, mitres, unit
 from foretwin.world_gen.export.parallels import filled, parallel, untangled
 
 BLEND_M = 10.0
@@ -243,7 +243,7 @@ def _uncrossed(drawn: dict[str, Borders]) -> dict[str, Borders]:
         left, right = drawn[name]
         straight = Borders(*(filled(line[[0, -1]], len(line)).round(3) for line in (left, right)))
         tries = [Borders(straight.left, right), Borders(left, straight.right)]
-        if arc_lengths(left)[-1] > arc_lengths(right)[-1]:
+        if length(left) > length(right):
             tries.reverse()
         tries.append(straight)
         clean = (pair for pair, bad in zip(tries, crossing(tries), strict=True) if not bad)

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import unit, without_repeats
+from foretwin.geometry.polyline import cross, unit, without_repeats
 
 STRAIGHT_M = 3.0
 """Longer segments are taken for straight; the World samples its curves more densely."""
@@ -71,7 +71,7 @@ class Curve:
             s = np.clip(s + ((points - near) * direction).sum(axis=1), 0.0, self.length_m)
         near, direction = self.at(s)
         gap = points - near
-        return s, direction[:, 0] * gap[:, 1] - direction[:, 1] * gap[:, 0]
+        return s, cross(direction, gap)
 
 
 def fit_curve(line: Array, *, start: Array | None = None, end: Array | None = None) -> Curve:
@@ -230,7 +230,7 @@ def _fit(points: Array, heading: Array, toward: Array) -> list[Array]:
     on_curve, tangent = _evaluated(cubic, t[:, None])
     gap = points - on_curve
     size = np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)
-    aside = np.abs(tangent[:, 0] * gap[:, 1] - tangent[:, 1] * gap[:, 0]) / size
+    aside = np.abs(cross(tangent, gap)) / size
     if aside.max() <= FIT_M:
         return [cubic]
     middle = int(np.clip(aside.argmax(), 1, len(points) - 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import mitres
+from foretwin.geometry.polyline import meeting, mitres
 
 _SHORTEST_M = 0.002
 """Shorter steps vanish when coordinates are rounded to millimetres."""
@@ -70,12 +70,8 @@ def _meeting(first: Array, second: Array) -> tuple[int, int, Array] | None:
     """Return the farthest apart segments of two lines that cross, and where they do."""
     a, u = first[:-1, None], np.diff(first, axis=0)[:, None]
     b, v = second[None, :-1], np.diff(second, axis=0)[None]
-    det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-    gap = b - a
-    safe = np.where(np.abs(det) > 1e-12, det, np.inf)
-    s = (gap[..., 0] * v[..., 1] - gap[..., 1] * v[..., 0]) / safe
-    t = (gap[..., 0] * u[..., 1] - gap[..., 1] * u[..., 0]) / safe
-    inside = (np.abs(det) > 1e-12) & (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
+    s, t = meeting(a, u, b, v, parallel=1e-12)
+    inside = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
     if not inside.any():
         return None
     i, j = np.nonzero(inside)

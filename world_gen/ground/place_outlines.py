@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of, units
+from foretwin.geometry.polyline import left_of, meeting, units
 from foretwin.geometry.polyline_batch import Polylines, points_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
@@ -120,12 +120,8 @@ def _polygons(mouths: _Mouths, count: np.ndarray) -> np.ndarray:
     u = units(a - mouths.left_next)
     v = units((right - mouths.right_next)[after])
     b = right[after]
-    cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    gap = b - a
-    safe = np.where(np.abs(cross) > PARALLEL, cross, 1.0)
-    s = (gap[:, 0] * v[:, 1] - gap[:, 1] * v[:, 0]) / safe
-    t = (gap[:, 0] * u[:, 1] - gap[:, 1] * u[:, 0]) / safe
-    meets = (np.abs(cross) > PARALLEL) & (np.minimum(s, t) > SHARPEST_CORNER_M)
+    s, t = meeting(a, u, b, v, parallel=PARALLEL)
+    meets = np.minimum(s, t) > SHARPEST_CORNER_M
     meets &= (s < FARTHEST_CORNER_M) & (t < FARTHEST_CORNER_M)
     corner = np.where(meets[:, None], a + s[:, None] * u, (a + b) / 2)
     tangent = np.minimum(s, t)[:, None]

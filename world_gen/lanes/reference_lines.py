@@ -11,7 +11,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.bends import Rounded, rounded_through, thinned, without_end_kinks
-from foretwin.geometry.polyline import cut, left_of, points_at, units
+from foretwin.geometry.polyline import cut, left_of, length, points_at, units
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.polyline_batch import cut as cut_all
 from foretwin.world_gen.extent import stretches_inside
@@ -75,7 +75,7 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
         if not crossing:
             found.append(Stretch(index, line, True, True, before, after))
             continue
-        full_m = float(np.hypot(*np.diff(line, axis=0).T).sum())
+        full_m = length(line)
         for from_m, to_m in stretches_inside(line, around.extent):
             first, last = from_m == 0.0, abs(to_m - full_m) < 1e-9
             piece = line if first and last else cut(line, from_m, to_m)

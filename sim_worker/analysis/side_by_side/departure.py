@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.side_by_side import DisagreementKind
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, kept_apart
 
 _LEAST_WAY_M = 3.0
 """Ways are compared as far as both went, and not at all where that is less."""
@@ -116,14 +116,7 @@ def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
 
 def _moved(track: Array) -> Array:
     """Return the rows of a track (N, 4) that lie apart from those before."""
-    steps = np.diff(track[:, :2], axis=0)
-    if (np.hypot(steps[:, 0], steps[:, 1]) >= _MOVED_M).all():
-        return track
-    kept = [0]
-    for row in range(1, len(track)):
-        if np.hypot(*(track[row, :2] - track[kept[-1], :2])) >= _MOVED_M:
-            kept.append(row)
-    return track[kept]
+    return track[kept_apart(track[:, :2], least_m=_MOVED_M)]
 
 
 def _greatest(values: Array) -> float:

@@ -10,7 +10,14 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths, headings_rad, points_at, unit
+from foretwin.geometry.polyline import (
+    arc_lengths,
+    headings_rad,
+    kept_apart,
+    length,
+    points_at,
+    unit,
+)
 from tests.world_gen.truth.lane_model import LaneModel, Nearby
 
 STEP_M = 0.5
@@ -37,13 +44,8 @@ def driven(xy_m: Array) -> Driven:
 
     It turns where its direction changes by more than 20° within 10 m.
     """
-    kept = [0]
-    for i in range(1, len(xy_m)):
-        if np.hypot(*(xy_m[i] - xy_m[kept[-1]])) >= _STILL_M:
-            kept.append(i)
-    line = xy_m[kept]
-    length_m = arc_lengths(line)[-1]
-    even = points_at(line, np.arange(0.0, max(length_m, 2.0 * STEP_M), STEP_M))
+    line = xy_m[kept_apart(xy_m, least_m=_STILL_M)]
+    even = points_at(line, np.arange(0.0, max(length(line), 2.0 * STEP_M), STEP_M))
     smooth = np.stack(
         [gaussian_filter1d(even[:, k], _SMOOTH_M / STEP_M, mode="nearest") for k in (0, 1)], axis=1
     )
