@@ -12,7 +12,7 @@ import typer
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge, recover, repeat
+from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
 from foretwin.orchestrator.commands.cli_options import (
     DemOption,
     DialectOption,
@@ -251,7 +251,7 @@ def sweep(
     raise typer.Exit(run_sweep(spec, out=out, workers=workers, fresh=fresh, as_json=as_json))
 
 
-for about_logs in (convert, identify, gap, judge, recover, repeat):
+for about_logs in ABOUT_LOGS:
     app.command()(about_logs)
 
 app.command("set")(set_value)

@@ -110,3 +110,30 @@ def gap(
     from foretwin.orchestrator.commands.gap import report_gap
 
     report_gap(recording, vehicle=vehicle, as_json=as_json, out=out, declaration=declaration)
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="LOG_A", help="recorded drive")],
+    second: Annotated[
+        Path, typer.Argument(metavar="LOG_B", help="another of the same road, or LOG_A again")
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="all of it as JSON")] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for a picture")] = None,
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares LOG_A; else LOG_A.toml"),
+    ] = None,
+    other_declaration: Annotated[
+        Path | None,
+        typer.Option("--other-declaration", help="TOML that declares LOG_B; else LOG_B.toml"),
+    ] = None,
+) -> None:
+    """Compare two drives of one road: how far people differ where nothing is wrong."""
+    asked = locals()
+    from foretwin.orchestrator.commands.compare import compare as compare_drives
+
+    compare_drives(**asked)
+
+
+ABOUT_LOGS = (convert, identify, gap, compare, judge, recover, repeat)
+"""In the order in which help lists them."""
