@@ -77,6 +77,9 @@ _CERTIFICATES = {
 }
 """Why somebody came no further than its handshake, by what Zenoh's words hold; in order."""
 UNFINISHED = "an unfinished handshake"
+_HUNG_UP = re.compile(rb"(?:Read|Write) error on ")
+"""Who has gone before it was answered was turned away by nobody: a process of ours on a slow
+machine hangs up when its time to connect is over, and calls again."""
 
 
 class RouterLog:
@@ -190,7 +193,7 @@ class RouterLog:
     def _handshake(self, text: bytes) -> None:
         if (why := _word(_PASSWORDS, text)) is not None:
             self._count("", why)
-        elif not text.startswith(b"New transport link accepted"):
+        elif not (text.startswith(b"New transport link accepted") or _HUNG_UP.match(text)):
             self._count("", UNFINISHED)
 
     def _count(self, name: str, what: str, key: str = "") -> None:

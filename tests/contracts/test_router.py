@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -199,10 +200,24 @@ def test_who_shows_no_or_a_wrong_password_is_counted(
                 ZenohBus(BusSetup(endpoint=endpoint, credentials=str(file)))
         with pytest.raises(BusUnreachable):
             ZenohBus(BusSetup(endpoint=endpoint))
-        wait_for_count(tmp_path, 3)
         deadline_s = time.monotonic() + DEADLINE_S
         while {why for _, why, _ in counted(tmp_path)} != {*shown, "no password"}:
             assert time.monotonic() < deadline_s, counted(tmp_path)
+
+
+def test_who_hangs_up_is_not_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A member whose time to connect is over before the router gets a processor."""
+    with guarded(tmp_path) as (process, endpoint):
+        with monkeypatch.context() as hasty:
+            hasty.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
+            process.send_signal(signal.SIGSTOP)
+            with pytest.raises(BusUnreachable):
+                as_member(tmp_path, endpoint, "worker-w0")
+            process.send_signal(signal.SIGCONT)
+        with as_member(tmp_path, endpoint, "worker-w0") as worker:
+            worker._session.put(key("mirror", run="r1"), b"1")  # what is counted comes last
+            wait_for_count(tmp_path, 1)
+        assert {why for _, why, _ in counted(tmp_path)} == {"say"}
 
 
 def test_a_flood_of_what_is_refused_fills_nothing_and_holds_up_nobody(tmp_path: Path) -> None:

@@ -130,11 +130,26 @@ def test_certificates_tell_the_role() -> None:
         ("UsrPwd extension - Recv InitSyn. Expected extension. at usrpwd.rs:380.", "no password"),
         ("UsrPwd extension - Recv OpenSyn. Invalid password. at u.rs:424.", "a wrong password"),
         ("UsrPwd extension - Recv OpenSyn. Invalid user. at u.rs:418.", "an unknown name"),
-        ("peer closed connection without sending TLS close_notify", UNFINISHED),
+        (
+            "Decode error on link: unixsock-stream/bus => unixsock-stream/75 at l.rs:331.",
+            UNFINISHED,
+        ),
     ],
 )
 def test_handshakes_that_fail_are_counted_by_why(text: str, why: str) -> None:
     assert counted(record(text, target=ACCEPT, level="DEBUG")) == {("", why, ""): 1}
+
+
+@pytest.mark.parametrize(
+    "why",
+    [
+        "Read error on UnixSocketStream link bus => 4e80: early eof at unicast.rs:113.",
+        "Write error on UnixSocketStream link bus => f282: Broken pipe (os error 32) at u.rs:93.",
+        "Read error on TLS link: peer closed connection without sending TLS close_notify",
+    ],
+)
+def test_who_hangs_up_is_refused_by_nobody(why: str) -> None:
+    assert counted(record(why, target=ACCEPT, level="DEBUG")) == {}
 
 
 def test_one_that_is_let_in_is_no_refusal() -> None:
