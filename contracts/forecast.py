@@ -43,11 +43,34 @@ class ProgressForecast(msgspec.Struct, frozen=True, kw_only=True):
         return self.at(0.5)
 
 
+class ForecastOutcome(msgspec.Struct, frozen=True, kw_only=True):
+    """What came of a round's forecast at one instant, `horizon_s` after it began.
+
+    `share` is the part of the forecast that lay below what came. The CRPS of the forecast, of the
+    same before it was calibrated in this drive (`table`), and of the round's futures, all taken as
+    equally likely (`futures`).
+    """
+
+    round_id: int
+    stamp_ns: int
+    intersection_id: str
+    horizon_s: float
+    travelled_m: float
+    p10_m: float
+    p50_m: float
+    p90_m: float
+    share: float
+    crps_m: float
+    crps_table_m: float
+    crps_futures_m: float
+
+
 def rising(quantiles_m: Array) -> Array:
-    """Return quantiles (..., Q) in order, and apart."""
-    spread = LEAST_APART_M * np.arange(quantiles_m.shape[-1])
-    ordered: Array = np.sort(quantiles_m, axis=-1)
-    return np.asarray(np.maximum.accumulate(ordered - spread, axis=-1) + spread)
+    """Return quantiles (T, Q) as distances have them: in order and apart, none below 0, and none
+    less than at an instant before."""
+    ordered = np.maximum.accumulate(np.maximum(np.sort(quantiles_m, axis=1), 0.0), axis=0)
+    spread = LEAST_APART_M * np.arange(quantiles_m.shape[1])
+    return np.asarray(np.maximum.accumulate(ordered - spread, axis=1) + spread)
 
 
 def share_below(levels: Array, quantiles: Array, values: Array) -> Array:

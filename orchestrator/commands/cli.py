@@ -26,6 +26,7 @@ from foretwin.orchestrator.commands.cli_options import (
     TracksOption,
     TuningOption,
 )
+from foretwin.orchestrator.commands.cli_progress import learn_progress
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_secure import doctor
 from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
@@ -251,7 +252,7 @@ def sweep(
     raise typer.Exit(run_sweep(spec, out=out, workers=workers, fresh=fresh, as_json=as_json))
 
 
-for about_logs in ABOUT_LOGS:
+for about_logs in (*ABOUT_LOGS, learn_progress):
     app.command()(about_logs)
 
 app.command("set")(set_value)

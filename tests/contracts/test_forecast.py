@@ -57,13 +57,18 @@ def test_shares_rise_from_nothing_to_all_however_far_away_a_value_is() -> None:
 
 
 @given(
-    st.lists(st.floats(-50.0, 50.0), min_size=3, max_size=20).map(lambda found: np.array([found]))
+    st.lists(st.lists(st.floats(-50.0, 50.0), min_size=5, max_size=5), min_size=1, max_size=8).map(
+        np.array
+    )
 )
-def test_quantiles_that_cross_are_put_in_order_and_apart(crossed: np.ndarray) -> None:
+def test_quantiles_that_cross_are_put_in_order_and_apart_and_no_car_goes_back(
+    crossed: np.ndarray,
+) -> None:
     found = rising(crossed)
 
-    assert (np.diff(found) >= LEAST_APART_M - 1e-9).all()
-    assert found[0, 0] == crossed.min()
+    assert (np.diff(found, axis=1) >= LEAST_APART_M - 1e-9).all()
+    assert (np.diff(found, axis=0) >= -1e-9).all()
+    assert found[0, 0] == max(crossed[0].min(), 0.0)
 
 
 def test_twice_the_mean_loss_is_the_crps() -> None:

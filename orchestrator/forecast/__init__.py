@@ -1,0 +1,1 @@
+"""How far the car will get in the next seconds: learnt from drives, calibrated while driving."""

@@ -1,0 +1,100 @@
+"""Learning how far a car gets, from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.drive import VehicleState
+from foretwin.orchestrator.commands.cli import EXIT_USER, run
+from foretwin.orchestrator.forecast.progress_model import SHIPPED_TABLE
+from foretwin.orchestrator.forecast.quantile_trees import read_trees
+from tests.orchestrator.forecast.town_drives import town_states
+
+COVERS = ("foretwin.orchestrator.commands.cli_progress",)
+DECLARED = """
+reference_point = "base_link"
+[time]
+column = "t"
+unit = "s"
+base = "log"
+[position]
+frame = "wgs84"
+latitude = { column = "lat", unit = "deg" }
+longitude = { column = "lon", unit = "deg" }
+"""
+
+
+def log_of(states: list[VehicleState], file: Path) -> Path:
+    lines = ["t,lat,lon"]
+    for one in states:
+        place = one.position
+        lines.append(f"{one.stamp_ns / 1e9:.3f},{place.lat_deg:.9f},{place.lon_deg:.9f}")
+    file.write_text("\n".join(lines) + "\n")
+    Path(f"{file}.toml").write_text(DECLARED)
+    return file
+
+
+def logs(folder: Path, *, minutes: float) -> list[Path]:
+    return [
+        log_of(list(town_states(seed=seed, minutes=minutes)), folder / f"drive{seed}.csv")
+        for seed in (1, 2)
+    ]
+
+
+def test_a_table_is_learnt_checked_and_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("sklearn", reason="the extra `learn` is not installed")
+    mine, other = logs(tmp_path, minutes=5.0)
+    out = tmp_path / "mine.npz"
+
+    assert run(["learn-progress", str(mine), "--out", str(out), "--check", str(other)]) == 0
+    told = capsys.readouterr().out
+    assert "learnt from drive1" in told
+    assert "drive2" in told
+    assert read_trees(out).words == {"drives": "drive1", "licence": "of the drives' owner"}
+
+
+def test_the_shipped_table_is_checked_on_ones_own_drive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = logs(tmp_path, minutes=3.0)[1]
+
+    assert run(["learn-progress", "--check", str(drive), "--json"]) == 0
+    (told,) = json.loads(capsys.readouterr().out).values()
+    assert 0.4 < told["p10_p90_coverage"] < 1.0
+    assert told["count"] > 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["LOG"], "--out FILE"),
+        ([], "nothing to do"),
+        (["LOG", "--out", "t.npz", "--check", "LOG"], "proves nothing"),
+        (["--check", "LOG", "--table", "LOG"], "no table of progress"),
+        (["missing.csv", "--out", "t.npz"], "missing.csv"),
+    ],
+)
+def test_mistakes_are_one_line(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    log = str(logs(tmp_path, minutes=0.5)[0])
+
+    assert run(["learn-progress", *(log if a == "LOG" else a for a in arguments)]) == EXIT_USER
+    told = capsys.readouterr().err
+    assert said in told.replace("\n", " ")
+
+
+def test_the_shipped_table_says_whose_drives_it_was_learnt_from() -> None:
+    words = read_trees(SHIPPED_TABLE).words
+    notice = SHIPPED_TABLE.with_suffix(".LICENSE.txt").read_text(encoding="utf-8")
+
+    assert "CC BY-SA 4.0" in words["licence"]
+    for drive in words["drives"].split(", "):
+        assert drive in notice

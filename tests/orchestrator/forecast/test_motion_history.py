@@ -1,0 +1,78 @@
+"""What is remembered of a car's motion."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.orchestrator.forecast.motion_history import KEPT_S, MotionHistory
+
+S = 1_000_000_000
+
+
+def driven(*speeds: tuple[float, float]) -> MotionHistory:
+    history = MotionHistory()
+    for time_s, speed in speeds:
+        history.take(round(time_s * S), speed)
+    return history
+
+
+def test_a_car_that_speeds_up_steadily_goes_half_its_speed_times_the_time() -> None:
+    history = driven(*((k / 10, k / 10) for k in range(41)))
+
+    assert history.now is not None
+    assert history.now.travelled_m == pytest.approx(8.0)
+    assert history.travelled_at(round(3.95 * S)) == pytest.approx(7.805, abs=0.01)
+    assert history.speeds_mps(np.array([0.5, 4.0, 4.5])) == pytest.approx(
+        [3.5, 0.0, np.nan], nan_ok=True
+    )
+    assert history.since_standing_s == pytest.approx(3.6)
+
+
+def test_backwards_is_travelled_too() -> None:
+    history = driven((0, -2.0), (1, -2.0))
+
+    assert history.now is not None
+    assert history.now.travelled_m == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("next_s", [-5.0, 12.1])
+def test_after_a_hole_or_a_step_back_everything_begins_anew(next_s: float) -> None:
+    history = driven((9, 5.0), (10, 5.0), (next_s, 5.0))
+
+    assert history.now is not None
+    assert (history.now.travelled_m, history.now.stretch) == (0.0, 1)
+    assert history.speeds_mps(np.array([1.0])) == pytest.approx([np.nan], nan_ok=True)
+
+
+def test_the_same_instant_twice_counts_once() -> None:
+    history = driven((0, 5.0), (1, 5.0), (1, 50.0))
+
+    assert history.now is not None
+    assert history.now.travelled_m == pytest.approx(5.0)
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(-5.0, 60.0)), max_size=80))
+def test_what_is_remembered_has_an_end_and_the_way_only_grows(steps: list) -> None:
+    history, time_s, before = MotionHistory(), 0.0, None
+    for step_s, speed in steps:
+        time_s += step_s
+        history.take(round(time_s * S), speed)
+        assert history.now is not None
+        if before is not None and before.stretch == history.now.stretch:
+            assert history.now.travelled_m >= before.travelled_m
+        before = history.now
+        assert history._kept[-1][0] - history._kept[0][0] <= KEPT_S * S
+
+
+def test_a_copy_goes_on_alike() -> None:
+    one = driven(*((k / 10, 3.0) for k in range(20)))
+    other = copy.deepcopy(one)
+    for history in (one, other):
+        history.take(3 * S, 4.0)
+
+    assert one.now == other.now
