@@ -108,6 +108,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     what is found counts (apply) or is only told: a simulation that nobody has asked to change
     stays that of the vehicle file. None is `report` in lock step and where workers have a
     processor each, else `off`."""
+    progress_table: str | None = None
+    """What `foretwin learn-progress` learnt, for how far the car will get in the next seconds;
+    None is the table that comes along, `off` is no forecast."""
     map_aiding: MapAiding = "auto"
     """Whether the map's roads help to find the car where its positions are rougher than they."""
     follow: FollowLimits = FollowLimits()

@@ -9,6 +9,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.signals import LearntSignal
+from foretwin.contracts.world import Control
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,8 @@ Instruction = BuildWorld | UseWorld | Notice
 class RoundIntent:
     """A round that should run now: in which World, along which path, at which speed.
 
-    For `off_lanes_m` the path is driven in the World along none of its lanes.
+    For `off_lanes_m` the path is driven in the World along none of its lanes. `next_junction` is
+    how the next one is controlled, and how far its centre is.
     """
 
     junction_id: str
@@ -55,6 +57,7 @@ class RoundIntent:
     speed_ahead_mps: Array
     """(K,) what the nominal future aims at from instant to instant; see `Job`."""
     off_lanes_m: float = 0.0
+    next_junction: tuple[Control, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

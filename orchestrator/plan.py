@@ -19,6 +19,7 @@ from foretwin.contracts.trace import TRACE_PARTS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.campaign.joining import admission
 from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
+from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
@@ -67,6 +68,8 @@ class DriveInputs:
     standin: StandinPath | None
     ros2: MappingFile | None = None
     """How the live car's ROS 2 topics are read, and what goes back."""
+    progress: ProgressModel | None = None
+    """What forecasts how far the car will get; None where nobody wants to know."""
 
     @property
     def towards_vehicle(self) -> bool:

@@ -23,6 +23,7 @@ from foretwin.orchestrator.campaign.joining import check_campaign
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
+from foretwin.orchestrator.forecast.progress_model import progress_of
 from foretwin.orchestrator.plan import DriveInputs, DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import scenarios_of
 from foretwin.orchestrator.routing.line_matching import match_line
@@ -62,6 +63,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
+    progress = progress_of(config.progress_table)
     ros2 = read_ros2(config)
     if config.secure is not None and config.endpoint is not None:
         check_campaign(Path(config.secure), config.endpoint, car=starts_a_car(config))
@@ -124,6 +126,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         info=info,
         standin=standin,
         ros2=ros2,
+        progress=progress,
     )
 
 

@@ -97,7 +97,7 @@ class ProgressLine:
             arrival_in_s=ahead[1] if ahead else None,
             futures_per_s=rate,
             dropped=conductor.mailbox.dropped + conductor.tables.dropped,
-            too_slow=conductor.rounds.short_of,
+            too_slow=conductor.rounds.pace.short_of,
             memory_mb=sum(conductor.context.memory.now_mb.values()) or None,
         )
 

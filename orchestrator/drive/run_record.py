@@ -64,6 +64,7 @@ def run_record(
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
         "comparison": conductor.rounds.comparisons.record(independent=independent),
+        "calibration": conductor.rounds.forecast_count.record(),
         "plan_comparison": conductor.rounds.plans.record(),
         "side_by_side": conductor.ads.record(),
         "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),

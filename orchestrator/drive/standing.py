@@ -21,6 +21,8 @@ from foretwin.orchestrator.drive.live_loop import RoundGrid
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR
 from foretwin.orchestrator.drive.side_by_side_handler import BesideStanding
+from foretwin.orchestrator.forecast.calibration import Calibration
+from foretwin.orchestrator.forecast.motion_history import MotionHistory
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
 from foretwin.orchestrator.record.kept_parts import read_removed
 from foretwin.orchestrator.record.ledger import RoundTally
@@ -57,6 +59,8 @@ class HeardStanding:
     samples: TelemetryCount
     skipped: int
     estimator: StateEstimator | None
+    history: MotionHistory | None
+    calibration: Calibration | None
     refusals: Refusals
     refusals_told: set[tuple[bool, str, str]]
     strangers: int
@@ -89,12 +93,14 @@ class DriveStanding:
 
 def heard_of(conductor: Conductor) -> bytes:
     """Return what a drive has heard, for `standing_of`: the estimator is by far the most of it."""
-    intake = conductor.intake
+    intake, progress = conductor.intake, conductor.rounds.progress
     return pickle.dumps(
         HeardStanding(
             samples=intake.counts,
             skipped=intake.refused,
             estimator=intake.estimator,
+            history=None if progress is None else progress.history,
+            calibration=None if progress is None else progress.calibration,
             refusals=conductor.refusals.counted,
             refusals_told=conductor.refusals.told,
             strangers=conductor.strangers.count,
@@ -182,6 +188,8 @@ def go_on(
     intake.counts, intake.refused = heard.samples, heard.skipped
     if heard.estimator is not None and not crashed:
         intake.go_on(heard.estimator)
+        if conductor.rounds.progress and heard.history and heard.calibration:
+            conductor.rounds.progress.go_on(heard.history, heard.calibration)
     conductor.refusals.counted = heard.refusals
     conductor.refusals.told = heard.refusals_told
     conductor.strangers.count = heard.strangers
@@ -208,6 +216,7 @@ def _go_on_with_rounds(conductor: Conductor, standing: RoundsStanding, results: 
     """Count on: what was open, or in no table yet, when the one before died, is lost."""
     rounds, counts = conductor.rounds, counted_in_tables(results)
     rounds.futures, rounds.comparisons, rounds.plans = counts[:3]
+    rounds.forecast_count = counts.forecasts
     rounds.futures.off_lanes_rounds = standing.off_lanes_rounds
     rounds.windows.go_on(kept_windows(results).windows, conductor.worlds.world)
     rounds.next_round_id = max(standing.next_round_id, counts.last_round_id + 1)

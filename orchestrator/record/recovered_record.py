@@ -18,6 +18,7 @@ from foretwin.orchestrator.record.bookkeeping import (
     PlanCount,
     percentile,
 )
+from foretwin.orchestrator.record.forecast_count import ForecastCount
 from foretwin.orchestrator.record.kept_parts import kept_record, read_removed
 from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.ledger import JobsLedger, RoundsLedger
@@ -33,7 +34,8 @@ RECORDING = "drive.mcap"
 _JOINING = ("endpoint", "credentials")
 """How a drive was spoken to while it went on."""
 _TOLD_WHILE_DRIVING = (
-    *("changes", "telemetry", "tuning", "comparison", "plan_comparison", "side_by_side"),
+    *("changes", "telemetry", "tuning", "comparison", "calibration", "plan_comparison"),
+    "side_by_side",
     *("agreement", "orchestrator", "workers", "dropped", "refused", "troubles", "off_road"),
     *("memory", "left_out", "wall_s"),
 )
@@ -47,6 +49,7 @@ class TableCounts(NamedTuple):
     futures: FuturesCount
     comparisons: ComparisonCount
     plans: PlanCount
+    forecasts: ForecastCount
     last_round_id: int = -1
     last_round_s: float | None = None
 
@@ -73,7 +76,9 @@ def counted_in_tables(results: Path) -> TableCounts:
     plans = kept_rows(results, "plan_comparisons", *columns)
     last = (rounds[-1]["round_id"], rounds[-1]["drive_time_s"]) if rounds else ()
     counted = PlanCount(RunningMeans([row[name] for name in columns] for row in plans))
-    return TableCounts(futures, comparisons, counted, *last)
+    forecasts = ForecastCount()
+    forecasts.take_rows(kept_rows(results, "forecasts"))
+    return TableCounts(futures, comparisons, counted, forecasts, *last)
 
 
 def recovered_record(
@@ -99,7 +104,9 @@ def recovered_record(
         "telemetry": _telemetry(run, heard, torn=torn),
         **_rounds_and_jobs(run / RESULTS, (said.get("ledger") or {})),
     }
-    can_be_none = {"plan_comparison", "side_by_side"} if so_far is not None else set()
+    can_be_none = (
+        {"calibration", "plan_comparison", "side_by_side"} if so_far is not None else set()
+    )
     windows = kept_rows(run / RESULTS, "windows", "round_id")
     can_be_none |= set() if windows else {"agreement"}
     unknown = [n for n in _TOLD_WHILE_DRIVING if told[n] is None and n not in can_be_none]
@@ -118,6 +125,8 @@ def _told_by_tables(run: Path, said: Mapping[str, Any]) -> dict[str, Any]:
     told["state_to_result_ms_p95"] = percentile(counts.futures.latencies_ms, 95)
     if "plan_comparisons.parquet" not in gone and counts.plans.rows.count:
         told["plan_comparison"] = counts.plans.record()
+    if "forecasts.parquet" not in gone and counts.forecasts.rows.count:
+        told["calibration"] = counts.forecasts.record()
     if "junctions.parquet" not in gone:
         told["intersections"] = visited_junctions(results).records
     mirror = kept_rows(results, "mirror", "independent")

@@ -13,6 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from foretwin.contracts.errors import one_line
+from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.gap import GapSample
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.contracts.simulation import (
@@ -53,6 +54,7 @@ _FLIP = "flip_{0}_factor:float flip_{0}_m:float"
 
 _COLUMNS = {
     "comparisons": columns_of(Comparison),
+    "forecasts": columns_of(ForecastOutcome),
     "plan_comparisons": {
         **columns_of(PlanComparison, PLAN),
         **columns_of(HorizonError),
@@ -137,8 +139,7 @@ class ResultTables:
         self._queue: queue.Queue[tuple[str, Rows] | None] = queue.Queue(QUEUE_DEPTH)
         self._lossless, self._roll = lossless, (keep or Keep()).tables
         self._kept = KeptParts(folder.parent, keep or Keep())
-        self._left = False
-        self._dropped = 0
+        self._left, self._dropped = False, 0
         self.lost_before = 0
         """Rows that an orchestrator before this one could not write."""
         self.troubles: list[str] = []

@@ -8,17 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.drive import PlannedTrajectory, VehicleState
 from foretwin.contracts.frames import (
     LocalFrame,
     local_from_geo,
     local_from_geo_yaw,
     target_from_source,
 )
-from foretwin.contracts.simulation import HORIZONS_S, Comparison
+from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.contracts.trace import traced
+from foretwin.contracts.world import World
+from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
 from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
-from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
+from foretwin.sim_worker.metrics.comparison import (
+    ActualTrack,
+    NominalTrack,
+    compare_nominal,
+    compare_plan,
+)
 
 LEAD_NS = 1_000_000_000
 """How much of the real track before a future's beginning goes into its comparison."""
@@ -114,6 +122,28 @@ class OpenComparisons:
         while len(self._stamps_ns) > 2 and self._stamps_ns[1] < oldest:
             self._stamps_ns.popleft()
             self._poses.popleft()
+
+
+def plan_compared(
+    done: RoundDone,
+    plan: PlannedTrajectory | None,
+    state: VehicleState,
+    path: PathAhead,
+    world: World,
+) -> PlanComparison | None:
+    """Return the car's own plan against a round's nominal future, None where it sent none lately.
+
+    `state` and `path` are those that the round began with.
+    """
+    if plan is None or state.stamp_ns - plan.stamp_ns > PLAN_FRESH_NS:
+        return None
+    return compare_plan(
+        plan,
+        done.results[0].trajectory,
+        path,
+        world_frame=world.frame,
+        round_id=done.order.round_id,
+    )
 
 
 def _shift_m(state: VehicleState) -> Array:

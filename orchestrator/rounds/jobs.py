@@ -31,6 +31,7 @@ from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.path_from_car import led_from_car
+from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from foretwin.orchestrator.rounds.seen_users import near_car
 from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures
 from foretwin.sim_worker.metrics.table import ROW_METRICS
@@ -43,8 +44,6 @@ HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
 """An older plan of the car is not compared with a new future, nor followed in one."""
 _KEPT_WORLDS = 8
-CRITICAL = 0.3
-"""From this criticality on (see `views.round_view`) a future is one to look at again."""
 LEAST_IN_JOB = 16
 """A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
 
@@ -88,10 +87,10 @@ class RoundPlanner:
         self._vehicle_digest = vehicle_digest(vehicle)
 
     def take_worst(self, futures: Sequence[Future], criticality: Array32) -> None:
-        """Keep of a round's futures the critical ones, the worst first: where the next round runs
-        fewer, these come first."""
+        """Keep of a round's futures those in which somebody is hit or nearly so, the worst first:
+        where the next round runs fewer, these come first."""
         worst = np.argsort(-criticality, kind="stable")
-        self._worst = tuple(futures[i] for i in worst if criticality[i] >= CRITICAL)
+        self._worst = tuple(futures[i] for i in worst if criticality[i] > 0.0)
 
     def draw_cases(self) -> None:
         """Draw the cases of all scenarios: before the drive, not in its first round."""
@@ -109,8 +108,9 @@ class RoundPlanner:
         *,
         start_stamp_ns: int,
         count: int,
+        progress: ProgressForecasts | None = None,
     ) -> tuple[Job, ...]:
-        """Return the jobs of a round of `count` futures."""
+        """Return the jobs of a round of `count` futures, with what `progress` forecasts."""
         config = self._config
         scenarios = self._fitting(world, intent.path)
         planned = self._futures_with(scenarios)
@@ -119,6 +119,9 @@ class RoundPlanner:
         signals = _signals(reports.signals, state)
         car_plan = _car_plan(reports.plan, state, world.frame)
         path = _begun_by_car(intent.path, state, world.frame)
+        forecast = None
+        if progress is not None:
+            forecast = progress.forecast(round_id, intent, state, users, world.frame)
         jobs = []
         for index, mine in enumerate(self._cut(futures)):
             named = {future.scenario_id for future in mine}
@@ -146,6 +149,7 @@ class RoundPlanner:
                     accident_motion=False,
                     vehicle=self._vehicle_digest,
                     vehicle_version=self._vehicle_version,
+                    progress=msgspec.UNSET if forecast is None else forecast,
                 )
             )
         return tuple(jobs)

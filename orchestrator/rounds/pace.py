@@ -139,6 +139,14 @@ class RoundPace:
         """Whether less is run than was asked for."""
         return self.now != self._paces[0]
 
+    @property
+    def short_of(self) -> str:
+        """What is run of what was asked for; empty where it is all."""
+        if not self.slowed:
+            return ""
+        rarely = "" if self.now.one_of == 1 else f" in 1 of {self.now.one_of} rounds"
+        return f"{self.now.futures} of {self._paces[0].futures} futures{rarely}"
+
     def take(self, pace: Pace, seconds: float, by: Collection[Played] = ()) -> bool:
         """Count a round that is complete or given up; returns whether the pace changes.
 

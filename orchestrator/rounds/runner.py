@@ -11,7 +11,7 @@ from typing import NamedTuple
 from foretwin.contracts.bus import Reply
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState
 from foretwin.contracts.runner import Answer
-from foretwin.contracts.simulation import Comparison
+from foretwin.contracts.simulation import Comparison, PlanComparison
 from foretwin.contracts.trace import since, traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -22,17 +22,18 @@ from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports, LatestState, Notice, RoundIntent
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.columns import row_of
+from foretwin.orchestrator.record.forecast_count import ForecastCount
 from foretwin.orchestrator.record.job_tables import VehicleKeeper, job_row, road_user_rows
 from foretwin.orchestrator.record.ledger import RoundTally
 from foretwin.orchestrator.record.result_rows import plan_row, round_futures, round_row
-from foretwin.orchestrator.rounds.comparisons import OpenComparisons
-from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
+from foretwin.orchestrator.rounds.comparisons import OpenComparisons, plan_compared
+from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.rounds.news import RoundNews
 from foretwin.orchestrator.rounds.pace import Pace, Played, RoundPace
+from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
 from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
-from foretwin.sim_worker.metrics.comparison import compare_plan
 
 log = logging.getLogger("orchestrator")
 
@@ -90,15 +91,10 @@ class RoundRunner:
         self._seeds: dict[int, _Seed] = {}
         self._slow_reported = False
         self._news = RoundNews(self._tell)
-
-    @property
-    def short_of(self) -> str:
-        """What is run of what was asked for; empty where it is all."""
-        if not self.pace.slowed:
-            return ""
-        now = self.pace.now
-        rarely = "" if now.one_of == 1 else f" in 1 of {now.one_of} rounds"
-        return f"{now.futures} of {self._plan.config.futures} futures{rarely}"
+        self.forecast_count = ForecastCount()
+        self.progress = None
+        if plan.progress is not None:
+            self.progress = ProgressForecasts(plan.progress, horizon_s=plan.config.horizon_s)
 
     def start(
         self,
@@ -122,6 +118,7 @@ class RoundRunner:
             self._world_of(intent.world_id),
             start_stamp_ns=self.start_stamp_ns,
             count=pace.futures,
+            progress=self.progress,
         )
         self._seeds[round_id] = _Seed(latest.state, reports.plan, intent, pace)
         order = RoundOrder(
@@ -217,6 +214,10 @@ class RoundRunner:
         """Add where the car is: comparisons fall due."""
         for comparison in self._open_comparisons.take_state(state):
             self._keep(comparison)
+        if self.progress is not None:
+            settled = self.progress.take_state(state, self.start_stamp_ns)
+            self.forecast_count.take(settled)
+            self._tables.add("forecasts", [row_of(one) for one in settled])
 
     def finish(self) -> None:
         """Compare what can still be compared at the drive's end."""
@@ -255,10 +256,14 @@ class RoundRunner:
         self._context.publish("round", view)
         self._planner.take_worst(order.futures, view.criticality)
         self._news.planners(done)
+        if self.progress is not None:
+            self.progress.take_round(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
-            self._compare_plans(done, seed, world)
+            self._keep_plan(
+                done, plan_compared(done, seed.plan, seed.state, seed.intent.path, world)
+            )
 
     def _take_time(self, pace: Pace, seconds: float, by: tuple[Played, ...] = ()) -> None:
         """Count how long a round took, and tell where the next ones have another pace."""
@@ -268,27 +273,19 @@ class RoundRunner:
             self._tell(Notice("info", "the machine keeps up: all futures in every round again"))
             return
         text = (
-            f"{self.short_of} from now on: the machine is too slow for all at "
+            f"{self.pace.short_of} from now on: the machine is too slow for all at "
             f"{self._plan.config.rate_hz:g} Hz"
         )
         self._tell(Notice("info" if self._slow_reported else "warning", text))
         self._slow_reported = True
 
-    def _compare_plans(self, done: RoundDone, seed: _Seed, world: World) -> None:
-        if seed.plan is None or seed.state.stamp_ns - seed.plan.stamp_ns > PLAN_FRESH_NS:
+    def _keep_plan(self, done: RoundDone, compared: PlanComparison | None) -> None:
+        if compared is None:
             return
-        compared = compare_plan(
-            seed.plan,
-            done.results[0].trajectory,
-            seed.intent.path,
-            world_frame=world.frame,
-            round_id=done.order.round_id,
-        )
-        if compared is not None:
-            self.plans.take(compared)
-            self._tables.add("plan_comparisons", [plan_row(compared)])
-            if not done.late:
-                self._context.publish("plan_comparison", compared)
+        self.plans.take(compared)
+        self._tables.add("plan_comparisons", [plan_row(compared)])
+        if not done.late:
+            self._context.publish("plan_comparison", compared)
 
     def _keep(self, comparison: Comparison) -> None:
         self.comparisons.take(comparison)

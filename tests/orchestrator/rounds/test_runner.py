@@ -147,7 +147,7 @@ def test_when_the_machine_keeps_up_again_that_is_said_too(
     assert (told[-1].level, told[-1].text) == (
         "info", "the machine keeps up: all futures in every round again",
     )  # fmt: skip
-    assert house.conductor.rounds.short_of == ""
+    assert house.conductor.rounds.pace.short_of == ""
 
 
 def test_after_its_longest_horizon_a_round_is_compared(tmp_path: Path) -> None:

@@ -1,0 +1,188 @@
+"""Forecasts of the car's progress: one for each round, and what came of those of complete ones."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.forecast import ForecastOutcome, ProgressForecast, pinball
+from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.futures import SeenRoadUser
+from foretwin.contracts.trace import traced
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.orchestrator.forecast.calibration import Calibration, shares_of
+from foretwin.orchestrator.forecast.features import (
+    CONTROLS,
+    AheadFacts,
+    bends_ahead,
+    feature_row,
+    lead_on,
+)
+from foretwin.orchestrator.forecast.motion_history import MotionHistory
+from foretwin.orchestrator.forecast.progress_model import ProgressModel
+from foretwin.orchestrator.instructions import RoundIntent
+from foretwin.orchestrator.runner.open_rounds import RoundDone
+from foretwin.sim_worker.driver_model import STANDING_MPS
+from foretwin.sim_worker.futures.likelihood import travelled_m
+
+_CAR_WITHIN_M = 60.0
+"""The car is looked for on this much of the path's beginning."""
+
+
+class _Given(NamedTuple):
+    """A round's forecasts: as the table has it, calibrated, and as its futures spread (T, Q)."""
+
+    table: ProgressForecast
+    told: ProgressForecast
+    stamp_ns: int
+    travelled_m: float
+    stretch: int
+
+
+class _NotYet(NamedTuple):
+    """One instant of a complete round, not yet come."""
+
+    due_ns: int
+    instant: int
+    round_id: int
+    intersection_id: str
+    given: _Given
+    futures: Array
+
+
+class ProgressForecasts:
+    """Takes states and rounds in their order; the same order gives the same bits."""
+
+    def __init__(self, model: ProgressModel, *, horizon_s: float) -> None:
+        self._model = model
+        self._instants = [k for k, t in enumerate(model.time_s) if t <= horizon_s + 1e-9]
+        self.history = MotionHistory()
+        self.calibration = Calibration(len(model.time_s))
+        self._given: dict[int, _Given] = {}
+        self._waiting: deque[_NotYet] = deque()
+
+    def go_on(self, history: MotionHistory, calibration: Calibration) -> None:
+        """Forecast on from what another orchestrator's forecasts had come to."""
+        self.history, self.calibration = history, calibration
+
+    def take_state(self, state: VehicleState, start_stamp_ns: int) -> list[ForecastOutcome]:
+        """Add how the car moves; return what this settles."""
+        drive_time_s = (state.stamp_ns - start_stamp_ns) / 1e9
+        self.history.take(state.stamp_ns, state.speed_mps)
+        found, still = [], deque[_NotYet]()
+        for one in self._waiting:
+            now = self.history.now
+            assert now is not None
+            if one.given.stretch != now.stretch:
+                continue  # nobody knows how far it went meanwhile
+            if one.due_ns > now.stamp_ns:
+                still.append(one)
+                continue
+            found.append(self._settled(one, drive_time_s))
+        self._waiting = still
+        return found
+
+    @traced("forecast of a round")
+    def forecast(
+        self,
+        round_id: int,
+        intent: RoundIntent,
+        state: VehicleState,
+        users: tuple[SeenRoadUser, ...],
+        frame: LocalFrame,
+    ) -> ProgressForecast | None:
+        """Return how far the car will get from its newest state, which this round begins with.
+
+        `users` are in the World's frame, as the intent's path. None before any motion is known.
+        """
+        now = self.history.now
+        if now is None:
+            return None
+        features = feature_row(
+            self.history,
+            accel_mps2=state.accel_mps2,
+            yaw_rate_radps=state.yaw_rate_radps,
+            ahead=_ahead(intent, state, users, frame),
+        )
+        table = self._model.forecast(features)
+        told = table
+        if now.speed_mps >= STANDING_MPS:
+            told = self.calibration.calibrated(table)
+            given = _Given(table, told, now.stamp_ns, now.travelled_m, now.stretch)
+            self._given[round_id] = given
+        return told
+
+    def take_round(self, done: RoundDone) -> None:
+        """Take a complete round: its forecast counts from when its instants have come."""
+        order = done.order
+        given = self._given.pop(order.round_id, None)
+        self._given = {r: one for r, one in self._given.items() if r > order.round_id}
+        if given is None:
+            return
+        spread = _spread_of_futures(done, given.told, self._instants)
+        for instant in self._instants:
+            due_ns = given.stamp_ns + round(self._model.time_s[instant] * 1e9)
+            self._waiting.append(
+                _NotYet(due_ns, instant, order.round_id, order.junction_id, given, spread[instant])
+            )
+
+    def _settled(self, one: _NotYet, drive_time_s: float) -> ForecastOutcome:
+        given, k = one.given, one.instant
+        travelled = self.history.travelled_at(one.due_ns) - given.travelled_m
+        came = np.full((len(given.table.time_s), 1), travelled)
+        self.calibration.take(k, drive_time_s, float(shares_of(given.table, came)[k, 0]))
+        levels = np.array(given.told.levels)
+        sides = np.stack([given.told.distance_m[k], given.table.distance_m[k], one.futures])
+        crps = 2.0 * pinball(levels, sides, np.full(3, travelled)).mean(axis=1)
+        p10, p50, p90 = (float(given.told.at(level)[k]) for level in (0.1, 0.5, 0.9))
+        return ForecastOutcome(
+            round_id=one.round_id,
+            stamp_ns=given.stamp_ns,
+            intersection_id=one.intersection_id,
+            horizon_s=float(given.told.time_s[k]),
+            travelled_m=travelled,
+            p10_m=p10,
+            p50_m=p50,
+            p90_m=p90,
+            share=float(shares_of(given.told, came)[k, 0]),
+            crps_m=float(crps[0]),
+            crps_table_m=float(crps[1]),
+            crps_futures_m=float(crps[2]),
+        )
+
+
+def _ahead(
+    intent: RoundIntent,
+    state: VehicleState,
+    users: tuple[SeenRoadUser, ...],
+    frame: LocalFrame,
+) -> AheadFacts:
+    path = FrenetPath(intent.path.xy_m, intent.path.speed_limit_mps)
+    here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
+    arc_m = float(path.locate(here[None], upto_arc_m=_CAR_WITHIN_M).arc_m[0])
+    gap_m, lead_mps = lead_on(path, arc_m, users)
+    facts = bends_ahead(path, arc_m)._replace(lead_gap_m=gap_m, lead_speed_mps=lead_mps)
+    if intent.next_junction is None:
+        return facts
+    control, junction_m = intent.next_junction
+    return facts._replace(junction_m=junction_m, control=float(CONTROLS.index(control)))
+
+
+def _spread_of_futures(done: RoundDone, forecast: ProgressForecast, instants: list[int]) -> Array:
+    """Return (T, Q) quantiles of how far a round's futures get, each as likely as any other."""
+    found = np.zeros((len(forecast.time_s), len(forecast.levels)))
+    ways = []
+    for result in done.results:
+        valid = result.outcome.valid.astype(bool)
+        ways.append(travelled_m(result.trajectory.states[valid]))
+    step_s = done.order.jobs[0].step_s
+    for k in instants:
+        place = round(float(forecast.time_s[k]) / step_s)
+        at = np.concatenate([way[:, place] for way in ways])
+        if len(at):
+            found[k] = np.quantile(at, forecast.levels)
+    return found
