@@ -102,6 +102,7 @@ SHAPES: dict[type[msgspec.Struct], dict[str, str]] = {
     simulation.RoundView: {
         "xy_m": "S M 2",
         "criticality": "S",
+        "likelihood": "S",
         "names": "S",
         "user_xy_m": "K M 2",
         "touch_xy_m": "C 2",

@@ -40,10 +40,16 @@ class BuildReply(msgspec.Struct, frozen=True, kw_only=True):
     cached: bool
 
 
+RED_FROM, AMBER_FROM, GREEN_TO = 1e-4, 1e-6, 1e-8
+"""Criticalities, two orders of magnitude between the colours. Chosen: red is what is likely and
+would kill one in ten thousand, or comes once in a hundred times and would kill one in a hundred."""
+
+
 class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     """One round for those who watch: futures (S, M, 2) and the rest in the drive's frame.
 
-    `criticality` (S,) in 0..1: 1 collides, 0 keeps 10 m or more from everything. `user_xy_m`
+    `likelihood` (S,) in 0..1: 1 is as likely as any. `criticality` (S,) in 0..1 is that times the
+    risk that somebody dies; `RED_FROM` and more is what one acts upon. `user_xy_m`
     (K, M, 2) are tracks of road users whom the worst futures meet, `touch_xy_m` (C, 2) where cars
     touch one, with the scenario's id in `touch_names`.
     """
@@ -54,6 +60,7 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     world_id: str
     xy_m: Array32
     criticality: Array32
+    likelihood: Array32
     nominal_index: int
     names: tuple[str, ...]
     collided: int

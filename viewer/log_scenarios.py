@@ -9,7 +9,15 @@ import rerun as rr
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.side_by_side import Disagreement
-from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison, RoundView
+from foretwin.contracts.simulation import (
+    AMBER_FROM,
+    GREEN_TO,
+    HORIZONS_S,
+    RED_FROM,
+    Comparison,
+    PlanComparison,
+    RoundView,
+)
 from foretwin.viewer.log_drive import PLAN
 from foretwin.viewer.log_roles import TWIN
 from foretwin.viewer.meshes import Colour
@@ -48,10 +56,17 @@ def static_rows() -> list[Row]:
     return rows
 
 
+def criticality_places(criticality: Array | Array32) -> Array:
+    """Return where (S,) criticalities stand by their logarithm: green 0, amber 0.5, red 1."""
+    known = np.nan_to_num(np.asarray(criticality, dtype=np.float64), nan=1.0)
+    place = np.log(np.maximum(known, GREEN_TO) / GREEN_TO) / np.log(RED_FROM / GREEN_TO)
+    return np.asarray(np.clip(place, 0.0, 1.0))
+
+
 def criticality_colours(criticality: Array | Array32) -> npt.NDArray[np.uint8]:
-    """Return (S, 3) colours from green over amber to red for (S,) criticality in 0..1."""
+    """Return (S, 3) colours from green over amber to red for (S,) criticalities."""
     ramp = np.array([SAFE, WATCH, CRITICAL], dtype=np.float64)
-    place = np.clip(np.nan_to_num(np.asarray(criticality, dtype=np.float64), nan=1.0), 0.0, 1.0) * 2
+    place = criticality_places(criticality) * 2
     low = np.minimum(place.astype(np.intp), 1)
     share = (place - low)[:, None]
     return np.asarray(ramp[low] * (1.0 - share) + ramp[low + 1] * share, dtype=np.uint8)
@@ -83,10 +98,10 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
     # Rounded to 1/64 m, paths compress to a third.
     paths = np.round(view.xy_m[:, chosen].astype(np.float64) * 64.0) / 64.0
     usable = np.isfinite(paths).all(axis=(1, 2))
-    criticality = np.nan_to_num(np.asarray(view.criticality, dtype=np.float64), nan=1.0)
-    colours = criticality_colours(criticality)
-    radii = 0.07 + 0.06 * np.clip(criticality, 0.0, 1.0)
-    heights = 0.25 + 0.15 * np.clip(criticality, 0.0, 1.0)
+    colours = criticality_colours(view.criticality)
+    places = criticality_places(view.criticality)
+    radii = 0.07 + 0.06 * places
+    heights = 0.25 + 0.15 * places
     if 0 <= view.nominal_index < count:
         colours[view.nominal_index] = NOMINAL
         radii[view.nominal_index] = 0.24
@@ -135,16 +150,17 @@ def scenario_table(view: RoundView) -> str:
         f"**{len(view.names)} futures** from {in_markdown(view.intersection_id)} · "
         f"{view.collided} collide · {clearance} · {view.latency_ms:.0f} ms",
         "",
-        "| # | future | criticality | |",
-        "|--:|:--|--:|:--|",
+        "| # | future | likelihood | criticality | |",
+        "|--:|:--|--:|--:|:--|",
     ]
     criticality = np.nan_to_num(np.asarray(view.criticality, dtype=np.float64), nan=1.0)
     worst = np.argsort(-criticality, kind="stable")[:WORST_SHOWN]
     for index in worst:
         value = float(criticality[index])
-        verdict = "collides" if value >= 1.0 else "close" if value >= 0.5 else "clear"
+        verdict = "grave" if value >= RED_FROM else "watch" if value >= AMBER_FROM else ""
         name = view.names[index] if index < len(view.names) else str(index)
-        lines.append(f"| {index} | {in_markdown(name)} | {value:.2f} | {verdict} |")
+        likely = float(view.likelihood[index])
+        lines.append(f"| {index} | {in_markdown(name)} | {likely:.2g} | {value:.1g} | {verdict} |")
     return "\n".join(lines)
 
 

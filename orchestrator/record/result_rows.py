@@ -19,12 +19,15 @@ DISTINCT_M = 0.1
 
 
 class RoundFutures(NamedTuple):
-    """All futures of a round, joined: states (S, N, 8) and outcomes (S,)."""
+    """All futures of a round, joined: states (S, N, 8), outcomes, likelihood and criticality
+    (S,)."""
 
     states: Array
     collided: Array
     min_clearance_m: Array
     valid: Array
+    likelihood: Array
+    criticality: Array
 
 
 class FutureRows(NamedTuple):
@@ -38,22 +41,24 @@ class FutureRows(NamedTuple):
 @traced("rows of a round")
 def round_futures(done: RoundDone, *, vehicle: str = "") -> FutureRows:
     """Return the futures of a round as rows, each with its difference from the nominal one."""
-    joined = RoundFutures(
-        np.concatenate([r.trajectory.states for r in done.results]).astype(np.float64),
-        np.concatenate([r.outcome.collided for r in done.results]).astype(bool),
-        np.concatenate([r.outcome.min_clearance_m for r in done.results]),
-        np.concatenate([r.outcome.valid for r in done.results]).astype(bool),
-    )
-    away_m = np.hypot(
-        joined.states[:, :, 0] - joined.states[0, :, 0],
-        joined.states[:, :, 1] - joined.states[0, :, 1],
-    )
     order = done.order
     rows = [
         row
         for job, recorded, result in zip(order.jobs, order.recorded, done.results, strict=True)
         for row in future_rows(job, result, job_sha256=recorded.sha256)
     ]
+    joined = RoundFutures(
+        np.concatenate([r.trajectory.states for r in done.results]).astype(np.float64),
+        np.concatenate([r.outcome.collided for r in done.results]).astype(bool),
+        np.concatenate([r.outcome.min_clearance_m for r in done.results]),
+        np.concatenate([r.outcome.valid for r in done.results]).astype(bool),
+        np.array([row["likelihood"] for row in rows]),
+        np.array([row["criticality"] for row in rows]),
+    )
+    away_m = np.hypot(
+        joined.states[:, :, 0] - joined.states[0, :, 0],
+        joined.states[:, :, 1] - joined.states[0, :, 1],
+    )
     for row, away in zip(rows, away_m, strict=True):
         row |= {
             "junction_id": order.junction_id,

@@ -146,8 +146,7 @@ class ResultTables:
         """What is lost or not in Parquet, and why; complete once closed."""
         self._so_far = b""
         self._news: queue.SimpleQueue[str] = queue.SimpleQueue()
-        self._moved_s = time.monotonic()
-        self._look_s = 0.0
+        self._moved_s, self._look_s = time.monotonic(), 0.0
         self._thread = threading.Thread(target=self._run, name="results", daemon=True)
         begun = bool(kept_rows(folder, "metrics", "name"))  # by an orchestrator before this one
         self._thread.start()

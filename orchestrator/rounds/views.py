@@ -15,10 +15,8 @@ from foretwin.orchestrator.record.result_rows import RoundFutures
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
 VIEW_POINTS = 25
-SAFE_CLEARANCE_M = 10.0
 _SHOWN = 16
-"""Of so many futures, the worst first, one sees the road user that they meet."""
-_SHOWN_FROM = 0.3
+"""Of so many futures, the worst first, one sees the road user that they hit or nearly hit."""
 _ROAD_USER = COLLISION_WITH.index("road_user")
 
 
@@ -39,9 +37,7 @@ def round_view(
         return moved.reshape(xy_m.shape).astype(np.float32)
 
     clearance = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)
-    criticality = np.where(
-        futures.collided, 1.0, np.clip(1.0 - clearance / SAFE_CLEARANCE_M, 0.0, 0.95)
-    )
+    criticality = futures.criticality
     nearest = float(clearance.min()) if count else np.inf
     met = _met(done, criticality, kept)
     return RoundView(
@@ -51,6 +47,7 @@ def round_view(
         world_id=done.order.world_id,
         xy_m=in_drive(futures.states[:, kept, :2]),
         criticality=criticality.astype(np.float32),
+        likelihood=futures.likelihood.astype(np.float32),
         nominal_index=0,
         names=_names(done),
         collided=int(np.count_nonzero(futures.collided)),
@@ -88,7 +85,7 @@ def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Me
     for result in done.results:
         poses, states = result.road_users.poses, result.trajectory.states
         for place in range(len(result.future_indices)):
-            shown = number in worst and criticality[number] >= _SHOWN_FROM
+            shown = number in worst and criticality[number] > 0.0
             future = done.order.futures[number]
             number += 1
             there = np.flatnonzero(np.isfinite(poses[place, 0, :, 0]))

@@ -19,6 +19,7 @@ from foretwin.contracts.futures import (
 )
 from foretwin.contracts.job_identity import future_id
 from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.sim_worker.futures.likelihood import risks
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 
 Row = dict[str, Any]
@@ -44,6 +45,7 @@ _COLUMNS: tuple[tuple[type, str], ...] = (
     (bool, "collided"),
     (float, "collision_time_s"),
     (str, "collision_with"),
+    (float, "likelihood criticality"),
     (float, "min_clearance_m progress_m end_x_m end_y_m end_yaw_rad end_speed_mps"),
     (float, "end_difference_from_nominal_m max_difference_from_nominal_m"),
     (str, "accident_with accident_kind"),
@@ -73,10 +75,15 @@ def future_rows(job: Job, result: FuturesResult | None, *, job_sha256: str) -> l
     places = {} if result is None else {i: p for p, i in enumerate(result.future_indices)}
     unplaced = {} if result is None else dict(result.unplaced)
     rows = []
+    risk = None if result is None else risks(job, result)
     for future in job.futures:
         row = _job_columns(job, future, job_sha256)
         if result is not None and future.index in places:
-            row |= _result_columns(job, future, result, places[future.index])
+            place = places[future.index]
+            row |= _result_columns(job, future, result, place)
+            assert risk is not None
+            row["likelihood"] = float(risk.likelihood[place])
+            row["criticality"] = float(risk.criticality[place])
         elif result is not None:
             row["left_out"] = unplaced[future.index]
         rows.append(row)

@@ -131,6 +131,7 @@ def round_at(time_s: float, *, futures: int = 64, points: int = 81) -> RoundView
         world_id=WORLD_ID,
         xy_m=xy.astype(np.float32),
         criticality=criticality.astype(np.float32),
+        likelihood=(1.0 - 0.5 * criticality).astype(np.float32),
         nominal_index=nominal,
         names=tuple(
             "nominal" if i == nominal else f"lead brakes, grip {0.4 + 0.6 * i / futures:.2f}"

@@ -12,10 +12,23 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.side_by_side import Disagreement
-from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
+from foretwin.contracts.simulation import (
+    AMBER_FROM,
+    GREEN_TO,
+    RED_FROM,
+    ActiveWorld,
+    Event,
+    WorldNotice,
+)
 from foretwin.contracts.world import World
 from foretwin.viewer.live_viewer import NoViewerError, live_viewer
-from foretwin.viewer.log_scenarios import CRITICAL, SAFE, criticality_colours, scenario_table
+from foretwin.viewer.log_scenarios import (
+    CRITICAL,
+    SAFE,
+    WATCH,
+    criticality_colours,
+    scenario_table,
+)
 from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.rows import plain_text
 from tests.viewer import scene
@@ -128,9 +141,15 @@ def test_a_diverged_future_is_left_out() -> None:
 def test_the_table_lists_the_worst_first() -> None:
     view = scene.round_at(3.0)
     rows = [line for line in scenario_table(view).splitlines() if line.startswith("| ")][1:]
-    criticality = [float(row.split("|")[3]) for row in rows]
+    criticality = [float(row.split("|")[4]) for row in rows]
     assert criticality == sorted(criticality, reverse=True)
-    assert criticality[0] == pytest.approx(float(view.criticality.max()), abs=0.01)
+    assert criticality[0] == pytest.approx(float(view.criticality.max()), rel=0.1)
+    assert {row.split("|")[5].strip() for row in rows} == {"grave"}
+
+
+def test_colours_follow_the_order_of_magnitude() -> None:
+    green, amber, red = criticality_colours(np.array([GREEN_TO, AMBER_FROM, RED_FROM])).tolist()
+    assert (tuple(green), tuple(amber), tuple(red)) == (SAFE, WATCH, CRITICAL)
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))

@@ -17,6 +17,7 @@ from foretwin.orchestrator.record.result_rows import (
 )
 from foretwin.orchestrator.record.results import MIRROR, MIRRORED, TABLES
 from foretwin.orchestrator.rounds.views import round_view
+from foretwin.sim_worker.futures.likelihood import NEAR_MISS
 from tests.contracts.mirror_samples import mirror_sample
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, town_world
@@ -115,20 +116,22 @@ def view_of(**outcome: np.ndarray):
     return round_view(done, round_futures(done).futures, FRAME, FRAME)
 
 
-def test_criticality_grows_as_clearance_shrinks_and_is_one_in_a_collision() -> None:
+def test_criticality_grows_as_clearance_shrinks_and_is_most_in_a_collision() -> None:
     view = view_of(
         collided=np.array([False, False, False, True]),
-        min_clearance_m=np.array([math.nan, 20.0, 5.0, 0.0]),
+        min_clearance_m=np.array([math.nan, 20.0, 1.0, 0.0]),
     )
 
-    assert view.criticality == pytest.approx([0.0, 0.0, 0.5, 1.0])
+    nothing, far, near, hit = view.criticality.tolist()
+    assert (nothing, far, near) == pytest.approx((0.0, 0.0, 0.5 * NEAR_MISS))
+    assert hit == pytest.approx(NEAR_MISS)
     assert (view.collided, view.min_clearance_m) == (1, 0.0)
 
 
 def test_a_near_miss_is_no_collision() -> None:
     view = view_of(min_clearance_m=np.array([math.nan, 20.0, 5.0, 0.01]))
 
-    assert view.criticality.max() == pytest.approx(0.95)
+    assert view.criticality.max() < NEAR_MISS
     assert view.collided == 0
 
 

@@ -23,7 +23,12 @@ PATH = PathAhead(
     xy_m=np.column_stack([np.arange(-10.0, 400.0), np.zeros(410)]), speed_limit_mps=np.full(410, 14)
 )
 INTENT = RoundIntent(
-    junction_id="n4", world_id="w", path=PATH, cruise_speed_mps=10.0, next_junction=("signals", 80)
+    junction_id="n4",
+    world_id="w",
+    path=PATH,
+    cruise_speed_mps=10.0,
+    speed_ahead_mps=np.full(17, 10.0),
+    next_junction=("signals", 80),
 )
 
 

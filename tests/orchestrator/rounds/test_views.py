@@ -8,8 +8,10 @@ import pytest
 
 from foretwin.contracts.futures import RoadUserTracks
 from foretwin.orchestrator.record.result_rows import round_futures
-from foretwin.orchestrator.rounds.views import SAFE_CLEARANCE_M, VIEW_POINTS, round_view
+from foretwin.orchestrator.rounds.views import VIEW_POINTS, round_view
 from foretwin.orchestrator.runner.open_rounds import RoundDone
+from foretwin.sim_worker.futures.likelihood import NEAR_MISS, NEAR_MISS_M
+from foretwin.sim_worker.scenarios.exposure import EXPOSURES
 from tests.orchestrator.futures_rounds import TIME_S, round_done, straight
 from tests.orchestrator.trip import town_world
 
@@ -27,7 +29,7 @@ def meeting(*users_xy: tuple[float, float]) -> RoundDone:
             "collided": np.array([False, False, True]),
             "collision_with": np.array([0, 0, 1]),
             "collision_time_s": np.array([np.nan, np.nan, 4.0]),
-            "min_clearance_m": np.array([20.0, 3.0, 0.0]),
+            "min_clearance_m": np.array([20.0, 0.5, 0.0]),
         },
     )
     poses = np.zeros((3, len(TIME_S), len(users_xy), 3), dtype=np.float32)
@@ -73,7 +75,7 @@ def test_the_nearest_is_so_in_both_directions_and_tracks_have_both_their_ends() 
     assert view.xy_m[:, [0, -1]] == pytest.approx(np.array(ends), abs=1e-3)
 
 
-@pytest.mark.parametrize(("clearance_m", "shown"), [(6.9, 1), (7.1, 0)])
+@pytest.mark.parametrize(("clearance_m", "shown"), [(1.9, 1), (2.1, 0)])
 def test_whom_a_future_passes_far_away_is_not_shown(clearance_m: float, shown: int) -> None:
     done = meeting((40.0, 2.0))
     done.results[0].outcome.min_clearance_m[1] = clearance_m
@@ -88,13 +90,15 @@ def test_without_road_users_there_is_nobody_to_show() -> None:
     assert view.touch_xy_m.shape == (0, 2)
 
 
-def test_criticality_grows_as_the_clearance_shrinks_and_is_one_where_cars_touch() -> None:
+def test_criticality_grows_as_the_clearance_shrinks_and_is_most_where_cars_touch() -> None:
     done = meeting((40.0, 2.0))
     view = round_view(done, round_futures(done).futures, FRAME, FRAME)
     safe, near, touching = view.criticality.tolist()
     assert safe == 0.0
-    assert near == pytest.approx(1.0 - 3.0 / SAFE_CLEARANCE_M)
-    assert touching == 1.0
+    # Somebody who drives heedlessly across comes a few times a year (E2).
+    assert view.likelihood == pytest.approx([EXPOSURES["E2"]] * 3)
+    assert near == pytest.approx(EXPOSURES["E2"] * NEAR_MISS * (1.0 - 0.5 / NEAR_MISS_M))
+    assert touching == pytest.approx(EXPOSURES["E2"] * NEAR_MISS)
     assert (view.collided, view.min_clearance_m, view.nominal_index) == (1, 0.0, 0)
     assert view.xy_m.shape == (3, VIEW_POINTS, 2)
 
