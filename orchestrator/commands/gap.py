@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
 from foretwin.contracts.errors import UserError
@@ -16,12 +17,20 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.commands.gap_text import table_lines, verdict_lines, why_undecided
+from foretwin.orchestrator.commands.gap_text import (
+    DrivenBy,
+    table_lines,
+    turning_lines,
+    turning_object,
+    verdict_lines,
+    why_undecided,
+)
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap, turning_gap
 from foretwin.sim_worker.analysis.gap.verdict import FaultDetector, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -40,6 +49,11 @@ class GapReport(NamedTuple):
     rows: list[GapRow]
     alarms: list[GapAlarm]
     verdicts: list[Verdict]
+    undecided: str
+    """What departs, where nobody is accused."""
+    turning: TurningGap | None
+    """The model driven by measured steering and speed; None where these are not enough."""
+    driven_by: DrivenBy
     refused: dict[str, int]
     """Samples that the reader refused, by reason."""
 
@@ -92,13 +106,31 @@ def _measured(
     record = without_manual_commands(recorder.record())
     motion = motion_on_grid(states, record.stamp_ns, frame=frame)
     meter = GapMeter(FreeRunner(vehicle), vehicle_id=log.info.vehicle_id)
-    samples = meter.samples(record, motion)
+    turning = turning_gap(record, vehicle)
+    samples = meter.samples(record, motion, measured=None if turning is None else turning.drive)
     if not samples:
         raise UserError(f"{name}: the heading is never known for a second, so no run can begin")
     limits = GapLimits()
     alarms = [alarm for sample in samples for alarm in limits.handle(sample)]
     refused = {reason: count for reason, count in log.skipped.items() if count}
-    return GapReport(log.info, samples, gap_table(samples), alarms, verdicts, refused)
+    driven_by: DrivenBy = "estimated commands"
+    if samples[0].independent:
+        driven_by = (
+            "commands"
+            if np.isfinite(record.command_accel_mps2).any()
+            else "measured steering and speed"
+        )
+    return GapReport(
+        info=log.info,
+        samples=samples,
+        rows=gap_table(samples),
+        alarms=alarms,
+        verdicts=verdicts,
+        undecided=detector.undecided or ("" if turning is None else turning.departure),
+        turning=turning,
+        driven_by=driven_by,
+        refused=refused,
+    )
 
 
 def report_gap(
@@ -139,17 +171,15 @@ def as_object(report: GapReport) -> dict[str, Any]:
     """
     return {
         "vehicle_id": report.info.vehicle_id,
-        "independent": _commanded(report),
+        "independent": all(row.independent for row in report.rows),
+        "driven_by": report.driven_by,
         "rows": [row._asdict() for row in report.rows],
-        "reason": why_undecided(report.verdicts, commanded=_commanded(report)),
+        "reason": why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by),
+        "turning": None if report.turning is None else turning_object(report.turning),
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
         "refused": report.refused,
     }
-
-
-def _commanded(report: GapReport) -> bool:
-    return all(row.independent for row in report.rows)
 
 
 def _lines(report: GapReport) -> list[str]:
@@ -157,9 +187,8 @@ def _lines(report: GapReport) -> list[str]:
     if report.refused:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.refused.items()))
         lines.append(f"refused: {left}")
+    if report.turning is not None:
+        lines += turning_lines(report.turning)
+    reason = why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by)
     start_ns = report.info.start_stamp_ns
-    return lines + list(
-        verdict_lines(
-            report.verdicts, report.alarms, start_ns=start_ns, commanded=_commanded(report)
-        )
-    )
+    return lines + list(verdict_lines(report.verdicts, report.alarms, reason, start_ns=start_ns))

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import Any, Literal
 
+import numpy as np
+
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.gap import GapAlarm, Verdict
+from foretwin.sim_worker.analysis.gap.clock_offsets import ClockOffset
 from foretwin.sim_worker.analysis.gap.errors import GapRow
+from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap
 
 WIDTH = 80
 _DEGREES = 57.29578
@@ -38,30 +44,122 @@ def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
         yield ""
 
 
-def why_undecided(verdicts: Sequence[Verdict], *, commanded: bool) -> str | None:
-    """Return why nobody is accused, None where somebody is."""
-    if any(verdict.culprit != "undecided" for verdict in verdicts):
+DrivenBy = Literal["commands", "measured steering and speed", "estimated commands"]
+"""What the model was driven by."""
+
+
+def why_undecided(
+    verdicts: Sequence[Verdict], undecided: str, *, driven_by: DrivenBy
+) -> str | None:
+    """Return why nobody is accused, None where somebody is; `undecided` is what departs."""
+    if verdicts:
         return None
-    if not commanded:
+    if undecided:
+        return undecided
+    if driven_by == "commands":
+        return "nothing shows that the car or the model departs"
+    if driven_by == "estimated commands":
         return (
             "commands were not recorded: the gap is that of commands estimated from the motion "
             "itself, and who departs from them cannot be said"
         )
-    if verdicts:
-        return verdicts[-1].text
-    return "nothing shows that the car or the model departs"
+    return (
+        "commands were not recorded: the model was driven by steering and speed as measured, and "
+        "nothing shows that it departs from the gyro beyond what parameters leave open"
+    )
+
+
+def turning_object(turning: TurningGap) -> dict[str, Any]:
+    """Return the turning at the measured steering as JSON has it; intervals are half widths."""
+    clocks = {"steering": turning.steering_clock, "speed": turning.speed_clock}
+    half = turning.half_width_radps
+    return {
+        "seconds": len(half),
+        "within_share": turning.within,
+        "interval_full_width_radps": {
+            "median": turning.full_width_radps,
+            "mean": 2.0 * float(np.mean(half)),
+            "widest": 2.0 * float(np.max(half)),
+        },
+        "error_rms_radps": _rms(turning.error_radps),
+        "error_rms_by_file_radps": _rms(turning.file_error_radps),
+        "clock_late_s": {
+            name: None if clock is None else {"value": clock.late_s, "half_95": _SURE * clock.std_s}
+            for name, clock in clocks.items()
+        },
+        "response_left_open_s": _SURE * turning.response_std_s,
+        "gyro_bias_radps": _fitted(turning.gyro_bias_radps, turning.gyro_bias_std_radps),
+        "steering_offset_rad": _fitted(
+            turning.steering_offset_rad, turning.steering_offset_std_rad
+        ),
+        "gain": _fitted(turning.gain, turning.gain_std),
+        "conditional_on": _CONDITION,
+    }
+
+
+_SURE = 1.96
+_CONDITION = (
+    "the vehicle file's wheelbase, tyres and inertia, its steering ratio give or take what it "
+    "says, and bends and speeds as in this drive"
+)
+
+
+def turning_lines(turning: TurningGap) -> list[str]:
+    """Return what the model at the measured steering says, each second from the others."""
+    half = _DEGREES * turning.half_width_radps
+    rms = [_DEGREES * _rms(one) for one in (turning.error_radps, turning.file_error_radps)]
+    late = (
+        f"steering is stamped {_clock(turning.steering_clock)} after the gyro, given the model's "
+        f"tyres and inertia, of which the file leaves {1e3 * _SURE * turning.response_std_s:.0f} "
+        "ms open"
+    )
+    if turning.speed_clock is not None:
+        late += f"; speed {_clock(turning.speed_clock)}, given a body that does not pitch"
+    bias, bias_std = turning.gyro_bias_radps, turning.gyro_bias_std_radps
+    zero, zero_std = turning.steering_offset_rad, turning.steering_offset_std_rad
+    said = (
+        f"the model at measured steering and speed against the gyro, {len(half)} s: {rms[0]:.2f} "
+        f"°/s apart (RMS of means over a second; {rms[1]:.2f} with the vehicle file's steering "
+        f"as it is); each second's 95 % interval, told by the others, is ±{np.median(half):.2f} "
+        f"°/s wide (median; ±{np.max(half):.2f} at most) and holds {turning.within:.0%} of them",
+        late,
+        f"gyro bias {_DEGREES * bias:+.2f} ± {_SURE * _DEGREES * bias_std:.2f} °/s, steering "
+        f"{_DEGREES * zero:+.2f} ± {_SURE * _DEGREES * zero_std:.2f}° at the tyres beside the "
+        f"file; the car turns {turning.gain:.2f} ± {_SURE * turning.gain_std:.2f} times as the "
+        "model",
+        f"intervals (95 %) hold given {_CONDITION}",
+    )
+    return [line for one in said for line in _wrapped(one, indent="  ")] + [""]
+
+
+def _clock(clock: ClockOffset) -> str:
+    return f"{1e3 * clock.late_s:+.0f} ± {1e3 * _SURE * clock.std_s:.0f} ms"
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _fitted(value: float, std: float) -> dict[str, float]:
+    return {"value": value, "half_95": _SURE * std}
 
 
 def verdict_lines(
-    verdicts: Sequence[Verdict], alarms: Sequence[GapAlarm], *, start_ns: int, commanded: bool
+    verdicts: Sequence[Verdict],
+    alarms: Sequence[GapAlarm],
+    reason: str | None,
+    *,
+    start_ns: int,
 ) -> Iterator[str]:
-    """Yield what is said of alarms and verdicts, with times since the drive's start."""
+    """Yield what is said of alarms and verdicts, with times since the drive's start.
+
+    `reason` says why there is no verdict.
+    """
     raised = [alarm for alarm in alarms if alarm.over]
     kinds = ", ".join(dict.fromkeys(alarm.quantity for alarm in raised))
     yield f"alarms: {len(raised)}{f' ({kinds})' if kinds else ''}"
-    reason = why_undecided(verdicts, commanded=commanded)
-    if reason is not None and not (commanded and verdicts):
-        yield from _wrapped(f"verdict: none: {reason}" if commanded else reason)
+    if reason is not None:
+        yield from _wrapped(f"nobody is accused: {reason}")
     for verdict in verdicts:
         who = {"vehicle": "real vehicle", "model": "vehicle model"}.get(
             verdict.culprit, verdict.culprit

@@ -31,9 +31,9 @@ PERIOD_S = 0.02
 class MotionRecord(NamedTuple):
     """Signals at N even instants; NaN where a sensor is absent or silent for too long.
 
-    Positions are those of the antenna in the given local frame; the yaw rate is the
-    body's; steering as measured (wheel, tyre) and as commanded, positive to the left. `manual`
-    says where a human drives.
+    Positions are those of the antenna in the given local frame; the yaw rate and the specific
+    force ahead are the body's; steering as measured (wheel, tyre) and as commanded, positive to the
+    left. `manual` says where a human drives.
     """
 
     stamp_ns: Stamps
@@ -43,6 +43,7 @@ class MotionRecord(NamedTuple):
     yaw_rad: Array
     speed_mps: Array
     yaw_rate_radps: Array
+    accel_x_mps2: Array
     wheel_rad: Array
     tire_rad: Array
     command_accel_mps2: Array
@@ -64,7 +65,7 @@ _MEASURED = {
     "gnss": ("x_m", "y_m", "altitude_m"),
     "heading": ("yaw_rad",),
     "speed": ("speed_mps",),
-    "imu": ("yaw_rate_radps",),
+    "imu": ("yaw_rate_radps", "accel_x_mps2"),
     "steering": ("wheel_rad", "tire_rad"),
 }
 _HELD = {"control": ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")}
@@ -120,8 +121,8 @@ class MotionRecorder:
                 )
             case SpeedSample(speed_mps=speed):
                 return (speed,)
-            case ImuSample(rate_radps=rate):
-                return (rate[2],)
+            case ImuSample(rate_radps=rate, accel_mps2=accel):
+                return rate[2], accel[0]
             case SteeringSample(steering_wheel_rad=wheel, tire_angle_rad=tire):
                 return _or_nan(wheel), _or_nan(tire)
             case ControlCommand(accel_mps2=accel, steering_wheel_rad=wheel, tire_angle_rad=tire):

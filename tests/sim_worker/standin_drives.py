@@ -75,6 +75,7 @@ def straight_minute(*, speed_mps: float = 33.0, seed: int = 0) -> MotionRecord:
         yaw_rate_radps=rate
         + sensors.gyro_bias_radps
         + random.normal(0.0, sensors.gyro_std_radps, count),
+        accel_x_mps2=pedal,
         wheel_rad=wheel + random.normal(0.0, sensors.steering_wheel_std_rad, count),
         tire_rad=absent,
         command_accel_mps2=(pedal + drag) / car.drive_gain,

@@ -32,6 +32,7 @@ from foretwin.sim_worker.analysis.gap.measured_motion import (
     MeasuredMotion,
     manoeuvre_of,
 )
+from foretwin.sim_worker.analysis.gap.measured_turning import MeasuredDrive
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.analysis.road_grade import climb_under
 from foretwin.sim_worker.vehicle.lag import without_lags
@@ -66,18 +67,20 @@ class GapMeter:
         motion: MeasuredMotion,
         *,
         horizons_s: Sequence[float] = HORIZONS_S,
+        measured: MeasuredDrive | None = None,
     ) -> list[GapSample]:
         """Return the gap at each horizon after each start, 1 s apart, in time order.
 
-        Where no commands were recorded, they are estimated from the motion and the samples are
-        not independent. Runs that meet a gap in the measured motion are left out.
+        Where no commands were recorded the model steers and rolls as `measured`; without that,
+        commands are estimated from the motion and the samples are not independent. Runs that meet
+        a gap in the measured motion are left out.
         """
         known = motion.known
         shortest = round(min(horizons_s) / PERIOD_S)
         starts = np.arange(0, len(known) - shortest, round(_EVERY_S / PERIOD_S))
         starts = starts[known[starts]]
         wanted = [(row, horizon) for row in range(len(starts)) for horizon in horizons_s]
-        return self._measure(record, motion, starts, wanted)
+        return self._measure(record, motion, starts, wanted, measured)
 
     def latest(
         self, record: MotionRecord, motion: MeasuredMotion, *, horizons_s: Sequence[float]
@@ -95,6 +98,7 @@ class GapMeter:
         motion: MeasuredMotion,
         starts: Indices,
         wanted: Sequence[tuple[int, float]],
+        measured: MeasuredDrive | None = None,
     ) -> list[GapSample]:
         """Run from each of `starts`; return the gap of each (row, horizon) wanted."""
         if not len(starts):
@@ -104,9 +108,12 @@ class GapMeter:
         vehicle, runner = self._runner.vehicle, self._runner
         signals = tire_angles(record, vehicle)
         recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
-        independent = bool(recorded[starts].mean() > 0.9)
+        commanded = bool(recorded[starts].mean() > 0.9)
+        measured = None if commanded else measured
+        independent = commanded or measured is not None
         tire, climb = signals.measured_rad, climb_under(record, runner.roads)
-        if independent:
+        held = None
+        if commanded:
             accel, steer = record.command_accel_mps2, signals.commanded_rad
         else:
             if self._immediate is None:
@@ -118,8 +125,12 @@ class GapMeter:
                 accel_mps2=motion.accel_mps2,
                 climb_mps2=None if climb is None else climb.mps2,
             )
-            begin = start_states(vehicle, motion, tire_rad=tire)
-            steer = np.where(known, begin[:, 6], np.nan)
+            if measured is None:
+                begin = start_states(vehicle, motion, tire_rad=tire)
+                steer = np.where(known, begin[:, 6], np.nan)
+            else:
+                steer, held = measured
+                tire = steer
         begin = start_states(vehicle, motion.at(starts), tire_rad=tire[starts])
         begin[:, :2] = 0.0  # near the origin, where numbers are exact
         steps = round(max(horizon for _, horizon in wanted) / PERIOD_S)
@@ -129,7 +140,8 @@ class GapMeter:
             steps=steps,
             accel_mps2=accel,
             tire_rad=steer,
-            delayed=independent,
+            hold_speed_mps=held,
+            delayed=commanded,
             climb_mps2=None if climb is None else climb.mps2,
         )
         for row, horizon in wanted:

@@ -10,7 +10,7 @@ from foretwin.sim_worker.analysis.gap.consistency import Consistency, Lag
 from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line
 
 _DEGREES = 180.0 / math.pi
-_GAIN = 0.2
+GAIN_LEFT_OPEN = 0.2
 """Ratios this far from 1 are beyond what parameters of the right car leave open."""
 _SPEED_GAIN = 0.1
 _GYRO_RADPS = 0.045
@@ -66,7 +66,7 @@ def findings_of(seen: Consistency) -> Finding | None:
 def _beyond(seen: Consistency, line: Line) -> bool:
     """Whether a gain is off by more than parameters leave open; the shorter seen, the surer."""
     stds = 2.0 if seen.excited_s >= _SETTLED_S else 5.0
-    return abs(line.gain - 1.0) > _GAIN + stds * line.gain_std
+    return abs(line.gain - 1.0) > GAIN_LEFT_OPEN + stds * line.gain_std
 
 
 def _evidence(name: str, value: float, expected: float, std: float, text: str) -> Evidence:
@@ -90,7 +90,7 @@ def _sensors(seen: Consistency) -> Finding | None:
         return Finding("vehicle", "speed_sensor", text, (_of("speed_by_gnss", speed, said),))
     if gyro is None:
         return None
-    if gyro.gain_std < 0.15 and abs(gyro.gain - 1.0) > _GAIN + 2.5 * gyro.gain_std:
+    if gyro.gain_std < 0.15 and abs(gyro.gain - 1.0) > GAIN_LEFT_OPEN + 2.5 * gyro.gain_std:
         said = f"the gyro shows {gyro.gain:.2f} of the turn of the course over ground"
         text = f"the car's gyro disagrees with its positions: {said}"
         return Finding("vehicle", "gyro_sensor", text, (_of("gyro_by_course", gyro, said),))
@@ -170,7 +170,9 @@ def _model_turns(seen: Consistency) -> Finding | None:
     def accuse(cause: str, text: str, more: Evidence) -> Finding:
         return Finding("model", cause, text, (more, *evidence))
 
-    obeys = car is not None and car.line.explained > 0.8 and abs(car.line.gain - 1.0) < _GAIN
+    obeys = (
+        car is not None and car.line.explained > 0.8 and abs(car.line.gain - 1.0) < GAIN_LEFT_OPEN
+    )
     if obeys and car is not None and model is not None:
         said = f"the model's tyres do {model.line.gain:.2f} of the command"
         if not math.isnan(seen.model_stops_at_rad):
@@ -198,10 +200,14 @@ def _model_turns(seen: Consistency) -> Finding | None:
     if line.gain_std > 0.1 or line.explained < 0.6:
         return None
     if _beyond(seen, line):
+        # Without commands to hold it against, the car's own steering sensor may be off as well.
+        whose = "the model's " if obeys else "the car's steering sensor or the model's "
         cause, why = "steering_ratio", "steering ratio or wheelbase"
         if lag.seconds >= 0.06 or (bent and hard is not None and abs(hard.gain - line.gain) > 0.25):
             cause, why = "cornering_stiffness", "cornering stiffness or friction"
-        text = f"{said}, though the car obeys its commands: the model's {why} is wrong"
+        text = (
+            f"{said}{', though the car obeys its commands' if obeys else ''}: {whose}{why} is wrong"
+        )
         return accuse(cause, text, _of("motion_by_measured", line, said))
     if seen.excited_s < _SETTLED_S:
         return None
@@ -211,7 +217,9 @@ def _model_turns(seen: Consistency) -> Finding | None:
         return accuse("inertia", f"{said}: its yaw inertia or tyres are wrong", more)
     if abs(line.offset) > _OFFSET_PM + 3.0 * line.offset_std:
         said = f"the model's curvature is off by {-line.offset:+.4f} 1/m"
-        text = f"{said}, though car and command agree: the model's steering offset is wrong"
+        text = f"{said}: its steering offset or the car's steering sensor is wrong"
+        if obeys:
+            text = f"{said}, though car and command agree: the model's steering offset is wrong"
         return accuse("steering_offset", text, _offset("curvature_offset", line, said))
     return None
 
@@ -220,4 +228,4 @@ def _gyro_confirmed(gyro: Line | None) -> bool:
     """Whether the course over ground turns as the gyro shows; without one it may."""
     if gyro is None:
         return True
-    return abs(gyro.gain - 1.0) + gyro.gain_std < _GAIN + 0.05
+    return abs(gyro.gain - 1.0) + gyro.gain_std < GAIN_LEFT_OPEN + 0.05

@@ -67,6 +67,8 @@ class FaultDetector:
         self._pending: tuple[str, str, int, int] | None = None
         self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
         self._reported: dict[tuple[str, str], int] = {}
+        self.undecided: str = ""
+        """What departs without saying whether it is the car or the model, empty where nothing."""
         self.latest: Consistency | None = None
         """The consistency of the latest stretch, for display."""
 
@@ -147,6 +149,9 @@ class FaultDetector:
             return None
         since_ns = self._pending[3]
         self._reported[key] = to_ns
+        if found.culprit == "undecided":
+            self.undecided = found.text
+            return None
         return Verdict(
             vehicle_id=self._vehicle_id,
             stamp_ns=to_ns,
@@ -170,8 +175,6 @@ def _confidence(found: Finding) -> float:
     """Return how sure it is that the first comparison departs: its normal deviations, to 0.99."""
     first = found.evidence[0]
     away = abs(first.value - first.expected) / max(first.std, 1e-6)
-    if found.culprit == "undecided":
-        return 0.0
     return float(np.clip(math.erf(away / math.sqrt(8.0)), 0.5, 0.99))
 
 

@@ -14,6 +14,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.orchestrator.commands.cli import run
 from foretwin.telemetry.logs.write_mcap import create
 from foretwin.telemetry.ros_messages.table import messages_from
+from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven
 from tests.sim_worker.analysis.gap.test_verdict import END_S, SEED
 from tests.sim_worker.faulty_standin import drive_of
 from tests.telemetry.standin_drive import FRAME
@@ -25,6 +26,7 @@ COVERS = (
 )
 
 WIDTH = 80
+BY_HAND = 300
 
 
 def written(file: Path, info: VehicleInfo, samples: Iterable[tuple[str, Any]]) -> Path:
@@ -75,12 +77,16 @@ def test_the_table_is_80_columns_wide_and_plots_are_written(
         assert (tmp_path / "p" / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_commands_it_says_that_nobody_can_be_accused(
+def positions_alone(folder: Path) -> Path:
+    drive = drive_of(SEED, end_s=END_S)
+    quiet = (sample for sample in drive.samples if sample[0] not in ("control", "steering"))
+    return written(folder / "quiet.mcap", drive.info, quiet)
+
+
+def test_without_commands_and_steering_it_says_that_nobody_can_be_accused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    drive = drive_of(SEED, end_s=END_S)
-    quiet = (sample for sample in drive.samples if sample[0] != "control")
-    file = written(tmp_path / "quiet.mcap", drive.info, quiet)
+    file = positions_alone(tmp_path)
     assert run(["gap", str(file)]) == 0
     said = capsys.readouterr().out
     assert "commands were not recorded" in said
@@ -88,8 +94,35 @@ def test_without_commands_it_says_that_nobody_can_be_accused(
     assert run(["gap", str(file), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["reason"].startswith("commands were not recorded")
+    assert (told["independent"], told["driven_by"]) == (False, "estimated commands")
+    assert told["turning"] is None
     assert told["rows"]
     assert told["verdicts"] == []
+
+
+def test_a_car_driven_by_hand_is_followed_at_its_measured_steering_and_speed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = drive_of(BY_HAND, end_s=60.0)
+    file = written(tmp_path / "hand.mcap", drive.info, hand_driven(BY_HAND, Lateness(), end_s=60.0))
+    assert run(["gap", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["independent"], told["driven_by"]) == (True, "measured steering and speed")
+    assert told["reason"].startswith("commands were not recorded: the model was driven by steering")
+    turning = told["turning"]
+    assert turning["within_share"] >= 0.85
+    assert turning["clock_late_s"]["steering"]["half_95"] < 0.02
+    assert abs(turning["clock_late_s"]["steering"]["value"]) < 0.01
+    assert "wheelbase, tyres and inertia" in turning["conditional_on"]
+    assert max(row["rms"]["across_m"] for row in told["rows"] if row["horizon_s"] == 2.0) < 0.5
+
+    assert run(["gap", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= WIDTH
+    assert "after the gyro, given the model's" in said
+    assert "nobody is accused" in said
+    for word in ("verdict", "obeys its commands", "sure 0%"):
+        assert word not in said
 
 
 def test_dirt_is_counted_said_and_survived(

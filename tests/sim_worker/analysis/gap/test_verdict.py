@@ -84,16 +84,21 @@ def test_a_fault_that_begins_while_driving_is_dated(fault: str) -> None:
 
 
 def test_without_commands_a_wrong_ratio_is_nobodys_but_degrees_are_the_cars() -> None:
-    def told(fault: str) -> list[str]:
+    def told(fault: str) -> tuple[list[str], str]:
         drive = drive_with(fault, seed=SEED, end_s=END_S)
         detector = FaultDetector(
             drive.info, model_with(fault if fault in MODEL_FAULTS else None), frame=FRAME
         )
         verdicts = [detector.handle(*sample) for sample in drive.samples if sample[0] != "control"]
-        return [f"{verdict.culprit} {verdict.cause}" for verdict in verdicts if verdict]
+        said = [f"{verdict.culprit} {verdict.cause}" for verdict in verdicts if verdict]
+        return said, detector.undecided
 
-    assert told("steering_ratio")[:1] == ["undecided steering_ratio"]
-    assert told("steering_read_in_degrees")[:1] == ["vehicle steering_in_degrees"]
+    accused, undecided = told("steering_ratio")
+    assert accused == []
+    assert "no commands are recorded" in undecided
+    assert "the car's steering sensor or the model's steering ratio or wheelbase" in undecided
+    assert "obeys its commands" not in undecided
+    assert told("steering_read_in_degrees")[0][:1] == ["vehicle steering_in_degrees"]
 
 
 def test_a_model_whose_steering_lags_as_the_cars_does_is_left_alone() -> None:
@@ -125,14 +130,17 @@ def test_late_lost_doubled_and_reordered_samples_accuse_nobody() -> None:
 
 def test_a_telephones_positions_accuse_no_sensor_and_confirm_none() -> None:
     drive = drive_of(SEED, end_s=END_S)
-    told = []
+    undecided = []
     for fault in (None, "steering_ratio"):
         detector = FaultDetector(drive.info, model_with(fault), frame=FRAME)
         for channel, message in drive.samples:
             if isinstance(message, GnssFix):
                 message = msgspec.structs.replace(message, std_m=3.0)
-            told.append(detector.handle(channel, message))
-    assert [verdict.culprit for verdict in told if verdict] == ["undecided"]
+            assert detector.handle(channel, message) is None
+        undecided.append(detector.undecided)
+    assert undecided[0] == ""
+    assert undecided[1].startswith("no precise positions confirm the gyro: ")
+    assert "though the car obeys its commands" in undecided[1]
 
 
 def test_no_verdict_without_excitation() -> None:

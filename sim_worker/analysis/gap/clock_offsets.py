@@ -1,0 +1,70 @@
+"""By how much a car's own samples are stamped later than those of its inertial unit.
+
+Speed and steering come over buses and adapters, which take their time, and are filtered on the way;
+telemetry has no clock that all of them share. What each says is compared with the unit by how it
+changes: levels say nothing of time.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.analysis.gap.shifted_fit import shifted_fit
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+
+_OVER_S = (0.4, 0.8)
+"""Changes are taken over these: both must say the same, else the difference is doubt."""
+_ROLLS_MPS = 0.5
+_GAIN_STD = 0.3
+"""How far what a sensor shows may be off in size, while only its time is sought."""
+
+
+class ClockOffset(NamedTuple):
+    """Samples are stamped `late_s` later than the inertial unit's, with a standard deviation."""
+
+    late_s: float
+    std_s: float
+
+
+def speed_offset(record: MotionRecord) -> ClockOffset | None:
+    """Return the offset of speeds, from the acceleration ahead; None where nothing tells it."""
+    speed = np.where(record.speed_mps > _ROLLS_MPS, record.speed_mps, np.nan)
+    known = np.isfinite(record.accel_x_mps2)
+    push = np.where(known, record.accel_x_mps2, 0.0)
+    gained = (np.cumsum(push) - 0.5 * push) * PERIOD_S
+    return _offset(np.where(known, gained, np.nan), speed)
+
+
+def turning_offset(gyro_radps: Array, turning_radps: Array) -> ClockOffset | None:
+    """Return the offset of what makes a model turn (N,), from how the gyro (N,) changes."""
+    return _offset(gyro_radps, turning_radps)
+
+
+def _offset(unit: Array, sensor: Array) -> ClockOffset | None:
+    found = []
+    for over_s in _OVER_S:
+        half = round(0.5 * over_s / PERIOD_S)
+        # What drifts steadily, as a slope's share of gravity does, is the same at all times.
+        columns = np.stack([_change(sensor, half), np.ones(len(sensor))], axis=1)
+        fit = shifted_fit(
+            _change(unit, half),
+            columns,
+            around=np.array([1.0, 0.0]),
+            prior_std=np.array([_GAIN_STD, np.inf]),
+        )
+        if fit is None:
+            return None
+        found.append((fit.shift_std_s, -fit.shift_s))
+    std_s, late_s = min(found)
+    apart_s = max(abs(late_s - other) for _, other in found)
+    return ClockOffset(late_s, float(np.hypot(std_s, 0.5 * apart_s)))
+
+
+def _change(values: Array, half: int) -> Array:
+    out = np.full(len(values), np.nan)
+    if len(values) > 2 * half:
+        out[half:-half] = values[2 * half :] - values[: -2 * half]
+    return out

@@ -1,0 +1,136 @@
+"""How one signal follows others after a shift in time: sizes, the shift, and how sure both are.
+
+Sensors stamp by clocks of their own, and late. The shift is sought on a grid and then fitted
+together with all else, by Gauss and Newton; deviations come from leaving out one stretch of
+driving after the other (block jackknife: Künsch 1989), since neighbouring samples err alike.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array, Flags, Indices
+from foretwin.sim_worker.analysis.gap.fitting import TOGETHER_S
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S
+
+BLOCK_S = 6.0
+"""Of driving that is left out at once: longer than a bend, in which a model errs alike."""
+LONGEST_SHIFT_S = 1.0
+"""Sought for either way. Chosen: what telephones and adapters send is late by up to 0.6 s."""
+_LEAST_BLOCKS = 5
+_MOST = round(LONGEST_SHIFT_S / PERIOD_S)
+_ROUNDS = 3
+
+
+class ShiftedFit(NamedTuple):
+    """y = columns shifted by `shift_s` @ sizes; a positive shift: y comes later than the columns.
+
+    `covariance` (C + 1, C + 1) is of sizes and shift. `without` (B, C + 1) has both as each
+    stretch of driving leaves them that is left out; `block` (N,) says which that is, -1 where
+    nothing was compared.
+    """
+
+    sizes: Array
+    shift_s: float
+    covariance: Array
+    without: Array
+    block: Indices
+
+    @property
+    def shift_std_s(self) -> float:
+        """Standard deviation of the shift."""
+        return float(np.sqrt(self.covariance[-1, -1]))
+
+    def std(self, index: int) -> float:
+        """Return the standard deviation of one size."""
+        return float(np.sqrt(self.covariance[index, index]))
+
+
+def shifted(column: Array, shift_s: float) -> Array:
+    """Return a signal (N,) on the grid as it comes `shift_s` later, NaN where unknown."""
+    at = np.arange(len(column)) - shift_s / PERIOD_S
+    before = np.floor(at).astype(np.intp)
+    part = at - before
+    inside = (before >= 0) & (before < len(column) - 1)
+    low = np.clip(before, 0, max(len(column) - 2, 0))
+    value = column[low] * (1.0 - part) + column[np.minimum(low + 1, len(column) - 1)] * part
+    return np.where(inside, value, np.nan)
+
+
+def shifted_fit(
+    y: Array,
+    columns: Array,
+    *,
+    around: Array,
+    prior_std: Array,
+    shift_prior_s: float = float("inf"),
+) -> ShiftedFit | None:
+    """Fit y (N,) by columns (N, C), shifted together.
+
+    Sizes are `around` (C,) give or take `prior_std` (C,), infinite where nothing is known, and the
+    shift is 0 give or take `shift_prior_s`. None for less than 30 s that can be compared.
+    """
+    known = np.isfinite(y) & _known_around(columns)
+    block = _blocks(known)
+    if known.sum() * PERIOD_S < _LEAST_BLOCKS * BLOCK_S:
+        return None
+    count = int(block.max()) + 1
+    most = 0 if np.isfinite(shift_prior_s) else _MOST
+    shift_s, variance = _best_on_grid(y, columns, known, most)
+    theta, without, covariance = np.zeros(0), np.zeros(0), np.zeros(0)
+    for _ in range(_ROUNDS):
+        rows = np.stack([shifted(column, shift_s) for column in columns.T], axis=1)
+        slope = -np.gradient(rows @ (theta[:-1] if len(theta) else around)) / PERIOD_S
+        design = np.column_stack([rows, slope])
+        used = known & np.isfinite(design).all(axis=1)
+        weight = PERIOD_S / TOGETHER_S / variance
+        each = np.zeros((count, design.shape[1], design.shape[1] + 1))
+        joined = np.column_stack([design, y])
+        for number in range(count):
+            mine = used & (block == number)
+            each[number] = weight * design[mine].T @ joined[mine]
+        prior = np.diag(np.append(prior_std, shift_prior_s) ** -2.0)
+        wanted = prior @ np.append(around, -shift_s)
+        theta = _solve(each.sum(axis=0), prior, wanted)
+        without = np.stack([_solve(each.sum(axis=0) - one, prior, wanted) for one in each])
+        off = without - without.mean(axis=0)
+        covariance = (count - 1) / count * off.T @ off
+        variance = max(float(np.mean((y[used] - design[used] @ theta) ** 2)), 1e-12)
+        moved_s = float(np.clip(theta[-1], -0.1, 0.1))
+        without[:, -1] += shift_s
+        shift_s = float(np.clip(shift_s + moved_s, -LONGEST_SHIFT_S, LONGEST_SHIFT_S))
+    return ShiftedFit(theta[:-1], shift_s, covariance, without, block)
+
+
+def _solve(normal: Array, prior: Array, wanted: Array) -> Array:
+    found, *_ = np.linalg.lstsq(normal[:, :-1] + prior, normal[:, -1] + wanted, rcond=None)
+    return np.asarray(found)
+
+
+def _known_around(columns: Array) -> Flags:
+    """Return where all columns (N, C) are known, the longest shift before and after too."""
+    unknown = np.concatenate([[0], np.cumsum(~np.isfinite(columns).all(axis=1))])
+    count = len(columns)
+    at = np.arange(count)
+    first, last = at - _MOST - 1, at + _MOST + 1
+    inside = (first >= 0) & (last < count)
+    first, last = np.clip(first, 0, count - 1), np.clip(last, 0, count - 1)
+    return np.asarray(inside & (unknown[last + 1] == unknown[first]))
+
+
+def _blocks(known: Flags) -> Indices:
+    """Number the stretches of driving (N,) by what of them can be compared."""
+    return np.where(known, (np.cumsum(known) - 1) // round(BLOCK_S / PERIOD_S), -1)
+
+
+def _best_on_grid(y: Array, columns: Array, known: Flags, most: int) -> tuple[float, float]:
+    """Return the shift that leaves least of y, and the mean square left."""
+    at = np.flatnonzero(known)
+    best = (np.inf, 0)
+    for late in range(-most, most + 1):
+        rows = columns[at - late]
+        sizes, *_ = np.linalg.lstsq(rows, y[at], rcond=None)
+        best = min(best, (float(np.mean((y[at] - rows @ sizes) ** 2)), late))
+    return best[1] * PERIOD_S, max(best[0], 1e-12)

@@ -1,0 +1,67 @@
+"""A car driven by hand: its model at the measured steering, against its gyro."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap
+from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven, turning_of
+from tests.sim_worker.faulty_standin import model_with
+
+COVERS = ("foretwin.sim_worker.analysis.gap.clock_offsets",)
+
+SEED = 300
+LATE = Lateness(steering_s=0.13, speed_s=0.21, gyro_s=0.04, bias_radps=0.02)
+
+
+@pytest.fixture(scope="module")
+def gap() -> TurningGap:
+    found = turning_of(hand_driven(SEED, LATE))
+    assert found is not None
+    return found
+
+
+def test_clocks_are_put_together(gap: TurningGap) -> None:
+    """Two sensors late by other times, and a gyro that is late itself."""
+    assert gap.steering_clock.late_s == pytest.approx(LATE.steering_s - LATE.gyro_s, abs=0.01)
+    assert 1.96 * gap.steering_clock.std_s < 0.02
+    assert gap.speed_clock is not None
+    # The body pitches when it is braked, which the unit takes for acceleration, later.
+    assert gap.speed_clock.late_s == pytest.approx(LATE.speed_s - LATE.gyro_s, abs=0.04)
+    assert 0.002 < gap.response_std_s < 0.03
+
+
+def test_bias_and_zero_of_the_steering_are_found(gap: TurningGap) -> None:
+    # The stand-in's own gyro is off by 0.002 rad/s, and its tyres by 0.2°.
+    assert gap.gyro_bias_radps == pytest.approx(LATE.bias_radps + 0.002, abs=0.002)
+    assert math.degrees(gap.steering_offset_rad) == pytest.approx(0.2, abs=0.1)
+    assert gap.gain == pytest.approx(16.0 / 15.3, abs=0.02)
+    assert gap.departure == ""
+
+
+def test_each_second_is_within_the_interval_that_the_others_say(gap: TurningGap) -> None:
+    assert 0.90 <= gap.within <= 1.0
+    assert math.degrees(gap.full_width_radps) < 1.0
+    assert len(gap.stamp_ns) == len(gap.error_radps) == len(gap.half_width_radps) >= 30
+    assert np.sqrt(np.mean(gap.error_radps**2)) < np.sqrt(np.mean(gap.file_error_radps**2))
+
+
+def test_a_model_that_turns_otherwise_is_told_and_nobody_named() -> None:
+    found = turning_of(hand_driven(SEED, LATE), model_with("steering_ratio"))
+    assert found is not None
+    assert found.gain != pytest.approx(1.0, abs=0.2)
+    assert "times as the model does at the measured steering" in found.departure
+    assert "or the car's steering sensor" in found.departure
+
+
+@pytest.mark.parametrize("channel", ["steering", "speed", "imu"])
+def test_without_steering_speed_or_gyro_there_is_nothing_to_compare(channel: str) -> None:
+    samples = [one for one in hand_driven(SEED, Lateness()) if one[0] != channel]
+    assert turning_of(samples) is None
+
+
+def test_half_a_minute_is_needed() -> None:
+    assert turning_of(hand_driven(SEED, Lateness(), end_s=25.0)) is None
