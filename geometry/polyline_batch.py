@@ -113,7 +113,8 @@ def segments_at(lines: Polylines, which: Indices, at_m: Array) -> Indices:
 
 def without_repeats(lines: Polylines, *, tolerance_m: float = 0.01) -> Polylines:
     """Drop points closer than `tolerance_m` to the one before; in place of an end, that one."""
-    wanted = np.concatenate([[True], lines.steps[1][:-1] > tolerance_m])
+    wanted = np.ones(len(lines.xy_m), dtype=bool)
+    wanted[1:] = lines.steps[1][:-1] > tolerance_m
     first, last = lines.first[:-1], lines.first[1:] - 1
     wanted[first] = True
     at_end = last[~wanted[last] & (last - first > 1)]

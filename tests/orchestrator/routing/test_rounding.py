@@ -70,3 +70,13 @@ def test_two_turns_close_together_are_widened_as_far_as_they_leave_room() -> Non
     assert np.abs(bend).max() < np.abs(curvature_pm(smoothed(both, 1.0))).max() - 0.02
     assert bend.max() > 0.05
     assert (np.diff(places) > 0.0).all()
+
+
+def test_a_tight_turn_at_the_very_end_has_no_room_and_stays() -> None:
+    xy, s = turn(math.pi / 2, 5.0)
+    cut = np.searchsorted(s, 40.0 + 5.0 * math.pi / 4)
+    xy, s = xy[:cut], s[:cut]
+    kept, places = with_driven_turns(xy, s, RADII_M)
+
+    assert kept == pytest.approx(xy, abs=0.1)
+    assert places[[0, -1]] == pytest.approx(s[[0, -1]])
