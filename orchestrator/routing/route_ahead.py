@@ -141,6 +141,11 @@ class WayAhead:
         """The speed that the nominal future aims at."""
         return self._cruise.aim_mps(self.speed_limit_mps)
 
+    @property
+    def acceleration_mps2(self) -> float:
+        """The trend of the speed over the last second."""
+        return self._cruise.acceleration_mps2
+
     @traced("speeds of a round")
     def speeds_ahead(self, path: PathAhead, *, horizon_s: float) -> Array:
         """Return (K,) what the nominal future is to drive along a path, from instant to instant."""

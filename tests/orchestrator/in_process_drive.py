@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.world import World
 from foretwin.orchestrator.config import DriveConfig
@@ -30,11 +31,16 @@ from foretwin.world_gen.junctions.map_index import index_map
 
 
 class Round(NamedTuple):
-    """A round of a drive: its World, the path that went into its job, and the state it began in."""
+    """A round of a drive: its World, what was meant to be driven, and the state it began in.
 
+    `acceleration_mps2` is the trend of the speed over the last second.
+    """
+
+    number: int
     world: World
     intent: RoundIntent
     state: VehicleState
+    acceleration_mps2: float
 
 
 class _Builder:
@@ -45,6 +51,7 @@ class _Builder:
         self._index = index_map(inputs.osm, inputs.graph, inputs.junctions)
         self._junctions = {junction.summary.id: junction for junction in inputs.junctions}
         self._worlds: dict[str, World] = {}
+        self.by_id: dict[str, World] = {}
         self._stages: dict[str, tuple[BatchSimulation, SceneMaker]] = {}
 
     def world(self, junction_id: str) -> World:
@@ -53,6 +60,7 @@ class _Builder:
                 self._inputs.osm, self._inputs.graph, self._junctions[junction_id],
                 radius_m=self._inputs.config.radius_m, index=self._index,
             )  # fmt: skip
+            self.by_id[self._worlds[junction_id].id] = self._worlds[junction_id]
         return self._worlds[junction_id]
 
     def stage(self, world: World) -> tuple[BatchSimulation, SceneMaker]:
@@ -133,19 +141,29 @@ class LockStep:
             return
         world = self._builder.world(intent.junction_id)
         number = len(self.rounds)
-        self.rounds.append(Round(world, intent, state))
+        trend = self.mission.way.acceleration_mps2
+        self.rounds.append(Round(number, world, intent, state, trend))
         if not self._futures:
             return
-        jobs = self._planner.plan(
-            number, intent, state, LatestReports(None, None, ()), world,
-            start_stamp_ns=self._start_ns, count=1,
-        )  # fmt: skip
+        job = self.job(self.rounds[-1])
         order = RoundOrder(
             round_id=number, stamp_ns=state.stamp_ns, junction_id=intent.junction_id,
-            world_id=world.id, receipt_mono_ns=0, started_mono_ns=0, jobs=jobs,
+            world_id=world.id, receipt_mono_ns=0, started_mono_ns=0, jobs=(job,),
         )  # fmt: skip
-        stage, scenes = self._builder.stage(world)
-        results = tuple(run_job(job, stage, scenes=scenes) for job in jobs)
-        if results[0].outcome.valid[0]:
-            done = RoundDone(order=order, results=results, latency_ms=0.0, seconds=0.0)
+        result = self.played(job)
+        if result.outcome.valid[0]:
+            done = RoundDone(order=order, results=(result,), latency_ms=0.0, seconds=0.0)
             self._desk.take_round(done, world.frame, state)
+
+    def job(self, one: Round) -> Job:
+        """The job of a round's nominal future."""
+        (job,) = self._planner.plan(
+            one.number, one.intent, one.state, LatestReports(None, None, ()), one.world,
+            start_stamp_ns=self._start_ns, count=1,
+        )  # fmt: skip
+        return job
+
+    def played(self, job: Job) -> FuturesResult:
+        """What a worker would answer."""
+        stage, scenes = self._builder.stage(self._builder.by_id[job.world_id])
+        return run_job(job, stage, scenes=scenes)
