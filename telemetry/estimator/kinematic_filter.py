@@ -16,6 +16,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.estimator import motion_noise
+from foretwin.telemetry.estimator.innovations import PositionInnovation
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
@@ -26,10 +27,7 @@ ROAD_OFFSET = SIZE
 _IDENTITY = np.eye(SIZE + 1)
 
 _MAX_STEP_S = 0.05
-_DRIFT_M = 0.03
 _STANDING_CURVATURE_PM = 0.1
-_LEAST_TURN_RAD = 0.002
-_KNOWN_YAW_VAR = 0.15**2
 
 
 class KinematicFilter:
@@ -53,6 +51,8 @@ class KinematicFilter:
         self.may_reverse = speed_mps < 0.0
         self._gnss_std_m = 0.0
         self._slip_density = motion_noise.SLIP_DENSITY
+        self.calm = self.steady = 1.0
+        """The shares of what a driver can do with pedals and wheel that are expected."""
 
     def copy(self) -> KinematicFilter:
         """Return another filter that goes on from the same state."""
@@ -108,7 +108,9 @@ class KinematicFilter:
         self.mean = mean
         covariance = jacobian @ self.covariance @ jacobian.T
         noise = covariance.reshape(-1)[:: size + 1]  # a view of the diagonal
-        wandering = motion_noise.densities(speed, slip=self._slip_density)
+        wandering = motion_noise.densities(
+            speed, slip=self._slip_density, calm=self.calm, steady=self.steady
+        )
         noise[YAW : ACCEL_BIAS + 1] += dt * np.array(wandering)
         if self._gnss_std_m:
             noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
@@ -169,8 +171,13 @@ class KinematicFilter:
             self.covariance[:, index] = 0.0
             self.covariance[index, index] = self._gnss_std_m**2
 
-    def _position_rows(self, lever_m: tuple[float, float], *, wander: bool) -> tuple[Array, Array]:
-        """Return where a receiver should say it is (2,), and that by the state."""
+    def position_innovation(
+        self, xy_m: Array, lever_m: tuple[float, float], *, wander: bool = False
+    ) -> PositionInnovation:
+        """Return how a position (2,) of a sensor at `lever_m` differs from the expected one.
+
+        `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.
+        """
         expected = self.sensor_xy(lever_m)
         rows = np.zeros((2, len(self.mean)))
         rows[0, X] = rows[1, Y] = 1.0
@@ -178,43 +185,27 @@ class KinematicFilter:
         if wander:
             rows[0, GNSS_X] = rows[1, GNSS_Y] = 1.0
             expected = expected + self.mean[GNSS_X : GNSS_Y + 1]
-        return expected, rows
-
-    def position_surprise(
-        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool
-    ) -> tuple[float, float]:
-        """Return how far a position (2,) lies off the expected one, and that one's spread."""
-        expected, rows = self._position_rows(lever_m, wander=wander)
-        spread = float(np.trace(rows @ self.covariance @ rows.T)) + 2.0 * std_m * std_m
-        return float(np.hypot(*(xy_m - expected))), math.sqrt(spread)
-
-    def correct_position(
-        self,
-        xy_m: Array,
-        std_m: float,
-        lever_m: tuple[float, float],
-        *,
-        wander: bool = False,
-        hold_yaw: bool = False,
-    ) -> None:
-        """Apply a position (2,) of a sensor at `lever_m` with white noise of `std_m`.
-
-        `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.
-        With `hold_yaw` the yaw stays as it is, and so does what is known of it.
-        """
-        expected, rows = self._position_rows(lever_m, wander=wander)
         cross = self.covariance @ rows.T
         (a, b), (_, d) = (rows @ cross).tolist()
-        a, d = a + std_m * std_m, d + std_m * std_m
-        inverse = np.array([[d, -b], [-b, a]]) / (a * d - b * b)
-        gain = cross @ inverse
+        return PositionInnovation(xy_m - expected, cross, a, b, d)
+
+    def correct_position(
+        self, innovation: PositionInnovation, std_m: float, *, hold_yaw: bool = False
+    ) -> None:
+        """Apply a position with white noise of `std_m`, as it differs from the expected one now.
+
+        With `hold_yaw` the yaw stays as it is, and so does what is known of it.
+        """
+        cross, noise = innovation.cross, std_m * std_m
+        a, b, d = innovation.xx_m2 + noise, innovation.xy_m2, innovation.yy_m2 + noise
+        gain = cross @ (np.array([[d, -b], [-b, a]]) / (a * d - b * b))
         covariance = self.covariance - gain @ cross.T
         if hold_yaw:
             # Any gain but the best one costs (K - K_best) S (K - K_best)': here in the yaw alone.
             kept = gain[YAW].copy()
             covariance[YAW, YAW] += kept @ cross[YAW]
             gain[YAW] = 0.0
-        self.mean = self.mean + gain @ (xy_m - expected)
+        self.mean = self.mean + gain @ innovation.residual_m
         self.covariance = 0.5 * (covariance + covariance.T)
         self._limit()
 
@@ -223,25 +214,22 @@ class KinematicFilter:
         self.mean[:2] += xy_m - self.sensor_xy(lever_m)
         self.doubt_position(std_m)
 
-    def drift_sideways(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
-        """Take a step across the car as the receiver's own: a car that creeps cannot go there."""
-        cos, sin = math.cos(self.mean[YAW]), math.sin(self.mean[YAW])
-        step = xy_m - self.sensor_xy(lever_m)
-        along, across = cos * step[0] + sin * step[1], -sin * step[0] + cos * step[1]
-        if abs(across) > max(abs(along), _DRIFT_M) and self.covariance[YAW, YAW] < _KNOWN_YAW_VAR:
-            sideways: Array = across * np.array([-sin, cos])
-            self.move_position(self.sensor_xy(lever_m) + sideways, std_m, lever_m)
+    def doubt_motion(self, speed_std_mps: float, accel_std_mps2: float, over_s: float) -> None:
+        """Make speed and acceleration less known by so much, as they were for `over_s` already."""
+        way = np.zeros(len(self.mean))
+        way[X], way[Y] = over_s * math.cos(self.mean[YAW]), over_s * math.sin(self.mean[YAW])
+        way[SPEED] = 1.0
+        self.covariance += (speed_std_mps * speed_std_mps) * np.outer(way, way)
+        self.covariance[ACCEL, ACCEL] += accel_std_mps2 * accel_std_mps2
 
-    def limit_turn(self, yaw_before_rad: float, *, moved_m: float) -> None:
-        """Undo what a correction turned beyond the tightest bend over `moved_m`.
-
-        Positions that shift under a car that hardly moves must not turn it round.
-        """
-        if self.covariance[YAW, YAW] > _KNOWN_YAW_VAR:
-            return
-        reach = MAX_CURVATURE_PM * moved_m + _LEAST_TURN_RAD
-        change = math.remainder(self.mean[YAW] - yaw_before_rad, math.tau)
-        self.mean[YAW] = yaw_before_rad + min(max(change, -reach), reach)
+    def reverse(self, speed_mps: float) -> None:
+        """Go backwards from now on, or forwards again: the body points where it pointed."""
+        self.may_reverse = speed_mps < 0.0
+        self.mean[SPEED], self.mean[ACCEL] = speed_mps, 0.0
+        for index, std in ((SPEED, 1.0), (ACCEL, 1.0)):
+            self.covariance[index, :] = 0.0
+            self.covariance[:, index] = 0.0
+            self.covariance[index, index] = std * std
 
     def correct_speed(self, speed_mps: float, std_mps: float) -> None:
         """Apply a measured speed, whose scale is estimated."""
@@ -287,12 +275,12 @@ class KinematicFilter:
         row[CURVATURE] = 1.0
         self.correct(row, curvature_pm - self.mean[CURVATURE], std_pm)
 
-    def stand(self) -> None:
+    def stand(self, speed_std_mps: float, accel_std_mps2: float) -> None:
         """Apply that the car stands: no speed and no acceleration; yaw stays as it is."""
         row = np.zeros(len(self.mean))
         row[SPEED] = 1.0
-        self.correct(row, -self.mean[SPEED], 0.01)
+        self.correct(row, -self.mean[SPEED], speed_std_mps)
         row[SPEED], row[ACCEL] = 0.0, 1.0
-        self.correct(row, -self.mean[ACCEL], 0.05)
+        self.correct(row, -self.mean[ACCEL], accel_std_mps2)
         # What positions said of the curvature in the last moments before a stop is mostly noise.
         self.correct_curvature(0.0, _STANDING_CURVATURE_PM)

@@ -73,7 +73,7 @@ class MotionCorrections:
         elif speed_mps > 0.1:
             filter_.may_reverse = False
         if abs(speed_mps) < STANDING_MPS:
-            filter_.stand()
+            filter_.stand(0.01, 0.05)
         else:
             std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]))
             filter_.correct_speed(speed_mps, std + 0.005 * abs(speed_mps))

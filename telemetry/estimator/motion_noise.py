@@ -35,14 +35,23 @@ GNSS_CORRELATION_S = 30.0
 Chosen."""
 
 
-def densities(speed_mps: float, *, slip: float) -> tuple[float, ...]:
-    """Return how much yaw, speed, acceleration, curvature and both inertial biases wander."""
+CALMEST = 0.03
+"""The least share of what a car can do that a calm driver makes of it. Chosen."""
+
+
+def densities(
+    speed_mps: float, *, slip: float, calm: float = 1.0, steady: float = 1.0
+) -> tuple[float, ...]:
+    """Return how much yaw, speed, acceleration, curvature and both inertial biases wander.
+
+    `calm` is the share of the jerk to be expected now, `steady` that of the wheel's turning.
+    """
     turning = min(_CURVATURE_RATE_PMPS, _LATERAL_JERK_MPS3 / max(speed_mps * speed_mps, 1e-6))
     return (
         slip * min(1.0, abs(speed_mps) / 10.0),
         0.0,
-        _JERK_DENSITY,
-        turning * turning,
+        calm * _JERK_DENSITY,
+        steady * turning * turning,
         GYRO_BIAS_DENSITY,
         _ACCEL_BIAS_DENSITY,
     )

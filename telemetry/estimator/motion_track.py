@@ -16,14 +16,14 @@ from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
-from foretwin.telemetry.estimator.position_gate import PositionGate
+from foretwin.telemetry.estimator.position_corrections import PositionCorrections
+from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
 from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
-_WANDER_M = 0.5
-_WHITE_SHARE = 0.1
-"""Of the stated error of a receiver that wanders: what changes from fix to fix."""
-_UNKNOWN_PLACE_M, _CREEPING_MPS = 1000.0, 1.0
+_UNKNOWN_PLACE_M = 1000.0
+_MOST_FASTER_MPS = 5.0
+"""A second and a half of a car's hardest pulling away (0.35 g)."""
 
 
 class MotionTrack:
@@ -53,12 +53,13 @@ class MotionTrack:
             skipped=self._gate.skipped,
         )
         self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
+        self._positions = PositionCorrections(self._measured, self._gate, self._lever[:2])
         self._aid = MapAid()
         self._place: LocalPlace | None = None
         self._filter: KinematicFilter | None = None
         self._start_ns = self._filter_stamp_ns = 0
         self._fix: GnssFix | None = None
-        self._shifts, self._standing = 0, False
+        self._standing = False
 
     @property
     def skipped(self) -> Counter[str]:
@@ -71,6 +72,7 @@ class MotionTrack:
         other._gate = self._gate.copy()
         other._measured = self._measured.copy(skipped=other._gate.skipped)
         other._corrections = self._corrections.copy(other._measured)
+        other._positions = self._positions.copy(other._measured, other._gate)
         other._aid = shallow_copy(self._aid)
         if self._filter is not None:
             other._filter = self._filter.copy()
@@ -115,7 +117,7 @@ class MotionTrack:
         filter_, fix, place = self._filter, self._fix, self._place
         if filter_ is None or fix is None or place is None or fix.std_m is None:
             return False
-        std = fix.std_m if self._wanders else 0.0
+        std = fix.std_m if self._positions.noise.wanders(fix) else 0.0
         return self._aid.take(filter_, place, line, receiver_std_m=std)
 
     # Positions.
@@ -129,16 +131,11 @@ class MotionTrack:
         xy = self._place.xy_m(fix.position)
         time_s = (fix.stamp_ns - self._start_ns) * 1e-9
         recent = self._gate.recent
-        held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
-        if (
-            held
-            and self._measured.fresh("speed_mps", fix.stamp_ns)
-            and abs(self._measured.speed_mps) > 0.5
-        ):
-            self.skipped["gnss_repeated"] += 1  # a slow receiver's last answer, sent once more
+        filter_ = self._advance(fix.stamp_ns)
+        if self._gate.frozen(time_s, xy, speed_mps=self._known_speed_mps(fix.stamp_ns)):
+            self.skipped["gnss_repeated"] += 1  # a receiver's last answer, sent once more
             return False
         lever = self._lever[:2]
-        filter_ = self._advance(fix.stamp_ns)
         expected = recent[-1].xy_m if recent else None
         if filter_ is not None:
             expected = filter_.sensor_xy(lever)
@@ -155,67 +152,27 @@ class MotionTrack:
             filter_ = self._filter = None
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
-        std = self._gate.std_m(fix)
+        self._positions.noise.take(time_s, xy)
         if filter_ is None:
-            self._start_from_course(fix.stamp_ns, std)
+            self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
         else:
-            self._correct(filter_, xy, std, relocate=verdict == "relocate")
+            self._correct(filter_, xy, fix, verdict)
         return True
 
-    def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
-        lever = self._lever[:2]
-        wander, white = self._wanders, std
-        if wander:
-            filter_.expect_wander(std)
-            white = _WHITE_SHARE * std
-        if relocate:
-            self._move(filter_, xy, std)
+    def _known_speed_mps(self, stamp_ns: int) -> float:
+        """Return the car's speed without the fix of now: the wheels', else the filter's."""
+        if self._measured.fresh("speed_mps", stamp_ns):
+            return math.inf if abs(self._measured.speed_mps) > 0.5 else 0.0
+        return 0.0 if self._filter is None else abs(float(self._filter.mean[SPEED]))
+
+    def _correct(self, filter_: KinematicFilter, xy: Array, fix: GnssFix, verdict: Verdict) -> None:
+        if verdict == "relocate":
+            self._positions.move(filter_, fix, xy)
             return
-        away_m, spread_m = filter_.position_surprise(xy, white, lever, wander=wander)
-        if away_m > max(1.0, 8.0 * spread_m):
-            self._shifts += 1
-            if wander and self._shifts < 3:
-                self.skipped["gnss_outlier"] += 1
-                return
-            self._move(filter_, xy, std)
-            if self._shifts >= 3:
-                self._turn_to_course(filter_)
-            return
-        self._shifts, yaw_before = 0, filter_.mean[YAW]
-        wheels = self._measured.fresh("speed_mps", self._filter_stamp_ns)
-        if abs(filter_.mean[SPEED]) < _CREEPING_MPS and not wander:
-            filter_.drift_sideways(xy, std, lever)
-        hold = wheels and self._standing
-        filter_.correct_position(xy, white, lever, wander=wander, hold_yaw=hold)
-        filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
-        if wander:
-            self._aid.watch(filter_, receiver_std_m=std)
-        if not wheels:
-            self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
-            if self._standing:
-                filter_.stand()
-        if self._standing:
-            filter_.mean[YAW] = yaw_before
-        elif not filter_.may_reverse and not self._measured.fresh("yaw_rad", self._filter_stamp_ns):
-            course = self._gate.course(1.0 + 5.0 * std, within_s=3.0)
-            if course is not None and abs(math.remainder(course - yaw_before, math.tau)) > 1.75:
-                self._turn_to_course(filter_)
-
-    def _move(self, filter_: KinematicFilter, xy: Array, std: float) -> None:
-        filter_.move_position(xy, std, self._lever[:2])
-        if self._wanders:
-            filter_.forget_wander()
-
-    @property
-    def _wanders(self) -> bool:
-        """Whether the receiver itself says that it is rough: then its error wanders slowly."""
-        return self._fix is not None and (self._fix.std_m or 0.0) >= _WANDER_M
-
-    def _turn_to_course(self, filter_: KinematicFilter) -> None:
-        course = self._gate.course(1.0, within_s=3.0)
-        if course is not None:
-            self._start(self._filter_stamp_ns, course, yaw_std_rad=0.3)
-        self._shifts = 0
+        found = self._positions.correct(filter_, fix, xy, aid=self._aid, standing=self._standing)
+        self._standing = found.standing
+        if found.course_rad is not None:
+            self._start(self._filter_stamp_ns, found.course_rad, yaw_std_rad=0.3)
 
     def _start_from_course(self, stamp_ns: int, std: float) -> None:
         course = self._gate.course(max(1.0, 5.0 * std))
@@ -233,17 +190,21 @@ class MotionTrack:
         measured, at = self._measured.fresh("speed_mps", stamp_ns), self._gate.recent[-1].xy_m
         xy = base_from_sensor(at, yaw_rad, self._lever)
         speed_mps = self._measured.speed_mps if measured else self._gate.speed_mps()
+        if self._filter is not None and not measured:
+            # Lost or not: no car has become so much faster since it was known.
+            before_mps = abs(float(self._filter.mean[SPEED]))
+            speed_mps = min(speed_mps, before_mps + _MOST_FASTER_MPS)
         self._filter = KinematicFilter(
             xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad, speed_mps=speed_mps
         )
         self._corrections.begin(self._filter)
         self._filter_stamp_ns = stamp_ns
-        if self._wanders:
-            assert self._fix is not None
-            std = self._gate.std_m(self._fix)
+        noise, fix = self._positions.noise, self._fix
+        if fix is not None and noise.wanders(fix):
             self._filter.doubt_position(_UNKNOWN_PLACE_M)
-            self._filter.expect_wander(std)
-            self._filter.correct_position(at, _WHITE_SHARE * std, self._lever[:2], wander=True)
+            self._filter.expect_wander(noise.std_m(fix))
+            innovation = self._filter.position_innovation(at, self._lever[:2], wander=True)
+            self._filter.correct_position(innovation, noise.white_std_m(fix))
 
     def _advance(self, stamp_ns: int) -> KinematicFilter | None:
         if self._filter is not None and stamp_ns > self._filter_stamp_ns:
@@ -263,7 +224,7 @@ class MotionTrack:
         if self._filter is None:
             assert self._fix is not None
             return self._fix.position
-        if fix is not None and self._gate.at_its_word(fix, alone=not self._measured.anything):
+        if fix is not None and self._positions.at_its_word(fix, alone=not self._measured.anything):
             if not any(self._lever):
                 return fix.position
             xy = base_from_sensor(self._gate.recent[-1].xy_m, self._filter.mean[YAW], self._lever)
@@ -290,6 +251,7 @@ class MotionTrack:
             wheelbase_m=self._wheelbase_m,
             standing=self._standing,
             map_shift_m=self._aid.shift_m,
+            overconfidence=self._positions.overconfidence,
         )
 
     @property

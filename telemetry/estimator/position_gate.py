@@ -15,13 +15,14 @@ from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 MAX_SPEED_MPS = 70.0
 """A position that asks for more than this is no motion of a road vehicle. Chosen: 252 km/h."""
-_UNKNOWN_STD_M = 0.01
-"""Of positions that state none, until they turn out worse."""
-_ROUGH_M = 0.3
 _JUMP_CONFIRM_S = 1.0
 _HISTORY_S = 6.0
-_STANDING_FIXES = 4
-_MOST_ACCEL_MPS2 = 4.0
+_STANDING_FIXES, _STANDING_S = 4, 0.55
+_UNSEEN_BRAKING_MPS2 = 3.0
+"""So hard may a car brake within two fixes that are the same to the bit. Chosen: harder braking
+shows in the fixes before."""
+_LONGEST_FROZEN_S = 3.0
+_CREEPING_MPS = 0.5
 _STANDING_MPS = 0.06
 
 Verdict = Literal["use", "relocate", "skip"]
@@ -46,8 +47,9 @@ class PositionGate:
         self._last_stamp_ns: int | None = None
         self._leap_stamp_ns: int | None = None
         self._elsewhere: list[LocalFix] = []
-        self.roughness_m = 0.0
-        """How far fixes lie, on average, off any motion with up to 4 m/s² through the last two."""
+        self._anew_s: float | None = None
+        self._held: LocalFix | None = None
+        """The first of fixes that have not changed by a bit."""
 
     def copy(self) -> PositionGate:
         """Return another gate that goes on from here by itself."""
@@ -120,42 +122,51 @@ class PositionGate:
         self._elsewhere.clear()
         self._remember(LocalFix(time_s, xy_m))
 
+    def frozen(self, time_s: float, xy_m: Array, *, speed_mps: float) -> bool:
+        """Whether a receiver gives its last answer once more while the car cannot have stopped.
+
+        `speed_mps` is what is known of the car's speed without this fix.
+        """
+        held = self._held
+        if held is None or held.xy_m[0] != xy_m[0] or held.xy_m[1] != xy_m[1]:
+            self._held = LocalFix(time_s, xy_m)
+            return False
+        since_s = time_s - held.time_s
+        if since_s > _LONGEST_FROZEN_S:
+            return False
+        return speed_mps - _UNSEEN_BRAKING_MPS2 * since_s > _CREEPING_MPS
+
+    def hold_back(self) -> LocalFix:
+        """Leave the last fix out of what shows the motion, and return it."""
+        return self.recent.pop()
+
+    def begin_anew(self, fixes: tuple[LocalFix, ...], *, after_s: float = 0.0) -> None:
+        """Let these show the motion, and none before them but those begun anew just before."""
+        if self._anew_s is None or fixes[0].time_s - self._anew_s > after_s:
+            self.recent.clear()
+        self.recent.extend(fixes)
+        self._anew_s = fixes[-1].time_s
+
+    def slip(self, by_m: Array, last: LocalFix) -> None:
+        """Move all fixes by (2,), and go on with `last`: the receiver moved, the car did not."""
+        self.recent = deque(LocalFix(fix.time_s, fix.xy_m + by_m) for fix in self.recent)
+        self.recent.append(last)
+
     def _remember(self, fix: LocalFix) -> None:
-        if len(self.recent) >= 2:
-            last, before = self.recent[-1], self.recent[-2]
-            step_s, step_before_s = fix.time_s - last.time_s, last.time_s - before.time_s
-            if step_before_s > 0.0:
-                straight = last.xy_m + (last.xy_m - before.xy_m) * (step_s / step_before_s)
-                allowed = 0.5 * _MOST_ACCEL_MPS2 * step_s * (step_s + step_before_s)
-                excess = min(max(0.0, _distance(fix.xy_m, straight) - allowed), 20.0)
-                self.roughness_m += 0.05 * (excess - self.roughness_m)
         self.recent.append(fix)
         while fix.time_s - self.recent[0].time_s > _HISTORY_S:
             self.recent.popleft()
 
-    @property
-    def rough(self) -> bool:
-        """Whether fixes have turned out too rough to be taken at their word."""
-        return self.roughness_m > _ROUGH_M
-
-    def std_m(self, fix: GnssFix) -> float:
-        """Return the standard deviation that a fix states, or what its like turned out to have."""
-        if fix.std_m is not None and math.isfinite(fix.std_m):
-            return min(max(fix.std_m, 1e-3), 1e4)
-        return self.roughness_m if self.rough else _UNKNOWN_STD_M
-
-    def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
-        """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
-        if fix.std_m is None:
-            return not self.rough
-        return fix.std_m <= 0.05 and alone
-
     def standing(self, std_m: float) -> bool:
         """Return whether the last fixes show nothing but jitter of `std_m` about one point."""
-        if len(self.recent) < _STANDING_FIXES:
+        last: list[LocalFix] = []
+        for fix in reversed(self.recent):
+            last.append(fix)
+            span_s = last[0].time_s - fix.time_s
+            if span_s >= _STANDING_S and len(last) >= _STANDING_FIXES:
+                break
+        else:
             return False
-        last = [self.recent[-k] for k in range(1, _STANDING_FIXES + 1)]
-        span_s = last[0].time_s - last[-1].time_s
         points = np.array([fix.xy_m for fix in last])
         spread = np.hypot(*(points - points.mean(axis=0)).T).max()
         return bool(spread < _STANDING_MPS * span_s + 1.5 * std_m)

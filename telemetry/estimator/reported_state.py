@@ -57,17 +57,19 @@ def moving_state(
     wheelbase_m: float,
     standing: bool,
     map_shift_m: tuple[float, float] | None,
+    overconfidence: float = 1.0,
 ) -> VehicleState:
     """Return the state of a car whose heading is known.
 
-    `convergence_rad` is the angle of the filter's frame against east; a car that stands has no
+    `overconfidence` is by how much the filter's spreads were too small so far. `convergence_rad`
+    is the angle of the filter's frame against east; a car that stands has no
     speed, turning or acceleration. Fields without a fresh sample are named in `estimated`.
     """
     estimated = measured.estimated(stamp_ns)
     angle = None if "tire_angle_rad" in estimated else measured.tire_angle_rad
     if angle is None:
         angle = math.atan(wheelbase_m * filter_.mean[CURVATURE])
-    spread = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
+    spread = overconfidence * np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
     position_std_m = math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)
     if map_shift_m is not None:
         position_std_m = math.hypot(position_std_m, ALIKE_M)

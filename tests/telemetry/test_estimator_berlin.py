@@ -74,10 +74,13 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def test_every_state_is_exactly_at_the_measured_position(data_dir: Path) -> None:
+def test_states_are_exactly_at_the_measured_positions_but_for_fixes_that_no_car_reaches(
+    data_dir: Path,
+) -> None:
     drive = berlin(data_dir)
-    for fix, state in zip(drive.fixes, drive.states, strict=True):
-        assert state.position == fix.position
+    pairs = list(zip(drive.fixes, drive.states, strict=True))
+    elsewhere = [fix.stamp_ns for fix, state in pairs if state.position != fix.position]
+    assert len(elsewhere) < 0.01 * len(pairs)
 
 
 def test_motion_is_close_to_what_the_whole_log_says(data_dir: Path) -> None:
@@ -110,12 +113,13 @@ def test_the_car_does_not_turn_while_it_stands(data_dir: Path) -> None:
     assert np.abs(drive.values("speed_mps")[standing]).max() < 0.2
 
 
-def test_nothing_of_the_real_drive_is_refused(data_dir: Path) -> None:
+def test_of_the_real_drive_only_glitches_are_held_back(data_dir: Path) -> None:
     log = open_log(data_dir / "drive-berlin-gendarmenmarkt" / "Berlin_Gendarmenmarkt_GT.txt")
     estimator = StateEstimator(log.info)
     for channel, message in log.samples():
         estimator.handle(channel, message)
-    assert not estimator.skipped
+    assert set(estimator.skipped) == {"gnss_outlier"}
+    assert estimator.skipped["gnss_outlier"] < 20
 
 
 def test_a_receiver_that_drifts_does_not_turn_a_standing_car(data_dir: Path) -> None:

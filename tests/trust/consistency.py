@@ -56,7 +56,8 @@ def consistency_of(states: States, truth: Truth) -> Consistency:
     speed = states.speed_mps[inside]
     faster = np.abs(speed) - true_speed  # a course knows no reverse
     turned = np.abs(wrap_angle(states.yaw_rad[inside] - truth.at(stamps, "yaw_rad")))
-    moving, driving = true_speed > MOVING_MPS, true_speed > DRIVING_MPS
+    moving = np.minimum(true_speed, _lasting(true_speed, time_s)) > MOVING_MPS
+    driving = true_speed > DRIVING_MPS
     calm = ~_soon_after(stamps, truth.slips)
     stands = (np.abs(speed) < STANDING_MPS) & moving
     lost = (np.degrees(turned) > WORST_YAW_DEG) & driving
@@ -73,6 +74,13 @@ def consistency_of(states: States, truth: Truth) -> Consistency:
         float(time_s[-1] - time_s[0]),
         states.us_per_sample,
     )
+
+
+def _lasting(speed_mps: Array, time_s: Array) -> Array:
+    """Return the median over a second and a half: small slips of a standing car's are no motion."""
+    reach = max(1, round(0.75 / float(np.median(np.diff(time_s)))))
+    padded = np.pad(speed_mps, reach, mode="edge")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
 
 
 def _soon_after(

@@ -103,7 +103,7 @@ def _given(data: Path) -> Iterator[RealDrive]:
     yield RealDrive("boreas-positions", "tuning", positions, boreas, 0.01)
     segment = data / "drive-comma2k19-sf" / "segment40"
     pose = partial(open_log, segment)
-    yield RealDrive("comma2k19", "tuning", pose, pose, 0.05, true_heading=True)
+    yield _alone("comma2k19", pose, position_std_m=0.05)
     ublox = partial(other_receivers.with_ublox, pose, segment)
     yield RealDrive("comma2k19-ublox", "tuning", ublox, pose, 0.05)
     for name, file in (

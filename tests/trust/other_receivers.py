@@ -21,7 +21,9 @@ from foretwin.contracts.frames import GeoPoint, geo_from_ecef
 from foretwin.telemetry.logs import Log
 from foretwin.telemetry.logs.log import Sample
 
-_SLOW_CLOCK_ROUNDS = 8
+_ROUNDS = 8
+_EARTH_RADPM = 7.2921151467e-5 / 299_792_458.0
+"""The Earth turns while a signal is under way (IS-GPS-200, 20.3.3.4.3)."""
 
 
 def positions_alone(log: Callable[[], Log]) -> Log:
@@ -124,9 +126,10 @@ def _single_point(rows: Array, stamp_ns: int) -> GnssFix | None:
         return None
     clocks = (systems[:, None] == kinds).astype(np.float64)
     place = np.zeros(3)
-    for _ in range(_SLOW_CLOCK_ROUNDS):
+    for _ in range(_ROUNDS):
         away = place - satellites
-        distance = np.linalg.norm(away, axis=1)
+        turned_m = _EARTH_RADPM * (satellites[:, 0] * place[1] - satellites[:, 1] * place[0])
+        distance = np.linalg.norm(away, axis=1) + turned_m
         design = np.hstack([away / distance[:, None], clocks]) / np.sqrt(variances)[:, None]
         step, *_, rank, _ = np.linalg.lstsq(
             design, (ranges - distance) / np.sqrt(variances), rcond=None

@@ -21,8 +21,8 @@ from tests.trust.drives import RealDrive
 
 _REACH = 4
 """Intervals before and after one that say what it should have been."""
-_LEAST_SLIP_M = 0.12
-_CAR_MPS2 = 5.0
+_LEAST_SLIP_M = 0.08
+_CAR_MPS2 = 2.0
 """What a car's motion may differ from its neighbours' straight line: jerk and curvature."""
 JERK_DENSITY = 4.0
 

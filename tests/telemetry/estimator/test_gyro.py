@@ -89,9 +89,10 @@ def test_a_held_yaw_stays_as_it_is_and_as_unsure(
     filter_.predict(2.0)
     filter_.correct_yaw_rate(0.05, 0.005, biased=True)
     yaw, before = filter_.mean[YAW], filter_.covariance.copy()
-    filter_.correct_position(
-        filter_.mean[:2] + np.array([x_m, y_m]), std_m, (1.0, 0.0), wander=wander, hold_yaw=True
+    innovation = filter_.position_innovation(
+        filter_.mean[:2] + np.array([x_m, y_m]), (1.0, 0.0), wander=wander
     )
+    filter_.correct_position(innovation, std_m, hold_yaw=True)
     assert filter_.mean[YAW] == yaw
     assert filter_.covariance[YAW, YAW] == pytest.approx(before[YAW, YAW], rel=1e-9)
     assert filter_.covariance[X, X] < before[X, X]

@@ -1,0 +1,291 @@
+"""Corrects the filter with positions, as far as a car can have gone where they say.
+
+A fix that surprises beyond what motion and noise explain is held back. The next one decides: back
+on the way, the first was a glitch; as far off as the first, the receiver has slipped, and the place
+moves while the motion stays; farther off still, the motion was misjudged, and begins anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import NamedTuple
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix
+from foretwin.telemetry.estimator.innovations import PositionInnovation
+from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.map_aid import MapAid
+from foretwin.telemetry.estimator.measured import MotionSamples
+from foretwin.telemetry.estimator.motion_noise import CALMEST
+from foretwin.telemetry.estimator.position_gate import LocalFix, PositionGate
+from foretwin.telemetry.estimator.position_noise import PositionNoise
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
+from foretwin.telemetry.estimator.slow_motion import drift_sideways, limit_turn
+
+_DOUBTFUL, _UNBELIEVABLE = 9.0, 25.0
+"""Normalised squares (three and five standard deviations) from which a fix counts for less, and
+for nothing until the next one bears it out."""
+_IMPOSSIBLE = 25.0
+"""The same where fixes are alone: how hard a driver may brake and turn is in what is expected."""
+_PLANE_95, _BY_CHANCE = 5.991, 1.5
+_UP, _DOWN = 1.2, 1.2 ** (-1.0 / 19.0)
+"""95 % of chi-square with two degrees of freedom, and what of 100 fixes the 5 beyond it, and the 95
+within, make of what is usual (Gibbs, Candes 2021: adaptive conformal inference). Where sources
+contradict each other all the time, no single fix is a glitch, and no spread is as small as said."""
+_LEAST_SLIP_M = 0.1
+_SHOWS_TURNING_M = 0.2
+"""Fixes rougher than this show no wheel being turned, only the bend that comes of it. Chosen."""
+_NIMBLE = 1.5
+"""Where nothing but fixes tells of turning, a turn must not lag behind them. Chosen."""
+_CALMING = 0.1
+"""How fast, fix by fix, a calm driver is believed to stay calm."""
+_MISJUDGED_MPS2 = 4.0
+_MOST_MPS2 = 10.0
+"""No car on tyres accelerates, brakes or turns harder (1 g)."""
+_SINCE_S, _SHORTLY_S = 0.2, 0.6
+_LOST_S = 2.0
+"""So long may fixes contradict each other before the newest is as good as any."""
+_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2 = 0.1, 1.0
+"""How well fixes alone tell that a car stands: it may have begun to roll. Chosen."""
+_ASTRAY = 3
+"""So many fixes in a row that agree neither with the filter nor with each other: it is lost."""
+_PASSED_ON_M = 0.05
+_CREEPING_MPS, _BACKING_MPS, _BACKED_M = 1.0, 0.3, 0.3
+_TURNED_RAD, _BACKWARDS_RAD = 1.75, 2.5
+"""No car turns by the first within a metre: its heading was wrong; from the second on it backs."""
+_KNOWN_YAW_VAR = 0.15**2
+_FASTEST_REVERSE_MPS, _LONGEST_REVERSE_M = 3.0, 15.0
+"""A car that positions alone show going faster or farther backwards was facing that way. Chosen:
+walking pace and some lengths of a parking space."""
+
+
+class Corrected(NamedTuple):
+    """Whether the car stands, and the course (rad) along which the motion has to begin anew."""
+
+    standing: bool
+    course_rad: float | None = None
+
+
+class _Doubted(NamedTuple):
+    """A fix, and how far it lay off what was expected (2,)."""
+
+    fix: LocalFix
+    off_m: Array
+
+
+class PositionCorrections:
+    """Gives each fix its weight. `skipped` counts refused input by reason."""
+
+    def __init__(
+        self, measured: MotionSamples, gate: PositionGate, lever_m: tuple[float, float]
+    ) -> None:
+        self._measured = measured
+        self._gate = gate
+        self._lever = lever_m
+        self.noise = PositionNoise()
+        self._doubted: tuple[_Doubted, ...] = ()
+        """The latest fixes in a row that were held back."""
+        self._reversed_m = 0.0
+        self._usual = 1.0
+        self.slips = 0
+        """How often the receiver has slipped."""
+
+    def copy(self, measured: MotionSamples, gate: PositionGate) -> PositionCorrections:
+        """Return others with the same doubts, which read `measured` and `gate`."""
+        other = shallow_copy(self)
+        other._measured, other._gate = measured, gate
+        other.noise = self.noise.copy()
+        return other
+
+    @property
+    def overconfidence(self) -> float:
+        """So many times smaller than it turned out does the filter say that its errors are."""
+        return math.sqrt(max(self._usual / _BY_CHANCE, 1.0))
+
+    @property
+    def skipped(self) -> Counter[str]:
+        """How many samples were refused, by reason."""
+        return self._gate.skipped
+
+    def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
+        """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
+        if self._doubted or self.noise.std_m(fix) > _PASSED_ON_M:
+            return False
+        return fix.std_m is None or alone
+
+    def correct(
+        self, filter_: KinematicFilter, fix: GnssFix, xy_m: Array, *, aid: MapAid, standing: bool
+    ) -> Corrected:
+        """Correct a filter already predicted to the fix, which lies at `xy_m` (2,)."""
+        std, white = self.noise.std_m(fix), self.noise.white_std_m(fix)
+        wander = self.noise.wanders(fix)
+        if wander:
+            filter_.expect_wander(std)
+        wheels = self._measured.fresh("speed_mps", fix.stamp_ns)
+        innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
+        square = innovation.square(white)
+        if wheels:
+            self.noise.surprised(innovation.away_m, innovation.variance_m2(0.0))
+        alone = not wheels and not self._measured.anything
+        usual = 1.0 if wander or alone else self._usual
+        astray = (
+            square > (_IMPOSSIBLE if alone else _UNBELIEVABLE * usual)
+            and innovation.away_m > _LEAST_SLIP_M
+        )
+        if astray or (self._doubted and self._slipped(innovation, white, standing=standing)):
+            held = self._doubt(filter_, fix, xy_m, innovation, standing=standing)
+            if held is not None:
+                return held
+            innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
+            square = innovation.square(white)
+        borne_out, self._doubted = bool(self._doubted), ()
+        self._usual = max(self._usual * (_UP if square > _PLANE_95 * self._usual else _DOWN), 1.0)
+        self._expect(filter_, square, white, alone=alone)
+        yaw_before = filter_.mean[YAW]
+        if (
+            abs(filter_.mean[SPEED]) < _CREEPING_MPS
+            and not wander
+            and drift_sideways(filter_, xy_m, std, self._lever)
+        ):
+            innovation = filter_.position_innovation(xy_m, self._lever)
+        doubt, noise = square / (_DOUBTFUL * usual), white
+        if doubt > 1.0 and not borne_out:
+            noise = math.sqrt(white * white + (doubt - 1.0) * innovation.variance_m2(white))
+        filter_.correct_position(innovation, noise, hold_yaw=wheels and standing)
+        limit_turn(filter_, yaw_before, moved_m=self._gate.last_step_m)
+        if wander:
+            aid.watch(filter_, receiver_std_m=std)
+        if not wheels:
+            stood, standing = standing, self._gate.standing(white)
+            standing = standing and abs(filter_.mean[SPEED]) < _CREEPING_MPS / 2.0
+            if stood and not standing:
+                filter_.doubt_motion(_CREEPING_MPS, _MISJUDGED_MPS2, 0.0)
+            if standing:
+                filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
+                filter_.calm = 1.0  # it may pull away at any time
+        if standing:
+            filter_.mean[YAW] = yaw_before
+            return Corrected(standing)
+        if not self._alone(fix):
+            return Corrected(standing)
+        return Corrected(standing, self._turned(filter_, yaw_before, std))
+
+    def move(self, filter_: KinematicFilter, fix: GnssFix, xy_m: Array) -> None:
+        """Put the place where the fix says, and leave the motion: the receiver has jumped."""
+        filter_.move_position(xy_m, self.noise.std_m(fix), self._lever)
+        if self.noise.wanders(fix):
+            filter_.forget_wander()
+        self.noise.restart()
+        self._doubted = ()
+
+    def _expect(
+        self, filter_: KinematicFilter, square: float, white_m: float, *, alone: bool
+    ) -> None:
+        """Let surprises say how calmly the car is driven, where fixes alone tell of it."""
+        filter_.steady = min(_NIMBLE, _SHOWS_TURNING_M / white_m) if alone else 1.0
+        if not alone or square > _DOUBTFUL:
+            filter_.calm = 1.0
+            return
+        pace = math.exp(_CALMING * (0.5 * min(square, _DOUBTFUL) - 1.0))
+        filter_.calm = min(max(filter_.calm * pace, CALMEST), 1.0)
+
+    def _slipped(self, innovation: PositionInnovation, white_m: float, *, standing: bool) -> bool:
+        """Whether a fix, believable by itself, lies off as the one before it that was held back."""
+        before, now = self._doubted[-1], self._gate.recent[-1]
+        moved = innovation.residual_m - before.off_m
+        step_s = now.time_s - before.fix.time_s
+        far = innovation.away_m > 0.5 * math.hypot(*before.off_m)
+        return far and self._alike(moved, step_s, white_m, standing=standing)
+
+    @staticmethod
+    def _alike(moved_m: Array, step_s: float, white_m: float, *, standing: bool) -> bool:
+        """Whether two fixes lie off alike, as far as noise and the motion between them allow."""
+        allowed_m = 0.5 * _LEAST_SLIP_M + 3.0 * white_m
+        if not standing:
+            allowed_m += 0.5 * _MISJUDGED_MPS2 * step_s * step_s
+        return math.hypot(*moved_m) < allowed_m
+
+    def _doubt(
+        self,
+        filter_: KinematicFilter,
+        fix: GnssFix,
+        xy_m: Array,
+        innovation: PositionInnovation,
+        *,
+        standing: bool,
+    ) -> Corrected | None:
+        """Hold back a fix that cannot be, or decide what the ones before it were.
+
+        Returns None where it may correct the filter after all.
+        """
+        now = _Doubted(self._gate.hold_back(), innovation.residual_m)
+        before, self._doubted = self._doubted, (*self._doubted, now)
+        if before:
+            moved = now.off_m - before[-1].off_m
+            step_s = now.fix.time_s - before[-1].fix.time_s
+            alike = self._alike(moved, step_s, self.noise.white_std_m(fix), standing=standing)
+            if alike and (len(before) >= _ASTRAY - 1 or not self.noise.wanders(fix)):
+                self._gate.slip(innovation.residual_m, now.fix)
+                self.move(filter_, fix, xy_m)
+                self.slips += 1
+                return Corrected(standing)
+            cos, sin = math.cos(filter_.mean[YAW]), math.sin(filter_.mean[YAW])
+            along = cos * moved[0] + sin * moved[1]
+            ahead = abs(along) > abs(cos * moved[1] - sin * moved[0])
+            can = abs(along) / step_s < _CREEPING_MPS + _MOST_MPS2 * (step_s + _SINCE_S)
+            if not alike and ahead and can and self._alone(fix):
+                # The car goes on along its heading, faster or slower than was thought.
+                self._gate.begin_anew(tuple(one.fix for one in self._doubted))
+                filter_.doubt_motion(abs(along) / step_s, _MISJUDGED_MPS2, step_s)
+                if filter_.mean[SPEED] + along / step_s < -_BACKING_MPS:
+                    self._reverse(filter_, along / step_s)
+                return None
+        lasts_s = now.fix.time_s - self._doubted[0].fix.time_s
+        if len(self._doubted) < _ASTRAY or (lasts_s < _LOST_S and self._erratic(fix)):
+            self.skipped["gnss_outlier"] += 1
+            return Corrected(standing)
+        self._gate.begin_anew(tuple(one.fix for one in self._doubted), after_s=_SHORTLY_S)
+        self.move(filter_, fix, xy_m)
+        far_m = _BACKED_M + 10.0 * self.noise.std_m(fix)
+        return Corrected(standing, self._gate.course(far_m, within_s=3.0))
+
+    def _erratic(self, fix: GnssFix) -> bool:
+        """Whether no car can go through the latest three fixes that were held back."""
+        one, two, three = (doubted.fix for doubted in self._doubted[-3:])
+        before_s, after_s = two.time_s - one.time_s, three.time_s - two.time_s
+        bend = three.xy_m - two.xy_m - (two.xy_m - one.xy_m) * (after_s / before_s)
+        allowed_m = 0.5 * _MOST_MPS2 * after_s * (before_s + after_s)
+        return math.hypot(*bend) > allowed_m + 4.0 * self.noise.white_std_m(fix)
+
+    def _turned(self, filter_: KinematicFilter, yaw_before: float, std_m: float) -> float | None:
+        """Return the course to begin anew along where positions alone go against the heading."""
+        speed_mps = float(filter_.mean[SPEED])
+        if filter_.may_reverse:
+            self._reversed_m += self._gate.last_step_m
+            if speed_mps > 0.5 * _CREEPING_MPS:
+                filter_.may_reverse = False
+            elif speed_mps < -_FASTEST_REVERSE_MPS or self._reversed_m > _LONGEST_REVERSE_M:
+                return self._gate.course(1.0 + 5.0 * std_m, within_s=3.0)
+            return None
+        known = filter_.covariance[YAW, YAW] < _KNOWN_YAW_VAR
+        course = self._gate.course((_BACKED_M if known else 1.0) + 5.0 * std_m, within_s=3.0)
+        if course is None:
+            return None
+        turned = abs(math.remainder(course - yaw_before, math.tau))
+        if known and turned > _BACKWARDS_RAD and speed_mps < _BACKING_MPS:
+            self._reverse(filter_, -self._gate.speed_mps())
+            return None
+        course = self._gate.course(1.0 + 5.0 * std_m, within_s=3.0)
+        if course is None or abs(math.remainder(course - yaw_before, math.tau)) <= _TURNED_RAD:
+            return None
+        return course
+
+    def _reverse(self, filter_: KinematicFilter, speed_mps: float) -> None:
+        self._reversed_m = 0.0
+        filter_.reverse(speed_mps)
+
+    def _alone(self, fix: GnssFix) -> bool:
+        """Whether nothing but positions tells of the direction."""
+        fresh = self._measured.fresh
+        return not (fresh("speed_mps", fix.stamp_ns) or fresh("yaw_rad", fix.stamp_ns))

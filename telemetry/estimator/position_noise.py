@@ -1,0 +1,146 @@
+"""How far a receiver's fixes are off: what it states, checked, and what is learnt without it.
+
+Two witnesses tell the noise from fix to fix. Four fixes in a row leave, after the quadratic through
+them, nothing but noise and what the car jerks: a bound that needs no filter, so that nothing it
+believes can mislead. Below that bound, where wheels are heard, the filter's surprises tell, less
+what it expected of itself. Medians of both: a slip spoils few. What lies under all fixes alike no
+witness sees: that is as large as the receiver states.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
+
+UNKNOWN_STD_M = 0.05
+"""Of fixes that state none, before the car has moved enough to tell. Chosen: between survey
+receivers with corrections, which mostly leave it out, and others."""
+LEAST_STD_M = 0.012
+"""No receiver on a moving car is better (NovAtel OEM7 with RTK: 1 cm + 1 ppm)."""
+WANDER_M = 0.5
+"""From this stated error on, a receiver has no corrections, and its error wanders slowly."""
+_WHITE_SHARE = 0.1
+"""Of the stated error of a receiver that wanders: what changes from fix to fix."""
+_JERK_MPS3 = 4.0
+_REMEMBERED, _LEAST_SEEN = 24, 6
+_LATEST, _CLEAN = 8, 2
+"""Four fixes' worth of the latest; a slip leaves two of them clean, more noise none."""
+_MOVING_MPS = 0.5
+_CLEAR = 0.2
+"""So small a share of what is looked for may the car's own jerk be to be told apart from it."""
+_LIES = 2.0
+"""So many times what was stated may what is seen be before it is believed instead."""
+_LINE_MEDIAN, _PLANE_MEDIAN = 0.4549, 1.3863
+"""Medians of chi-square with one and two degrees of freedom."""
+
+
+class _TimedPlace(NamedTuple):
+    time_s: float
+    x_m: float
+    y_m: float
+
+
+class PositionNoise:
+    """Learns the white noise of one receiver's fixes, from the fixes and from the surprises."""
+
+    def __init__(self) -> None:
+        self._last: tuple[_TimedPlace, ...] = ()
+        self._rough: tuple[float, ...] = ()
+        self._jerked_m = 0.0
+        self._surprises: tuple[float, ...] = ()
+        self._seen_m: float | None = None
+        """The white noise that was seen; None before there is enough of it."""
+
+    def copy(self) -> PositionNoise:
+        """Return another one that goes on from here by itself."""
+        return shallow_copy(self)
+
+    def restart(self) -> None:
+        """Forget the last fixes: what comes next lies elsewhere."""
+        self._last = ()
+
+    def take(self, time_s: float, xy_m: Array) -> None:
+        """Take a fix at `xy_m` (2,) that is no wild one."""
+        self._last = (*self._last[-3:], _TimedPlace(time_s, float(xy_m[0]), float(xy_m[1])))
+        if len(self._last) < 4:
+            return
+        first, last = self._last[0], self._last[-1]
+        span_s = last.time_s - first.time_s
+        way_m = math.hypot(last.x_m - first.x_m, last.y_m - first.y_m)
+        weights = _beyond_quadratic(*(one.time_s for one in self._last))
+        if way_m < _MOVING_MPS * span_s or weights is None:
+            return
+        self._jerked_m = _JERK_MPS3 * (span_s / 3.0) ** 3 / math.sqrt(20.0)
+        for off in (
+            sum(w * one.x_m for w, one in zip(weights, self._last, strict=True)),
+            sum(w * one.y_m for w, one in zip(weights, self._last, strict=True)),
+        ):
+            self._rough = (*self._rough[1 - _REMEMBERED :], off * off)
+        self._learn()
+
+    def surprised(self, away_m: float, expected_m2: float) -> None:
+        """Take how far a fix lay off where wheels led, and the variance expected there per axis."""
+        square = away_m * away_m - _PLANE_MEDIAN * expected_m2
+        self._surprises = (*self._surprises[1 - _REMEMBERED :], square)
+
+    def _learn(self) -> None:
+        if len(self._rough) < _LEAST_SEEN:
+            return
+        latest = self._rough[-_LATEST:]
+        if len(latest) == _LATEST and sorted(latest)[_CLEAN - 1] > 2.0 * _middle(self._rough):
+            self._rough = latest  # the receiver has become another one
+        bound = _middle(self._rough) / _LINE_MEDIAN
+        if len(self._surprises) < _LEAST_SEEN:
+            square = bound - self._jerked_m * self._jerked_m
+        else:
+            square = min(bound, _middle(self._surprises) / _PLANE_MEDIAN)
+        self._seen_m = math.sqrt(max(square, 0.0))
+
+    def std_m(self, fix: GnssFix) -> float:
+        """Return one standard deviation of a fix on each axis, all that is known together."""
+        if fix.std_m is None or not math.isfinite(fix.std_m):
+            return UNKNOWN_STD_M if self._seen_m is None else max(self._seen_m, LEAST_STD_M)
+        stated = min(max(fix.std_m, 1e-3), 1e4)
+        return max(stated, self._seen_beyond(stated))
+
+    def white_std_m(self, fix: GnssFix) -> float:
+        """Return what of it changes from fix to fix."""
+        std = self.std_m(fix)
+        if not self.wanders(fix):
+            return std
+        white = _WHITE_SHARE * min(max(fix.std_m or 0.0, 1e-3), 1e4)
+        if self._seen_m is not None and self._jerked_m < _CLEAR * white:
+            return max(self._seen_m, LEAST_STD_M)
+        return max(white, self._seen_beyond(white))
+
+    def _seen_beyond(self, stated_m: float) -> float:
+        """Return what was seen where it gives the lie to `stated_m`, 0 elsewhere."""
+        seen = self._seen_m or 0.0
+        return seen if seen > max(_LIES * stated_m, LEAST_STD_M) else 0.0
+
+    def wanders(self, fix: GnssFix) -> bool:
+        """Whether the receiver itself says that it is rough: then its error wanders slowly."""
+        return (fix.std_m or 0.0) >= WANDER_M
+
+
+def _beyond_quadratic(a: float, b: float, c: float, d: float) -> list[float] | None:
+    """Return weights of four instants, of length 1, that leave nothing of a quadratic."""
+    products = (
+        (a - b) * (a - c) * (a - d),
+        (b - a) * (b - c) * (b - d),
+        (c - a) * (c - b) * (c - d),
+        (d - a) * (d - b) * (d - c),
+    )
+    if not all(products):
+        return None
+    weights = [1.0 / product for product in products]
+    length = math.sqrt(sum(weight * weight for weight in weights))
+    return [weight / length for weight in weights]
+
+
+def _middle(values: tuple[float, ...]) -> float:
+    return sorted(values)[len(values) // 2]

@@ -1,0 +1,110 @@
+"""Fixes that no car reaches: held back, and borne out or not by the next one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from tests.telemetry.position_track import Sample, along, circle, fix, info, states_of, xy, yaw
+
+COVERS = (
+    "foretwin.telemetry.estimator.innovations",
+    "foretwin.telemetry.estimator.slow_motion",
+)
+DRIVEN_S = 20.0
+
+
+def straight(time_s: float) -> tuple[float, float]:
+    return 9.0 * time_s, 0.0
+
+
+def slipped(
+    by_m: tuple[float, float], *, from_s: float = 10.0, until_s: float = 99.0
+) -> list[Sample]:
+    def place(time_s: float) -> tuple[float, float]:
+        x, y = circle(time_s)
+        off = from_s <= time_s < until_s
+        return x + off * by_m[0], y + off * by_m[1]
+
+    return along(place, DRIVEN_S)
+
+
+@pytest.mark.parametrize("by_m", [(-0.8, 0.0), (0.0, 0.6), (1.2, 0.4), (-0.3, -0.3)])
+def test_a_slip_of_the_receiver_moves_the_place_and_leaves_the_motion(
+    by_m: tuple[float, float],
+) -> None:
+    states = states_of(slipped(by_m))
+    for state in states[25:]:
+        assert state.speed_mps == pytest.approx(6.0, abs=0.5)
+        expected = 0.4 * state.stamp_ns * 1e-9
+        assert abs(math.remainder(yaw(state) - expected, math.tau)) < 0.1
+    last_s = states[-1].stamp_ns * 1e-9
+    assert xy(states[-1]) == pytest.approx(np.add(circle(last_s), by_m), abs=0.01)
+
+
+def test_one_wrong_fix_is_passed_over_and_the_next_leaves_as_it_came() -> None:
+    samples = slipped((0.0, 1.5), from_s=10.0, until_s=10.1)
+    estimator = StateEstimator(info())
+    states = [estimator.handle(*sample) for sample in samples]
+    assert estimator.skipped == {"gnss_outlier": 1}
+    wrong, after = states[50], states[51]
+    assert wrong is not None
+    assert after is not None
+    assert xy(wrong) == pytest.approx(circle(10.0), abs=0.1)
+    assert wrong.position != samples[50][1].position
+    assert after.position == samples[51][1].position
+
+
+def test_a_car_that_really_brakes_hard_is_followed() -> None:
+    def braking(time_s: float) -> tuple[float, float]:
+        t = max(0.0, min(time_s - 10.0, 12.0 / 9.0))
+        return 12.0 * min(time_s, 10.0) + 12.0 * t - 4.5 * t * t, 0.0
+
+    states = {state.stamp_ns: state for state in states_of(along(braking, DRIVEN_S))}
+    assert states[10_600_000_000].speed_mps == pytest.approx(12.0 - 9.0 * 0.6, abs=2.0)
+    assert states[12_200_000_000].speed_mps == pytest.approx(0.0, abs=0.3)
+
+
+def test_a_frozen_receiver_does_not_stop_a_car_and_a_stop_is_one() -> None:
+    held = [fix(k / 5, *straight(min(k / 5, 10.0) if k < 58 else k / 5)) for k in range(100)]
+    frozen = states_of(held)
+    assert min(state.speed_mps for state in frozen[20:]) > 8.0
+
+    def stopping(time_s: float) -> tuple[float, float]:
+        t = max(0.0, min(time_s - 6.0, 4.5))
+        return 9.0 * min(time_s, 6.0) + 9.0 * t - t * t, 0.0
+
+    stopped = states_of(along(stopping, DRIVEN_S))
+    assert stopped[-1].speed_mps == 0.0
+    assert stopped[-1].yaw_valid
+
+
+def test_a_car_that_backs_out_keeps_its_heading_and_one_that_was_taken_the_wrong_way_turns() -> (
+    None
+):
+    def out_and_back(time_s: float) -> tuple[float, float]:
+        braking_s, leaving_s = min(max(time_s - 6.0, 0.0), 2.0), max(time_s - 10.0, 0.0)
+        forth_m = 5.0 * min(time_s, 6.0) + 5.0 * braking_s - 1.25 * braking_s**2
+        back_m = 0.5 * min(leaving_s, 2.0) ** 2 + 2.0 * max(leaving_s - 2.0, 0.0)
+        return forth_m - back_m, 0.0
+
+    backing = states_of(along(out_and_back, 16.0))[-1]
+    assert backing.speed_mps == pytest.approx(-2.0, abs=0.2)
+    assert abs(yaw(backing)) < 0.1
+    gone = states_of(along(out_and_back, 30.0))[-1]
+    assert gone.speed_mps == pytest.approx(2.0, abs=0.2)
+    assert abs(abs(yaw(gone)) - math.pi) < 0.1
+
+
+def test_noise_that_is_stated_a_hundred_times_too_small_widens_what_the_state_says() -> None:
+    noise = np.random.default_rng(7).normal(0.0, 2.0, (150, 2))
+    rough = [fix(k / 5, 2.0 * k + noise[k, 0], noise[k, 1], std_m=0.02) for k in range(150)]
+    states = states_of(rough)
+    assert states[-1].position_std_m is not None
+    assert states[-1].position_std_m > 0.2
+    honest = states_of([fix(k / 5, 2.0 * k, 0.0, std_m=0.02) for k in range(150)])
+    assert honest[-1].position_std_m is not None
+    assert honest[-1].position_std_m < 0.03

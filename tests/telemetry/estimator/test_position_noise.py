@@ -1,0 +1,74 @@
+"""What is learnt of a receiver's noise, with and without its word."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.estimator.position_noise import LEAST_STD_M, UNKNOWN_STD_M, PositionNoise
+
+
+def fix(std_m: float | None = None) -> GnssFix:
+    return GnssFix(stamp_ns=0, position=GeoPoint(52.0, 13.0), std_m=std_m)
+
+
+def driven(std_m: float, *, rate_hz: float = 5.0, count: int = 60, seed: int = 1) -> PositionNoise:
+    """What a car is seen with that brakes from 12 m/s by 2 m/s² in a bend, again and again."""
+    noise, random = PositionNoise(), np.random.default_rng(seed)
+    for k in range(count):
+        t = k / rate_hz
+        way_m = 8.0 * t + 2.0 * np.sin(t)
+        at = 40.0 * np.array([np.cos(way_m / 40.0), np.sin(way_m / 40.0)])
+        noise.take(t, at + random.normal(0.0, std_m, 2))
+    return noise
+
+
+def test_before_the_car_has_moved_a_fix_is_taken_for_middling_and_never_for_a_centimetre() -> None:
+    assert PositionNoise().std_m(fix()) == UNKNOWN_STD_M
+    assert driven(0.0).std_m(fix()) == LEAST_STD_M
+
+
+@pytest.mark.parametrize("std_m", [0.1, 0.5, 2.0])
+def test_noise_that_nobody_states_is_learnt(std_m: float) -> None:
+    found = [driven(std_m, seed=seed).std_m(fix()) for seed in range(12)]
+    assert np.median(found) == pytest.approx(std_m, rel=0.3)
+
+
+def test_a_stated_error_that_lies_by_a_hundred_is_overruled_and_an_honest_one_is_not() -> None:
+    noise = driven(2.0)
+    assert noise.std_m(fix(0.02)) == pytest.approx(2.0, rel=0.5)
+    assert driven(0.02).std_m(fix(0.02)) == 0.02
+    assert driven(0.02).std_m(fix(0.1)) == 0.1
+
+
+def test_fixes_once_a_second_are_not_held_for_noise_because_the_car_moves() -> None:
+    assert driven(0.05, rate_hz=1.0).std_m(fix(0.3)) == 0.3
+
+
+def test_of_a_rough_receiver_with_smooth_fixes_only_the_noise_is_small() -> None:
+    noise = driven(0.02)
+    assert noise.std_m(fix(2.0)) == 2.0
+    assert noise.white_std_m(fix(2.0)) < 0.05
+    assert PositionNoise().white_std_m(fix(2.0)) == pytest.approx(0.2)
+
+
+def test_a_receiver_that_becomes_worse_is_found_out_within_eight_fixes() -> None:
+    noise, random = driven(0.02), np.random.default_rng(2)
+    for k in range(8):
+        noise.take(12.0 + 0.2 * k, np.array([3.0 * k, 0.0]) + random.normal(0.0, 2.0, 2))
+    assert noise.std_m(fix()) > 0.5
+
+
+def test_a_standing_car_teaches_nothing_and_a_copy_goes_on_by_itself() -> None:
+    noise = driven(0.3)
+    other, before = noise.copy(), noise.std_m(fix())
+    other.restart()
+    for k in range(40):
+        other.take(20.0 + 0.2 * k, np.zeros(2))
+    assert other.std_m(fix()) == before
+    other.restart()
+    for k in range(40):
+        other.take(30.0 + 0.2 * k, np.array([2.0 * k, 0.0]))
+    assert other.std_m(fix()) < noise.std_m(fix()) == before
