@@ -105,11 +105,15 @@ def gap(
         Path | None,
         typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml"),
     ] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="another drive of this road: how far people differ on it")
+    ] = None,
 ) -> None:
     """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
+    asked = locals()
     from foretwin.orchestrator.commands.gap import report_gap
 
-    report_gap(recording, vehicle=vehicle, as_json=as_json, out=out, declaration=declaration)
+    report_gap(**asked)
 
 
 def compare(

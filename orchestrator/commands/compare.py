@@ -119,6 +119,15 @@ def as_object(found: ComparedDrives) -> dict[str, Any]:
     }
 
 
+def scale_object(found: ComparedDrives) -> dict[str, Any]:
+    """Return what a gap is measured against: the other drive, and how far both are apart."""
+    return {
+        "log": str(found.second),
+        "common_m": found.difference.common_a_m,
+        "after": [_after(row) for row in found.difference.after],
+    }
+
+
 def _states(recording: Path, declaration: Path | None) -> tuple[list[VehicleState], bool]:
     """Return a drive's estimated states, and whether it says where its positions are of."""
     log: Log = open_log(recording, declaration=declaration)

@@ -17,6 +17,8 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.commands.compare import compare_logs, scale_object
+from foretwin.orchestrator.commands.compare_text import after_lines
 from foretwin.orchestrator.commands.gap_text import (
     DrivenBy,
     table_lines,
@@ -140,12 +142,17 @@ def report_gap(
     as_json: bool,
     out: Path | None,
     declaration: Path | None = None,
+    against: Path | None = None,
 ) -> None:
-    """Print the gap of a recorded drive; with `out` also write its plots there."""
+    """Print the gap of a recorded drive; with `out` also write its plots there.
+
+    `against` is another drive of the same road: how far people differ on it is printed beside.
+    """
     parameters = load_vehicle(vehicle)
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     check_finished(recording if recording.is_dir() else recording.parent)
+    people = None if against is None else compare_logs(recording, against, declaration=declaration)
     log = open_log(recording, declaration=declaration)
     report = gap_of(log, parameters, name=str(recording), progress=True)
     plots: list[Path] = []
@@ -157,8 +164,12 @@ def report_gap(
                 report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
             )
     if as_json:
-        say(json.dumps(as_object(report), indent=2))
+        scale = {} if people is None else {"against": scale_object(people)}
+        say(json.dumps(as_object(report) | scale, indent=2))
         return
+    if people is not None:
+        title = f"two drives of this road, this one and {against}: what a gap is measured against"
+        say("\n".join([title, *after_lines(people.difference), ""]))
     say("\n".join(_lines(report)))
     for plot in plots:
         say(f"wrote {plot}")

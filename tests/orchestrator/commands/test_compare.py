@@ -114,3 +114,21 @@ def test_what_cannot_be_compared_is_said_in_one_line(
         error = capsys.readouterr().err.strip()
         assert told in error
         assert "\n" not in error
+
+
+def test_a_gap_is_told_beside_how_far_people_differ(
+    pair: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = str(recorded(tmp_path / "again.mcap", BEND, 10.2))
+    assert run(["gap", pair[0], "--against", again, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["against"]["log"] == again
+    after = {row["horizon_s"]: row for row in said["against"]["after"]}
+    assert after[4.0]["along_m"]["p50"] == pytest.approx(0.8, abs=0.1)
+    assert said["rows"]
+    assert run(["gap", pair[0], "--against", again]) == 0
+    told = capsys.readouterr().out
+    assert told.index("what a gap is measured against") < told.index("RMS of the gap")
+    away = str(recorded(tmp_path / "away.mcap", BEND + np.array([0.0, 700.0]), 8.0))
+    assert run(["gap", pair[0], "--against", away]) == 2
+    assert "no 30 m of road in common" in capsys.readouterr().err
