@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,13 +20,6 @@ from foretwin.sim_worker.metrics.violations import (
 )
 
 _HEARD_FOR_NS = 2_000_000_000
-
-
-class Crossed(NamedTuple):
-    """Motions (K,) whose fronts cross a line, and when (K,)."""
-
-    motion: Array
-    at_s: Array
 
 
 def at_lights(

@@ -76,7 +76,7 @@ def _nearest_of_passages(
     """Return of each place of `b`, and each time that `a` passed it, the nearest place of `a`."""
     if not len(rows_a):
         return rows_a, rows_b
-    new = (np.diff(rows_b) > 0) | (np.diff(rows_a) > _LOST_M) | (np.diff(a.piece[rows_a]) != 0)
+    new = (np.diff(rows_b) > 0) | (np.diff(rows_a) > _LOST_M)
     passage = np.concatenate([[0], np.cumsum(new)])
     away = b.xy_m[rows_b] - a.xy_m[rows_a]
     ahead_m = np.abs((away * a.along[rows_a]).sum(axis=1))

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from foretwin.contracts.provenance import Provenance, Quantity
-from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.contracts.world import ATTRIBUTION, Area, World
 from foretwin.sim_worker.metrics.ground import DrivableGround, paved_areas
 from foretwin.sim_worker.metrics.road_edges import (
     COUNTED_EDGE_M,
@@ -89,3 +89,23 @@ def test_ground_grows_by_what_is_left_open() -> None:
     world = mapped()
     most = DrivableGround(world, wider_m=edge_doubt(world).edge_m)
     assert farther_m(most, DrivableGround(world)) == pytest.approx(UNCOUNTED_EDGE_M, abs=0.1)
+
+
+def test_a_road_goes_by_its_own_width_where_another_goes_on() -> None:
+    """Two roads end to end: the second one's width is a default."""
+    town = mapped(width="tagged")
+    road, lane = town.roads[0], town.lanes[0]
+    outline = np.array([[0.0, -3.0], [50.0, -3.0], [50.0, 3.0], [0.0, 3.0]])
+    ends = np.array([[0.0, 0.0], [50.0, 0.0]])
+    halves = [("one", "tagged", 0.0), ("two", "default", 50.0)]
+    lanes, roads, areas = [], [], []
+    for name, source, from_m in halves:
+        width = Quantity(3.0, source)  # type: ignore[arg-type]
+        along = np.array([from_m, 0.0])
+        lanes.append(msgspec.structs.replace(lane, id=name, width_m=width))
+        roads.append(msgspec.structs.replace(road, lane_ids=(name,), reference_line=ends + along))
+        areas.append(Area(id=name, outline=outline + along))
+    world = msgspec.structs.replace(
+        town, lanes=tuple(lanes), roads=tuple(roads), road_surface=tuple(areas), junctions=()
+    )
+    assert edge_doubt(world).edge_m.tolist() == [TAGGED_EDGE_M, UNCOUNTED_EDGE_M]

@@ -78,3 +78,10 @@ def test_a_short_detour_leaves_two_stretches() -> None:
     a, b = line(driven(straight, 8.0)), line(driven(around, 8.0))
     found = common_ways(a, b).stretches
     assert lengths(*found) == pytest.approx([150, 150], abs=15)
+
+
+def test_a_stretch_ends_where_one_of_the_drives_does() -> None:
+    longer = np.array([[-40.0, 0.0], [460.0, 0.0]])
+    a, b = line(driven(np.array([[0.0, 0.0], [400.0, 0.0]]), 8.0)), line(driven(longer, 8.0))
+    (one,) = common_ways(a, b).stretches
+    assert b.xy_m[one.rows_b[[0, -1]], 0] == pytest.approx([0.0, 400.0], abs=1.6)

@@ -63,7 +63,7 @@ def test_a_stop_is_time_and_no_way() -> None:
 
 def test_what_comes_after_a_place_is_compared_from_like_speeds() -> None:
     """From the same 10 m/s one speeds up by 0.5 m/s² by way of place, the other keeps its speed."""
-    faster = line(driven(STRAIGHT, lambda m: float(np.sqrt(100.0 + 1.0 * m))))
+    faster = line(driven(STRAIGHT, lambda m: float(np.sqrt(100.0 + 1.0 * m)), left_m=1.0))
     found = compared(line(driven(STRAIGHT, 10.0)), faster)
     two = next(row for row in found.after if row.horizon_s == 2.0)
     # Only the first 11 m are passed within 0.5 m/s: a second of it.

@@ -42,7 +42,10 @@ def test_positions_that_jitter_while_the_car_stands_are_no_way() -> None:
         )
         for s, (n, e) in zip(states, noise.tolist(), strict=True)
     ]
-    assert line(jittered).length_m == pytest.approx(300.0, abs=12.0)
+    found = line(jittered)
+    assert found.length_m == pytest.approx(300.0, abs=12.0)
+    assert (np.diff(found.moment_m) >= 0.0).all()
+    assert found.come_m(np.array([70.0]))[0] < found.at_m(found.arc_m, np.array([115.0]))[0]
 
 
 def test_a_hole_parts_the_way_and_is_not_counted() -> None:
