@@ -93,7 +93,11 @@ from a moment to a whole manoeuvre."""
 
 
 class Comparison(msgspec.Struct, frozen=True, kw_only=True):
-    """The nominal future of a round against what the car did, with two baselines."""
+    """The nominal future of a round against what the car did, with two baselines.
+
+    `weighted_ade_m` is the mean distance of the mean of all futures, weighed by their likelihoods;
+    None where it was not told.
+    """
 
     round_id: int
     stamp_ns: int
@@ -102,6 +106,7 @@ class Comparison(msgspec.Struct, frozen=True, kw_only=True):
     nominal: HorizonError
     constant_velocity: HorizonError
     constant_turn_rate: HorizonError
+    weighted_ade_m: float | None = None
 
 
 class PlanComparison(msgspec.Struct, frozen=True, kw_only=True):

@@ -19,6 +19,8 @@ HALF_LIFE_S = 240.0
 """After so much of the drive what came counts half."""
 PRIOR_ROUNDS = 20.0
 """The table counts as much as so many rounds: neighbours of 2 Hz tell about the same."""
+MOST_BACK_S = 1.0
+"""Stamps of a live car come a little out of order; a clock that steps back starts another drive."""
 LEAST_SHARE = 1e-9
 """So far out even a table that is much too sure of itself has what came."""
 _GRID = 1.0 / (1.0 + np.exp(-np.linspace(-20.8, 20.8, 417)))
@@ -39,7 +41,7 @@ class Calibration:
     def take(self, instant: int, drive_time_s: float, share: float) -> None:
         """Count which share of a forecast lay below what came; not the calibrated one's.
 
-        Time only goes on; where it steps back, what was before is forgotten.
+        Where time steps back by more than a second, what was before is forgotten.
         """
         self._fade(drive_time_s)
         share = min(max(share, LEAST_SHARE), 1.0 - LEAST_SHARE)
@@ -48,6 +50,8 @@ class Calibration:
     def _fade(self, drive_time_s: float) -> None:
         if self._at_s is not None:
             passed_s = drive_time_s - self._at_s
+            if -MOST_BACK_S <= passed_s < 0.0:
+                return
             self._came *= 0.0 if passed_s < 0.0 else 0.5 ** (passed_s / self._half_life_s)
         self._at_s = drive_time_s
 

@@ -45,8 +45,13 @@ class DriveScore(NamedTuple):
         return float(np.mean((self.table_share >= BAND[0]) & (self.table_share <= BAND[1])))
 
 
-def score(model: ProgressModel, drive: Examples, *, blind: bool = False) -> DriveScore:
-    """Return how a drive's forecasts come out, in its order; `blind` without the way ahead."""
+def score(
+    model: ProgressModel, drive: Examples, *, blind: bool = False, truth_m: Array | None = None
+) -> DriveScore:
+    """Return how a drive's forecasts come out, in its order; `blind` without the way ahead.
+
+    Scored by `truth_m` (N, T) where that is known, calibrated by what the car itself measured.
+    """
     calibration = Calibration(len(model.time_s))
     waiting: deque[tuple[int, int, float]] = deque()
     times_ns = np.round(model.time_s * 1e9).astype(np.int64)
@@ -56,31 +61,32 @@ def score(model: ProgressModel, drive: Examples, *, blind: bool = False) -> Driv
     for place in np.flatnonzero(drive.speed_mps >= STANDING_MPS).tolist():
         now_ns = int(drive.stamp_ns[place])
         came = drive.distance_m[place]
+        true = came if truth_m is None else truth_m[place]
         for _ in range(len(waiting)):
             due_ns, instant, share = waiting.popleft()
             if due_ns <= now_ns:
-                calibration.take(instant, due_ns / 1e9, share)
+                calibration.take(instant, now_ns / 1e9, share)
             else:
                 waiting.append((due_ns, instant, share))
         table = model.forecast(features[place])
         told = calibration.calibrated(table)
-        table_share = shares_of(table, came[:, None])[:, 0]
+        measured_share = shares_of(table, came[:, None])[:, 0]
         speed, accel = drive.speed_mps[place], features[place, accel_place]
         rows.append(
             (
-                shares_of(told, came[:, None])[:, 0],
-                table_share,
-                2.0 * pinball(told.levels, told.distance_m, came).mean(axis=1),
-                2.0 * pinball(table.levels, table.distance_m, came).mean(axis=1),
+                shares_of(told, true[:, None])[:, 0],
+                shares_of(table, true[:, None])[:, 0],
+                2.0 * pinball(told.levels, told.distance_m, true).mean(axis=1),
+                2.0 * pinball(table.levels, table.distance_m, true).mean(axis=1),
                 told.at(BAND[1]) - told.at(BAND[0]),
                 table.at(BAND[1]) - table.at(BAND[0]),
-                np.abs(told.median_m - came),
-                np.abs(speed * model.time_s - came),
-                np.abs(_steady(speed, accel, model.time_s) - came),
+                np.abs(told.median_m - true),
+                np.abs(speed * model.time_s - true),
+                np.abs(_steady(speed, accel, model.time_s) - true),
             )
         )
         waiting.extend(
-            (now_ns + int(after), k, float(table_share[k])) for k, after in enumerate(times_ns)
+            (now_ns + int(after), k, float(measured_share[k])) for k, after in enumerate(times_ns)
         )
     moving = drive.stamp_ns[drive.speed_mps >= STANDING_MPS]
     shape = (len(rows), len(model.time_s))

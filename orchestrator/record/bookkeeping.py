@@ -146,9 +146,11 @@ class FuturesCount:
 
 @dataclass(slots=True)
 class ComparisonCount:
-    """Mean displacement errors by horizon: nominal future and two baselines on the same data."""
+    """Mean displacement errors by horizon: nominal future and two baselines on the same data, and
+    the mean of all futures by their likelihood."""
 
     errors: dict[float, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
+    weighted: dict[float, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
 
     def take(self, comparison: Comparison) -> None:
         """Count one comparison."""
@@ -159,12 +161,17 @@ class ComparisonCount:
                 comparison.constant_turn_rate.ade_m,
             )
         )
+        if comparison.weighted_ade_m is not None:
+            self.weighted[comparison.horizon_s].take((comparison.weighted_ade_m,))
 
     def record(self, *, independent: bool) -> dict[str, Any]:
         """Return the `comparison` part of run.json."""
         means = {f"{h:g}": rows.means for h, rows in sorted(self.errors.items())}
         return {
             "ade_m": {h: round(m[0], 4) for h, m in means.items()},
+            "weighted_ade_m": {
+                f"{h:g}": round(rows.means[0], 4) for h, rows in sorted(self.weighted.items())
+            },
             "constant_velocity_ade_m": {h: round(m[1], 4) for h, m in means.items()},
             "constant_turn_rate_ade_m": {h: round(m[2], 4) for h, m in means.items()},
             "count": {f"{h:g}": rows.count for h, rows in sorted(self.errors.items())},

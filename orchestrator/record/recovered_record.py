@@ -72,6 +72,8 @@ def counted_in_tables(results: Path) -> TableCounts:
     for row in kept_rows(results, "comparisons"):
         errors = (row[f"{name}_ade_m"] for name in _BASELINES)
         comparisons.errors[row["horizon_s"]].take((next(errors), next(errors), next(errors)))
+        if (weighted := row.get("weighted_ade_m")) is not None:  # none of an older foretwin
+            comparisons.weighted[row["horizon_s"]].take((weighted,))
     columns = "ade_m", "fde_m", "path_offset_m"
     plans = kept_rows(results, "plan_comparisons", *columns)
     last = (rounds[-1]["round_id"], rounds[-1]["drive_time_s"]) if rounds else ()

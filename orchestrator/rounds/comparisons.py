@@ -75,8 +75,15 @@ class OpenComparisons:
         self._forget(state.stamp_ns)
         return done
 
-    def take_round(self, done: RoundDone, world_frame: LocalFrame, seed: VehicleState) -> None:
-        """Add a round's nominal future, the first of its first job."""
+    def take_round(
+        self,
+        done: RoundDone,
+        world_frame: LocalFrame,
+        seed: VehicleState,
+        weights: Array | None = None,
+    ) -> None:
+        """Add a round's nominal future, the first of its first job, and the mean of all by their
+        `weights` (S,)."""
         trajectory = done.results[0].trajectory
         states = np.asarray(trajectory.states[0], dtype=np.float64)
         poses = target_from_source(self.frame, world_frame, states[:, :2], states[:, 2])
@@ -87,8 +94,22 @@ class OpenComparisons:
             xy_yaw=np.column_stack([xy, poses.yaw_rad]),
             speed_mps=seed.speed_mps,
             yaw_rate_radps=seed.yaw_rate_radps,
+            mean_xy=None if weights is None else self._mean_xy(done, world_frame, seed, weights),
         )
         self._waiting.append((nominal, done.order))
+
+    def _mean_xy(
+        self, done: RoundDone, world_frame: LocalFrame, seed: VehicleState, weights: Array
+    ) -> Array | None:
+        """Return (N, 2) where futures are in the mean; None where none is likely at all."""
+        if weights.sum() <= 0.0:
+            return None
+        xy = np.concatenate([result.trajectory.states[:, :, :2] for result in done.results])
+        some = weights > 0.0  # what diverged is nowhere
+        mean = np.average(xy[some].astype(np.float64), axis=0, weights=weights[some])
+        yaw = np.zeros(len(mean))
+        moved = target_from_source(self.frame, world_frame, mean, yaw).xy_m - _shift_m(seed)
+        return np.asarray(moved)
 
     def flush(self) -> list[Comparison]:
         """Return what can still be compared over the horizons that the drive has covered."""

@@ -259,7 +259,7 @@ class RoundRunner:
         if self.progress is not None:
             self.progress.take_round(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
-            self._open_comparisons.take_round(done, world.frame, seed.state)
+            self._open_comparisons.take_round(done, world.frame, seed.state, futures.likelihood)
             self.windows.take_round(done, seed.intent.path, world)
             self._keep_plan(
                 done, plan_compared(done, seed.plan, seed.state, seed.intent.path, world)

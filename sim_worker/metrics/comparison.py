@@ -27,7 +27,8 @@ _MIN_PLAN_S = 0.5
 class NominalTrack(NamedTuple):
     """A nominal future: `xy_yaw` (N, 3) at `time_s` (N,) after `stamp_ns`, 0 included.
 
-    `speed_mps` and `yaw_rate_radps` are those of the seeding state, for the baselines.
+    `speed_mps` and `yaw_rate_radps` are those of the seeding state, for the baselines. `mean_xy`
+    (N, 2) is where its round's futures are in the mean, by their likelihood.
     """
 
     stamp_ns: int
@@ -35,6 +36,7 @@ class NominalTrack(NamedTuple):
     xy_yaw: Array
     speed_mps: float
     yaw_rate_radps: float
+    mean_xy: Array | None = None
 
 
 class ActualTrack(NamedTuple):
@@ -67,6 +69,10 @@ def compare_nominal(
             start, speed_mps=speed, yaw_rate_radps=nominal.yaw_rate_radps, time_s=time_s
         )
         straight = constant_velocity(start, speed_mps=speed, time_s=time_s)
+        weighted = None
+        if nominal.mean_xy is not None:
+            apart = nominal.mean_xy[chosen] - truth[:, :2]
+            weighted = float(np.hypot(*apart.T).mean())
         comparisons.append(
             Comparison(
                 round_id=round_id,
@@ -76,6 +82,7 @@ def compare_nominal(
                 nominal=horizon_error(nominal.xy_yaw[chosen], truth),
                 constant_velocity=horizon_error(straight, truth),
                 constant_turn_rate=horizon_error(turn, truth),
+                weighted_ade_m=weighted,
             )
         )
     return comparisons

@@ -103,3 +103,15 @@ def test_where_time_steps_back_what_came_is_forgotten() -> None:
     calibration.take(0, 1.0, 0.5)
 
     assert calibration.calibrated(forecast()).median_m[0] == pytest.approx(20.0, abs=0.5)
+
+
+def test_a_stamp_a_little_out_of_order_costs_nothing() -> None:
+    one, other = Calibration(1), Calibration(1)
+    for k in range(50):
+        for calibration in (one, other):
+            calibration.take(0, 100.0 + k, 0.9)
+    one.take(0, 149.0, 0.9)
+    other.take(0, 148.7, 0.9)
+
+    told = [c.calibrated(forecast()).distance_m.tobytes() for c in (one, other)]
+    assert told[0] == told[1]

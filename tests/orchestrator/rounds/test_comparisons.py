@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.simulation import Comparison
+from foretwin.orchestrator.record.bookkeeping import ComparisonCount
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along
@@ -156,3 +157,33 @@ def test_after_the_clock_has_stepped_back_comparisons_go_on() -> None:
         if state.stamp_ns == START_NS:
             handler.take_round(round_done(straight()), DRIVE, state)
     assert {comparison.horizon_s for comparison in found} == {1.0, 2.0, 4.0, 8.0}
+
+
+def test_the_mean_future_is_weighed_by_how_likely_futures_are() -> None:
+    """One stays on the way, one lies 4 m to the left and is a third as likely, one is lost."""
+    lost = straight((0.0, 0.0))
+    lost[:] = np.nan
+    done = round_done(np.concatenate([straight(), straight((0.0, 4.0)), lost]))
+    handler = OpenComparisons(DRIVE, 8.0)
+    found = []
+    for state in car(DRIVE):
+        found += handler.take_state(state)
+        if state.stamp_ns == START_NS:
+            handler.take_round(done, DRIVE, state, np.array([0.3, 0.1, 0.0]))
+
+    assert [one.weighted_ade_m for one in found] == pytest.approx([1.0] * 4, abs=1e-3)
+    count = ComparisonCount()
+    for one in found:
+        count.take(one)
+    assert count.record(independent=False)["weighted_ade_m"]["8"] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_where_no_future_is_likely_there_is_no_mean() -> None:
+    handler = OpenComparisons(DRIVE, 8.0)
+    found = []
+    for state in car(DRIVE):
+        found += handler.take_state(state)
+        if state.stamp_ns == START_NS:
+            handler.take_round(round_done(straight()), DRIVE, state, np.zeros(1))
+
+    assert [one.weighted_ade_m for one in found] == [None] * 4
