@@ -109,6 +109,7 @@ def drive_blueprint(
                     _plot("/correction", "Correction, m/s²", last_30_s, legend=True),
                     reality,
                     parameters,
+                    _plot("/estimate", "How sure", last_30_s, legend=True),
                     active_tab=details.index(detail),
                 ),
                 row_shares=[1.0, 1.0, 1.0, 1.6],

@@ -118,6 +118,15 @@ class DriveLog:
             Row("map/ego", drive_ns, rr.Points3D([point_at(here, MARK_HEIGHT_M)])),
             Row("geo/ego/real", drive_ns, rr.GeoPoints(lat_lon=[lat_lon])),
         ]
+        rows += [
+            Row(f"estimate/{name}", drive_ns, rr.Scalars(scale * std))
+            for name, std, scale in (
+                ("position_m", state.position_std_m, 1.0),
+                ("yaw_deg", state.yaw_std_rad, float(np.degrees(1.0))),
+                ("speed_mps", state.speed_std_mps, 1.0),
+            )
+            if std is not None
+        ]
         if len(self._trail) > 1 and self._due("trail", drive_ns, TRAIL_PERIOD_NS):
             path = raised(np.array([point for _, point, _ in self._trail]), 0.1)
             places = [place for _, _, place in self._trail]

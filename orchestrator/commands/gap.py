@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.compare import compare_logs, scale_object
 from foretwin.orchestrator.commands.compare_text import after_lines
 from foretwin.orchestrator.commands.gap_text import (
+    WIDTH,
     DrivenBy,
     table_lines,
     turning_lines,
@@ -28,6 +30,7 @@ from foretwin.orchestrator.commands.gap_text import (
     why_undecided,
 )
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.drive.telemetry_watch import estimate_line, estimate_object
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
@@ -37,6 +40,7 @@ from foretwin.sim_worker.analysis.gap.verdict import FaultDetector, without_manu
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import estimator_of
+from foretwin.telemetry.estimator.motion_track import StateConsistency
 from foretwin.telemetry.logs.log import Log, Sample
 from foretwin.telemetry.logs.opening import open_log
 
@@ -58,6 +62,8 @@ class GapReport(NamedTuple):
     driven_by: DrivenBy
     refused: dict[str, int]
     """Samples that the reader refused, by reason."""
+    estimate: StateConsistency
+    """How far the states that all of it rests on can be trusted."""
 
 
 def gap_of(log: Log, vehicle: VehicleParameters, *, name: str, progress: bool = False) -> GapReport:
@@ -132,6 +138,7 @@ def _measured(
         turning=turning,
         driven_by=driven_by,
         refused=refused,
+        estimate=estimator.consistency,
     )
 
 
@@ -190,6 +197,7 @@ def as_object(report: GapReport) -> dict[str, Any]:
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
         "refused": report.refused,
+        "estimate": estimate_object(report.estimate),
     }
 
 
@@ -198,6 +206,7 @@ def _lines(report: GapReport) -> list[str]:
     if report.refused:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.refused.items()))
         lines.append(f"refused: {left}")
+    lines += textwrap.wrap(estimate_line(report.estimate), WIDTH, subsequent_indent="  ")
     if report.turning is not None:
         lines += turning_lines(report.turning)
     reason = why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by)

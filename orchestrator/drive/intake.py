@@ -194,11 +194,15 @@ class Intake:
 def _position_record(state: VehicleState | None) -> dict[str, Any]:
     """Return what gave the position, and how sure of it the newest state is."""
     if state is None:
-        return {"position_from": [], "position_std_m": None}
-    std_m = state.position_std_m
+        nothing = dict.fromkeys(("position_std_m", "yaw_std_rad", "speed_std_mps"))
+        return {"position_from": [], **nothing}
+    stds = state.position_std_m, state.yaw_std_rad, state.speed_std_mps
+    position, yaw, speed = (None if std is None else round(std, 4) for std in stds)
     return {
         "position_from": ["gnss"] if state.map_shift_m is None else ["gnss", "map"],
-        "position_std_m": None if std_m is None else round(std_m, 3),
+        "position_std_m": position,
+        "yaw_std_rad": yaw,
+        "speed_std_mps": speed,
     }
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import Any
 
 from foretwin.telemetry.estimator.estimator import ClockReport, StateEstimator
+from foretwin.telemetry.estimator.motion_track import StateConsistency
 
 REARM_NS = 5_000_000_000
 """A channel that was overdue must have come for this long before it is named once more."""
@@ -78,4 +79,37 @@ def record(
         "clock_drift_ppm": None if clock.drift_ppm is None else round(clock.drift_ppm, 2),
         "delay_spread_ms_p95": None if clock.spread_s is None else round(clock.spread_s * 1e3, 3),
         "clock_steps_s": [round(step.step_ns * 1e-9, 3) for step in clock.steps],
+        "estimate": None if estimator is None else estimate_object(estimator.consistency),
     }
+
+
+def estimate_object(found: StateConsistency) -> dict[str, Any]:
+    """Return as JSON how far the states can be trusted; an honest share within is 0.95."""
+    return {
+        "within_95": {
+            channel: {"share": round(one.within / one.taken, 4), "count": one.taken}
+            for channel, one in found.surprises.items()
+        },
+        "spreads_widened": round(found.widened, 3),
+        "position_noise_m": None
+        if found.position_noise_m is None
+        else round(found.position_noise_m, 3),
+        "receiver_slips": found.slips,
+    }
+
+
+def estimate_line(found: StateConsistency) -> str:
+    """Return in one line how far the states can be trusted."""
+    shares = ", ".join(
+        f"{channel} {100.0 * one.within / one.taken:.0f} %"
+        for channel, one in found.surprises.items()
+    )
+    noise = found.position_noise_m
+    parts = [f"estimate: within its 95 %: {shares or 'nothing came'}"]
+    if noise is not None:
+        parts.append(f"fixes taken for good to {noise:.2f} m")
+    if found.slips:
+        parts.append(f"the receiver slipped {found.slips} times")
+    if found.widened > 1.0:
+        parts.append(f"spreads widened by {found.widened:.1f}")
+    return "; ".join(parts)

@@ -17,7 +17,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
 from foretwin.telemetry.estimator.map_aid import RoadLine
-from foretwin.telemetry.estimator.motion_track import MotionTrack
+from foretwin.telemetry.estimator.motion_track import MotionTrack, StateConsistency
 from foretwin.telemetry.estimator.reordering import Reordering
 from foretwin.telemetry.estimator.staleness import Staleness
 
@@ -106,6 +106,11 @@ class StateEstimator:
         return ClockReport(
             self._clock.offset_ns, self._clock.drift_ppm, self._clock.spread_s(), steps
         )
+
+    @property
+    def consistency(self) -> StateConsistency:
+        """Whether the states were as sure of themselves as they turned out to be."""
+        return self._track.consistency
 
     @property
     def gyro_bias_radps(self) -> float:

@@ -10,6 +10,44 @@ import math
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
+
+LINE_95, PLANE_95 = 3.841, 5.991
+"""95 % of chi-square with one and two degrees of freedom."""
+
+
+class Surprises(NamedTuple):
+    """How many measurements of a kind were taken, and how many of them were no surprise.
+
+    `within` counts those with normalised squares below their 95 % bound: of an honest filter 95 of
+    100.
+    """
+
+    taken: int
+    within: int
+
+
+class SurpriseCount:
+    """Counts surprises by channel."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, Surprises] = {}
+
+    def copy(self) -> SurpriseCount:
+        """Return another count that goes on from here by itself."""
+        other = shallow_copy(self)
+        other._counts = self._counts.copy()
+        return other
+
+    def take(self, channel: str, square: float, bound: float) -> None:
+        """Take a measurement's normalised square, which 95 of 100 have below `bound`."""
+        taken, within = self._counts.get(channel, (0, 0))
+        self._counts[channel] = Surprises(taken + 1, within + (square <= bound))
+
+    @property
+    def counts(self) -> dict[str, Surprises]:
+        """What was counted so far, by channel."""
+        return dict(sorted(self._counts.items()))
 
 
 class PositionInnovation(NamedTuple):

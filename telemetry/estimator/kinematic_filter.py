@@ -116,13 +116,17 @@ class KinematicFilter:
             noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
         self.covariance = covariance
 
-    def correct(self, row: Array, residual: float, std: float) -> None:
-        """Apply one scalar measurement: `row` is its derivative by the state."""
+    def correct(self, row: Array, residual: float, std: float) -> float:
+        """Apply one scalar measurement; return its normalised square.
+
+        `row` is its derivative by the state.
+        """
         cross = self.covariance @ row
         variance = float(row @ cross) + std * std
         self.mean += cross * (residual / variance)
         self.covariance -= cross[:, None] * (cross / variance)
         self._limit()
+        return residual * residual / variance
 
     def _limit(self) -> None:
         mean = self.mean
@@ -231,22 +235,25 @@ class KinematicFilter:
             self.covariance[:, index] = 0.0
             self.covariance[index, index] = std * std
 
-    def correct_speed(self, speed_mps: float, std_mps: float) -> None:
-        """Apply a measured speed, whose scale is estimated."""
+    def correct_speed(self, speed_mps: float, std_mps: float) -> float:
+        """Apply a measured speed, whose scale is estimated; return its normalised square."""
         if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
             self.covariance[SPEED_SCALE, SPEED_SCALE] = motion_noise.SPEED_SCALE_STD**2
         row = np.zeros(len(self.mean))
         row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
-        self.correct(row, speed_mps - self.mean[SPEED] * row[SPEED], std_mps)
+        return self.correct(row, speed_mps - float(self.mean[SPEED] * row[SPEED]), std_mps)
 
-    def correct_yaw(self, yaw_rad: float, std_rad: float) -> None:
-        """Apply a measured yaw in the local frame."""
+    def correct_yaw(self, yaw_rad: float, std_rad: float) -> float:
+        """Apply a measured yaw in the local frame; return its normalised square."""
         row = np.zeros(len(self.mean))
         row[YAW] = 1.0
-        self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
+        return self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
 
-    def correct_yaw_rate(self, rate_radps: float, std_radps: float, *, biased: bool) -> None:
-        """Apply a measured yaw rate; `biased` for a gyro, whose bias is estimated."""
+    def correct_yaw_rate(self, rate_radps: float, std_radps: float, *, biased: bool) -> float:
+        """Apply a measured yaw rate; return its normalised square.
+
+        `biased` for a gyro, whose bias is estimated.
+        """
         row = np.zeros(len(self.mean))
         row[SPEED], row[CURVATURE] = self.mean[CURVATURE], self.mean[SPEED]
         expected = self.yaw_rate_radps
@@ -254,7 +261,7 @@ class KinematicFilter:
             self._know_slip()
             row[GYRO_BIAS] = 1.0
             expected += self.mean[GYRO_BIAS]
-        self.correct(row, rate_radps - expected, std_radps)
+        return self.correct(row, rate_radps - expected, std_radps)
 
     def _know_slip(self) -> None:
         """Tell the body's heading from the path's: a gyro shows how they part."""

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
 from foretwin.contracts.frames import GeoPoint, base_from_sensor
+from foretwin.telemetry.estimator.innovations import Surprises
 from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from foretwin.telemetry.estimator.measured import MotionSamples
-from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
+from foretwin.telemetry.estimator.motion_corrections import (
+    STANDING_MPS,
+    STOPPING_MPS,
+    MotionCorrections,
+)
 from foretwin.telemetry.estimator.position_corrections import PositionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
 from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
@@ -24,6 +29,20 @@ from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 _UNKNOWN_PLACE_M = 1000.0
 _MOST_FASTER_MPS = 5.0
 """A second and a half of a car's hardest pulling away (0.35 g)."""
+
+
+class StateConsistency(NamedTuple):
+    """Whether an estimate is as good as it says.
+
+    `surprises` by channel; the spreads that states tell are `widened` so many times now;
+    `position_noise_m` is what the newest fix is taken for, None before there is one; the receiver
+    has slipped `slips` times.
+    """
+
+    surprises: dict[str, Surprises]
+    widened: float
+    position_noise_m: float | None
+    slips: int
 
 
 class MotionTrack:
@@ -104,7 +123,9 @@ class MotionTrack:
     def _motion(self, message: Any) -> None:
         filter_ = self._advance(message.stamp_ns)
         if isinstance(message, SpeedSample):
-            self._standing = abs(message.speed_mps) < STANDING_MPS
+            self._standing = abs(message.speed_mps) < STANDING_MPS and (
+                filter_ is None or abs(filter_.mean[SPEED]) < STOPPING_MPS
+            )
         self._corrections.watch(message, standing=self._standing)
         if filter_ is not None:
             self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
@@ -258,3 +279,14 @@ class MotionTrack:
     def gyro_bias_radps(self) -> float:
         """The gyro's bias as learnt so far; 0 before the heading is known."""
         return 0.0 if self._filter is None else float(self._filter.mean[GYRO_BIAS])
+
+    @property
+    def consistency(self) -> StateConsistency:
+        """Whether the states were as sure of themselves as they turned out to be."""
+        found, fix = self._positions, self._fix
+        return StateConsistency(
+            {**found.surprises.counts, **self._corrections.surprises.counts},
+            found.overconfidence,
+            None if fix is None else found.noise.std_m(fix),
+            found.slips,
+        )

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
-from foretwin.telemetry.estimator.innovations import PositionInnovation
+from foretwin.telemetry.estimator.innovations import PLANE_95, PositionInnovation, SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.map_aid import MapAid
 from foretwin.telemetry.estimator.measured import MotionSamples
@@ -28,11 +28,11 @@ _DOUBTFUL, _UNBELIEVABLE = 9.0, 25.0
 for nothing until the next one bears it out."""
 _IMPOSSIBLE = 25.0
 """The same where fixes are alone: how hard a driver may brake and turn is in what is expected."""
-_PLANE_95, _BY_CHANCE = 5.991, 1.5
+_BY_CHANCE = 1.5
 _UP, _DOWN = 1.2, 1.2 ** (-1.0 / 19.0)
-"""95 % of chi-square with two degrees of freedom, and what of 100 fixes the 5 beyond it, and the 95
-within, make of what is usual (Gibbs, Candes 2021: adaptive conformal inference). Where sources
-contradict each other all the time, no single fix is a glitch, and no spread is as small as said."""
+"""What of 100 fixes the 5 beyond their 95 % bound, and the 95 within it, make of what is usual
+(Gibbs, Candes 2021: adaptive conformal inference). Where sources contradict each other all the
+time, no single fix is a glitch, and no spread is as small as said."""
 _LEAST_SLIP_M = 0.1
 _SHOWS_TURNING_M = 0.2
 """Fixes rougher than this show no wheel being turned, only the bend that comes of it. Chosen."""
@@ -88,6 +88,7 @@ class PositionCorrections:
         """The latest fixes in a row that were held back."""
         self._reversed_m = 0.0
         self._usual = 1.0
+        self.surprises = SurpriseCount()
         self.slips = 0
         """How often the receiver has slipped."""
 
@@ -95,7 +96,7 @@ class PositionCorrections:
         """Return others with the same doubts, which read `measured` and `gate`."""
         other = shallow_copy(self)
         other._measured, other._gate = measured, gate
-        other.noise = self.noise.copy()
+        other.noise, other.surprises = self.noise.copy(), self.surprises.copy()
         return other
 
     @property
@@ -128,6 +129,7 @@ class PositionCorrections:
         if wheels:
             self.noise.surprised(innovation.away_m, innovation.variance_m2(0.0))
         alone = not wheels and not self._measured.anything
+        self.surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
         usual = 1.0 if wander or alone else self._usual
         astray = (
             square > (_IMPOSSIBLE if alone else _UNBELIEVABLE * usual)
@@ -140,7 +142,7 @@ class PositionCorrections:
             innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
             square = innovation.square(white)
         borne_out, self._doubted = bool(self._doubted), ()
-        self._usual = max(self._usual * (_UP if square > _PLANE_95 * self._usual else _DOWN), 1.0)
+        self._usual = max(self._usual * (_UP if square > PLANE_95 * self._usual else _DOWN), 1.0)
         self._expect(filter_, square, white, alone=alone)
         yaw_before = filter_.mean[YAW]
         if (

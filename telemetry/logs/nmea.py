@@ -1,9 +1,10 @@
 """Reader of NMEA-0183 logs: RMC, GGA, VTG, HDT and ZDA of any talker, one sentence per line.
 
 Positions are GGA's where the file has any, else RMC's; altitude is made ellipsoidal with GGA's
-geoid separation. Speed is RMC's in knots, else VTG's. Yaw is HDT's heading; without any HDT it is
-RMC's course over ground above MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are
-RMC's or ZDA's; where only times are told, one that falls by half a day or more begins the next day.
+geoid separation, and the standard deviation is what GGA's quality and HDOP promise. Speed is RMC's
+in knots, else VTG's. Yaw is HDT's heading; without any HDT it is RMC's course over ground above
+MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are RMC's or ZDA's; where only times
+are told, one that falls by half a day or more begins the next day.
 Sentences without a time (VTG, HDT) get that of the sentence before. Lines may have something before
 the `$`; a wrong checksum is counted, a missing one is let pass.
 """
@@ -34,6 +35,11 @@ MIN_COURSE_MPS = 2.0
 _DAY_NS = 86_400 * 10**9
 _WINDOW_NS = 2_000_000_000
 _SENTENCE = re.compile(r"\$([A-Z]{2}|P[A-Z]*)(RMC|GGA|VTG|HDT|ZDA),([^*\r\n$]*)(?:\*(\w*))?")
+_STD_M = {"1": 2.1, "2": 1.7, "3": 2.1, "4": 0.015, "5": 0.3, "9": 1.7}
+"""One standard deviation on each axis at an HDOP of 1, by GGA's quality: 2.5 m CEP alone and 2 m
+with SBAS (u-blox NEO-M8 data sheet, over 1.177), 1 cm + 1 ppm CEP with RTK (ZED-F9P data sheet);
+floating RTK is chosen."""
+_LEAST_HDOP = 0.5
 _MODES_WITHOUT_FIX = ("N", "E", "M", "S")
 """Mode indicators: not valid, estimated, manual, simulator."""
 
@@ -226,7 +232,8 @@ def _gga(fields: Fields, stamp_ns: int, _found: _Found, skipped: Skipped) -> Ite
         _degrees(fields[3], fields[4], "W", "E"),
         height_m + separation_m,
     )
-    yield "gnss", drive.GnssFix(stamp_ns=stamp_ns, position=position)
+    std_m = _STD_M[quality] * max(float(fields[7]) if fields[7] else 1.0, _LEAST_HDOP)
+    yield "gnss", drive.GnssFix(stamp_ns=stamp_ns, position=position, std_m=std_m)
 
 
 def _vtg(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iterator[Sample]:

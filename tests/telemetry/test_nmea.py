@@ -87,6 +87,14 @@ def test_gga_is_preferred_and_ellipsoidal_and_south_and_west_are_negative(tmp_pa
     assert position.alt_m == pytest.approx(79.0)
 
 
+@pytest.mark.parametrize(("quality", "std_m"), [(1, 1.26), (2, 1.02), (4, 0.009), (5, 0.18)])
+def test_how_far_a_fix_is_off_comes_from_its_quality_and_hdop(
+    tmp_path: Path, quality: int, std_m: float
+) -> None:
+    _, found = opened(tmp_path, rmc("120000", "010326"), gga("120000", quality=quality))
+    assert found["gnss"][0].std_m == pytest.approx(std_m)
+
+
 def test_a_compass_is_preferred_to_a_course(tmp_path: Path) -> None:
     _, found = opened(tmp_path, rmc("120000", "010326"), line("HEHDT,0.0,T"))
     assert [one.yaw_rad for one in found["heading"]] == [pytest.approx(0.5 * math.pi)]

@@ -164,3 +164,17 @@ def test_in_lock_step_times_of_receipt_mean_nothing() -> None:
     record = telemetry.intake.record()
     assert record["clock_offset_ms"] is None
     assert record["late"] == record["doubled"] == 0
+
+
+def test_a_run_says_how_far_its_states_can_be_trusted() -> None:
+    telemetry = Telemetry()
+    assert telemetry.intake.record()["estimate"]["within_95"] == {}
+    telemetry.send(*FIXES)
+    record = telemetry.intake.record()
+    estimate = record["estimate"]
+    assert estimate["within_95"]["gnss"]["count"] > 0
+    assert 0.0 <= estimate["within_95"]["gnss"]["share"] <= 1.0
+    assert estimate["spreads_widened"] == 1.0
+    assert estimate["receiver_slips"] == 0
+    assert 0.0 < record["speed_std_mps"] < 2.0
+    assert 0.0 < record["yaw_std_rad"] < 1.0

@@ -7,13 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from foretwin.contracts.drive import SpeedSample
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import Sample, along, circle, fix, info, states_of, xy, yaw
 
-COVERS = (
-    "foretwin.telemetry.estimator.innovations",
-    "foretwin.telemetry.estimator.slow_motion",
-)
+COVERS = ("foretwin.telemetry.estimator.slow_motion",)
 DRIVEN_S = 20.0
 
 
@@ -108,3 +106,23 @@ def test_noise_that_is_stated_a_hundred_times_too_small_widens_what_the_state_sa
     honest = states_of([fix(k / 5, 2.0 * k, 0.0, std_m=0.02) for k in range(150)])
     assert honest[-1].position_std_m is not None
     assert honest[-1].position_std_m < 0.03
+
+
+def test_a_wheel_that_says_nought_at_speed_does_not_stop_the_car_and_a_stop_does() -> None:
+    samples: list[Sample] = []
+    for k in range(300):
+        says_mps = 0.0 if 140 <= k < 150 else 9.0
+        stamp_ns = round(k * 0.05e9)
+        samples.append(("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=says_mps)))
+        if k % 4 == 0:
+            samples.append(fix(k / 20, *straight(k / 20), std_m=0.02))
+    states = [state for state in states_of(samples) if state.stamp_ns > 3e9]
+    assert min(state.speed_mps for state in states) > 8.0
+    stopped = [
+        (
+            "speed",
+            SpeedSample(stamp_ns=round((15.0 + k * 0.05) * 1e9), speed_mps=max(9.0 - k / 4, 0.0)),
+        )
+        for k in range(60)
+    ]
+    assert states_of([*samples, *stopped])[-1].speed_mps == 0.0
