@@ -231,6 +231,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     mission_state: str
     next_intersection: str | None
     arrival_in_s: float | None
+    """None without a junction ahead, and while the car stands before it, waiting."""
     futures_per_s: float
     dropped: int
     too_slow: str = ""

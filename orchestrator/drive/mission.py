@@ -135,10 +135,11 @@ class Mission:
         return (self._car.stamp_ns - self.start_stamp_ns) / 1e9
 
     @property
-    def next_junction(self) -> tuple[str, float] | None:
-        """Name of the junction ahead and seconds until the car is there."""
+    def next_junction(self) -> tuple[str, float | None] | None:
+        """Name of the junction ahead and seconds until the car is there, None while it stands."""
         for ahead in self.way.junctions[:1]:
-            return ahead.junction.summary.name or ahead.junction.summary.id, ahead.in_s
+            name = ahead.junction.summary.name or ahead.junction.summary.id
+            return name, self.way.countdown_s
         return None
 
     @property

@@ -135,7 +135,9 @@ class ProgressLine:
         sick = " ".join(name for name in dispatch.workers if name in dispatch.sickness.sick)
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
-            ahead = f"{progress.next_intersection} in {progress.arrival_in_s:.0f} s"
+            in_s = progress.arrival_in_s
+            when = "waiting" if in_s is None else f"in {in_s:.0f} s"
+            ahead = f"{progress.next_intersection} {when}"
         short = f"{progress.too_slow} (machine too slow for all)  " if progress.too_slow else ""
         return (
             f"{self._open_to_all}{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}"

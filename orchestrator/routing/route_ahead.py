@@ -10,7 +10,14 @@ from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, target
 from foretwin.contracts.futures import PATH_BEHIND_M, PathAhead
 from foretwin.contracts.trace import traced
 from foretwin.contracts.world import World
-from foretwin.orchestrator.routing.arrival import Arrival, DrivingPace, predict_arrivals
+from foretwin.orchestrator.routing.arrival import (
+    STRAIGHT,
+    Arrival,
+    BendSpeeds,
+    Countdown,
+    DrivingPace,
+    predict_arrivals,
+)
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
 from foretwin.orchestrator.routing.driving_path import SPACING_M, driving_path
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
@@ -20,7 +27,7 @@ from foretwin.orchestrator.routing.road_index import RoadIndex, legality
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import PlaceOnRoute, RouteFollower, RouteProgress
-from foretwin.orchestrator.routing.speed_ahead import speeds_ahead
+from foretwin.orchestrator.routing.speed_ahead import bend_speeds, speeds_ahead, stands
 from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
@@ -56,6 +63,9 @@ class WayAhead:
         self._progress: RouteProgress | None = None
         self._xy_m: Array = np.zeros(2)
         self._lanes: WorldLanes | None = None
+        self._bends: BendSpeeds = STRAIGHT
+        """Of the latest round's path, until the next one."""
+        self._countdown = Countdown()
         self.off_lanes_m = 0.0
         """So much of the latest path is driven in its World along none of its lanes."""
         self.junctions: tuple[Arrival, ...] = ()
@@ -79,12 +89,21 @@ class WayAhead:
         self._progress = self._follower.update(self._match)
         if self._progress is None:
             self.junctions = ()
+            self._countdown.update(state.stamp_ns, None, waiting=False)
             return None
         self._pace.update(state.stamp_ns, state.speed_mps, self.speed_limit_mps)
         upcoming: tuple[UpcomingJunction, ...] = self._follower.upcoming(FAR_AHEAD_M)
         self.junctions = predict_arrivals(
-            self._follower.route, self._progress.s_m, upcoming, self._pace
+            self._follower.route,
+            self._progress.s_m,
+            upcoming,
+            self._pace,
+            acceleration_mps2=self._cruise.acceleration_mps2,
+            bends=self._bends,
         )
+        next_one = self.junctions[0] if self.junctions else None
+        waiting = stands(self._cruise.speed_mps, self._cruise.acceleration_mps2)
+        self._countdown.update(state.stamp_ns, next_one, waiting=waiting)
         return self._progress.passed
 
     @traced("road line")
@@ -146,6 +165,11 @@ class WayAhead:
         """The trend of the speed over the last second."""
         return self._cruise.acceleration_mps2
 
+    @property
+    def countdown_s(self) -> float | None:
+        """The seconds until the next junction, for people; None while the car stands."""
+        return self._countdown.in_s
+
     @traced("speeds of a round")
     def speeds_ahead(self, path: PathAhead, *, horizon_s: float) -> Array:
         """Return (K,) what the nominal future is to drive along a path, from instant to instant."""
@@ -190,4 +214,6 @@ class WayAhead:
         xy = target_from_source_m(world.frame, self._graph.frame, geometry.xy_m)
         off_lanes = inside(world, xy) & guide.without_lanes(geometry.s_m)
         self.off_lanes_m = SPACING_M * int(np.count_nonzero(off_lanes))
-        return PathAhead(xy_m=xy, speed_limit_mps=geometry.speed_limit_mps)
+        path = PathAhead(xy_m=xy, speed_limit_mps=geometry.speed_limit_mps)
+        self._bends = BendSpeeds(self.s_m, bend_speeds(path))
+        return path

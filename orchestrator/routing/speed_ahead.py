@@ -50,15 +50,13 @@ def speeds_ahead(
     usually drives.
     """
     line = FrenetPath(path.xy_m, path.speed_limit_mps)
-    curve = line.speed_profile(
-        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
-    ).tolist()
+    curve = _curve_speeds(line).tolist()
     limit = line.speed_limit_mps.tolist()
     most_mps = max(speed_mps, limit[_node(line, PATH_BEHIND_M)])
     every = round(SPEED_AHEAD_STEP_S / _STEP_S)
     steps = math.ceil(horizon_s / SPEED_AHEAD_STEP_S - 1e-9) * every
     speeds = [max(speed_mps, 0.0)]
-    if speed_mps < STANDING_MPS and acceleration_mps2 < PULLING_AWAY_MPS2:
+    if stands(speed_mps, acceleration_mps2):
         at_s = _STEP_S * np.arange(0, steps + 1, every)
         return np.asarray(np.maximum(speed_mps - COMFORT_DECEL_MPS2 * at_s, 0.0))
     arc_m = PATH_BEHIND_M
@@ -75,6 +73,21 @@ def speeds_ahead(
         arc_m += _STEP_S * (speed + faster) / 2.0
         speeds.append(faster)
     return np.array(speeds[::every])
+
+
+def stands(speed_mps: float, acceleration_mps2: float) -> bool:
+    """Return whether a car stands and does not pull away."""
+    return speed_mps < STANDING_MPS and acceleration_mps2 < PULLING_AWAY_MPS2
+
+
+def bend_speeds(path: PathAhead) -> tuple[float, ...]:
+    """Return what the bends of a path allow, every metre from the car on."""
+    line = FrenetPath(path.xy_m)
+    return tuple(_curve_speeds(line)[_node(line, PATH_BEHIND_M) :].tolist())
+
+
+def _curve_speeds(line: FrenetPath) -> Array:
+    return line.speed_profile(lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2)
 
 
 def _node(line: FrenetPath, arc_m: float) -> int:

@@ -83,6 +83,9 @@ class Pass(NamedTuple):
     drive: LockStep
     truth: Truth
     rounds: list[Round]
+    from_s: float
+    until_s: float
+    """Since the first position."""
 
     def true_xy_m(self, one: Round, times_s: np.ndarray = TIMES_S) -> np.ndarray:
         """Where the car was (T, 2) at times after a round, in its World's frame."""
@@ -91,20 +94,24 @@ class Pass(NamedTuple):
         return np.asarray(target_from_source_m(one.world.frame, self.truth.frame, xy))
 
 
-def passes(names: list[str], groups: list[Group], folder: Path) -> Iterator[Pass]:
+def passes(
+    names: list[str], groups: list[Group], folder: Path, *, driver: type[LockStep] = LockStep
+) -> Iterator[Pass]:
     """Drive the passes of some groups, or by their names; drawn maps are written to `folder`."""
     drives = {drive.name: drive for drive in all_drives()}
     for source in SOURCES:
         wanted = source.name in names if names else source.group in groups
         if wanted and source.name in drives:
-            yield from _passes_of(source, drives[source.name], folder)
+            yield from _passes_of(source, drives[source.name], folder, driver)
 
 
-def _passes_of(source: Source, drive: RealDrive, folder: Path) -> Iterator[Pass]:
+def _passes_of(
+    source: Source, drive: RealDrive, folder: Path, driver: type[LockStep]
+) -> Iterator[Pass]:
     base, truth = Path(os.environ[source.variable]), truth_of(drive)
     log = str(base / source.log)
     if source.map is not None:
-        driven = _driven(str(base / source.map), log)
+        driven = _driven(driver, str(base / source.map), log)
         for number, window in enumerate(source.windows_s, 1):
             yield _cut(f"{source.name} {number}", driven, truth, window)
         return
@@ -118,16 +125,16 @@ def _passes_of(source: Source, drive: RealDrive, folder: Path) -> Iterator[Pass]
             xy, truth.frame, folder / f"{source.name}-{number}.osm", seed=number,
             speed_limit_kmh=source.speed_limit_kmh,
         )  # fmt: skip
-        driven = _driven(str(map_file), log)
+        driven = _driven(driver, str(map_file), log)
         yield _cut(f"{source.name} {number + 1}, drawn", driven, truth, window)
 
 
-def _driven(map_file: str, log: str) -> LockStep:
+def _driven(driver: type[LockStep], map_file: str, log: str) -> LockStep:
     config = DriveConfig(
         map=map_file, log=log, route="from-log", speed=None, view="none", horizon_s=HORIZON_S,
         futures=1, futures_per_job=1, scenarios=(),
     )  # fmt: skip
-    return LockStep(config, futures=False).run()
+    return driver(config, futures=False).run()
 
 
 def _cut(name: str, drive: LockStep, truth: Truth, window_s: tuple[float, float]) -> Pass:
@@ -141,4 +148,4 @@ def _cut(name: str, drive: LockStep, truth: Truth, window_s: tuple[float, float]
         whole = at_s >= window_s[0] and at_s + HORIZON_S < window_s[1] and end < stamps[-1]
         if whole and not np.any((stamps[long + 1] > begin) & (stamps[long] < end)):
             kept.append(one)
-    return Pass(name, drive, truth, kept)
+    return Pass(name, drive, truth, kept, *window_s)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from foretwin.contracts.mailbox import Mailbox
@@ -158,3 +159,20 @@ def test_a_street_named_like_markup_is_shown_as_it_is_named(
     assert "[/a] Lane \\u001b[2J in 5 s" in said.getvalue()
     assert "error: [/b]: [/a] Lane \\u001b[2J\\nfake: line" in said.getvalue()
     assert "\x1b[2J" not in said.getvalue()
+
+
+def test_before_a_junction_a_standing_car_waits(
+    house: House, capsys: pytest.CaptureFixture[str]
+) -> None:
+    house.drive(5)
+    stood = msgspec.structs.replace(house.states[5], speed_mps=0.0)
+    for number in range(12):
+        stamp_ns = stood.stamp_ns + number * 100_000_000
+        state = msgspec.structs.replace(stood, stamp_ns=stamp_ns)
+        house.mission.on_state(state, mono_s=0.0)
+    assert house.mission.next_junction is not None
+    assert house.mission.next_junction[1] is None
+    with ProgressLine(house.conductor, house.mission) as line:
+        line.update(line._last_plain_s + 11.0)
+
+    assert f"{house.mission.next_junction[0]} waiting" in capsys.readouterr().err

@@ -126,7 +126,7 @@ def test_arrivals_predicted_20_s_before_are_off_by_less_than_15_s(
             pace.update(int(drive.time_s[i] * 1e9), float(drive.speed_mps[i]), limit_mps)
         now = replayed.progress[asked]
         assert now is not None
-        predicted_s = pace.seconds_for(route.routes[0], now.s_m, passed.centre_s_m)
+        (predicted_s,) = pace.seconds_to(route.routes[0], now.s_m, [passed.centre_s_m])
         errors.append(predicted_s - 20.0)
 
     assert np.abs(errors).max() < 15.0
