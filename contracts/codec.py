@@ -8,11 +8,13 @@ random number of who numbers, 0 where none is told: who begins anew numbers from
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
+from msgspec import structs
 
 from foretwin.contracts.arrays import array_from_wire, array_to_wire
 from foretwin.contracts.partial_file import partial_file
@@ -22,6 +24,8 @@ MAGIC = b"FTw1"
 _HEADER = struct.Struct("<4sHxxQq")
 _NUMBERED_HEADER = struct.Struct("<4sHHQq")
 _SENDER = struct.Struct("<6xH")
+_PART = 256
+"""So many items of a field are encoded at a time."""
 MOST_SENDER = 2**16 - 1
 
 Message = TypeVar("Message")
@@ -127,10 +131,40 @@ def content_bytes(message: msgspec.Struct | tuple[Any, ...]) -> bytes:
     return _encoder.encode(message)
 
 
+def content_parts(message: msgspec.Struct) -> Iterator[bytes]:
+    """Yield `content_bytes` part by part, so that a large message need not be held beside them.
+
+    https://github.com/msgpack/msgpack/blob/master/spec.md says what stands before maps and arrays.
+    """
+    config = message.__struct_config__
+    if config.tag is not None or config.array_like or config.omit_defaults:
+        yield content_bytes(message)
+        return
+    fields = [(one.encode_name, getattr(message, one.name)) for one in structs.fields(message)]
+    told = [(name, value) for name, value in fields if value is not msgspec.UNSET]
+    yield bytes([0x80 | len(told)]) if len(told) < 16 else struct.pack(">BH", 0xDE, len(told))
+    for name, value in told:
+        yield _encoder.encode(name)
+        if not isinstance(value, tuple):
+            yield _encoder.encode(value)
+            continue
+        yield _before_array(len(value))
+        for first in range(0, len(value), _PART):
+            part = value[first : first + _PART]
+            yield _encoder.encode(part)[len(_before_array(len(part))) :]
+
+
+def _before_array(count: int) -> bytes:
+    if count < 16:
+        return bytes([0x90 | count])
+    return struct.pack(">BH", 0xDC, count) if count < 2**16 else struct.pack(">BI", 0xDD, count)
+
+
 def write_message(message: msgspec.Struct, path: Path) -> None:
     """Write one message to a file, complete or not at all; raises OSError, and leaves nothing."""
-    with partial_file(path) as partial:
-        partial.write_bytes(encode(message))
+    with partial_file(path) as partial, partial.open("wb") as file:
+        file.write(_NUMBERED_HEADER.pack(MAGIC, SCHEMA_VERSION, 0, 0, 0))
+        file.writelines(content_parts(message))
 
 
 def read_message(path: Path, kind: type[Message]) -> Message:

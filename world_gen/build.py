@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.codec import content_parts
 from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
@@ -239,8 +239,10 @@ def _elevation(
 def with_id(world: World) -> World:
     """Return the World with the id that its content has: 16 hex digits of a SHA-256."""
     nameless = msgspec.structs.replace(world, id="")
-    digest = hashlib.sha256(content_bytes(nameless)).hexdigest()
-    return msgspec.structs.replace(nameless, id=digest[:16])
+    digest = hashlib.sha256()
+    for part in content_parts(nameless):
+        digest.update(part)
+    return msgspec.structs.replace(nameless, id=digest.hexdigest()[:16])
 
 
 def _connections(

@@ -17,6 +17,7 @@ from foretwin.contracts.codec import (
     SCHEMA_VERSION,
     SchemaMismatch,
     content_bytes,
+    content_parts,
     decode,
     encode,
     header_of,
@@ -24,7 +25,7 @@ from foretwin.contracts.codec import (
     sender_of,
     write_message,
 )
-from foretwin.contracts.drive import GnssFix, PlannedTrajectory, SpeedSample
+from foretwin.contracts.drive import GnssFix, PlannedTrajectory, SpeedSample, VehicleInfo
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import FuturesResult
 from foretwin.contracts.keys import CHANNELS
@@ -68,6 +69,7 @@ def test_every_message_survives_the_wire(kind: type, data: st.DataObject) -> Non
 
     assert same(envelope.message, message)
     assert (envelope.seq, envelope.sent_ns) == (7, -3)
+    assert b"".join(content_parts(message)) == content_bytes(message)
 
 
 def test_a_sender_is_told_by_two_bytes_and_may_stay_untold() -> None:
@@ -166,6 +168,20 @@ def test_deeply_nested_bodies_are_refused() -> None:
         decode(encode(PLAN)[:24] + b"\x91" * 100_000, PlannedTrajectory)
 
 
+@pytest.mark.parametrize("count", [0, 15, 16, 255, 256, 257, 70_000])
+def test_parts_of_long_fields_are_those_of_the_whole(count: int) -> None:
+    info = VehicleInfo(
+        vehicle_id="car",
+        time_base="utc",
+        start_stamp_ns=0,
+        sends=tuple(f"channel {i}" for i in range(count)),
+    )
+    parts = list(content_parts(info))
+
+    assert b"".join(parts) == content_bytes(info)
+    assert max(map(len, parts)) < 5_000
+
+
 def test_files_hold_one_whole_message(tmp_path: Path) -> None:
     path = tmp_path / "plan.bin"
 
@@ -188,12 +204,13 @@ def test_a_disk_without_room_is_left_as_it_was(
 ) -> None:
     write_message(PLAN, tmp_path / "plan")
 
-    def no_room(self: Path, data: bytes) -> int:
+    def no_room(self: Path, mode: str) -> None:
         self.touch()
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", no_room)
-    with pytest.raises(OSError, match="No space left"):
-        write_message(PLAN, tmp_path / "plan")
+    with monkeypatch.context() as full:
+        full.setattr(Path, "open", no_room)
+        with pytest.raises(OSError, match="No space left"):
+            write_message(PLAN, tmp_path / "plan")
     assert [path.name for path in tmp_path.iterdir()] == ["plan"]
     assert same(read_message(tmp_path / "plan", type(PLAN)), PLAN)
