@@ -11,7 +11,7 @@ import rerun as rr
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, PlannedTrajectory, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
-from foretwin.contracts.gap import ALARM_LIMITS_PER_S
+from foretwin.contracts.gap import limits_after
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
 from foretwin.viewer.meshes import Colour
@@ -21,13 +21,22 @@ TRAIL: Colour = (126, 132, 144)
 PLAN: Colour = (88, 150, 255)
 LIMIT: Colour = (229, 72, 66)
 
-GAP_LIMITS_PER_S = {
-    "pos_m": math.hypot(ALARM_LIMITS_PER_S["along_m"], ALARM_LIMITS_PER_S["across_m"]),
-    "yaw_deg": math.degrees(ALARM_LIMITS_PER_S["yaw_rad"]),
-    "speed_mps": ALARM_LIMITS_PER_S["speed_mps"],
-}
-"""The lines of the gap plots, for each second since the free twin started anew. Who is farther away
-than `pos_m` is beyond the limit along or across."""
+GAPS = ("pos_m", "yaw_deg", "speed_mps")
+"""Of the free twin, as plotted."""
+
+
+def gap_limits(since_reset_s: float) -> dict[str, float]:
+    """Return the lines of the gap plots so long after the free twin started anew.
+
+    Who is farther away than `pos_m` is beyond the limit along or across.
+    """
+    limits = limits_after(since_reset_s)
+    return {
+        "pos_m": math.hypot(limits["along_m"], limits["across_m"]),
+        "yaw_deg": math.degrees(limits["yaw_rad"]),
+        "speed_mps": limits["speed_mps"],
+    }
+
 
 TRAIL_S = 10.0
 PERIOD_NS = 95_000_000
@@ -57,7 +66,7 @@ def static_rows() -> list[Row]:
         static("world/ego/trail/real", rr.LineStrips3D.from_fields(radii=0.12, colors=[TRAIL])),
         static("world/plan", rr.LineStrips3D.from_fields(radii=0.22, colors=[PLAN])),
     ]
-    for quantity in GAP_LIMITS_PER_S:
+    for quantity in GAPS:
         names = ["limit"] if quantity == "pos_m" else ["limit", "-limit"]
         count = len(names)
         limit = rr.SeriesLines(colors=[LIMIT] * count, names=names, widths=[2.5] * count)
@@ -174,13 +183,14 @@ class DriveLog:
         real, shadow = sample.real, sample.shadow
         rows = self._roles.rows(sample, drive_ns)
         twin_gap = (sample.gap_m, np.degrees(sample.gap_yaw_rad), sample.gap_speed_mps)
-        gaps = zip(GAP_LIMITS_PER_S, twin_gap, _gap(shadow, real), strict=True)
+        gaps = zip(GAPS, twin_gap, _gap(shadow, real), strict=True)
         for quantity, twin, other in gaps:
             rows += [
                 Row(f"gap/{quantity}/twin", drive_ns, rr.Scalars(float(twin))),
                 Row(f"gap/{quantity}/shadow", drive_ns, rr.Scalars(float(other))),
             ]
-        return rows + self._limits(sample.since_reset_s, drive_ns)
+        # What estimated commands lose is no alarm: there is no limit then.
+        return rows + (self._limits(sample.since_reset_s, drive_ns) if sample.independent else [])
 
     def _limits(self, since_reset_s: float, drive_ns: int) -> list[Row]:
         """Return points of the limits' lines: once a second, and both ends of each fall."""
@@ -195,12 +205,10 @@ class DriveLog:
             Row(
                 f"gap/{quantity}/limit",
                 at_ns,
-                rr.Scalars(
-                    [per_s * at_s] if quantity == "pos_m" else [per_s * at_s, -per_s * at_s]
-                ),
+                rr.Scalars([limit] if quantity == "pos_m" else [limit, -limit]),
             )
             for at_s, at_ns in points
-            for quantity, per_s in GAP_LIMITS_PER_S.items()
+            for quantity, limit in gap_limits(at_s).items()
         ]
 
 

@@ -10,8 +10,8 @@ import rerun as rr
 
 from foretwin.contracts.gap import (
     ALARM_HORIZON_S,
-    ALARM_LIMITS_PER_S,
     GapSample,
+    LimitedQuantity,
     Manoeuvre,
     Verdict,
 )
@@ -24,7 +24,11 @@ from foretwin.viewer.rows import Row, document, in_markdown, static
 _SHOWN_VERDICTS = 20
 """The newest; all are in the run's table."""
 GAPS = {"across_m": 1.0, "along_m": 1.0, "yaw_deg": math.degrees(1.0)}
-_FIELDS = {"across_m": "across_m", "along_m": "along_m", "yaw_deg": "yaw_rad"}
+_FIELDS: dict[str, LimitedQuantity] = {
+    "across_m": "across_m",
+    "along_m": "along_m",
+    "yaw_deg": "yaw_rad",
+}
 MANOEUVRE_COLOURS: dict[Manoeuvre, Colour] = {
     "standstill": (126, 132, 144),
     "straight": (88, 150, 255),
@@ -90,11 +94,10 @@ class TuningLog:
         rows = []
         for gap, scale in GAPS.items():
             value = scale * getattr(sample, _FIELDS[gap])
-            limit = scale * ALARM_LIMITS_PER_S[_FIELDS[gap]] * ALARM_HORIZON_S
-            rows += [
-                Row(f"reality/{gap}/{sample.manoeuvre}", drive_ns, rr.Scalars(value)),
-                Row(f"reality/{gap}/limit", drive_ns, rr.Scalars([limit, -limit])),
-            ]
+            rows.append(Row(f"reality/{gap}/{sample.manoeuvre}", drive_ns, rr.Scalars(value)))
+            if sample.independent:
+                limit = scale * sample.limits[_FIELDS[gap]]
+                rows.append(Row(f"reality/{gap}/limit", drive_ns, rr.Scalars([limit, -limit])))
         return rows
 
     def verdict(self, verdict: Verdict, drive_ns: int) -> list[Row]:

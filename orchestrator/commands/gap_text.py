@@ -28,18 +28,22 @@ _COLUMNS = (
 
 
 def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
-    """Yield one table of RMS and one of 95th percentiles: a line for each horizon and manoeuvre."""
+    """Yield tables of RMS, 95th percentiles and states' doubt, by horizon and manoeuvre."""
     first = f"{'after':>5} {'manoeuvre':<12} {'runs':>5}"
     for title, named in (
         ("RMS of the gap, the model left to itself", "rms"),
         ("95 % of its gaps are below", "p95"),
+        ("of which uncertain states leave open (standard deviations, RMS)", "state_std"),
     ):
         yield title
         yield first + "".join(f"{label:>8}" for _, label, _, _ in _COLUMNS)
         yield " " * len(first) + "".join(f"{unit:>8}" for _, _, unit, _ in _COLUMNS)
         for row in rows:
-            values = row.rms if named == "rms" else row.p95
-            cells = "".join(f"{scale * values[name]:>8.2f}" for name, _, _, scale in _COLUMNS)
+            values: dict[str, float] = getattr(row, named)
+            cells = "".join(
+                f"{scale * values[name]:>8.2f}" if name in values else f"{'-':>8}"
+                for name, _, _, scale in _COLUMNS
+            )
             yield f"{row.horizon_s:>3g} s {row.manoeuvre:<12} {row.runs:>5}{cells}"
         yield ""
 
@@ -114,7 +118,7 @@ def turning_lines(turning: TurningGap) -> list[str]:
         "ms open"
     )
     if turning.speed_clock is not None:
-        late += f"; speed {_clock(turning.speed_clock)}, given a body that does not pitch"
+        late += f"; speed {_clock(turning.speed_clock)}"
     bias, bias_std = turning.gyro_bias_radps, turning.gyro_bias_std_radps
     zero, zero_std = turning.steering_offset_rad, turning.steering_offset_std_rad
     said = (

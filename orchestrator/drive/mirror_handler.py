@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from foretwin.contracts.gap import limits_after
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.columns import row_of
@@ -26,6 +27,9 @@ class MirrorHandler:
     stamp_ns: int = 0
     """Of the newest sample."""
     independent: bool | None = None
+    compared: int = 0
+    """Samples of a free twin under recorded commands, and those beyond a limit of the alarms."""
+    beyond: int = 0
     touches: int = 0
     """Times that two began to touch."""
     _touched_ns: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -41,6 +45,9 @@ class MirrorHandler:
         self._stamps_ns.append(sample.stamp_ns)
         self.stamp_ns = sample.stamp_ns
         self.independent = sample.independent
+        if sample.independent:
+            self.compared += 1
+            self.beyond += _is_beyond(sample)
         at = {"stamp_ns": sample.stamp_ns}
         self.tables.add("mirror", [row_of(sample, MIRROR)])
         if sample.others:
@@ -57,3 +64,17 @@ class MirrorHandler:
                 self.touches += 1
                 one, other = ("what stands" if name == "world" else name for name in pair)
                 self.tell(Notice("warning", f"in the mirror, {one} and {other} touch"))
+
+    def record(self) -> dict[str, int]:
+        """Return the `free_twin` of run.json."""
+        return {"samples": self.compared, "beyond_limits": self.beyond}
+
+
+def _is_beyond(sample: MirrorSample) -> bool:
+    limits = limits_after(sample.since_reset_s)
+    return (
+        abs(sample.gap_along_m) > limits["along_m"]
+        or abs(sample.gap_across_m) > limits["across_m"]
+        or abs(sample.gap_yaw_rad) > limits["yaw_rad"]
+        or abs(sample.gap_speed_mps) > limits["speed_mps"]
+    )

@@ -54,6 +54,7 @@ def run_record(
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
         "tuning": conductor.tuning.record(),
+        "free_twin": conductor.mirror.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
             missed=tally.missed,

@@ -85,6 +85,8 @@ class DriveStanding:
     beside: BesideStanding
     mirror_independent: bool | None
     touches: int
+    free_twin: tuple[int, int]
+    """Samples that were compared, and those beyond a limit."""
     changes: FirstOf[Change]
     dropped_rows: int
     troubles: list[str]
@@ -146,6 +148,7 @@ def standing_of(
             beside=conductor.ads.standing,
             mirror_independent=conductor.mirror.independent,
             touches=conductor.mirror.touches,
+            free_twin=(conductor.mirror.compared, conductor.mirror.beyond),
             changes=conductor.changes.made,
             dropped_rows=conductor.tables.dropped,
             troubles=watch.troubles,
@@ -205,6 +208,7 @@ def go_on(
     conductor.ads.go_on(standing.beside)
     conductor.mirror.independent = standing.mirror_independent
     conductor.mirror.touches = standing.touches
+    conductor.mirror.compared, conductor.mirror.beyond = standing.free_twin
     conductor.tables.lost_before = standing.dropped_rows
     watch.troubles[:] = standing.troubles
     watch.given_up |= standing.given_up

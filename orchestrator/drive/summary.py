@@ -77,5 +77,14 @@ def summary_text(record: dict[str, object]) -> str:
     lines += side_by_side_lines(record.get("side_by_side"))
     lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
     lines += summary_lines(record["tuning"])  # type: ignore[arg-type]
+    lines += _free_twin_lines(record.get("free_twin"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join(plain(line) for line in (*lines, attribution))
+
+
+def _free_twin_lines(free_twin: dict[str, int] | None) -> list[str]:
+    """Say how often the free twin was beyond a limit that the viewer draws."""
+    if not free_twin or not free_twin["samples"]:
+        return []
+    share = free_twin["beyond_limits"] / free_twin["samples"]
+    return [f"  free twin: beyond a limit {share:.1%} of the time"]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.gap import ALARM_HORIZON_S, GapAlarm, GapSample, Verdict
 from foretwin.contracts.running import MOST_LISTED, FirstOf, RunningMeans
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
 from foretwin.contracts.vehicle import VehicleParameters
@@ -21,8 +21,6 @@ from foretwin.orchestrator.tuning.parameter_versions import departs
 from foretwin.orchestrator.tuning.words import alarm_text, found_text, verdict_text
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable, is_left_open
 
-HORIZON_S = 2.0
-"""The horizon whose gap is told; the tables hold all."""
 _SQUARES = ("along_m", "across_m", "yaw_rad", "speed_mps")
 
 
@@ -33,6 +31,7 @@ class FindingsStanding(NamedTuple):
     reported: dict[str, float]
     gaps: dict[str, RunningMeans]
     alarms: int
+    beyond: int
     verdicts: FirstOf[Verdict]
     independent: bool
 
@@ -50,22 +49,29 @@ class Findings:
     _reported: dict[str, float] = field(default_factory=dict)
     _gaps: dict[str, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
     _alarms: int = 0
+    _beyond: int = 0
     _verdicts: FirstOf[Verdict] = field(default_factory=lambda: FirstOf(MOST_LISTED))
     _independent: bool = True
 
     @property
     def standing(self) -> FindingsStanding:
         """What was said until now."""
-        gaps = dict(self._gaps)
         return FindingsStanding(
-            self._latest, self._reported, gaps, self._alarms, self._verdicts, self._independent
+            latest=self._latest,
+            reported=self._reported,
+            gaps=dict(self._gaps),
+            alarms=self._alarms,
+            beyond=self._beyond,
+            verdicts=self._verdicts,
+            independent=self._independent,
         )
 
     def go_on(self, standing: FindingsStanding) -> None:
         """Begin with what was said before."""
         self._latest, self._reported = standing.latest, standing.reported
         self._gaps.update(standing.gaps)
-        self._alarms, self._verdicts = standing.alarms, standing.verdicts
+        self._alarms, self._beyond = standing.alarms, standing.beyond
+        self._verdicts = standing.verdicts
         self._independent = standing.independent
 
     def take(self, found: Identification | GapSample | GapAlarm | Verdict) -> None:
@@ -76,7 +82,9 @@ class Findings:
             case GapSample():
                 self.tables.add("gaps", [row_of(found, GAP)])
                 self._independent = self._independent and found.independent
-                if abs(found.horizon_s - HORIZON_S) < 1e-9:
+                # The horizon of the alarms is told; the tables hold all.
+                if abs(found.horizon_s - ALARM_HORIZON_S) < 1e-9:
+                    self._beyond += found.independent and found.beyond_limits
                     self._gaps[found.manoeuvre].take(
                         tuple(getattr(found, name) ** 2 for name in _SQUARES)
                     )
@@ -117,10 +125,11 @@ class Findings:
         """Return the `gap`, `verdicts` and `parameters` of run.json."""
         return {
             "gap": {
-                "horizon_s": HORIZON_S,
+                "horizon_s": ALARM_HORIZON_S,
                 "independent": self._independent,
                 "samples": sum(rows.count for rows in self._gaps.values()),
                 "alarms": self._alarms,
+                "beyond_limits": self._beyond,
                 "rms": {
                     "all": _rms(sum(self._gaps.values(), RunningMeans())),
                     **{name: _rms(rows) for name, rows in sorted(self._gaps.items())},

@@ -43,17 +43,27 @@ def found_text(found: ParameterEstimate, counts: float) -> str:
     )
 
 
+def _why_none(gap: dict[str, Any]) -> str:
+    if not gap["independent"]:
+        return "none: who departs from commands that were not recorded cannot be said"
+    if gap["alarms"]:
+        return "none: the gap was beyond its limits, and nothing shows by whom"
+    return "nothing shows that vehicle or model departs"
+
+
 def summary_lines(tuning: dict[str, Any]) -> list[str]:
     """Return what the end of a drive says of gap, verdicts and parameters, from its record."""
     lines = []
     gap, rms = tuning["gap"], tuning["gap"]["rms"]["all"]
     if rms is not None:
-        alarms = f"{gap['alarms']} alarms" if gap["alarms"] != 1 else "1 alarm"
+        told = "commands estimated from the motion: no limits"
+        if gap["independent"]:
+            told = f"{gap['alarms']} alarm{'s' if gap['alarms'] != 1 else ''}"
+            told += f", beyond a limit {gap['beyond_limits']} of {gap['samples']} times"
         lines.append(
             f"  gap of the model after {gap['horizon_s']:g} s (RMS): {rms['along_m']:.2f} m along, "
             f"{rms['across_m']:.2f} m across, {math.degrees(rms['yaw_rad']):.1f}°, "
-            f"{rms['speed_mps']:.2f} m/s; {alarms}"
-            + ("" if gap["independent"] else "; commands estimated from the motion")
+            f"{rms['speed_mps']:.2f} m/s; {told}"
         )
     lines += [
         f"  verdict at {verdict['drive_time_s']:.1f} s: {_CULPRITS[verdict['culprit']]}, "
@@ -61,7 +71,7 @@ def summary_lines(tuning: dict[str, Any]) -> list[str]:
         for verdict in tuning["verdicts"]
     ]
     if rms is not None and not tuning["verdicts"]:
-        lines.append("  verdict: nothing shows that vehicle or model departs")
+        lines.append(f"  verdict: {_why_none(gap)}")
     first: dict[str, float] = {}
     last = {change["name"]: change for change in tuning["changes"]}
     for change in tuning["changes"]:

@@ -35,7 +35,7 @@ def numbers(row: Row) -> list[float]:
     return [float(value) for value in cells.scalars.as_arrow_array().to_pylist()]
 
 
-def limits_after(since_s: float) -> dict[str, list[float]]:
+def limits_drawn(since_s: float) -> dict[str, list[float]]:
     """The lines of the gap plots while the free twin has run for so long."""
     sample = msgspec.structs.replace(scene.mirror_at(3.0), since_reset_s=since_s)
     rows = DriveLog(scene.DRIVE_FRAME).mirror(sample, 1)
@@ -66,7 +66,7 @@ def test_beyond_the_line_of_a_gap_after_2_s_is_an_alarm(plot: str, field: str, u
 
 
 def test_the_lines_of_the_free_twin_s_gaps_grow_as_alarms_allow() -> None:
-    drawn = limits_after(ALARM_HORIZON_S)
+    drawn = limits_drawn(ALARM_HORIZON_S)
     for plot, field, unit in (
         ("speed_mps", "speed_mps", 1.0),
         ("yaw_deg", "yaw_rad", math.pi / 180),
@@ -78,8 +78,30 @@ def test_the_lines_of_the_free_twin_s_gaps_grow_as_alarms_allow() -> None:
     for angle in (0.0, 0.5, 1.0, 1.5):
         along_m, across_m = distance_m * math.cos(angle), distance_m * math.sin(angle)
         assert alarms(along_m=1.001 * along_m, across_m=1.001 * across_m)
-    for plot, lines in limits_after(2.0 * ALARM_HORIZON_S).items():
-        assert lines == pytest.approx([2.0 * line for line in drawn[plot]])
+    for plot, lines in limits_drawn(2.0 * ALARM_HORIZON_S).items():
+        grown = 4.0 if plot == "pos_m" else 2.0
+        assert lines == pytest.approx([grown * line for line in drawn[plot]])
+    assert limits_drawn(0.1) == drawn
+
+
+def test_what_uncertain_states_leave_open_widens_the_line_and_holds_the_alarm_back() -> None:
+    unsure = {"across_std_m": 0.3}
+    rows = TuningLog().gap(msgspec.structs.replace(QUIET, **unsure), 1)
+    line = next(numbers(row) for row in rows if row.path == "reality/across_m/limit")[0]
+    assert line == pytest.approx(1.0 + 0.6)
+    assert alarms(across_m=1.001 * line, **unsure) == {"across_m"}
+    assert alarms(across_m=0.999 * line, **unsure) == set()
+
+
+def test_where_no_alarm_can_be_raised_no_limit_is_drawn() -> None:
+    """Of commands that were estimated from the motion itself."""
+    guessed = msgspec.structs.replace(QUIET, independent=False, across_m=9.0)
+    assert not GapLimits().handle(guessed)
+    assert [row.path for row in TuningLog().gap(guessed, 1) if row.path.endswith("/limit")] == []
+    sample = msgspec.structs.replace(scene.mirror_at(3.0), independent=False)
+    rows = DriveLog(scene.DRIVE_FRAME).mirror(sample, 1)
+    assert [row.path for row in rows if row.path.endswith("/twin")]
+    assert [row.path for row in rows if row.path.endswith("/limit")] == []
 
 
 def test_lines_fall_at_once_where_the_free_twin_starts_anew() -> None:
@@ -90,6 +112,6 @@ def test_lines_fall_at_once_where_the_free_twin_starts_anew() -> None:
                 assert row.drive_ns is not None
                 points.append((row.drive_ns / 1e9, numbers(row)[0]))
     for at_s, limit in points:
-        assert limit == pytest.approx(0.6 * (at_s % 8.0))
+        assert limit == pytest.approx(0.6 * max(at_s % 8.0, 2.0))
     assert {7.9, 8.0} <= {at_s for at_s, _ in points}
     assert len(points) < 20

@@ -7,6 +7,7 @@ changes: levels say nothing of time.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,12 @@ from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 _OVER_S = (0.4, 0.8)
 """Changes are taken over these: both must say the same, else the difference is doubt."""
 _ROLLS_MPS = 0.5
+_GRID_S = PERIOD_S / math.sqrt(12.0)
+"""Signals are compared on a grid and held for a tick: so much of a time stays open (standard
+deviation of what is anywhere in a tick)."""
+_PITCH_S = 0.015
+"""A body that pitches as it is braked shows the unit a share of gravity, later: with the stand-in,
+speeds look 25 ms early for it."""
 _GAIN_STD = 0.3
 """How far what a sensor shows may be off in size, while only its time is sought."""
 
@@ -35,15 +42,15 @@ def speed_offset(record: MotionRecord) -> ClockOffset | None:
     known = np.isfinite(record.accel_x_mps2)
     push = np.where(known, record.accel_x_mps2, 0.0)
     gained = (np.cumsum(push) - 0.5 * push) * PERIOD_S
-    return _offset(np.where(known, gained, np.nan), speed)
+    return _offset(np.where(known, gained, np.nan), speed, open_s=math.hypot(_GRID_S, _PITCH_S))
 
 
 def turning_offset(gyro_radps: Array, turning_radps: Array) -> ClockOffset | None:
     """Return the offset of what makes a model turn (N,), from how the gyro (N,) changes."""
-    return _offset(gyro_radps, turning_radps)
+    return _offset(gyro_radps, turning_radps, open_s=_GRID_S)
 
 
-def _offset(unit: Array, sensor: Array) -> ClockOffset | None:
+def _offset(unit: Array, sensor: Array, *, open_s: float) -> ClockOffset | None:
     found = []
     for over_s in _OVER_S:
         half = round(0.5 * over_s / PERIOD_S)
@@ -60,7 +67,7 @@ def _offset(unit: Array, sensor: Array) -> ClockOffset | None:
         found.append((fit.shift_std_s, -fit.shift_s))
     std_s, late_s = min(found)
     apart_s = max(abs(late_s - other) for _, other in found)
-    return ClockOffset(late_s, float(np.hypot(std_s, 0.5 * apart_s)))
+    return ClockOffset(late_s, math.hypot(std_s, 0.5 * apart_s, open_s))
 
 
 def _change(values: Array, half: int) -> Array:

@@ -42,6 +42,14 @@ QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "
 """Of a sample; a row has `position_m` too, how far apart both are."""
 
 
+_STDS = {
+    "along_m": "along_std_m",
+    "across_m": "across_std_m",
+    "yaw_rad": "yaw_std_rad",
+    "speed_mps": "speed_std_mps",
+}
+
+
 class GapRow(NamedTuple):
     """RMS and 95th percentile of |model - reality| by quantity, for one horizon and manoeuvre."""
 
@@ -51,6 +59,8 @@ class GapRow(NamedTuple):
     independent: bool
     rms: dict[str, float]
     p95: dict[str, float]
+    state_std: dict[str, float]
+    """RMS of what uncertain states leave open of the gap, as standard deviations."""
 
 
 class GapMeter:
@@ -172,9 +182,28 @@ class GapMeter:
                     speed_mps=float(model[3] - real.speed_mps),
                     accel_mps2=float(model[7] - real.accel_mps2),
                     independent=independent,
+                    **_open_by_states(motion, start, end, horizon_s=horizon),
                 )
             )
         return sorted(found, key=lambda sample: sample.stamp_ns)
+
+
+def _open_by_states(
+    motion: MeasuredMotion, start: int, end: int, *, horizon_s: float
+) -> dict[str, float]:
+    """Return what the states at both ends leave open of a gap, as standard deviations.
+
+    A heading that is off at the start leads the run aside, a speed ahead or behind. What positions
+    of one receiver are off by is nearly the same at both ends.
+    """
+    yaw, speed = motion.yaw_std_rad, motion.speed_std_mps
+    gone_m = abs(float(np.mean(motion.speed_mps[start : end + 1]))) * horizon_s
+    return {
+        "along_std_m": float(speed[start]) * horizon_s,
+        "across_std_m": float(yaw[start]) * gone_m,
+        "yaw_std_rad": float(np.hypot(yaw[start], yaw[end])),
+        "speed_std_mps": float(np.hypot(speed[start], speed[end])),
+    }
 
 
 def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
@@ -194,6 +223,10 @@ def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
                 runs=len(group),
                 independent=all(one.independent for one in group),
                 rms={name: float(np.sqrt(np.mean(v * v))) for name, v in values.items()},
+                state_std={
+                    name: float(np.sqrt(np.mean([getattr(one, std) ** 2 for one in group])))
+                    for name, std in _STDS.items()
+                },
                 p95={name: float(np.percentile(np.abs(v), 95)) for name, v in values.items()},
             )
         )
@@ -208,7 +241,7 @@ class GapLimits:
     """Watches each quantity of `ALARM_LIMITS_PER_S` at one horizon with hysteresis.
 
     Two samples in a row beyond the limit raise the alarm, three within 70 % of it end it: a gap
-    that plays about its limit is told once.
+    that plays about its limit is told once. Where states are unsure limits are wider.
     """
 
     def __init__(self) -> None:
@@ -220,8 +253,7 @@ class GapLimits:
         if abs(sample.horizon_s - ALARM_HORIZON_S) > 1e-9 or not sample.independent:
             return []
         alarms = []
-        for name, limit_per_s in ALARM_LIMITS_PER_S.items():
-            limit = limit_per_s * ALARM_HORIZON_S
+        for name, limit in sample.limits.items():
             value = getattr(sample, name)
             over = self._over[name]
             against = abs(value) < _BACK * limit if over else abs(value) > limit

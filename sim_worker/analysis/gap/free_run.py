@@ -115,7 +115,9 @@ class FreeRunner:
 def start_states(vehicle: VehicleParameters, motion: MeasuredMotion, *, tire_rad: Array) -> Array:
     """Return (K, 8) states to start from; a tyre angle that is NaN is that of steady cornering."""
     rows = np.zeros((len(tire_rad), 8))
-    for row, pose_and_motion, tire in zip(rows, np.stack(motion, axis=1), tire_rad, strict=True):
+    for row, pose_and_motion, tire in zip(
+        rows, np.stack(motion[:6], axis=1), tire_rad, strict=True
+    ):
         x, y, yaw, speed, rate, accel = pose_and_motion.tolist()
         slip = rear_slip_velocity(vehicle, speed, rate)
         angle = tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate)

@@ -20,7 +20,10 @@ _LONGEST_GAP_S = 0.5
 
 
 class MeasuredMotion(NamedTuple):
-    """Base_link at N instants in a local frame; NaN where no state is near."""
+    """Base_link at N instants in a local frame; NaN where no state is near.
+
+    Standard deviations are 0 where states give none.
+    """
 
     x_m: Array
     y_m: Array
@@ -28,6 +31,8 @@ class MeasuredMotion(NamedTuple):
     speed_mps: Array
     yaw_rate_radps: Array
     accel_mps2: Array
+    yaw_std_rad: Array
+    speed_std_mps: Array
 
     def at(self, index: int | Indices) -> MeasuredMotion:
         """Return the motion at one instant, or at some."""
@@ -58,6 +63,8 @@ def motion_on_grid(
             state.speed_mps,
             state.yaw_rate_radps,
             state.accel_mps2,
+            state.yaw_std_rad or 0.0,
+            state.speed_std_mps or 0.0,
             *(state.map_shift_m or (0.0, 0.0)),
         )
         time_s = (state.stamp_ns - base_ns) * 1e-9
@@ -67,9 +74,9 @@ def motion_on_grid(
     if len(rows) < 2:
         return MeasuredMotion(*(np.full(len(at), np.nan) for _ in MeasuredMotion._fields))
     table = np.array(rows)
-    xy = local_from_geo(frame, table[:, 1], table[:, 2]) - table[:, 7:9]
+    xy = local_from_geo(frame, table[:, 1], table[:, 2]) - table[:, 9:11]
     yaw = np.unwrap(local_from_geo_yaw(frame, table[:, 3], table[:, 1], table[:, 2]))
-    columns = (xy[:, 0], xy[:, 1], yaw, table[:, 4], table[:, 5], table[:, 6])
+    columns = (xy[:, 0], xy[:, 1], yaw, *table[:, 4:9].T)
     return MeasuredMotion(
         *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.instructions import Notice
@@ -20,8 +22,8 @@ class Tables:
         self.rows[table] = self.rows.get(table, 0) + len(rows)
 
 
-def sample(at_s: float, *touches: tuple[str, str]) -> MirrorSample:
-    return mirror_sample(round(at_s * 1e9), HERE, touches=touches)
+def sample(at_s: float, *touches: tuple[str, str], **changes: Any) -> MirrorSample:
+    return mirror_sample(round(at_s * 1e9), HERE, touches=touches, **changes)
 
 
 def test_a_touch_is_told_as_it_begins_and_again_only_after_a_while() -> None:
@@ -47,3 +49,20 @@ def test_what_a_mirror_that_was_started_again_says_once_more_counts_once() -> No
         handler.take(sample(at_s, ("ego", "van")))
     assert tables.rows == {"mirror": 5, "touches": 5}
     assert handler.stamp_ns == 1_300_000_000
+
+
+@pytest.mark.parametrize(
+    ("gap", "size"),
+    [
+        ("gap_along_m", 1.6 * 4.0),
+        ("gap_across_m", 1.0 * 4.0),
+        ("gap_yaw_rad", 0.28),
+        ("gap_speed_mps", 2.4),
+    ],
+)
+def test_a_free_twin_beyond_a_limit_of_the_alarms_is_counted(gap: str, size: float) -> None:
+    handler = MirrorHandler(Tables(), lambda _: None)  # type: ignore[arg-type]
+    for at_s, share in ((1.0, 0.99), (2.0, 1.01), (3.0, -1.01)):
+        handler.take(sample(at_s, since_reset_s=4.0, **{gap: share * size}))
+    handler.take(sample(4.0, since_reset_s=4.0, independent=False, **{gap: 9.0 * size}))
+    assert handler.record() == {"samples": 3, "beyond_limits": 2}

@@ -160,6 +160,14 @@ def test_the_summary_names_every_junction_and_the_maps_source(house: House) -> N
     assert text.splitlines()[-1] == house.plan.osm.attribution
 
 
+def test_the_summary_says_how_often_the_free_twin_was_beyond_a_limit(house: House) -> None:
+    record = record_of(house)
+    assert "free twin" not in summary_text(record)
+
+    record["free_twin"] = {"samples": 200, "beyond_limits": 3}
+    assert "\n  free twin: beyond a limit 1.5% of the time\n" in summary_text(record)
+
+
 def test_the_summary_says_where_the_map_helped_to_find_the_car(house: House) -> None:
     record = record_of(house)
     assert "GNSS" not in summary_text(record)

@@ -185,6 +185,7 @@ def test_what_was_found_until_then_stays_found(tmp_path: Path) -> None:
     )  # fmt: skip
     house.conductor.ads.standing.ended.append(segment)
     house.conductor.mirror.independent = False
+    house.conductor.mirror.compared, house.conductor.mirror.beyond = 7, 2
     house.tables.lost_before = 3
     before = findings.record(), house.conductor.ads.record()
     left = standing_of(house.conductor, watch(), grid=None, heard=heard_of(house.conductor))
@@ -199,6 +200,7 @@ def test_what_was_found_until_then_stays_found(tmp_path: Path) -> None:
     assert before[0]["gap"]["samples"] == 2
     assert before[1] is not None
     assert again.conductor.mirror.independent is False
+    assert again.conductor.mirror.record() == {"samples": 7, "beyond_limits": 2}
     assert again.tables.dropped == 3
     # The windows are judged alike by who goes on, and by who would have gone on.
     record = [one.rounds.windows for one in (house.conductor, again.conductor)]

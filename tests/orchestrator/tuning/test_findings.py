@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
+import pytest
 
 from foretwin.contracts.gap import Evidence, GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
@@ -91,10 +92,34 @@ def test_findings_are_kept_told_and_counted(tmp_path: Path) -> None:
 def test_the_end_of_a_drive_tells_it_in_a_few_lines(tmp_path: Path) -> None:
     reply = TuneReply(identifications=(FOUND,), gaps=(gap(0.3),), verdicts=(VERDICT,))
     assert summary_lines(Kept(tmp_path, reply).record) == [
-        "  gap of the model after 2 s (RMS): 0.00 m along, 0.30 m across, 5.7°, 0.00 m/s; 0 alarms",
+        "  gap of the model after 2 s (RMS): 0.00 m along, 0.30 m across, 5.7°, 0.00 m/s; "
+        "0 alarms, beyond a limit 0 of 1 times",
         "  verdict at 9.0 s: the model, steering_ratio: the model turns 14 % less",
         "  found, within what the vehicle file leaves open: steering_ratio 15.3",
     ]
+
+
+@pytest.mark.parametrize(
+    ("reply", "told"),
+    [
+        (TuneReply(gaps=(gap(0.3),)), ["0 alarms, beyond a limit 0 of 1", "nothing shows that"]),
+        (
+            TuneReply(gaps=(gap(1.3), gap(1.3)), alarms=(ALARM,)),
+            ["1 alarm, beyond a limit 2 of 2", "none: the gap was beyond its limits"],
+        ),
+        (
+            TuneReply(gaps=(gap(9.0, independent=False),)),
+            ["estimated from the motion: no limits", "none: who departs from commands that were"],
+        ),
+    ],
+    ids=["within", "beyond", "estimated commands"],
+)
+def test_a_summary_counts_by_the_limits_of_the_alarms(
+    tmp_path: Path, reply: TuneReply, told: list[str]
+) -> None:
+    lines = summary_lines(Kept(tmp_path, reply).record)
+    for line, part in zip(lines, told, strict=True):
+        assert part in line
 
 
 def test_a_value_that_the_vehicle_file_leaves_open_is_no_other_car(tmp_path: Path) -> None:
