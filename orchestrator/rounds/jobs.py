@@ -30,6 +30,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
+from foretwin.orchestrator.rounds.learnt_speed import partly_learnt
 from foretwin.orchestrator.rounds.path_from_car import led_from_car
 from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from foretwin.orchestrator.rounds.seen_users import near_car
@@ -119,9 +120,11 @@ class RoundPlanner:
         signals = _signals(reports.signals, state)
         car_plan = _car_plan(reports.plan, state, world.frame)
         path = _begun_by_car(intent.path, state, world.frame)
-        forecast = None
+        forecast, speed_ahead = None, intent.speed_ahead_mps
         if progress is not None:
             forecast = progress.forecast(round_id, intent, state, users, world.frame)
+        if forecast is not None:
+            speed_ahead = partly_learnt(speed_ahead, forecast)
         jobs = []
         for index, mine in enumerate(self._cut(futures)):
             named = {future.scenario_id for future in mine}
@@ -137,7 +140,7 @@ class RoundPlanner:
                     step_s=RESULT_STEP_S,
                     seed=config.seed,
                     cruise_speed_mps=intent.cruise_speed_mps,
-                    speed_ahead_mps=intent.speed_ahead_mps,
+                    speed_ahead_mps=speed_ahead,
                     scenarios=tuple(s for s in scenarios if s.id in named),
                     road_users=users,
                     signals=signals,

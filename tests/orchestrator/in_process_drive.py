@@ -19,6 +19,7 @@ from foretwin.orchestrator.instructions import BuildWorld, Instruction, LatestRe
 from foretwin.orchestrator.plan import DriveInputs
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
+from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
@@ -41,6 +42,8 @@ class Round(NamedTuple):
     intent: RoundIntent
     state: VehicleState
     acceleration_mps2: float
+    job: Job
+    """Of its nominal future."""
 
 
 class _Builder:
@@ -95,6 +98,9 @@ class LockStep:
             start_stamp_ns=self._start_ns,
         )
         self._builder, self._planner = _Builder(inputs), RoundPlanner(config, vehicle)
+        self._forecasts = None
+        if inputs.progress is not None:
+            self._forecasts = ProgressForecasts(inputs.progress, horizon_s=config.horizon_s)
         self._desk = OpenComparisons(inputs.drive_frame, config.horizon_s)
         self._asked: set[str] = set()
         self._wanted: list[Instruction] = []
@@ -121,6 +127,8 @@ class LockStep:
         if state is None:
             return
         self._latest = state
+        if self._forecasts is not None:
+            self._forecasts.take_state(state, self._start_ns)
         self.comparisons += self._desk.take_state(state)
         self._wanted += self.mission.on_state(state, mono_s=0.0)
         if self.mission.road_line is not None:
@@ -142,10 +150,13 @@ class LockStep:
         world = self._builder.world(intent.junction_id)
         number = len(self.rounds)
         trend = self.mission.way.acceleration_mps2
-        self.rounds.append(Round(number, world, intent, state, trend))
+        (job,) = self._planner.plan(
+            number, intent, state, LatestReports(None, None, ()), world,
+            start_stamp_ns=self._start_ns, count=1, progress=self._forecasts,
+        )  # fmt: skip
+        self.rounds.append(Round(number, world, intent, state, trend, job))
         if not self._futures:
             return
-        job = self.job(self.rounds[-1])
         order = RoundOrder(
             round_id=number, stamp_ns=state.stamp_ns, junction_id=intent.junction_id,
             world_id=world.id, receipt_mono_ns=0, started_mono_ns=0, jobs=(job,),
@@ -154,14 +165,6 @@ class LockStep:
         if result.outcome.valid[0]:
             done = RoundDone(order=order, results=(result,), latency_ms=0.0, seconds=0.0)
             self._desk.take_round(done, world.frame, state)
-
-    def job(self, one: Round) -> Job:
-        """The job of a round's nominal future."""
-        (job,) = self._planner.plan(
-            one.number, one.intent, one.state, LatestReports(None, None, ()), one.world,
-            start_stamp_ns=self._start_ns, count=1,
-        )  # fmt: skip
-        return job
 
     def played(self, job: Job) -> FuturesResult:
         """What a worker would answer."""

@@ -71,13 +71,12 @@ def constant_turn_rate(_: Pass, one: Round) -> Array:
 
 def nominal(on: Pass, one: Round) -> Array:
     """What is shipped."""
-    return _played(on, one, on.drive.job(one))
+    return _played(on, one, one.job)
 
 
 def before(on: Pass, one: Round) -> Array:
     """The same without speeds ahead, on the path as the map has it."""
-    job = on.drive.job(one)
-    old = msgspec.structs.replace(job, path=one.intent.path, speed_ahead_mps=msgspec.UNSET)
+    old = msgspec.structs.replace(one.job, path=one.intent.path, speed_ahead_mps=msgspec.UNSET)
     return _played(on, one, old)
 
 
