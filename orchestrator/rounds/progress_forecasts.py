@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+import heapq
 from typing import NamedTuple
 
 import numpy as np
@@ -44,11 +44,11 @@ class _Given(NamedTuple):
 
 
 class _NotYet(NamedTuple):
-    """One instant of a complete round, not yet come."""
+    """One instant of a complete round, not yet come; the next one due is the least."""
 
     due_ns: int
-    instant: int
     round_id: int
+    instant: int
     intersection_id: str
     given: _Given
     futures: Array
@@ -63,7 +63,7 @@ class ProgressForecasts:
         self.history = MotionHistory()
         self.calibration = Calibration(len(model.time_s))
         self._given: dict[int, _Given] = {}
-        self._waiting: deque[_NotYet] = deque()
+        self._waiting: list[_NotYet] = []
 
     def go_on(self, history: MotionHistory, calibration: Calibration) -> None:
         """Forecast on from what another orchestrator's forecasts had come to."""
@@ -73,17 +73,13 @@ class ProgressForecasts:
         """Add how the car moves; return what this settles."""
         drive_time_s = (state.stamp_ns - start_stamp_ns) / 1e9
         self.history.take(state.stamp_ns, state.speed_mps)
-        found, still = [], deque[_NotYet]()
-        for one in self._waiting:
-            now = self.history.now
-            assert now is not None
-            if one.given.stretch != now.stretch:
-                continue  # nobody knows how far it went meanwhile
-            if one.due_ns > now.stamp_ns:
-                still.append(one)
-                continue
-            found.append(self._settled(one, drive_time_s))
-        self._waiting = still
+        found: list[ForecastOutcome] = []
+        now, waiting = self.history.now, self._waiting
+        assert now is not None
+        if waiting and waiting[0].given.stretch != now.stretch:
+            waiting.clear()  # nobody knows how far the car went meanwhile
+        while waiting and waiting[0].due_ns <= now.stamp_ns:
+            found.append(self._settled(heapq.heappop(waiting), drive_time_s))
         return found
 
     @traced("forecast of a round")
@@ -121,13 +117,16 @@ class ProgressForecasts:
         order = done.order
         given = self._given.pop(order.round_id, None)
         self._given = {r: one for r, one in self._given.items() if r > order.round_id}
-        if given is None:
+        now = self.history.now
+        if given is None or now is None or given.stretch != now.stretch:
             return
         spread = _spread_of_futures(done, given.told, self._instants)
         for instant in self._instants:
             due_ns = given.stamp_ns + round(self._model.time_s[instant] * 1e9)
-            self._waiting.append(
-                _NotYet(due_ns, instant, order.round_id, order.junction_id, given, spread[instant])
+            at = spread[instant]
+            heapq.heappush(
+                self._waiting,
+                _NotYet(due_ns, order.round_id, instant, order.junction_id, given, at),
             )
 
     def _settled(self, one: _NotYet, drive_time_s: float) -> ForecastOutcome:

@@ -159,3 +159,17 @@ def test_the_same_rounds_give_the_same_bits_and_a_copy_goes_on_alike() -> None:
     other = copy.deepcopy(one)
 
     assert drive(one, from_s=15.1, until_s=30.0) == drive(other, from_s=15.1, until_s=30.0)
+
+
+def test_a_round_that_completes_after_a_hole_does_not_count() -> None:
+    forecasts = fresh()
+    for k in range(30):
+        forecasts.take_state(state(k / 10), START_NS)
+    assert forecasts.forecast(7, INTENT, state(2.9), (), FRAME) is not None
+    forecasts.take_state(state(10.0), START_NS)
+    assert forecasts.forecast(8, INTENT, state(10.0), (), FRAME) is not None
+    for round_id in (7, 8):
+        forecasts.take_round(round_done(straight(), round_id=round_id))
+    found = drive(forecasts, from_s=10.1, until_s=20.0, rounds=False)
+
+    assert [one.round_id for one in found] == [8] * 8
