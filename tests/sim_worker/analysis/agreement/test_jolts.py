@@ -8,6 +8,7 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.agreement.jolts import gently
 from foretwin.sim_worker.analysis.agreement.judgement import VerdictWord, word
+from foretwin.sim_worker.metrics.comfort import motion, motion_std
 from foretwin.sim_worker.metrics.rollout import RolloutView
 from tests.sim_worker.metrics.motions import Mover, rollout, times
 
@@ -70,3 +71,21 @@ def test_a_simulation_is_known_exactly() -> None:
     hard.states[0, :, 3] = braking(4.6, ramp_s=0.4)
     found = gently(RolloutView(hard))
     assert (found.passes[0], found.fails[0]) == (False, True)
+
+
+def test_the_uncertainty_of_derivatives_is_that_of_many_noisy_drives() -> None:
+    count, speed_std, yaw_std = 400, 0.1, 0.02
+    rng = np.random.default_rng(8)
+    exact = rollout(Mover(0, 0, 0, 5.0), time_s=TIME_S)
+    exact.states[0, :, 2], exact.states[0, :, 3] = 0.2 * TIME_S, 9.0 + 0.8 * TIME_S
+    noisy = rollout(Mover(0, 0, 0, 5.0), time_s=TIME_S, futures=count)
+    noisy.states[:] = exact.states[0]
+    noisy.states[..., 2] += rng.normal(0.0, yaw_std, (count, len(TIME_S)))
+    noisy.states[..., 3] += rng.normal(0.0, speed_std, (count, len(TIME_S)))
+    stds = np.full(len(TIME_S), speed_std), np.full(len(TIME_S), yaw_std)
+    told = motion_std(RolloutView(exact), *stds, alike_s=0.1)
+    for name, values in motion(RolloutView(noisy))._asdict().items():
+        if name == "jerk_mps3":  # of the size of both accelerations: no more than told
+            assert (values.std(axis=0) < 1.2 * getattr(told, name)[0]).all()
+        else:
+            assert values.std(axis=0) == pytest.approx(getattr(told, name)[0], rel=0.2), name

@@ -85,3 +85,11 @@ def test_a_stretch_ends_where_one_of_the_drives_does() -> None:
     a, b = line(driven(np.array([[0.0, 0.0], [400.0, 0.0]]), 8.0)), line(driven(longer, 8.0))
     (one,) = common_ways(a, b).stretches
     assert b.xy_m[one.rows_b[[0, -1]], 0] == pytest.approx([0.0, 400.0], abs=1.6)
+
+
+def test_a_way_that_is_longer_for_a_moment_parts_the_stretch() -> None:
+    """8 m of one are 20 m of the other, round something that stands there."""
+    around = np.array([[0.0, 0.0], [150.0, 0.0], [154.0, 9.0], [158.0, 0.0], [300.0, 0.0]])
+    straight = np.array([[0.0, 0.0], [300.0, 0.0]])
+    found = common_ways(line(driven(around, 5.0)), line(driven(straight, 5.0))).stretches
+    assert len(found) == 2
