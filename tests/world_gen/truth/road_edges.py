@@ -56,11 +56,12 @@ def measure(data: Path, work: Path) -> Beyond:
         for counted in found:
             file = work / f"{hd.name.replace(' ', '-')}-{counted}.osm"
             file.write_text(text if counted else _LANE_TAGS.sub("", text), encoding="utf-8")
-            found[counted] += _beyond(hd, area, _world(file))
+            found[counted] += _beyond(hd, area, world_of(file))
     return Beyond(np.array(found[True]), np.array(found[False]))
 
 
-def _world(file: Path) -> World:
+def world_of(file: Path) -> World:
+    """Return the World of a whole map."""
     osm = read_map(file)
     graph = build_road_graph(osm)
     index = index_map(osm, graph, find_intersections(osm, graph))
