@@ -16,6 +16,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
+from foretwin.contracts.tracks import DrivenTrack
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.campaign.joining import admission
 from foretwin.orchestrator.config import DriveConfig, OtherVehicleConfig
@@ -70,6 +71,8 @@ class DriveInputs:
     """How the live car's ROS 2 topics are read, and what goes back."""
     progress: ProgressModel | None = None
     """What forecasts how far the car will get; None where nobody wants to know."""
+    tracks: tuple[DrivenTrack, ...] = ()
+    """Of earlier drives near the map, where the user asks for them."""
 
     @property
     def towards_vehicle(self) -> bool:

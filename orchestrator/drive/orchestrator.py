@@ -73,7 +73,7 @@ class Orchestrator:
         self._before = read_standing(life.standing)
         self._standing: HandingOver
         self._mission = Mission(
-            WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
+            WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index, tracks=plan.tracks),
             MissionSettings(
                 radius_m=plan.config.radius_m,
                 look_ahead_s=plan.config.look_ahead_s,

@@ -78,7 +78,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     clip = None if near is None else Clip(near, CORRIDOR_M)
     opened = open_map(map_file, clip=clip)
     # For its errors alone, before anything starts: the process that builds Worlds reads them.
-    tracks_for(opened.osm.bounds, config.tracks)
+    earlier = tracks_for(opened.osm.bounds, config.tracks)
     osm, graph, junctions = opened.osm, opened.graph, opened.junctions
     index = RoadIndex(graph)
     if positions is not None and log_file is not None:
@@ -127,6 +127,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         standin=standin,
         ros2=ros2,
         progress=progress,
+        tracks=() if earlier is None else earlier.tracks,
     )
 
 

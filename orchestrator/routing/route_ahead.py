@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from foretwin.contracts.arrays import Array
@@ -9,6 +11,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, target_from_source_m
 from foretwin.contracts.futures import PATH_BEHIND_M, PathAhead
 from foretwin.contracts.trace import traced
+from foretwin.contracts.tracks import DrivenTrack
 from foretwin.contracts.world import World
 from foretwin.orchestrator.routing.arrival import (
     STRAIGHT,
@@ -19,6 +22,7 @@ from foretwin.orchestrator.routing.arrival import (
     predict_arrivals,
 )
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
+from foretwin.orchestrator.routing.driven_speeds import DrivenSpeeds
 from foretwin.orchestrator.routing.driving_path import SPACING_M, driving_path
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
 from foretwin.orchestrator.routing.lane_chain import LaneGuide
@@ -50,7 +54,9 @@ class WayAhead:
         routes: tuple[Route, ...],
         *,
         index: RoadIndex | None = None,
+        tracks: Sequence[DrivenTrack] = (),
     ) -> None:
+        """`tracks` are of earlier drives, whose speeds the nominal future then heeds."""
         index = index or RoadIndex(graph)
         self._graph = graph
         self._matcher = MapMatcher(graph, index=index)
@@ -58,10 +64,14 @@ class WayAhead:
         self._lines = RoadLines(graph)
         self._pace = DrivingPace()
         self._cruise = CruiseSpeed()
+        self._earlier = DrivenSpeeds(tracks, graph.frame) if tracks else None
+        self._driven_mps: Array | None = None
+        """Of earlier drives, at the points of the latest round's path."""
         self._given = bool(routes)
         self._match: Match | None = None
         self._progress: RouteProgress | None = None
         self._xy_m: Array = np.zeros(2)
+        self._stamp_ns = 0
         self._lanes: WorldLanes | None = None
         self._bends: BendSpeeds = STRAIGHT
         """Of the latest round's path, until the next one."""
@@ -83,6 +93,7 @@ class WayAhead:
     def locate(self, state: VehicleState) -> tuple[PassedJunction, ...] | None:
         """Find the car on the map; returns the junctions just passed, None off the map."""
         lat, lon = state.position.lat_deg, state.position.lon_deg
+        self._stamp_ns = state.stamp_ns
         xy = self._xy_m = local_from_geo(self._graph.frame, lat, lon)
         yaw = float(local_from_geo_yaw(self._graph.frame, state.yaw_rad, lat, lon))
         self._match = self._matcher.update(xy, yaw, state.yaw_valid, state.speed_mps)
@@ -179,6 +190,7 @@ class WayAhead:
             acceleration_mps2=self._cruise.acceleration_mps2,
             usual_share=self._pace.share,
             horizon_s=horizon_s,
+            driven_mps=self._driven_mps,
         )
 
     @property
@@ -216,4 +228,8 @@ class WayAhead:
         self.off_lanes_m = SPACING_M * int(np.count_nonzero(off_lanes))
         path = PathAhead(xy_m=xy, speed_limit_mps=geometry.speed_limit_mps)
         self._bends = BendSpeeds(self.s_m, bend_speeds(path))
+        if self._earlier is not None:
+            self._driven_mps = self._earlier.along(
+                geometry.xy_m, stamp_ns=self._stamp_ns, car_xy_m=self._xy_m
+            )
         return path

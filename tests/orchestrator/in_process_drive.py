@@ -89,7 +89,13 @@ class LockStep:
             steering_offset_rad=vehicle.steering_offset_rad.value,
         )  # fmt: skip
         self.mission = Mission(
-            WayAhead(inputs.graph, inputs.junctions, inputs.routes, index=inputs.index),
+            WayAhead(
+                inputs.graph,
+                inputs.junctions,
+                inputs.routes,
+                index=inputs.index,
+                tracks=inputs.tracks,
+            ),
             MissionSettings(
                 radius_m=config.radius_m,
                 look_ahead_s=config.look_ahead_s,

@@ -6,7 +6,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source
+from foretwin.contracts.frames import (
+    GeoPoint,
+    LocalFrame,
+    geo_from_local,
+    target_from_source,
+)
+from foretwin.contracts.tracks import DrivenTrack
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_ahead import MIN_PATH_M, WayAhead
 from foretwin.world_gen.roads.road_graph import DirectedEdge
@@ -160,3 +166,24 @@ def test_the_nominal_speed_is_the_cars_own_and_no_more_than_allowed() -> None:
     assert driven((110, 100), (150, 100), speed_mps=9.0).cruise_speed_mps == pytest.approx(9.0)
     fast = driven((110, 100), (190, 100), speed_mps=20.0)
     assert fast.cruise_speed_mps == pytest.approx(20.0)  # it is not slowed down by the limit
+
+
+def test_with_tracks_the_nominal_speed_heeds_how_the_road_was_driven() -> None:
+    line = np.column_stack([np.arange(100.0, 400.0), np.full(300, 98.5)])
+    lat, lon = geo_from_local(FRAME, line).T
+    earlier = DrivenTrack(
+        id="0123456789ab", name="earlier", added_utc="2030-01-01T00:00:00Z",
+        stamp_ns=np.arange(300) * 10**8, lat_deg=lat, lon_deg=lon, speed_mps=np.full(300, 5.0),
+    )  # fmt: skip
+
+    def speeds(*tracks: DrivenTrack) -> np.ndarray:
+        way = WayAhead(GRID, CORNERS, (), tracks=tracks)
+        for state in states_along(FRAME, drive([(110, 100), (150, 100)]), start_s=1000.0):
+            way.take_speed(state)
+            way.locate(state)
+        path = way.path(EMPTY, speed_mps=10.0, horizon_s=8.0)
+        assert path is not None
+        return np.asarray(way.speeds_ahead(path, horizon_s=8.0))
+
+    assert speeds()[-1] > 9.5
+    assert 5.0 < speeds(earlier)[-1] < 7.5

@@ -89,3 +89,21 @@ def test_bends_ahead_are_braked_for() -> None:
     assert speeds[2] == pytest.approx(10.0, abs=0.2)
     assert speeds.min() == pytest.approx(math.sqrt(2.5 * 10.0), abs=0.6)
     assert speeds.argmin() in range(9, 15)
+
+
+def test_what_was_driven_before_is_come_back_to_sooner_than_what_is_usual() -> None:
+    path = PathAhead(xy_m=STRAIGHT, speed_limit_mps=np.full(len(STRAIGHT), 14.0))
+
+    def to(driven_mps: np.ndarray | None) -> np.ndarray:
+        return speeds_ahead(
+            path, speed_mps=8.0, acceleration_mps2=0.0, usual_share=12.0 / 14.0, horizon_s=8.0,
+            driven_mps=driven_mps,
+        )  # fmt: skip
+
+    before = to(np.full(len(STRAIGHT), 12.0))
+    assert before[-1] > to(None)[-1] + 1.0
+    assert before[2] == pytest.approx(to(None)[2], abs=0.15)
+    np.testing.assert_array_equal(to(np.full(len(STRAIGHT), np.nan)), to(None))
+    slow_from_50_m = to(np.where(STRAIGHT[:, 0] < 50.0, np.nan, 4.0))
+    assert slow_from_50_m.max() > 8.0
+    assert slow_from_50_m[-1] < 8.0
