@@ -17,6 +17,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.contracts.tuning import Identification
+from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.output import print_json
 from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
 from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
@@ -78,7 +79,7 @@ def identify_log(
     if as_json:
         print_json(as_object(told))
     else:
-        say("\n".join(as_lines(told)))
+        say("\n".join(as_lines(told, vehicle)))
         if out is not None:
             say(f"{out}: vehicle.toml, identification.json and plots")
     return 0
@@ -132,8 +133,11 @@ def as_object(told: Identification) -> dict[str, Any]:
     return {found.name: {name: getattr(found, name) for name in names} for found in told.estimates}
 
 
-def as_lines(told: Identification) -> list[str]:
-    """Return the table, at most 80 columns wide: a line a parameter, reasons below them."""
+def as_lines(told: Identification, vehicle: VehicleParameters) -> list[str]:
+    """Return the table, at most 80 columns wide: a line a parameter, reasons below them.
+
+    `vehicle` is what was identified against, which the intervals are conditional on.
+    """
     duration_s = (told.stamp_ns - told.from_stamp_ns) * 1e-9
     lines = [f"{duration_s:.0f} s of {told.vehicle_id}", ""]
     lines.append(_ROW.format("", "value", "95 % interval", "unit", "file", "").rstrip())
@@ -153,7 +157,13 @@ def as_lines(told: Identification) -> list[str]:
         speeds = f"{entry.from_mps:g} to {entry.to_mps:g} m/s"
         interval = _interval(entry.low, entry.high, 1.0)
         lines.append(_ROW.format(speeds, _number(entry.ratio, 1.0), interval, "", "", "").rstrip())
-    return [*lines, "", "* may be taken: nothing speaks against it"]
+    base, mass = vehicle.wheelbase_m, vehicle.mass_kg.value
+    given = (
+        f"intervals hold given the file's {vehicle.name}: of the steering its wheelbase of "
+        f"{base.value:.4g} ± {1.96 * (base.std or 0.0):.2g} m and its tyres, of the resistances "
+        f"its mass of {mass:.0f} kg; and given that sensors share one clock"
+    )
+    return [*lines, "", *textwrap.wrap(given, _WIDTH), "* may be taken: nothing speaks against it"]
 
 
 def _number(value: float | None, scale: float) -> str:

@@ -65,6 +65,10 @@ def test_the_table_is_read_at_80_columns(
     (base,) = (index for index, line in enumerate(lines) if line.startswith("wheelbase"))
     assert lines[base].split() == ["wheelbase", "-", "m", "2.579"]
     assert lines[base + 1].startswith("    no tyre angle was measured: ")
+    said = " ".join(lines)
+    assert (
+        "intervals hold given the file's bmw_320i: of the steering its wheelbase of 2.579" in said
+    )
 
 
 def test_a_declaration_that_lies_elsewhere_is_named(
