@@ -176,8 +176,8 @@ def _check(value: Any, name: str, *, finite: bool) -> None:
             finite = finite and kind not in MAY_BE_UNKNOWN
             for field, far, words in _fields(kind):
                 one = getattr(value, field)
-                if type(one) is float and -far <= one <= far:
-                    continue  # most are; NaN is not
+                if one is None or _fits(one, far):
+                    continue  # most do
                 _check(one, field, finite=finite)
                 if words:
                     _check_word(one, field, words)
@@ -190,6 +190,16 @@ def _check(value: Any, name: str, *, finite: bool) -> None:
             for key, one in value.items():
                 _check(key, name, finite=finite)
                 _check(one, name, finite=finite)
+
+
+def _fits(value: Any, far: float) -> bool:
+    """Whether a value is a plain number within its bound, or some; NaN is not."""
+    kind = type(value)
+    if kind is float:
+        return bool(-far <= value <= far)
+    if kind is int:
+        return bool(-MOST_INTEGER <= value <= MOST_INTEGER)
+    return kind is tuple and all(type(one) is float and -far <= one <= far for one in value)
 
 
 @functools.cache

@@ -14,7 +14,14 @@ import pytest
 
 from foretwin.contracts.bounds import MOST_IDENTIFIER, MOST_USERS, SHAPES
 from foretwin.contracts.codec import encode
-from foretwin.contracts.drive import GnssFix, PlannedTrajectory, RoadUser, RoadUsers, SpeedSample
+from foretwin.contracts.drive import (
+    GnssFix,
+    ImuSample,
+    PlannedTrajectory,
+    RoadUser,
+    RoadUsers,
+    SpeedSample,
+)
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import (
     Refused,
@@ -80,6 +87,8 @@ def test_numbers_are_within_bounds() -> None:
     )
     assert why(GnssFix(stamp_ns=2**62 + 1, position=HERE)) == "GnssFix: stamp_ns out of bounds"
     assert why(SpeedSample(stamp_ns=1, speed_mps=1e5)) == "SpeedSample: speed_mps out of bounds"
+    shaken = ImuSample(stamp_ns=1, accel_mps2=(0.0, 0.0, -1.1e5), rate_radps=(0.0, 0.0, 0.0))
+    assert why(shaken) == "ImuSample: accel_mps2 out of bounds"
     assert admit(GnssFix(stamp_ns=1, position=GeoPoint(90.0, -180.0)), where=KEY)
 
 
