@@ -91,16 +91,22 @@ class LiveLoop:
             if not self._telemetry_waits():
                 until_s = min(now_s + GATHER_S, self._next_due_s, next_housekeeping_s)
                 conductor.mailbox.gather(max(0.0, until_s - now_s))
-            seen = conductor.intake.states
             wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
+            until_s = min(self._next_due_s, wake_s)
+            seen = conductor.intake.states
             item = conductor.mailbox.take(max(0.0, wake_s - time.monotonic()))
-            now_s = time.monotonic()
-            if item is not None:
+            if item is None:
+                now_s = time.monotonic()
+                conductor.watch_telemetry(round(now_s * 1e9))
+            while item is not None:
                 with span(item_name(item)):
                     conductor.handle(item)
                 now_s = time.monotonic()
-            else:
-                conductor.watch_telemetry(round(now_s * 1e9))
+                # Only samples go without a turn in between: nothing that it looks at hangs on them.
+                if now_s >= until_s or not is_telemetry(item) or not self._telemetry_waits():
+                    break
+                seen = conductor.intake.states
+                item = conductor.mailbox.take()
             due = now_s >= self._next_due_s and not self._is_unplaced(now_s)
             fresh = due and (fresh or conductor.intake.states > seen)
             missed_end.look(conductor.intake, now_s)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,119 +9,12 @@ import pytest
 
 from foretwin.orchestrator.drive import live_loop
 from foretwin.orchestrator.drive.live_loop import GATHER_S, LiveLoop
-from foretwin.orchestrator.record.ledger import RoundTally
-from foretwin.orchestrator.rounds.pace import Pace
-from tests.contracts.memory_bus import MemoryBus
+from tests.orchestrator.drive.loop_stage import Clock, Conductor, every
 
 
-class Clock:
-    """Stands in for the module `time`: moves when somebody waits."""
-
-    def __init__(self) -> None:
-        self.now_s = 100.0
-
-    def monotonic(self) -> float:
-        return self.now_s
-
-
-class Mailbox:
-    """Items with the second at which each arrives; taking waits, and time passes."""
-
-    def __init__(self, clock: Clock, items: list[tuple[float, str]]) -> None:
-        self._clock = clock
-        self._items = deque(sorted(items))
-        self.gathered_s: list[float] = []
-
-    def __len__(self) -> int:
-        return sum(at_s <= self._clock.now_s for at_s, _ in self._items)
-
-    def gather(self, most_s: float) -> None:
-        self.gathered_s.append(most_s)
-        self._clock.now_s += most_s + 1e-6  # nobody wakes up too early
-
-    def take(self, timeout_s: float) -> str | None:
-        until_s = self._clock.now_s + max(timeout_s, 1e-4)
-        if self._items and self._items[0][0] <= until_s:
-            at_s, item = self._items.popleft()
-            self.arrived_s = at_s
-            self._clock.now_s = max(self._clock.now_s, at_s)
-            return item
-        self._clock.now_s = until_s
-        return None
-
-
-class Conductor:
-    """Takes states and runs rounds that last `round_s`, beginning at second 100."""
-
-    def __init__(
-        self,
-        clock: Clock,
-        *,
-        states_s: list[float],
-        end_s: float,
-        round_s: float = 0.1,
-        rate_hz: float = 2.0,
-        handling: Callable[[float], None] = lambda _: None,
-        one_of: int = 1,
-        settled_s: float = 0.0,
-        received: bool = False,
-        wants_rounds: bool = True,
-    ) -> None:
-        self._received = received
-        """Whether a state counts as received when it came, not when it is handled."""
-        self._clock = clock
-        self._round_s = round_s
-        self._handling = handling
-        self._open_until_s: float | None = None
-        config = SimpleNamespace(rate_hz=rate_hz, speed=1.0, vehicle_id="car")
-        self.plan, self.bus = SimpleNamespace(config=config), MemoryBus()
-        self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
-        self.intake = SimpleNamespace(states=0, latest=None, end=None)
-        self._settled_s = settled_s
-        self.tuning = SimpleNamespace(parameters=self)
-        self.rounds, self.pace = self, SimpleNamespace(now=Pace(64, one_of))
-        self.mission = SimpleNamespace(wants_rounds=wants_rounds)
-        self.tally = RoundTally()
-        self.started_s: list[float] = []
-        self.seeds_s: list[float] = []
-        """When the states came from which rounds were started."""
-        self.dropped_s, self.watched_s, self.changes_made_s = (list[float]() for _ in range(3))
-
-    @property
-    def open(self) -> bool:
-        return self._open_until_s is not None and self._clock.now_s < self._open_until_s
-
-    @property
-    def settled(self) -> bool:
-        return self._clock.now_s >= 100.0 + self._settled_s
-
-    def next_is_due(self) -> None:
-        if self._clock.now_s - 100 - self.started_s[-1] > 10.0:
-            self.dropped_s.append(self._clock.now_s - 100)
-            self._open_until_s = None
-
-    def handle(self, item: str) -> None:
-        self._handling(self._clock.now_s - 100)
-        if item == "state":
-            self.intake.states += 1
-            at_s = self.mailbox.arrived_s if self._received else self._clock.now_s
-            state = SimpleNamespace(stamp_ns=0)
-            self.intake.latest = SimpleNamespace(receipt_mono_ns=at_s * 1e9, state=state)
-        else:
-            self.intake.end = SimpleNamespace(stamp_ns=0)
-
-    def make_changes(self) -> None:
-        self.changes_made_s.append(self._clock.now_s - 100)
-
-    def watch_telemetry(self, mono_ns: int) -> None:
-        self.watched_s.append(mono_ns * 1e-9 - 100)
-
-    def start_round(self) -> bool:
-        self.started_s.append(self._clock.now_s - 100)
-        self.seeds_s.append(self.intake.latest.receipt_mono_ns / 1e9 - 100)
-        self._open_until_s = self._clock.now_s + self._round_s
-        self.tally.run += 1
-        return True
+@pytest.fixture(autouse=True)
+def _states_are_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_loop, "is_telemetry", lambda item: item == "state")
 
 
 @pytest.fixture
@@ -139,10 +29,6 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> Any:
         return conductor
 
     return drive
-
-
-def every(period_s: float, until_s: float, *, start_s: float = 0.0) -> list[float]:
-    return [start_s + k * period_s for k in range(int((until_s - start_s) / period_s))]
 
 
 def test_rounds_start_on_the_grid(driven: Any) -> None:
@@ -279,14 +165,45 @@ def test_messages_are_gathered_and_no_round_waits_for_it(driven: Any) -> None:
     assert conductor.started_s[:20] == pytest.approx([k / 2 for k in range(20)], abs=0.0031)
 
 
-def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = Clock()
-    monkeypatch.setattr(live_loop, "time", clock)
-    conductor = Conductor(clock, states_s=[0.0, 0.3], end_s=1.0)
-    turns_s: list[float] = []
-    noted = lambda: turns_s.append(clock.now_s)  # noqa: E731
-    LiveLoop(conductor, lambda _: None, lambda: False, noted).run()  # type: ignore[arg-type]
-    assert np.diff([*turns_s, 101.0]).max() < 0.051
+@pytest.fixture
+def turns(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What a loop does in turn: its turns, with their seconds, and the items that it takes."""
+
+    def drive(*, answer_at: int | None = None, handling_s: float = 0.0, **settings: Any) -> Any:
+        clock, done = Clock(), list[tuple[str, float]]()
+        monkeypatch.setattr(live_loop, "time", clock)
+        conductor = Conductor(clock, **settings)
+        if answer_at is not None:
+            conductor.mailbox.answer_at(answer_at)
+        handle = conductor.handle
+
+        def handled(item: str) -> None:
+            clock.now_s += handling_s
+            done.append((item, clock.now_s))
+            handle(item)
+
+        conductor.handle = handled  # type: ignore[method-assign]
+        turn = lambda: done.append(("turn", clock.now_s))  # noqa: E731
+        LiveLoop(conductor, lambda _: None, lambda: False, turn).run()  # type: ignore[arg-type]
+        return done
+
+    return drive
+
+
+def test_something_is_done_each_turn_at_least_every_50_ms(turns: Any) -> None:
+    for done in (
+        turns(states_s=[0.0, 0.3], end_s=1.0),
+        turns(states_s=every(0.003, 0.4), end_s=0.4, handling_s=0.004, wants_rounds=False),
+    ):
+        turns_s = [at_s for what, at_s in done if what == "turn"]
+        assert np.diff([*turns_s, done[-1][1]]).max() < 0.0541
+
+
+def test_samples_of_a_portion_need_no_turn_and_what_else_comes_gets_one(turns: Any) -> None:
+    done = [what for what, _ in turns(states_s=every(0.003, 2.7), end_s=2.8, answer_at=700)]
+    assert done.count("state") == 900
+    assert done.count("turn") < 150
+    assert done[done.index("answer") + 1] == "turn"
 
 
 def test_changes_asked_for_are_looked_at_every_turn(driven: Any) -> None:
