@@ -87,13 +87,13 @@ def estimate_object(found: StateConsistency) -> dict[str, Any]:
     """Return as JSON how far the states can be trusted; an honest share within is 0.95."""
     return {
         "within_95": {
-            channel: {"share": round(one.within / one.taken, 4), "count": one.taken}
+            channel: {"share": round(float(one.within / one.taken), 4), "count": one.taken}
             for channel, one in found.surprises.items()
         },
-        "spreads_widened": round(found.widened, 3),
+        "spreads_widened": round(float(found.widened), 3),
         "position_noise_m": None
         if found.position_noise_m is None
-        else round(found.position_noise_m, 3),
+        else round(float(found.position_noise_m), 3),
         "receiver_slips": found.slips,
     }
 

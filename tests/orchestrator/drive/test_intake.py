@@ -12,6 +12,9 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Mailbox, Received
 from foretwin.orchestrator.drive.intake import Intake
+from foretwin.orchestrator.drive.telemetry_watch import estimate_object
+from foretwin.telemetry.estimator.innovations import Surprises
+from foretwin.telemetry.estimator.motion_track import StateConsistency
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
@@ -164,6 +167,15 @@ def test_in_lock_step_times_of_receipt_mean_nothing() -> None:
     record = telemetry.intake.record()
     assert record["clock_offset_ms"] is None
     assert record["late"] == record["doubled"] == 0
+
+
+def test_what_is_said_of_trust_is_of_plain_numbers() -> None:
+    """A record is told while a drive goes on: numbers of numpy's would end it."""
+    imu = Surprises(taken=4, within=np.float64(3.0))
+    found = StateConsistency({"imu": imu}, np.float64(1.5), np.float64(0.02), 0)
+    said = msgspec.json.decode(msgspec.json.encode(estimate_object(found)))
+    assert said["within_95"] == {"imu": {"share": 0.75, "count": 4}}
+    assert (said["spreads_widened"], said["position_noise_m"]) == (1.5, 0.02)
 
 
 def test_a_run_says_how_far_its_states_can_be_trusted() -> None:
