@@ -79,11 +79,8 @@ def difference_lines(found: dict[str, Any]) -> list[str]:
         ]
     lines.append(f"verdicts that change: {len(found['outcomes'])}")
     lines += [
-        f"  {one['drive_time_s']:.1f} s at {one['junction_id']}: {one['before']['outcome']} "
-        f"(simulated fails {one['before']['simulated_fails'] or 'nothing'}, driven "
-        f"{one['before']['driven_fails'] or 'nothing'}) → {one['after']['outcome']} (simulated "
-        f"fails {one['after']['simulated_fails'] or 'nothing'}, driven "
-        f"{one['after']['driven_fails'] or 'nothing'})"
+        f"  {one['drive_time_s']:.1f} s at {one['junction_id']}: {_verdict(one['before'])} → "
+        f"{_verdict(one['after'])}"
         for one in found["outcomes"]
     ]
     junctions = found["junctions"]
@@ -133,7 +130,7 @@ def _is_same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 def _outcomes(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the windows of the same time whose outcome, or what fails, is another one now."""
-    told = ("outcome", "simulated_fails", "driven_fails", "observable")
+    told = ("outcome", "simulated_fails", "driven_fails", "observable", "not_observable")
     changed = []
     for one in after:
         near = [o for o in before if abs(o["stamp_ns"] - one["stamp_ns"]) <= _SAME_WINDOW_NS]
@@ -148,6 +145,14 @@ def _outcomes(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list
                 }
             )
     return changed
+
+
+def _verdict(one: dict[str, Any]) -> str:
+    unseen = one["not_observable"]
+    return (
+        f"{one['outcome']} (simulated fails {one['simulated_fails'] or 'nothing'}, driven "
+        f"{one['driven_fails'] or 'nothing'}{f', not observable: {unseen}' if unseen else ''})"
+    )
 
 
 def _junctions(before: dict[str, Any], after: dict[str, Any]) -> dict[str, list[str]]:

@@ -15,11 +15,13 @@ def disagreement(at_s: float, kind: str = "ads_stops") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def window(at_s: float, outcome: str, driven_fails: str = "") -> dict[str, Any]:
+def window(
+    at_s: float, outcome: str, driven_fails: str = "", not_observable: str = ""
+) -> dict[str, Any]:
     return {
         "stamp_ns": round(at_s * 1e9), "drive_time_s": at_s, "intersection_id": "n4",
         "outcome": outcome, "observable": "comfort stop_line", "simulated_fails": "",
-        "driven_fails": driven_fails,
+        "driven_fails": driven_fails, "not_observable": not_observable,
     }  # fmt: skip
 
 
@@ -93,3 +95,13 @@ def test_each_side_names_what_it_was_driven_with() -> None:
         "before: a (map a.osm)",
         "after: b (map b.osm, vehicle car.toml, Worlds of corrected)",
     ]
+
+
+def test_a_verdict_that_nobody_can_tell_any_more_says_of_what() -> None:
+    before = run("a", [], [window(3.0, "agree_pass")])
+    after = run("b", [], [window(3.0, "not_observable", not_observable="drivable_area")])
+    (line,) = (one for one in difference_lines(difference_of(before, after)) if "3.0 s at" in one)
+    assert line.endswith(
+        "agree_pass (simulated fails nothing, driven nothing) → not_observable (simulated fails "
+        "nothing, driven nothing, not observable: drivable_area)"
+    )
