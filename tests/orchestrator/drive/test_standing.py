@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -121,6 +122,20 @@ def test_the_state_goes_on_from_the_estimate_of_before(twice: Twice, tmp_path: P
     assert latest is not None
     assert latest.state.yaw_valid
     assert latest.state.speed_mps > 1.0
+    twice.second.tables.close()
+
+
+def test_forecasts_go_on_from_what_was_learnt_before(twice: Twice) -> None:
+    first, second = (house.conductor.rounds.progress for house in (twice.first, twice.second))
+    assert first is not None
+    assert second is not None
+    assert second.history.now == first.history.now
+    assert second.history.now is not None
+    assert pickle.dumps(second.calibration) == pickle.dumps(first.calibration)
+    told = twice.second.conductor.rounds.forecast_count.record()
+    assert told == twice.first.conductor.rounds.forecast_count.record()
+    assert told is not None
+    assert told["count"] > 0
     twice.second.tables.close()
 
 
