@@ -9,12 +9,17 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.forecast import ForecastOutcome, ProgressForecast, pinball
+from foretwin.contracts.forecast import (
+    ForecastOutcome,
+    ProgressForecast,
+    pinball,
+    share_below,
+)
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.futures import SeenRoadUser
 from foretwin.contracts.trace import traced
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.orchestrator.forecast.calibration import Calibration, shares_of
+from foretwin.orchestrator.forecast.calibration import Calibration
 from foretwin.orchestrator.forecast.features import (
     CONTROLS,
     AheadFacts,
@@ -132,12 +137,12 @@ class ProgressForecasts:
     def _settled(self, one: _NotYet, drive_time_s: float) -> ForecastOutcome:
         given, k = one.given, one.instant
         travelled = self.history.travelled_at(one.due_ns) - given.travelled_m
-        came = np.full((len(given.table.time_s), 1), travelled)
-        self.calibration.take(k, drive_time_s, float(shares_of(given.table, came)[k, 0]))
         levels = np.array(given.told.levels)
         sides = np.stack([given.told.distance_m[k], given.table.distance_m[k], one.futures])
+        share, table_share = share_below(levels, sides[:2], np.full((2, 1), travelled))[:, 0]
+        self.calibration.take(k, drive_time_s, float(table_share))
         crps = 2.0 * pinball(levels, sides, np.full(3, travelled)).mean(axis=1)
-        p10, p50, p90 = (float(given.told.at(level)[k]) for level in (0.1, 0.5, 0.9))
+        p10, p50, p90 = np.interp((0.1, 0.5, 0.9), levels, sides[0]).tolist()
         return ForecastOutcome(
             round_id=one.round_id,
             stamp_ns=given.stamp_ns,
@@ -147,7 +152,7 @@ class ProgressForecasts:
             p10_m=p10,
             p50_m=p50,
             p90_m=p90,
-            share=float(shares_of(given.told, came)[k, 0]),
+            share=float(share),
             crps_m=float(crps[0]),
             crps_table_m=float(crps[1]),
             crps_futures_m=float(crps[2]),
@@ -174,14 +179,13 @@ def _ahead(
 def _spread_of_futures(done: RoundDone, forecast: ProgressForecast, instants: list[int]) -> Array:
     """Return (T, Q) quantiles of how far a round's futures get, each as likely as any other."""
     found = np.zeros((len(forecast.time_s), len(forecast.levels)))
-    ways = []
-    for result in done.results:
-        valid = result.outcome.valid.astype(bool)
-        ways.append(travelled_m(result.trajectory.states[valid]))
     step_s = done.order.jobs[0].step_s
-    for k in instants:
-        place = round(float(forecast.time_s[k]) / step_s)
-        at = np.concatenate([way[:, place] for way in ways])
-        if len(at):
-            found[k] = np.quantile(at, forecast.levels)
+    places = [round(float(forecast.time_s[k]) / step_s) for k in instants]
+    ways = [
+        travelled_m(result.trajectory.states[np.asarray(result.outcome.valid, dtype=bool)])
+        for result in done.results
+    ]
+    at = np.concatenate([way[:, places] for way in ways])
+    if len(at):
+        found[instants] = np.quantile(at, forecast.levels, axis=0).T
     return found

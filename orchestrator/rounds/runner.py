@@ -217,7 +217,8 @@ class RoundRunner:
         if self.progress is not None:
             settled = self.progress.take_state(state, self.start_stamp_ns)
             self.forecast_count.take(settled)
-            self._tables.add("forecasts", [row_of(one) for one in settled])
+            if settled:
+                self._tables.add("forecasts", [row_of(one) for one in settled])
 
     def finish(self) -> None:
         """Compare what can still be compared at the drive's end."""

@@ -103,12 +103,15 @@ def relative_density(forecast: ProgressForecast, distance_m: Array, instants: li
     levels = np.asarray(forecast.levels)
     reach = SMOOTH_PART * (forecast.at(0.9) - forecast.at(0.1))[instants][:, None]
 
-    def within(values: Array) -> Array:
-        above = share_below(levels, quantiles, values + reach)
-        return above - share_below(levels, quantiles, values - reach)
-
-    most = within(quantiles).max(axis=1, keepdims=True)
-    return np.asarray(np.clip(within(distance_m) / most, LEAST_DENSITY, 1.0))
+    values = np.concatenate([quantiles, distance_m], axis=1)
+    below, above = np.split(
+        share_below(levels, quantiles, np.concatenate([values - reach, values + reach], axis=1)),
+        2,
+        axis=1,
+    )
+    within, own = above - below, quantiles.shape[1]
+    most = within[:, :own].max(axis=1, keepdims=True)
+    return np.asarray(np.clip(within[:, own:] / most, LEAST_DENSITY, 1.0))
 
 
 def _severity(result: FuturesResult) -> Array:
