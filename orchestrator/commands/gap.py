@@ -32,6 +32,7 @@ from foretwin.orchestrator.commands.gap_text import (
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.drive.telemetry_watch import estimate_line, estimate_object
 from foretwin.orchestrator.record.run_state import check_finished
+from foretwin.sim_worker.analysis.gap.clock_offsets import on_one_clock
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
@@ -95,6 +96,15 @@ def _measured(
     estimator = estimator_of(log.info, vehicle)
     detector = FaultDetector(log.info, vehicle, frame=frame)
     recorder = MotionRecorder(frame=frame, keep_s=1e6, depth=len(messages) + 1)
+    for channel, message in messages:
+        recorder.handle(channel, message)
+    record = without_manual_commands(recorder.record())
+    turning = turning_gap(record, vehicle)
+    by_hand = turning is not None and not np.isfinite(record.command_accel_mps2).any()
+    if turning is not None and by_hand:
+        # States and pairs of signals that are compared must not be of different times.
+        clocks = {"steering": turning.steering_clock, "speed": turning.speed_clock}
+        messages = on_one_clock(messages, clocks)
     states: list[VehicleState] = []
     verdicts: list[Verdict] = []
     next_ns: int | None = None
@@ -104,17 +114,14 @@ def _measured(
         while stamp_ns >= next_ns:
             next_ns += _SECOND_NS
             advance(Path(name).name)
-        recorder.handle(channel, message)
         verdict = detector.handle(channel, message)
         if verdict is not None:
             verdicts.append(verdict)
         state = estimator.handle(channel, message)
         if state is not None:
             states.append(state)
-    record = without_manual_commands(recorder.record())
     motion = motion_on_grid(states, record.stamp_ns, frame=frame)
     meter = GapMeter(FreeRunner(vehicle), vehicle_id=log.info.vehicle_id)
-    turning = turning_gap(record, vehicle)
     samples = meter.samples(record, motion, measured=None if turning is None else turning.drive)
     if not samples:
         raise UserError(f"{name}: the heading is never known for a second, so no run can begin")
@@ -123,18 +130,14 @@ def _measured(
     refused = {reason: count for reason, count in log.skipped.items() if count}
     driven_by: DrivenBy = "estimated commands"
     if samples[0].independent:
-        driven_by = (
-            "commands"
-            if np.isfinite(record.command_accel_mps2).any()
-            else "measured steering and speed"
-        )
+        driven_by = "measured steering and speed" if by_hand else "commands"
     return GapReport(
         info=log.info,
         samples=samples,
         rows=gap_table(samples),
         alarms=alarms,
         verdicts=verdicts,
-        undecided=detector.undecided or ("" if turning is None else turning.departure),
+        undecided=turning.departure if turning is not None and by_hand else detector.undecided,
         turning=turning,
         driven_by=driven_by,
         refused=refused,

@@ -8,9 +8,11 @@ changes: levels say nothing of time.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.shifted_fit import shifted_fit
@@ -18,7 +20,7 @@ from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
 _OVER_S = (0.4, 0.8)
 """Changes are taken over these: both must say the same, else the difference is doubt."""
-_ROLLS_MPS = 0.5
+_ROLLS_MPS, _SURE = 0.5, 1.96
 _GRID_S = PERIOD_S / math.sqrt(12.0)
 """Signals are compared on a grid and held for a tick: so much of a time stays open (standard
 deviation of what is anywhere in a tick)."""
@@ -34,6 +36,27 @@ class ClockOffset(NamedTuple):
 
     late_s: float
     std_s: float
+
+
+def on_one_clock(
+    samples: Sequence[tuple[str, Any]], offsets: Mapping[str, ClockOffset | None]
+) -> list[tuple[str, Any]]:
+    """Return a drive's samples stamped as the inertial unit's, in the order of their stamps.
+
+    `offsets` are by channel. One within 1.96 of its standard deviations of 0 is let be.
+    """
+    late_ns = {
+        channel: round(offset.late_s * 1e9)
+        for channel, offset in offsets.items()
+        if offset is not None and abs(offset.late_s) > _SURE * offset.std_s
+    }
+    moved = [
+        (channel, replace(message, stamp_ns=message.stamp_ns - late_ns[channel]))
+        if channel in late_ns
+        else (channel, message)
+        for channel, message in samples
+    ]
+    return sorted(moved, key=lambda one: one[1].stamp_ns)
 
 
 def speed_offset(record: MotionRecord) -> ClockOffset | None:

@@ -5,6 +5,7 @@ Limits on the gap raise an alarm when it is exceeded, and another when it is wel
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -193,14 +194,15 @@ def _open_by_states(
 ) -> dict[str, float]:
     """Return what the states at both ends leave open of a gap, as standard deviations.
 
-    A heading that is off at the start leads the run aside, a speed ahead or behind. What positions
-    of one receiver are off by is nearly the same at both ends.
+    A heading that is off at the start leads the run aside, a speed ahead or behind. Positions count
+    at both ends: how alike they err is not told.
     """
     yaw, speed = motion.yaw_std_rad, motion.speed_std_mps
+    placed_m = float(np.hypot(motion.position_std_m[start], motion.position_std_m[end]))
     gone_m = abs(float(np.mean(motion.speed_mps[start : end + 1]))) * horizon_s
     return {
-        "along_std_m": float(speed[start]) * horizon_s,
-        "across_std_m": float(yaw[start]) * gone_m,
+        "along_std_m": math.hypot(float(speed[start]) * horizon_s, placed_m),
+        "across_std_m": math.hypot(float(yaw[start]) * gone_m, placed_m),
         "yaw_std_rad": float(np.hypot(yaw[start], yaw[end])),
         "speed_std_mps": float(np.hypot(speed[start], speed[end])),
     }

@@ -31,6 +31,7 @@ class MeasuredMotion(NamedTuple):
     speed_mps: Array
     yaw_rate_radps: Array
     accel_mps2: Array
+    position_std_m: Array
     yaw_std_rad: Array
     speed_std_mps: Array
 
@@ -63,6 +64,7 @@ def motion_on_grid(
             state.speed_mps,
             state.yaw_rate_radps,
             state.accel_mps2,
+            state.position_std_m or 0.0,
             state.yaw_std_rad or 0.0,
             state.speed_std_mps or 0.0,
             *(state.map_shift_m or (0.0, 0.0)),
@@ -74,9 +76,9 @@ def motion_on_grid(
     if len(rows) < 2:
         return MeasuredMotion(*(np.full(len(at), np.nan) for _ in MeasuredMotion._fields))
     table = np.array(rows)
-    xy = local_from_geo(frame, table[:, 1], table[:, 2]) - table[:, 9:11]
+    xy = local_from_geo(frame, table[:, 1], table[:, 2]) - table[:, 10:12]
     yaw = np.unwrap(local_from_geo_yaw(frame, table[:, 3], table[:, 1], table[:, 2]))
-    columns = (xy[:, 0], xy[:, 1], yaw, *table[:, 4:9].T)
+    columns = (xy[:, 0], xy[:, 1], yaw, *table[:, 4:10].T)
     return MeasuredMotion(
         *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
     )

@@ -202,7 +202,7 @@ def turning_of_model(
         return found
     zero, begun_mps = np.zeros(len(starts)), speed[starts]
     rate = begun_mps * np.tan(tire[starts]) / runner.vehicle.wheelbase_m.value
-    begun = MeasuredMotion(zero, zero, zero, begun_mps, rate, zero, zero, zero)
+    begun = MeasuredMotion(zero, zero, zero, begun_mps, rate, zero, zero, zero, zero)
     runs = runner.run(
         states=start_states(runner.vehicle, begun, tire_rad=tire[starts]),
         starts=starts,

@@ -224,7 +224,7 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
     def run(rows: Indices) -> Array:
         begun, zero = at[rows], np.zeros(len(rows))
         motion = MeasuredMotion(
-            zero, zero, zero, eased[begun], rate[begun], slope[begun], zero, zero
+            zero, zero, zero, eased[begun], rate[begun], slope[begun], zero, zero, zero
         )
         begin = start_states(runner.vehicle, motion, tire_rad=np.full(len(rows), np.nan))
         return runner.run(

@@ -71,6 +71,7 @@ def test_what_states_leave_open_of_a_gap_grows_with_the_way_and_the_time() -> No
     states = [
         msgspec.structs.replace(
             state_at(0.16 * k, 0.0, 0.0, 8.0, stamp_ns=int(stamp_ns), yaw_rate=0.0, accel=0.0),
+            position_std_m=0.0,
             yaw_std_rad=0.1,
             speed_std_mps=0.2,
         )
@@ -89,6 +90,10 @@ def test_what_states_leave_open_of_a_gap_grows_with_the_way_and_the_time() -> No
         assert sample.yaw_std_rad == pytest.approx(math.hypot(0.1, 0.1))
         assert sample.speed_std_mps == pytest.approx(math.hypot(0.2, 0.2))
         assert not sample.beyond_limits
+    unsure = motion._replace(position_std_m=np.full(len(motion.x_m), 3.0))
+    for sample in meter.samples(record, unsure, horizons_s=(2.0,)):
+        assert sample.along_std_m == pytest.approx(math.hypot(0.4, 3.0, 3.0))
+        assert sample.across_std_m == pytest.approx(math.hypot(1.6, 3.0, 3.0), rel=0.01)
     assert {row.horizon_s: row.state_std["along_m"] for row in gap_table(found)} == pytest.approx(
         {1.0: 0.2, 2.0: 0.4}
     )

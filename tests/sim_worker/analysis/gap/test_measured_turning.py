@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from foretwin.sim_worker.analysis.gap.clock_offsets import ClockOffset, on_one_clock
 from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap
 from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven, turning_of
 from tests.sim_worker.faulty_standin import model_with
@@ -61,6 +63,21 @@ def test_a_model_that_turns_otherwise_is_told_and_nobody_named() -> None:
 def test_without_steering_speed_or_gyro_there_is_nothing_to_compare(channel: str) -> None:
     samples = [one for one in hand_driven(SEED, Lateness()) if one[0] != channel]
     assert turning_of(samples) is None
+
+
+def test_samples_are_put_on_one_clock_where_it_is_told_well_enough() -> None:
+    samples = hand_driven(SEED, LATE, end_s=5.0)
+    clocks = {"steering": ClockOffset(0.1, 0.01), "speed": ClockOffset(0.1, 0.1), "imu": None}
+    moved = on_one_clock(samples, clocks)
+    stamps = [message.stamp_ns for _, message in moved]
+    assert stamps == sorted(stamps)
+
+    def of(channel: str, kept: list[tuple[str, Any]]) -> list[int]:
+        return [message.stamp_ns for name, message in kept if name == channel]
+
+    assert of("steering", moved) == [ns - 100_000_000 for ns in of("steering", samples)]
+    for channel in ("speed", "imu"):
+        assert of(channel, moved) == of(channel, samples)
 
 
 def test_half_a_minute_is_needed() -> None:
