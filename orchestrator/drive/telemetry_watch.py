@@ -7,6 +7,7 @@ from typing import Any
 
 from foretwin.telemetry.estimator.estimator import ClockReport, StateEstimator
 from foretwin.telemetry.estimator.motion_track import StateConsistency
+from foretwin.telemetry.estimator.mounting import Learnt
 
 REARM_NS = 5_000_000_000
 """A channel that was overdue must have come for this long before it is named once more."""
@@ -95,7 +96,17 @@ def estimate_object(found: StateConsistency) -> dict[str, Any]:
         if found.position_noise_m is None
         else round(float(found.position_noise_m), 3),
         "receiver_slips": found.slips,
+        "antenna_forward_m": _learnt(found.mounting.antenna_forward_m),
+        "antenna_left_m": _learnt(found.mounting.antenna_left_m),
+        "fixes_late_s": _learnt(found.mounting.fixes_late_s),
     }
+
+
+def _learnt(one: Learnt) -> dict[str, float] | None:
+    """Return a value and its spread, None where the drive does not tell of it."""
+    if not one.observable:
+        return None
+    return {"value": round(float(one.value), 4), "std": round(float(one.std), 4)}
 
 
 def estimate_line(found: StateConsistency) -> str:
@@ -110,6 +121,11 @@ def estimate_line(found: StateConsistency) -> str:
         parts.append(f"fixes taken for good to {noise:.2f} m")
     if found.slips:
         parts.append(f"the receiver slipped {found.slips} times")
+    forward, late = found.mounting.antenna_forward_m, found.mounting.fixes_late_s
+    if forward.observable:
+        parts.append(f"antenna {forward.value:.2f} ± {1.96 * forward.std:.2f} m ahead of the axle")
+    if late.observable:
+        parts.append(f"fixes {1e3 * late.value:.0f} ± {1.96e3 * late.std:.0f} ms late")
     if found.widened > 1.0:
         parts.append(f"spreads widened by {found.widened:.1f}")
     return "; ".join(parts)

@@ -31,23 +31,27 @@ class SurpriseCount:
     """Counts surprises by channel."""
 
     def __init__(self) -> None:
-        self._counts: dict[str, Surprises] = {}
+        self._counts: dict[str, list[int]] = {}
 
     def copy(self) -> SurpriseCount:
         """Return another count that goes on from here by itself."""
         other = shallow_copy(self)
-        other._counts = self._counts.copy()
+        other._counts = {channel: count.copy() for channel, count in self._counts.items()}
         return other
 
     def take(self, channel: str, square: float, bound: float) -> None:
         """Take a measurement's normalised square, which 95 of 100 have below `bound`."""
-        taken, within = self._counts.get(channel, (0, 0))
-        self._counts[channel] = Surprises(taken + 1, within + (square <= bound))
+        count = self._counts.get(channel)
+        if count is None:
+            count = self._counts[channel] = [0, 0]
+        count[0] += 1
+        if square <= bound:
+            count[1] += 1
 
     @property
     def counts(self) -> dict[str, Surprises]:
         """What was counted so far, by channel."""
-        return dict(sorted(self._counts.items()))
+        return {channel: Surprises(*count) for channel, count in sorted(self._counts.items())}
 
 
 class PositionInnovation(NamedTuple):

@@ -67,14 +67,14 @@ class KinematicFilter:
 
     def predict(self, duration_s: float) -> None:
         """Move the state on by `duration_s`, in steps short enough for the linearisation."""
-        steps = max(1, math.ceil(duration_s / _MAX_STEP_S - 1e-9))
+        steps = max(1, math.ceil(duration_s / _MAX_STEP_S - 1e-3))
         for _ in range(steps):
             self._step(duration_s / steps)
 
     def _step(self, dt: float) -> None:
-        x, y, yaw, speed, accel, curvature, *_ = self.mean.tolist()
-        slip = float(self.mean[SLIP])
-        size = len(self.mean)
+        values = self.mean.tolist()
+        x, y, yaw, speed, accel, curvature = values[: CURVATURE + 1]
+        slip, size = values[SLIP], len(values)
         if not self.may_reverse and speed + accel * dt < 0.0:
             accel = min(0.0, -speed / dt)  # it stops within the step
         distance = (speed + 0.5 * accel * dt) * dt
@@ -100,12 +100,12 @@ class KinematicFilter:
         jacobian[YAW, CURVATURE], jacobian[SPEED, ACCEL] = distance, dt
         fading = math.exp(-dt / motion_noise.GNSS_CORRELATION_S)
         jacobian[GNSS_X, GNSS_X] = jacobian[GNSS_Y, GNSS_Y] = fading
-        mean = self.mean.copy()
-        mean[X], mean[Y] = x + distance * cos, y + distance * sin
-        mean[YAW] = yaw + curvature * distance
-        mean[SPEED], mean[ACCEL] = speed + accel * dt, accel
-        mean[GNSS_X : GNSS_Y + 1] *= fading
-        self.mean = mean
+        values[X], values[Y] = x + distance * cos, y + distance * sin
+        values[YAW] = yaw + curvature * distance
+        values[SPEED], values[ACCEL] = speed + accel * dt, accel
+        values[GNSS_X] *= fading
+        values[GNSS_Y] *= fading
+        self.mean = np.array(values)
         covariance = jacobian @ self.covariance @ jacobian.T
         noise = covariance.reshape(-1)[:: size + 1]  # a view of the diagonal
         wandering = motion_noise.densities(
@@ -126,13 +126,13 @@ class KinematicFilter:
         self.mean += cross * (residual / variance)
         self.covariance -= cross[:, None] * (cross / variance)
         self._limit()
-        return residual * residual / variance
+        return float(residual * residual) / variance
 
     def _limit(self) -> None:
         mean = self.mean
-        if not self.may_reverse and mean[SPEED] < 0.0:
+        if not self.may_reverse and mean.item(SPEED) < 0.0:
             mean[SPEED] = 0.0
-        if abs(mean[CURVATURE]) > MAX_CURVATURE_PM:
+        if abs(mean.item(CURVATURE)) > MAX_CURVATURE_PM:
             mean[CURVATURE] = math.copysign(MAX_CURVATURE_PM, mean[CURVATURE])
 
     def sensor_xy(self, lever_m: tuple[float, float]) -> Array:

@@ -5,38 +5,54 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.innovations import LINE_95, SurpriseCount
-from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.kinematic_filter import (
+    GYRO_BIAS,
+    SPEED,
+    YAW,
+    KinematicFilter,
+)
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
+from foretwin.telemetry.estimator.mounting import MountingLearner
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
-STOPPING_MPS = 1.0
-"""A car that has been faster a moment ago does not stand, whatever one sample says. Chosen."""
+_STOPPING_MPS, _STOPPING_S, _STOPPING_MPS2 = 1.0, 0.5, 4.0
+"""A car that is faster than the first does not stand because wheels say so at once: they must say
+it for the time that braking takes, and half a second more. Chosen."""
 
 
 class MotionCorrections:
     """Gives each kind of sample its weight; speeds and headings lose theirs as they surprise."""
 
-    def __init__(self, measured: MotionSamples, *, wheelbase_m: float) -> None:
+    def __init__(
+        self, measured: MotionSamples, surprises: SurpriseCount, *, wheelbase_m: float
+    ) -> None:
         self._measured = measured
         self._wheelbase_m = wheelbase_m
         self._speed_doubt = Doubt(0.05)
         self._yaw_doubt = Doubt(0.02)
         self._gyro = Gyro()
-        self.surprises = SurpriseCount()
+        self._stands = False
+        self._nought_ns: int | None = None
+        self.gyro_bias_radps = 0.0
+        """As the filter knows it."""
+        self._surprises = surprises
+        self.mounting = MountingLearner()
 
-    def copy(self, measured: MotionSamples) -> MotionCorrections:
-        """Return others with the same doubts, which read `measured`."""
+    def copy(self, measured: MotionSamples, surprises: SurpriseCount) -> MotionCorrections:
+        """Return others with the same doubts, which read `measured` and count in `surprises`."""
         other = shallow_copy(self)
         other._measured = measured
         other._speed_doubt = shallow_copy(self._speed_doubt)
         other._yaw_doubt = shallow_copy(self._yaw_doubt)
         other._gyro = shallow_copy(self._gyro)
-        other.surprises = self.surprises.copy()
+        other._surprises = surprises
+        other.mounting = self.mounting.copy()
         return other
 
     def watch(self, message: Any, *, standing: bool) -> None:
@@ -44,6 +60,27 @@ class MotionCorrections:
         if isinstance(message, ImuSample):
             standing = standing and self._measured.fresh("speed_mps", message.stamp_ns)
             self._gyro.take(message.stamp_ns, message.rate_radps[2], standing=standing)
+            if self._measured.fresh("speed_mps", message.stamp_ns):
+                rate = message.rate_radps[2] - self.gyro_bias_radps
+                self.mounting.turn(message.stamp_ns, rate, self._measured.speed_mps)
+
+    def stands(self, sample: SpeedSample, filter_: KinematicFilter | None) -> bool:
+        """Whether the wheels say, believably, that the car stands; takes each of their samples."""
+        if abs(sample.speed_mps) >= STANDING_MPS:
+            self._nought_ns = None
+            self._stands = False
+            return False
+        self._nought_ns = sample.stamp_ns if self._nought_ns is None else self._nought_ns
+        faster_mps = 0.0 if filter_ is None else abs(filter_.mean.item(SPEED))
+        lasts_s = (sample.stamp_ns - self._nought_ns) * 1e-9
+        braked = lasts_s > _STOPPING_S + faster_mps / _STOPPING_MPS2
+        self._stands = faster_mps < _STOPPING_MPS or braked
+        return self._stands
+
+    def watch_fix(self, stamp_ns: int, xy_m: Array, std_m: float) -> None:
+        """Let a believed fix show where the antenna is, as far as wheels and gyro are heard."""
+        if self._measured.fresh("speed_mps", stamp_ns):
+            self.mounting.take(stamp_ns, xy_m, std_m, self._measured.speed_mps)
 
     def begin(self, filter_: KinematicFilter) -> None:
         """Give a new filter what is known of the sensors already."""
@@ -59,13 +96,14 @@ class MotionCorrections:
                 self._correct_speed(filter_, speed)
             case ImuSample(accel_mps2=accel, rate_radps=rate):
                 square = filter_.correct_yaw_rate(rate[2], self._gyro.std_radps, biased=True)
-                self.surprises.take("imu", square, LINE_95)
+                self._surprises.take("imu", square, LINE_95)
+                self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
                 filter_.correct_accel(accel[0], 0.5)
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
                 local_yaw = yaw + convergence_rad
                 surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))
                 square = filter_.correct_yaw(local_yaw, self._yaw_doubt.std(surprise))
-                self.surprises.take("heading", square, LINE_95)
+                self._surprises.take("heading", square, LINE_95)
                 if yaw_rate is not None:
                     filter_.correct_yaw_rate(yaw_rate, 0.01, biased=False)
             case SteeringSample():
@@ -79,9 +117,9 @@ class MotionCorrections:
             filter_.may_reverse = True
         elif speed_mps > 0.1:
             filter_.may_reverse = False
-        if abs(speed_mps) < STANDING_MPS and abs(filter_.mean[SPEED]) < STOPPING_MPS:
+        if self._stands:
             filter_.stand(0.01, 0.05)
         else:
             std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]))
             square = filter_.correct_speed(speed_mps, std + 0.005 * abs(speed_mps))
-            self.surprises.take("speed", square, LINE_95)
+            self._surprises.take("speed", square, LINE_95)

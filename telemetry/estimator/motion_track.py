@@ -11,16 +11,13 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
 from foretwin.contracts.frames import GeoPoint, base_from_sensor
-from foretwin.telemetry.estimator.innovations import Surprises
+from foretwin.telemetry.estimator.innovations import SurpriseCount, Surprises
 from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from foretwin.telemetry.estimator.measured import MotionSamples
-from foretwin.telemetry.estimator.motion_corrections import (
-    STANDING_MPS,
-    STOPPING_MPS,
-    MotionCorrections,
-)
+from foretwin.telemetry.estimator.motion_corrections import MotionCorrections
+from foretwin.telemetry.estimator.mounting import Mounting
 from foretwin.telemetry.estimator.position_corrections import PositionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
 from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
@@ -36,13 +33,14 @@ class StateConsistency(NamedTuple):
 
     `surprises` by channel; the spreads that states tell are `widened` so many times now;
     `position_noise_m` is what the newest fix is taken for, None before there is one; the receiver
-    has slipped `slips` times.
+    has slipped `slips` times, and sits as `mounting` says.
     """
 
     surprises: dict[str, Surprises]
     widened: float
     position_noise_m: float | None
     slips: int
+    mounting: Mounting
 
 
 class MotionTrack:
@@ -71,8 +69,13 @@ class MotionTrack:
             steering_offset_rad=steering_offset_rad,
             skipped=self._gate.skipped,
         )
-        self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
-        self._positions = PositionCorrections(self._measured, self._gate, self._lever[:2])
+        self._surprises = SurpriseCount()
+        self._corrections = MotionCorrections(
+            self._measured, self._surprises, wheelbase_m=wheelbase_m
+        )
+        self._positions = PositionCorrections(
+            self._measured, self._gate, self._surprises, self._lever[:2]
+        )
         self._aid = MapAid()
         self._place: LocalPlace | None = None
         self._filter: KinematicFilter | None = None
@@ -90,8 +93,9 @@ class MotionTrack:
         other = shallow_copy(self)
         other._gate = self._gate.copy()
         other._measured = self._measured.copy(skipped=other._gate.skipped)
-        other._corrections = self._corrections.copy(other._measured)
-        other._positions = self._positions.copy(other._measured, other._gate)
+        other._surprises = self._surprises.copy()
+        other._corrections = self._corrections.copy(other._measured, other._surprises)
+        other._positions = self._positions.copy(other._measured, other._gate, other._surprises)
         other._aid = shallow_copy(self._aid)
         if self._filter is not None:
             other._filter = self._filter.copy()
@@ -123,9 +127,7 @@ class MotionTrack:
     def _motion(self, message: Any) -> None:
         filter_ = self._advance(message.stamp_ns)
         if isinstance(message, SpeedSample):
-            self._standing = abs(message.speed_mps) < STANDING_MPS and (
-                filter_ is None or abs(filter_.mean[SPEED]) < STOPPING_MPS
-            )
+            self._standing = self._corrections.stands(message, filter_)
         self._corrections.watch(message, standing=self._standing)
         if filter_ is not None:
             self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
@@ -174,6 +176,7 @@ class MotionTrack:
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
         self._positions.noise.take(time_s, xy)
+        self._corrections.watch_fix(fix.stamp_ns, xy, self._positions.noise.white_std_m(fix))
         if filter_ is None:
             self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
         else:
@@ -284,9 +287,8 @@ class MotionTrack:
     def consistency(self) -> StateConsistency:
         """Whether the states were as sure of themselves as they turned out to be."""
         found, fix = self._positions, self._fix
+        noise_m = None if fix is None else found.noise.std_m(fix)
+        mounting = self._corrections.mounting.mounting
         return StateConsistency(
-            {**found.surprises.counts, **self._corrections.surprises.counts},
-            found.overconfidence,
-            None if fix is None else found.noise.std_m(fix),
-            found.slips,
+            self._surprises.counts, found.overconfidence, noise_m, found.slips, mounting
         )

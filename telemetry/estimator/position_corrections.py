@@ -78,7 +78,11 @@ class PositionCorrections:
     """Gives each fix its weight. `skipped` counts refused input by reason."""
 
     def __init__(
-        self, measured: MotionSamples, gate: PositionGate, lever_m: tuple[float, float]
+        self,
+        measured: MotionSamples,
+        gate: PositionGate,
+        surprises: SurpriseCount,
+        lever_m: tuple[float, float],
     ) -> None:
         self._measured = measured
         self._gate = gate
@@ -88,15 +92,17 @@ class PositionCorrections:
         """The latest fixes in a row that were held back."""
         self._reversed_m = 0.0
         self._usual = 1.0
-        self.surprises = SurpriseCount()
+        self._surprises = surprises
         self.slips = 0
         """How often the receiver has slipped."""
 
-    def copy(self, measured: MotionSamples, gate: PositionGate) -> PositionCorrections:
-        """Return others with the same doubts, which read `measured` and `gate`."""
+    def copy(
+        self, measured: MotionSamples, gate: PositionGate, surprises: SurpriseCount
+    ) -> PositionCorrections:
+        """Return others with the same doubts, which read and count in what is given."""
         other = shallow_copy(self)
         other._measured, other._gate = measured, gate
-        other.noise, other.surprises = self.noise.copy(), self.surprises.copy()
+        other.noise, other._surprises = self.noise.copy(), surprises
         return other
 
     @property
@@ -129,7 +135,7 @@ class PositionCorrections:
         if wheels:
             self.noise.surprised(innovation.away_m, innovation.variance_m2(0.0))
         alone = not wheels and not self._measured.anything
-        self.surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
+        self._surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
         usual = 1.0 if wander or alone else self._usual
         astray = (
             square > (_IMPOSSIBLE if alone else _UNBELIEVABLE * usual)
