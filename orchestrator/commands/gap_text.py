@@ -75,7 +75,11 @@ def why_undecided(
 
 def turning_object(turning: TurningGap) -> dict[str, Any]:
     """Return the turning at the measured steering as JSON has it; intervals are half widths."""
-    clocks = {"steering": turning.steering_clock, "speed": turning.speed_clock}
+    clocks = {
+        "steering": turning.steering_clock,
+        "speed": turning.speed_clock,
+        "position": turning.position_clock,
+    }
     half = turning.half_width_radps
     return {
         "seconds": len(half),
@@ -119,6 +123,8 @@ def turning_lines(turning: TurningGap) -> list[str]:
     )
     if turning.speed_clock is not None:
         late += f"; speed {_clock(turning.speed_clock)}"
+    if turning.position_clock is not None:
+        late += f"; positions {_clock(turning.position_clock)}"
     bias, bias_std = turning.gyro_bias_radps, turning.gyro_bias_std_radps
     zero, zero_std = turning.steering_offset_rad, turning.steering_offset_std_rad
     said = (

@@ -15,9 +15,12 @@ import numpy as np
 from msgspec.structs import replace
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.shifted_fit import shifted_fit
+from foretwin.sim_worker.analysis.gap.pairs import FASTEST_MPS, smooth
+from foretwin.sim_worker.analysis.gap.shifted_fit import shifted, shifted_fit
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
+_GROUND_OVER_S = 0.4
+"""Speed over ground is that between positions so far apart."""
 _OVER_S = (0.4, 0.8)
 """Changes are taken over these: both must say the same, else the difference is doubt."""
 _ROLLS_MPS, _SURE = 0.5, 1.96
@@ -71,6 +74,21 @@ def speed_offset(record: MotionRecord) -> ClockOffset | None:
 def turning_offset(gyro_radps: Array, turning_radps: Array) -> ClockOffset | None:
     """Return the offset of what makes a model turn (N,), from how the gyro (N,) changes."""
     return _offset(gyro_radps, turning_radps, open_s=_GRID_S)
+
+
+def position_offset(record: MotionRecord, speed: ClockOffset) -> ClockOffset | None:
+    """Return the offset of positions, from the speed over ground that they make.
+
+    `speed` is that of the speeds that they are compared with, whose doubt comes in.
+    """
+    half = round(0.5 * _GROUND_OVER_S / PERIOD_S)
+    gone = np.hypot(_change(record.x_m, half), _change(record.y_m, half))
+    ground = gone / (2 * half * PERIOD_S)
+    # A fix that leaps says nothing of time.
+    ground = np.where((ground > _ROLLS_MPS) & (ground < FASTEST_MPS), ground, np.nan)
+    wheels = smooth(shifted(record.speed_mps, -speed.late_s), half)
+    found = _offset(np.where(wheels > _ROLLS_MPS, wheels, np.nan), ground, open_s=_GRID_S)
+    return None if found is None else found._replace(std_s=math.hypot(found.std_s, speed.std_s))
 
 
 def _offset(unit: Array, sensor: Array, *, open_s: float) -> ClockOffset | None:

@@ -17,6 +17,7 @@ from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.clock_offsets import (
     ClockOffset,
+    position_offset,
     speed_offset,
     turning_offset,
 )
@@ -68,6 +69,8 @@ class TurningGap(NamedTuple):
     steering_clock: ClockOffset
     speed_clock: ClockOffset | None
     """None where the drive does not tell it: then it is that of the steering."""
+    position_clock: ClockOffset | None
+    """None where speed or positions do not tell it."""
     response_std_s: float
     """What the vehicle file leaves open of how late its model turns in: the steering's clock is
     told given its tyres and inertia."""
@@ -264,6 +267,7 @@ def _told(
         drive=drive,
         steering_clock=clock,
         speed_clock=speed_clock,
+        position_clock=None if speed_clock is None else position_offset(record, speed_clock),
         response_std_s=response_std_s,
         gyro_bias_radps=float(fit.sizes[2]),
         gyro_bias_std_radps=fit.std(2),

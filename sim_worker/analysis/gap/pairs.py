@@ -38,7 +38,7 @@ _SETTLED = round(0.4 / PERIOD_S)
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration alone, say something."""
-_FASTEST_MPS = 80.0
+FASTEST_MPS = 80.0
 """No car's: positions that leap say nothing of its sensors."""
 MIN_TURN_RAD = 0.012
 
@@ -165,7 +165,7 @@ def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
     half = _COURSE_HALF
     dx, dy = _change(record.x_m, half), _change(record.y_m, half)
     gone = np.hypot(dx, dy) / (2 * half * PERIOD_S)
-    leapt = gone > _FASTEST_MPS
+    leapt = gone > FASTEST_MPS
     dx[leapt], gone[leapt] = np.nan, np.nan
     drives = gone > MOVES_MPS
     rate = np.where(drives, record.yaw_rate_radps, np.nan)

@@ -39,6 +39,7 @@ class Lateness(NamedTuple):
     speed_s: float = 0.0
     gyro_s: float = 0.0
     bias_radps: float = 0.0
+    position_s: float = 0.0
 
 
 def hand_driven(seed: int, late: Lateness, *, end_s: float = DURATION_S) -> list[tuple[str, Any]]:
@@ -56,6 +57,8 @@ def _stamped(message: Any, late: Lateness) -> Any:
         late_s = late.steering_s
     elif isinstance(message, SpeedSample):
         late_s = late.speed_s
+    elif isinstance(message, GnssFix):
+        late_s = late.position_s
     elif isinstance(message, ImuSample):
         x, y, z = message.rate_radps
         message = msgspec.structs.replace(message, rate_radps=(x, y, z + late.bias_radps))
@@ -82,7 +85,8 @@ def _line(name: str, gap: TurningGap) -> str:
         f"{name:<28} {len(full):>4} s within {gap.within:.1%}, full width median "
         f"{np.median(full):.2f}, "
         f"mean {full.mean():.2f}, widest {full.max():.2f} °/s, RMS {rms:.2f} °/s, steering "
-        f"{_clock(gap.steering_clock)}, speed {_clock(gap.speed_clock)}, gain {gap.gain:.3f} ± "
+        f"{_clock(gap.steering_clock)}, speed {_clock(gap.speed_clock)}, positions "
+        f"{_clock(gap.position_clock)}, gain {gap.gain:.3f} ± "
         f"{_SURE * gap.gain_std:.3f}"
     )
 

@@ -16,7 +16,7 @@ from tests.sim_worker.faulty_standin import model_with
 COVERS = ("foretwin.sim_worker.analysis.gap.clock_offsets",)
 
 SEED = 300
-LATE = Lateness(steering_s=0.13, speed_s=0.21, gyro_s=0.04, bias_radps=0.02)
+LATE = Lateness(steering_s=0.13, speed_s=0.21, gyro_s=0.04, bias_radps=0.02, position_s=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +33,9 @@ def test_clocks_are_put_together(gap: TurningGap) -> None:
     assert gap.speed_clock is not None
     # The body pitches when it is braked, which the unit takes for acceleration, later.
     assert gap.speed_clock.late_s == pytest.approx(LATE.speed_s - LATE.gyro_s, abs=0.04)
+    assert gap.position_clock is not None
+    assert gap.position_clock.late_s == pytest.approx(LATE.position_s - LATE.gyro_s, abs=0.05)
+    assert gap.position_clock.std_s > gap.speed_clock.std_s
     assert 0.002 < gap.response_std_s < 0.03
 
 
