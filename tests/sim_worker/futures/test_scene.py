@@ -14,7 +14,7 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.places import crossroads, happening, job, state_at
+from tests.sim_worker.places import crossroads, happening, job, state_at, straight_path
 from tests.sim_worker.road_users.crossroads import crossroads as mapped_crossroads
 from tests.sim_worker.road_users.crossroads import straight_on
 
@@ -251,3 +251,16 @@ def test_speeds_ahead_that_are_none_are_refused(ahead: list[float], stage: Batch
 
     with pytest.raises(ValueError, match="speed_ahead_mps needs speeds"):
         run_job(told, stage)
+
+
+def test_where_the_limit_drops_speeds_ahead_rise_by_its_share(stage: BatchSimulation) -> None:
+    path = straight_path()
+    limit = np.where(path.xy_m[:, 0] < -45.0, 14.0, 7.0)
+    told = msgspec.structs.replace(
+        job((Future(index=0, name="n"),), state=state_at(-50.0, -1.5, speed=4.0)),
+        path=PathAhead(xy_m=path.xy_m, speed_limit_mps=limit),
+        speed_ahead_mps=np.linspace(4.0, 20.0, 17),
+    )
+    speed = run_job(told, stage).trajectory.states[0, :, 3]
+
+    np.testing.assert_allclose(speed[40:70], 0.5 * (4.0 + 0.2 * np.arange(40, 70)), atol=0.25)
