@@ -22,6 +22,7 @@ from foretwin.telemetry.estimator.position_gate import LocalFix, PositionGate
 from foretwin.telemetry.estimator.position_noise import PositionNoise
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 from foretwin.telemetry.estimator.slow_motion import drift_sideways, limit_turn
+from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse, turned_m
 
 _DOUBTFUL, _UNBELIEVABLE = 9.0, 25.0
 """Normalised squares (three and five standard deviations) from which a fix counts for less, and
@@ -31,8 +32,8 @@ _IMPOSSIBLE = 25.0
 _BY_CHANCE = 1.5
 _UP, _DOWN = 1.2, 1.2 ** (-1.0 / 19.0)
 """What of 100 fixes the 5 beyond their 95 % bound, and the 95 within it, make of what is usual
-(Gibbs, Candes 2021: adaptive conformal inference). Where sources contradict each other all the
-time, no single fix is a glitch, and no spread is as small as said."""
+(Gibbs, Candes 2021). Where sources contradict each other all the time, no single fix is a
+glitch, and no spread is as small as said."""
 _LEAST_SLIP_M = 0.1
 _SHOWS_TURNING_M = 0.2
 """Fixes rougher than this show no wheel being turned, only the bend that comes of it. Chosen."""
@@ -49,15 +50,14 @@ _LOST_S = 2.0
 _STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2 = 0.1, 1.0
 """How well fixes alone tell that a car stands: it may have begun to roll. Chosen."""
 _ASTRAY = 3
-"""So many fixes in a row that agree neither with the filter nor with each other: it is lost."""
+"""So many fixes in a row that agree neither with it nor with each other: the filter is lost."""
 _PASSED_ON_M = 0.05
 _CREEPING_MPS, _BACKING_MPS, _BACKED_M = 1.0, 0.3, 0.3
 _TURNED_RAD, _BACKWARDS_RAD = 1.75, 2.5
 """No car turns by the first within a metre: its heading was wrong; from the second on it backs."""
 _KNOWN_YAW_VAR = 0.15**2
 _FASTEST_REVERSE_MPS, _LONGEST_REVERSE_M = 3.0, 15.0
-"""A car that positions alone show going faster or farther backwards was facing that way. Chosen:
-walking pace and some lengths of a parking space."""
+"""A car that positions show going faster or farther backwards was facing that way. Chosen."""
 
 
 class Corrected(NamedTuple):
@@ -137,10 +137,9 @@ class PositionCorrections:
         alone = not wheels and not self._measured.anything
         self._surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
         usual = 1.0 if wander or alone else self._usual
-        astray = (
-            square > (_IMPOSSIBLE if alone else _UNBELIEVABLE * usual)
-            and innovation.away_m > _LEAST_SLIP_M
-        )
+        impossible = _IMPOSSIBLE if alone else _UNBELIEVABLE * usual
+        least_m = max(_LEAST_SLIP_M, turned_m(self._gate.recent) if alone else 0.0)
+        astray = square > impossible and innovation.away_m > least_m
         if astray or (self._doubted and self._slipped(innovation, white, standing=standing)):
             held = self._doubt(filter_, fix, xy_m, innovation, standing=standing)
             if held is not None:
@@ -172,6 +171,8 @@ class PositionCorrections:
             if standing:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
+            elif alone and sparse(self._gate.recent):
+                follow_fixes(filter_, self._gate.recent, white)
         if standing:
             filter_.mean[YAW] = yaw_before
             return Corrected(standing)

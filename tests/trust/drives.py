@@ -49,6 +49,10 @@ _MORE = {
     "chemnitz": _Public("chemnitz-city/Chemnitz_GT.txt", "tuning"),
     "boulder": _Public("boulder-rtk/boulder.csv", "tuning"),
     "boulder-no-std": _Public("boulder-rtk/boulder_no_std.csv", "tuning"),
+    "kitti-00": _Public("kitti-00/kitti00.csv", "tuning"),
+    "kitti-05": _Public("kitti-05/kitti05.csv", "tuning"),
+    "kitti-02": _Public("kitti-02/kitti02.csv", "held_out"),
+    "kitti-08": _Public("kitti-08/kitti08.csv", "held_out"),
     "main-tower": _Public("frankfurt-main-tower/Frankfurt_Main_Tower_GT.txt", "held_out"),
     "boreas-september": _Public(
         "boreas-2021-09-02/lidar_poses.csv", "held_out", 0.01, true_heading=True
@@ -60,7 +64,12 @@ _MORE = {
     "austin-car": _Public("austin-bmw/austin_car_gps.csv", "held_out", 1.0),
 }
 """libRSF's Chemnitz City and smartLoc, rtklibexplorer's drive_0708 in Boulder,
-Boreas, i2Nav's awesome-gins-datasets, smartphone_driving_dataset of Austin."""
+KITTI's odometry poses, Boreas, i2Nav's awesome-gins-datasets, smartphone_driving_dataset of
+Austin."""
+
+
+_ONCE_A_SECOND = ("chemnitz", "boulder", "boulder-no-std")
+"""Drives that stand in the list once more, as a receiver of one fix a second had sent them."""
 
 
 def all_drives(split: Split | None = None) -> list[RealDrive]:
@@ -101,6 +110,9 @@ def _given(data: Path) -> Iterator[RealDrive]:
     yield RealDrive("boreas", "tuning", boreas, boreas, 0.01, true_heading=True)
     positions = partial(other_receivers.positions_alone, boreas)
     yield RealDrive("boreas-positions", "tuning", positions, boreas, 0.01)
+    yield RealDrive(
+        "boreas-1hz", "tuning", partial(other_receivers.once_a_second, boreas), boreas, 0.01
+    )
     segment = data / "drive-comma2k19-sf" / "segment40"
     pose = partial(open_log, segment)
     yield _alone("comma2k19", pose, position_std_m=0.05)
@@ -131,6 +143,11 @@ def further_drives(folder: Path) -> list[RealDrive]:
             found.append(
                 RealDrive(name, one.split, log, reference, one.position_std_m, one.true_heading)
             )
+            if name in _ONCE_A_SECOND:
+                slow = partial(other_receivers.once_a_second, log)
+                found.append(
+                    RealDrive(f"{name}-1hz", one.split, slow, reference, one.position_std_m)
+                )
     return found
 
 

@@ -1,0 +1,83 @@
+"""Positions once a second and nothing else: the motion follows them and does not swing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import VehicleState
+from foretwin.telemetry.estimator.kinematic_filter import (
+    ACCEL,
+    CURVATURE,
+    SPEED,
+    YAW,
+    KinematicFilter,
+)
+from foretwin.telemetry.estimator.position_gate import LocalFix
+from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse
+from tests.telemetry.position_track import along, circle, states_of, xy, yaw
+
+
+def once_a_second(
+    place: Callable[[float], tuple[float, float]], duration_s: float
+) -> list[VehicleState]:
+    return states_of(along(place, duration_s)[::5])
+
+
+def test_a_bend_is_followed_without_swinging() -> None:
+    for state in once_a_second(circle, 40.0)[6:]:
+        time_s = state.stamp_ns * 1e-9
+        assert state.speed_mps == pytest.approx(6.0, abs=0.4)
+        assert abs(math.remainder(yaw(state) - 0.4 * time_s, math.tau)) < 0.1
+        assert xy(state) == pytest.approx(circle(time_s), abs=0.01)
+
+
+def test_who_pulls_away_and_turns_soon_is_not_held_back() -> None:
+    """It drives in to a stop for 8 s, then pulls away at 2 m/s² into a bend of 12 m."""
+
+    def place(time_s: float) -> tuple[float, float]:
+        if time_s < 10.0:
+            return 0.5 * (time_s**2 - max(0.0, time_s - 5.0) ** 2 * 2.0), 0.0
+        way = max(0.0, time_s - 18.0) ** 2 if time_s < 21.0 else 9.0 + 6.0 * (time_s - 21.0)
+        return 25.0 + 12.0 * math.sin(way / 12.0), 12.0 * (1.0 - math.cos(way / 12.0))
+
+    states = once_a_second(place, 30.0)
+    for state in states[3:]:
+        assert xy(state) == pytest.approx(place(state.stamp_ns * 1e-9), abs=0.02)
+    faster = [state for state in states if state.stamp_ns >= 20_900_000_000]
+    assert all(state.speed_mps == pytest.approx(6.0, abs=1.2) for state in faster)
+
+
+def test_the_quadratic_tells_speed_course_and_bend() -> None:
+    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.9, speed_mps=3.0, yaw_std_rad=0.5)
+    filter_.covariance[SPEED, SPEED] = filter_.covariance[CURVATURE, CURVATURE] = 100.0
+    # A car on a circle of 20 m at 5 m/s; its quadratic's course at the end lags by little.
+    fixes = [
+        LocalFix(t, 20.0 * np.array([math.sin(t / 4.0), 1.0 - math.cos(t / 4.0)]))
+        for t in (0.0, 1.0, 2.0, 3.0)
+    ]
+    follow_fixes(filter_, fixes, 0.02)
+    assert filter_.mean[SPEED] == pytest.approx(5.0, abs=0.2)
+    assert filter_.mean[YAW] == pytest.approx(0.75, abs=0.1)
+    assert filter_.mean[CURVATURE] == pytest.approx(0.05, abs=0.02)
+    assert filter_.mean[ACCEL] == pytest.approx(0.0, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("times_s", "are"),
+    [
+        ((0.0, 1.0, 2.0, 3.0), True),
+        ((0.0, 0.5, 1.0, 1.5), True),
+        ((0.0, 0.2, 0.4, 0.6), False),
+        ((0.0, 0.2, 0.8, 1.4), False),  # of a fast receiver two were held back
+        ((0.0, 1.0, 2.0, 9.0), False),
+        ((0.0, 1.0, 2.0), False),
+    ],
+)
+def test_fixes_are_sparse_where_all_of_the_latest_are(
+    times_s: tuple[float, ...], are: bool
+) -> None:
+    assert sparse([LocalFix(t, np.zeros(2)) for t in times_s]) is are
