@@ -35,7 +35,7 @@ def whole_map(path: Path) -> tuple[OsmMap, World]:
 @pytest.mark.parametrize(
     ("name", "plans"),
     [
-        ("berlin", 10),
+        ("berlin", 8),
         ("moritzplatz", 3),
         ("kingsway", 3),
         pytest.param("badhersfeld", 19, marks=pytest.mark.judge),
