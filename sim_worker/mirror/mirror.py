@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
@@ -28,8 +29,9 @@ class Mirror:
     """Steps the twin along with the measured states of one car; no clock, no bus.
 
     The free twin starts from the measured state, runs on commands alone, and starts anew after each
-    `window_s`, in each new World and where its physics diverged; it never teleports otherwise. All
-    gaps are its own. Roles, corrections and other vehicles need a `VehicleGroup` beside it, which
+    `window_s`, in each new World, where its physics diverged and where it runs into what stands:
+    what it loses there says nothing of the model. It never teleports otherwise. All gaps are its
+    own. Roles, corrections and other vehicles need a `VehicleGroup` beside it, which
     is there only as long as something asks for it. States must come in time order; a command counts
     from its stamp on and should come before the first state after it.
     """
@@ -54,6 +56,10 @@ class Mirror:
         self._pending: list[tuple[int, World | None]] = []
         self._pending_vehicles: list[tuple[int, VehicleParameters]] = []
         self._world_id: str | None = None
+        self._met: frozenset[tuple[str, str]] = frozenset()
+        """What the free twin has just run into: it starts anew with the state that is due."""
+        self._touches = self._met
+        """The same since the last sample."""
         self._frame = drive_frame
         self._build(None)
         self._track = self._new_track()
@@ -129,10 +135,14 @@ class Mirror:
         else:
             self._advance(state.stamp_ns)
         self._world.place(self._vehicle_id, measured[:3])
-        if not np.isfinite(self._twin.state).all():
+        self._touches |= self._met
+        if self._met or not np.isfinite(self._twin.state).all():
             self._seed(measured, state.stamp_ns)
         self._role_manager.advance(state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
+        if sample is not None and self._touches:
+            touches = tuple(sorted({*sample.touches, *self._touches}))
+            sample, self._touches = msgspec.structs.replace(sample, touches=touches), frozenset()
         if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
             self._seed(measured, state.stamp_ns)
         return sample
@@ -170,6 +180,7 @@ class Mirror:
         self._world.reset()
         self._twin.seed(measured, steering_history_rad=history)
         self._seed_stamp_ns, self._steps = stamp_ns, 0
+        self._met = frozenset()
         self._seed_map_shift_m = self._map_shift_m
         self._role_manager.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
@@ -186,6 +197,9 @@ class Mirror:
             self._world.step()
             self._twin.read()
             self._steps += 1
+            if found := self._world.contacts():
+                self._met = frozenset(found)
+                break
         self._commands.forget_before(stamp_ns)
 
     def _command(self, stamp_ns: int, guess: TwinCommand) -> TwinCommand:

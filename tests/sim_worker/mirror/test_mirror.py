@@ -7,13 +7,15 @@ import msgspec
 import numpy as np
 import pytest
 
+from foretwin.contracts.beside_road import Building
 from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source
+from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.sim_worker.mirror.mirror import Mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
-from tests.sim_worker.places import FRAME, crossroads, state_at
+from tests.sim_worker.places import FRAME, box, crossroads, state_at
 
 COVERS = ("foretwin.sim_worker.mirror.samples", "foretwin.sim_worker.mirror.track")
 CAR = load_vehicle()
@@ -134,6 +136,33 @@ def test_a_new_world_starts_the_twin_anew_at_its_stamp() -> None:
     mirror.set_world(crossroads(), from_stamp_ns=0)
     after = _samples(mirror, _circle(until_s=5.0)[201:])
     assert after[-1].since_reset_s == pytest.approx(3.0, abs=0.01)
+
+
+def test_a_free_twin_that_runs_into_a_post_starts_anew_and_it_is_told_once() -> None:
+    """The car drives past the post at 7 m/s; its twin keeps straight on and drifts into it."""
+    post = Building(
+        id="post",
+        outline=box(0.0, -3.0, 0.6, 0.6).outline,
+        holes=(),
+        height_m=Quantity(4.0, "default"),
+    )
+    world = msgspec.structs.replace(crossroads(), buildings=(post,))
+    mirror = Mirror(CAR, drive_frame=FRAME, commands_recorded=True)
+    mirror.set_world(world)
+    samples = []
+    for k in range(150):
+        t = k / 50.0
+        x, aside = 7.0 * t - 14.0, 1.5 * math.sin(min(t, 1.0) * math.pi / 2.0)
+        state = state_at(x, -2.6 + aside, 0.0, 7.0, stamp_ns=round(t * 1e9) + 1)
+        straight = ControlCommand(stamp_ns=state.stamp_ns, tire_angle_rad=0.0, accel_mps2=0.0)
+        mirror.handle_command(straight)
+        if sample := mirror.handle_state(state):
+            samples.append(sample)
+    told = [sample for sample in samples if sample.touches]
+    assert [sample.touches for sample in told] == [(("ego", "world"),)]
+    assert told[0].since_reset_s < 0.1
+    assert max(sample.gap_m for sample in samples) < 2.0
+    assert all(sample.twin.speed_mps == pytest.approx(7.0, abs=0.2) for sample in samples)
 
 
 def test_the_twin_follows_recorded_commands_with_the_vehicles_ratio_offset_and_delay() -> None:
