@@ -26,7 +26,8 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.trust.drives import RealDrive, all_drives
 from tests.trust.truth import truth_of
 
-LEARNT_FROM = ("chemnitz", "boulder", "boulder-no-std", "dresden-1")
+_LEARNT = ("chemnitz", "boulder", "boulder-no-std", "dresden-1")
+LEARNT_FROM = (*_LEARNT, *(f"{name}-1hz" for name in _LEARNT))
 LEAST_ROUNDS, LONG_S = 60, 300.0
 RANKS = 10
 _HEAD = (
