@@ -103,7 +103,9 @@ def test_a_short_span_does_not_tell_what_it_waited_for(tmp_path: Path) -> None:
     with trace.span("nothing"):
         pass
     assert trace._TOLD_FROM_NS == 500_000
-    assert by_name(recorded(tmp_path), "nothing")["args"] == {}
+    told = by_name(recorded(tmp_path), "nothing")
+    # A machine that puts the thread aside in between makes the span long.
+    assert told["args"] == {} or told["dur"] >= 500.0
 
 
 def test_what_is_off_records_nothing(tmp_path: Path) -> None:

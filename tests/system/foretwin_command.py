@@ -85,7 +85,10 @@ def started(
 
 def run_folder(out: Path) -> Path | None:
     """Return the folder of the only run below `out`, None where there is none."""
-    runs = sorted(path for path in out.glob("*") if path.is_dir()) if out.is_dir() else []
+    try:
+        runs = sorted(path for path in out.iterdir() if path.is_dir())
+    except FileNotFoundError:  # nor while the drive tries whether it may be written there
+        return None
     assert len(runs) <= 1
     return runs[0] if runs else None
 

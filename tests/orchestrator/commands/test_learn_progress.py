@@ -9,6 +9,7 @@ import pytest
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
+from foretwin.orchestrator.forecast import learning
 from foretwin.orchestrator.forecast.progress_model import SHIPPED_TABLE
 from foretwin.orchestrator.forecast.quantile_trees import read_trees
 from tests.orchestrator.forecast.town_drives import town_states
@@ -45,9 +46,10 @@ def logs(folder: Path, *, minutes: float) -> list[Path]:
 
 
 def test_a_table_is_learnt_checked_and_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("sklearn", reason="the extra `learn` is not installed")
+    monkeypatch.setattr(learning, "ROUNDS", 4)  # how well it does is asked elsewhere
     mine, other = logs(tmp_path, minutes=5.0)
     out = tmp_path / "mine.npz"
 
