@@ -17,6 +17,8 @@ LATERAL_ACCEL_MPS2 = 2.5
 """In bends. Chosen: half of the 4.89 m/s² up to which nuPlan calls human driving comfortable."""
 COMFORT_DECEL_MPS2 = 2.0
 """IDM's b. Chosen: the paper has 1.67 m/s²; AASHTO's stopping sight distances suppose 3.4 m/s²."""
+CURVE_TIME_S = 0.5
+"""So far ahead a bend's speed counts: it is to be driven by then. Chosen."""
 MAX_DECEL_MPS2 = 8.0
 """In emergencies. Chosen: what tyres give on dry asphalt, less a margin; friction limits it too."""
 MAX_ACCEL_MPS2 = 1.5

@@ -72,9 +72,4 @@ class MirrorHandler:
 
 def _is_beyond(sample: MirrorSample) -> bool:
     limits = limits_after(sample.since_reset_s)
-    return (
-        abs(sample.gap_along_m) > limits["along_m"]
-        or abs(sample.gap_across_m) > limits["across_m"]
-        or abs(sample.gap_yaw_rad) > limits["yaw_rad"]
-        or abs(sample.gap_speed_mps) > limits["speed_mps"]
-    )
+    return any(abs(getattr(sample, f"gap_{name}")) > limit for name, limit in limits.items())

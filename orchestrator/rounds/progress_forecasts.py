@@ -30,12 +30,10 @@ from foretwin.orchestrator.forecast.features import (
 from foretwin.orchestrator.forecast.motion_history import MotionHistory
 from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.orchestrator.instructions import RoundIntent
+from foretwin.orchestrator.rounds.path_from_car import CAR_WITHIN_M
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.futures.likelihood import travelled_m
-
-_CAR_WITHIN_M = 60.0
-"""The car is looked for on this much of the path's beginning."""
 
 
 class _Given(NamedTuple):
@@ -167,7 +165,7 @@ def _ahead(
 ) -> AheadFacts:
     path = FrenetPath(intent.path.xy_m, intent.path.speed_limit_mps)
     here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
-    arc_m = float(path.locate(here[None], upto_arc_m=_CAR_WITHIN_M).arc_m[0])
+    arc_m = float(path.locate(here[None], upto_arc_m=CAR_WITHIN_M).arc_m[0])
     gap_m, lead_mps = lead_on(path, arc_m, users)
     facts = bends_ahead(path, arc_m)._replace(lead_gap_m=gap_m, lead_speed_mps=lead_mps)
     if intent.next_junction is None:

@@ -21,6 +21,7 @@ import numpy as np
 
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.route import Route
+from foretwin.sim_worker.driver_model import CURVE_TIME_S
 from foretwin.world_gen.junctions.intersections import Junction
 
 USUAL_SHARE = 0.75
@@ -35,7 +36,6 @@ EASING_S = 6.0
 SETTLING_S = 1.0
 """Time constant with which what is shown follows what is expected."""
 _STEP_S = 0.2
-_CURVE_TIME_S = 0.5
 _MOVING_MPS = 1.5
 _LEAST_SPEED_MPS = 2.0
 _CREEPING_MPS = 0.3
@@ -110,7 +110,7 @@ class DrivingPace:
             accel = (
                 acceleration_mps2 * present + (1.0 - present) * (speeds[edge] - speed) / EASING_S
             )
-            accel = min(accel, (bends.at(s_m + _CURVE_TIME_S * speed) - speed) / _CURVE_TIME_S)
+            accel = min(accel, (bends.at(s_m + CURVE_TIME_S * speed) - speed) / CURVE_TIME_S)
             faster = max(speed + _STEP_S * accel, _CREEPING_MPS)
             mean_mps = (speed + faster) / 2.0
             while place is not None and place <= s_m + _STEP_S * mean_mps:

@@ -23,6 +23,7 @@ from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.driver_model import (
     COMFORT_DECEL_MPS2,
+    CURVE_TIME_S,
     LATERAL_ACCEL_MPS2,
     MAX_DECEL_MPS2,
     STANDING_MPS,
@@ -36,8 +37,6 @@ error along the way is 9 % less up to 8 s, 4 % up to 4 s, and up to 1 and 2 s ab
 PULLING_AWAY_MPS2 = 0.15
 """A car that stands and accelerates less does not pull away."""
 _STEP_S = 0.1
-_CURVE_TIME_S = 0.5
-"""So far ahead a bend's speed counts, as for the planners."""
 
 
 def speeds_ahead(
@@ -80,8 +79,8 @@ def speeds_ahead(
             wanted_mps, within_s = driven[node], DRIVEN_S
         if math.isfinite(wanted_mps):
             accel += (1.0 - present) * (wanted_mps - speed) / within_s
-        bend_mps = curve[_node(line, arc_m + _CURVE_TIME_S * speed)]
-        accel = max(min(accel, (bend_mps - speed) / _CURVE_TIME_S), -MAX_DECEL_MPS2)
+        bend_mps = curve[_node(line, arc_m + CURVE_TIME_S * speed)]
+        accel = max(min(accel, (bend_mps - speed) / CURVE_TIME_S), -MAX_DECEL_MPS2)
         faster = min(max(speed + _STEP_S * accel, 0.0), most_mps)
         arc_m += _STEP_S * (speed + faster) / 2.0
         speeds.append(faster)

@@ -15,7 +15,6 @@ from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 TURNING_ACCEL_MPS2 = 4.0
 """Of the wheels' own curvature: more than that of the path, which alone governs on it."""
-_CURVE_TIME_S = 0.5
 
 
 _TRACKING = (
@@ -26,7 +25,7 @@ _TRACKING = (
     tracking.MAX_LATERAL_ACCEL_MPS2,
     tracking.MAX_TURN_RAD,
     TURNING_ACCEL_MPS2,
-    _CURVE_TIME_S,
+    driver.CURVE_TIME_S,
 )
 
 

@@ -170,10 +170,7 @@ class KinematicFilter:
     def forget_wander(self) -> None:
         """Begin the receiver's error anew: it has jumped."""
         for index in (GNSS_X, GNSS_Y):
-            self.mean[index] = 0.0
-            self.covariance[index, :] = 0.0
-            self.covariance[:, index] = 0.0
-            self.covariance[index, index] = self._gnss_std_m**2
+            self._begin_anew(index, 0.0, self._gnss_std_m)
 
     def position_innovation(
         self, xy_m: Array, lever_m: tuple[float, float], *, wander: bool = False
@@ -229,11 +226,15 @@ class KinematicFilter:
     def reverse(self, speed_mps: float) -> None:
         """Go backwards from now on, or forwards again: the body points where it pointed."""
         self.may_reverse = speed_mps < 0.0
-        self.mean[SPEED], self.mean[ACCEL] = speed_mps, 0.0
-        for index, std in ((SPEED, 1.0), (ACCEL, 1.0)):
-            self.covariance[index, :] = 0.0
-            self.covariance[:, index] = 0.0
-            self.covariance[index, index] = std * std
+        self._begin_anew(SPEED, speed_mps, 1.0)
+        self._begin_anew(ACCEL, 0.0, 1.0)
+
+    def _begin_anew(self, index: int, value: float, std: float) -> None:
+        """Forget what is known of one component and of what it hangs together with."""
+        self.mean[index] = value
+        self.covariance[index, :] = 0.0
+        self.covariance[:, index] = 0.0
+        self.covariance[index, index] = std * std
 
     def correct_speed(self, speed_mps: float, std_mps: float) -> float:
         """Apply a measured speed, whose scale is estimated; return its normalised square."""
