@@ -17,7 +17,7 @@ from foretwin.telemetry.estimator.kinematic_filter import (
     KinematicFilter,
 )
 from foretwin.telemetry.estimator.position_gate import LocalFix
-from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse
+from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse, turned_m
 from tests.telemetry.position_track import along, circle, states_of, xy, yaw
 
 
@@ -81,3 +81,18 @@ def test_fixes_are_sparse_where_all_of_the_latest_are(
     times_s: tuple[float, ...], are: bool
 ) -> None:
     assert sparse([LocalFix(t, np.zeros(2)) for t in times_s]) is are
+
+
+def test_a_turn_or_a_stop_between_sparse_fixes_is_no_glitch() -> None:
+    slow = [LocalFix(float(t), np.zeros(2)) for t in range(4)]
+    fast = [LocalFix(0.2 * t, np.zeros(2)) for t in range(4)]
+    assert turned_m(slow) == pytest.approx(2.0)  # half of 4 m/s² for a second
+    assert turned_m(fast) == 0.0
+
+
+def test_who_backs_keeps_the_heading() -> None:
+    """It faces east and rolls west at 2 m/s."""
+    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=-2.0, yaw_std_rad=0.1)
+    follow_fixes(filter_, [LocalFix(float(t), np.array([-2.0 * t, 0.0])) for t in range(4)], 0.02)
+    assert filter_.mean[YAW] == pytest.approx(0.0, abs=0.02)
+    assert filter_.mean[SPEED] == pytest.approx(-2.0, abs=0.1)
