@@ -176,9 +176,9 @@ def test_curves_and_free_roads_are_driven_by_the_formulas(
     profile = CIRCLE.speed_profile(
         lateral_accel_mps2=driver.LATERAL_ACCEL_MPS2, decel_mps2=driver.COMFORT_DECEL_MPS2
     )
-    ahead = CIRCLE.at_nodes(profile, seen.arc_m + idm._CURVE_TIME_S * speed)
+    ahead = CIRCLE.at_nodes(profile, seen.arc_m + driver.CURVE_TIME_S * speed)
     turning = turning_speed(seen, wanted, lateral_accel_mps2=idm.TURNING_ACCEL_MPS2)
-    curve = (np.minimum(ahead * factor, turning) - speed) / idm._CURVE_TIME_S
+    curve = (np.minimum(ahead * factor, turning) - speed) / driver.CURVE_TIME_S
     most = driver.MAX_ACCEL_MPS2 * factor
     ratio = speed / target
     slower = driver.COMFORT_DECEL_MPS2 * (
