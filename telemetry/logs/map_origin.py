@@ -14,6 +14,7 @@ altitude = 34.0                        # of z = 0, above the ellipsoid
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
@@ -21,6 +22,8 @@ from foretwin.contracts.drive import Vector3
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.toml_file import toml_text
 from foretwin.telemetry.logs.log import LogError
+
+_Kind = TypeVar("_Kind")
 
 
 class MapSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,21 +50,34 @@ class RecordingDeclaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unk
 def declared_of(path: Path, declaration: Path | None = None) -> RecordingDeclaration:
     """Return what `declaration`, else `NAME.toml` beside a recording, says; all is optional.
 
-    Raises FileNotFoundError for a declaration that was named and is not there, and LogError naming
-    the field that is wrong.
+    Raises as `declaration_beside`, and LogError where the origin is no place on Earth.
     """
-    beside = path.with_name(path.name + ".toml")
-    if declaration is None and not beside.is_file():
+    found = declaration_beside(path, declaration, RecordingDeclaration)
+    if found is None:
         return RecordingDeclaration()
-    file = beside if declaration is None else declaration
-    text = toml_text(file, "declaration", error=LogError)
-    try:
-        found = msgspec.toml.decode(text, type=RecordingDeclaration)
-    except msgspec.DecodeError as error:
-        raise LogError(f"{file}: {error}") from None
     if (frame := found.frame()) is not None:
         try:
             frame.origin.validate()
         except ValueError as error:
-            raise LogError(f"{file}: [map] {error}") from None
+            raise LogError(f"{declaration or _beside(path)}: [map] {error}") from None
     return found
+
+
+def declaration_beside(path: Path, declaration: Path | None, kind: type[_Kind]) -> _Kind | None:
+    """Return what `declaration`, else `NAME.toml` beside a log, declares; None where there is none.
+
+    Raises FileNotFoundError for a declaration that was named and is not there, and LogError naming
+    the field that is wrong.
+    """
+    file = declaration or _beside(path)
+    if declaration is None and not file.is_file():
+        return None
+    text = toml_text(file, "declaration", error=LogError)
+    try:
+        return msgspec.toml.decode(text, type=kind)
+    except msgspec.DecodeError as error:
+        raise LogError(f"{file}: {error}") from None
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(path.name + ".toml")

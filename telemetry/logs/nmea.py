@@ -1,10 +1,12 @@
 """Reader of NMEA-0183 logs: RMC, GGA, VTG, HDT and ZDA of any talker, one sentence per line.
 
-Positions are GGA's where the file has any, else RMC's; altitude is made ellipsoidal with GGA's
-geoid separation, and the standard deviation is what GGA's quality and HDOP promise. Speed is RMC's
-in knots, else VTG's. Yaw is HDT's heading; without any HDT it is RMC's course over ground above
-MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are RMC's or ZDA's; where only times
-are told, one that falls by half a day or more begins the next day.
+Of each instant the position is GGA's, where it has one, else RMC's. Altitude is made ellipsoidal
+with GGA's geoid separation, and the standard deviation is what quality and HDOP promise; an RMC
+between two GGAs has the altitude and HDOP of the last GGA and the quality of its own mode. Speed is
+RMC's in knots, else VTG's. Yaw is HDT's heading; without any HDT it is RMC's course over ground
+above MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are RMC's or ZDA's, else the one
+declared in `NAME.toml` beside the log; without any of them times count from the log's first. Where
+only times are told, one that falls by half a day or more begins the next day.
 Sentences without a time (VTG, HDT) get that of the sentence before. Lines may have something before
 the `$`; a wrong checksum is counted, a missing one is let pass.
 """
@@ -12,97 +14,103 @@ the `$`; a wrong checksum is counted, a missing one is let pass.
 from __future__ import annotations
 
 import datetime
-import functools
-import math
-import operator
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from foretwin.contracts import drive
-from foretwin.contracts.frames import GeoPoint, wrap_angle
+from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample
+from foretwin.telemetry.logs.map_origin import declaration_beside
 from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.nmea_positions import (
+    QUALITY_OF_MODE,
+    STD_M,
+    NmeaPosition,
+    joined,
+)
+from foretwin.telemetry.logs.nmea_sentences import (
+    DAY_NS,
+    Fields,
+    Sentence,
+    date_of,
+    degrees_of,
+    midnight_ns,
+    sentence_of,
+    time_of_day_ns,
+    yaw_rad_of,
+)
 from foretwin.telemetry.ros_messages.foreign import NO_FIX
 
-CHECKSUM_WRONG = "checksum wrong"
 NO_TIME = "sentence before any time"
+DATE_UNKNOWN = "date unknown"
 MIN_COURSE_MPS = 2.0
 """A course over ground means nothing at a standstill."""
-_DAY_NS = 86_400 * 10**9
 _WINDOW_NS = 2_000_000_000
-_SENTENCE = re.compile(r"\$([A-Z]{2}|P[A-Z]*)(RMC|GGA|VTG|HDT|ZDA),([^*\r\n$]*)(?:\*(\w*))?")
-_STD_M = {"1": 2.1, "2": 1.7, "3": 2.1, "4": 0.015, "5": 0.3, "9": 1.7}
-"""One standard deviation on each axis at an HDOP of 1, by GGA's quality: 2.5 m CEP alone and 2 m
-with SBAS (u-blox NEO-M8 data sheet, over 1.177), 1 cm + 1 ppm CEP with RTK (ZED-F9P data sheet);
-floating RTK is chosen."""
-_LEAST_HDOP = 0.5
 _MODES_WITHOUT_FIX = ("N", "E", "M", "S")
 """Mode indicators: not valid, estimated, manual, simulator."""
 
-
-Fields = list[str]
 Skipped = Counter[str]
 
 
-class Sentence(NamedTuple):
-    """One sentence: its formatter such as RMC, and the fields after it."""
+class NmeaDeclaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a log does not say of itself: the day of its first time (UTC), the antenna's place."""
 
-    formatter: str
-    fields: Fields
+    date: datetime.date | None = None
+    body_from_antenna_m: drive.Vector3 | None = None
 
 
 class _Found(NamedTuple):
-    """What a file holds, which decides what is taken from where."""
+    """What a file holds, which decides what is taken from where; `dated` where it tells days."""
 
     formatters: frozenset[str]
     first_date: datetime.date
     first_time_ns: int
+    dated: bool
 
 
 def is_nmea(text: str) -> bool:
     """Tell whether a text begins like an NMEA-0183 log."""
     lines = text.splitlines()[:20]
-    return any(_SENTENCE.search(line) for line in lines) and not text.startswith(("<", "{"))
+    if text.startswith(("<", "{")):
+        return False
+    return any(sentence_of(line.partition("*")[0]) is not None for line in lines)
 
 
-def sentence_of(line: str) -> Sentence | str | None:
-    """Return the sentence of a line, why it is refused, or None for other sentences and texts."""
-    # The last `$`: where a receiver was cut off, the next sentence begins within the line.
-    start = line.rfind("$")
-    match = _SENTENCE.match(line, start) if start >= 0 else None
-    if match is None:
-        return None
-    _, formatter, body, checksum = match.groups()
-    if checksum is not None:
-        between = line[start + 1 : line.index("*", start)]
-        summed = functools.reduce(operator.xor, between.encode("utf-8", "replace"), 0)
-        if checksum.upper() != f"{summed:02X}":
-            return CHECKSUM_WRONG
-    return Sentence(formatter, body.split(","))
+def open_nmea(path: Path, *, declaration: Path | None = None) -> Log:
+    """Open an NMEA-0183 log; `declaration`, else `NAME.toml` beside it, is an NmeaDeclaration.
 
-
-def open_nmea(path: Path) -> Log:
-    """Open an NMEA-0183 log; raises LogError where it tells no date or no position."""
-    found = _survey(path)
-    samples = list(_samples(path, found, Counter()))
-    if not any(channel == "gnss" for channel, _ in samples):
+    Raises LogError where it tells no position, or another date than the one declared.
+    """
+    declared = declaration_beside(path, declaration, NmeaDeclaration) or NmeaDeclaration()
+    found = _survey(path, declared.date)
+    sends: dict[str, None] = {}
+    first_ns = last_ns = None
+    for channel, message in joined(_samples(path, found, Counter())):
+        stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        sends[channel] = None
+        first_ns = stamp_ns if first_ns is None else min(first_ns, stamp_ns)
+        last_ns = stamp_ns if last_ns is None else max(last_ns, stamp_ns)
+    if first_ns is None or "gnss" not in sends:
         raise LogError(f"{path}: no RMC or GGA sentence with a fix, so no positions")
-    stamps = [message.stamp_ns for _, message in samples]  # type: ignore[attr-defined]
     return Log(
         info=drive.VehicleInfo(
             vehicle_id="car",
-            time_base="utc",
-            start_stamp_ns=min(stamps),
-            end_stamp_ns=max(stamps),
-            source=path.name,
+            time_base="utc" if found.dated else "log",
+            start_stamp_ns=first_ns,
+            end_stamp_ns=last_ns,
+            source=path.name if found.dated else f"{path.name} ({DATE_UNKNOWN})",
             reference_point="antenna",
-            sends=tuple(dict.fromkeys(channel for channel, _ in samples)),
+            body_from_antenna_m=declared.body_from_antenna_m,
+            sends=tuple(sends),
         ),
-        read=lambda skipped: reordered(_samples(path, found, skipped), window_ns=_WINDOW_NS),
+        read=lambda skipped: joined(
+            reordered(_samples(path, found, skipped), window_ns=_WINDOW_NS)
+        ),
     )
 
 
@@ -111,7 +119,7 @@ def _lines(path: Path) -> Iterator[str]:
         yield from text
 
 
-def _survey(path: Path) -> _Found:
+def _survey(path: Path, declared: datetime.date | None) -> _Found:
     formatters, first = set(), None
     first_time_ns: int | None = None
     for line in _lines(path):
@@ -120,21 +128,32 @@ def _survey(path: Path) -> _Found:
             continue
         formatters.add(sentence.formatter)
         try:
-            time_ns, date = _time_ns(sentence), _date(sentence)
+            time_ns, date = time_of_day_ns(sentence), date_of(sentence)
         except (ValueError, IndexError):  # counted when it is read
             continue
+        if time_ns is None:
+            continue
         first_time_ns = time_ns if first_time_ns is None else first_time_ns
-        if first is None and date is not None and time_ns is not None and first_time_ns is not None:
+        if first is None and date is not None:
             # What came before the first date may be of the day before.
-            late = first_time_ns - time_ns > _DAY_NS // 2
+            late = first_time_ns - time_ns > DAY_NS // 2
             first = date - datetime.timedelta(days=1) if late else date
-    if first is None or first_time_ns is None:
-        raise LogError(f"{path}: no RMC or ZDA sentence with a date, so no times")
-    return _Found(frozenset(formatters), first, first_time_ns)
+    if first_time_ns is None:
+        raise LogError(f"{path}: no RMC, GGA or ZDA sentence with a time")
+    if first is not None and declared is not None and first != declared:
+        raise LogError(f"{path}: its RMC or ZDA tell {first}, and {declared} is declared")
+    first = first or declared
+    return _Found(
+        frozenset(formatters),
+        first or datetime.date(1970, 1, 1),
+        first_time_ns,
+        dated=first is not None,
+    )
 
 
-def _samples(path: Path, found: _Found, skipped: Counter[str]) -> Iterator[Sample]:
+def _samples(path: Path, found: _Found, skipped: Skipped) -> Iterator[Sample]:
     date, latest_ns, stamp_ns = found.first_date, found.first_time_ns, None
+    zero_ns = 0 if found.dated else found.first_time_ns
     for line in _lines(path):
         sentence = sentence_of(line)
         if sentence is None:
@@ -143,14 +162,14 @@ def _samples(path: Path, found: _Found, skipped: Counter[str]) -> Iterator[Sampl
             skipped[sentence] += 1
             continue
         try:
-            time_ns = _time_ns(sentence)
+            time_ns = time_of_day_ns(sentence)
             if time_ns is not None:
-                if (stated := _date(sentence)) is not None:
+                if (stated := date_of(sentence)) is not None:
                     date = stated
-                elif latest_ns - time_ns > _DAY_NS // 2:
+                elif latest_ns - time_ns > DAY_NS // 2:
                     date += datetime.timedelta(days=1)
                 latest_ns = time_ns
-                stamp_ns = _midnight_ns(date) + time_ns
+                stamp_ns = midnight_ns(date) + time_ns - zero_ns
             if stamp_ns is None:
                 skipped[NO_TIME] += 1
                 continue
@@ -159,62 +178,16 @@ def _samples(path: Path, found: _Found, skipped: Counter[str]) -> Iterator[Sampl
             skipped[UNREADABLE_ROW] += 1
 
 
-def _midnight_ns(date: datetime.date) -> int:
-    return (date - datetime.date(1970, 1, 1)).days * _DAY_NS
-
-
-def _time_ns(sentence: Sentence) -> int | None:
-    """Return the time of day, None where the sentence tells none."""
-    if sentence.formatter not in ("RMC", "GGA", "ZDA") or not sentence.fields[0]:
-        return None
-    text = sentence.fields[0]
-    whole, _, fraction = text.partition(".")
-    if len(whole) != 6 or not (whole + fraction).isdecimal():
-        raise ValueError(f"time {text!r}")
-    hours, minutes, seconds = int(whole[:2]), int(whole[2:4]), int(whole[4:])
-    if hours > 23 or minutes > 59 or seconds > 60:
-        raise ValueError(f"time {text!r}")
-    return ((hours * 60 + minutes) * 60 + seconds) * 10**9 + int(fraction[:9].ljust(9, "0"))
-
-
-def _date(sentence: Sentence) -> datetime.date | None:
-    fields = sentence.fields
-    if sentence.formatter == "RMC" and len(fields) > 8 and len(fields[8]) == 6:
-        day, month, year = int(fields[8][:2]), int(fields[8][2:4]), int(fields[8][4:])
-        # GPS began in 1980: two digits from 80 on are of that century.
-        return datetime.date(year + (1900 if year >= 80 else 2000), month, day)
-    if sentence.formatter == "ZDA" and len(fields) > 3 and fields[3]:
-        return datetime.date(int(fields[3]), int(fields[2]), int(fields[1]))
-    return None
-
-
-def _degrees(value: str, half: str, negative: str, positive: str) -> float:
-    """Return degrees of `dddmm.mmm` and its hemisphere."""
-    point = value.find(".")
-    minutes_at = (len(value) if point < 0 else point) - 2
-    if minutes_at < 1 or half not in (negative, positive):
-        raise ValueError(f"angle {value!r} {half!r}")
-    minutes = float(value[minutes_at:])
-    if not 0.0 <= minutes < 60.0:
-        raise ValueError(f"angle {value!r}")
-    degrees = int(value[:minutes_at]) + minutes / 60.0
-    return -degrees if half == negative else degrees
-
-
-def _yaw_rad(clockwise_deg: str) -> float:
-    return float(wrap_angle(math.radians(90.0 - float(clockwise_deg))))
-
-
 def _rmc(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iterator[Sample]:
     mode = fields[11] if len(fields) > 11 else ""
     if fields[1] != "A" or mode in _MODES_WITHOUT_FIX:
         skipped[NO_FIX] += 1
         return
-    if "GGA" not in found.formatters:
-        position = GeoPoint(
-            _degrees(fields[2], fields[3], "S", "N"), _degrees(fields[4], fields[5], "W", "E")
-        )
-        yield "gnss", drive.GnssFix(stamp_ns=stamp_ns, position=position)
+    position = GeoPoint(
+        degrees_of(fields[2], fields[3], "S", "N"), degrees_of(fields[4], fields[5], "W", "E")
+    )
+    quality = QUALITY_OF_MODE.get(mode, "")
+    yield "gnss", NmeaPosition(stamp_ns, position, quality, None, False)
     if fields[6]:
         yield from _velocity(stamp_ns, float(fields[6]) * units.SPEED["kn"], fields[7], found)
 
@@ -222,18 +195,18 @@ def _rmc(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iter
 def _gga(fields: Fields, stamp_ns: int, _found: _Found, skipped: Skipped) -> Iterator[Sample]:
     quality = fields[5]
     # 6 estimated, 7 manual, 8 simulator: none of them was measured.
-    if quality not in ("1", "2", "3", "4", "5", "9"):
+    if quality not in STD_M:
         skipped[NO_FIX] += 1
         return
     height_m = float(fields[8]) if fields[8] else 0.0
     separation_m = float(fields[10]) if len(fields) > 10 and fields[10] else 0.0
     position = GeoPoint(
-        _degrees(fields[1], fields[2], "S", "N"),
-        _degrees(fields[3], fields[4], "W", "E"),
+        degrees_of(fields[1], fields[2], "S", "N"),
+        degrees_of(fields[3], fields[4], "W", "E"),
         height_m + separation_m,
     )
-    std_m = _STD_M[quality] * max(float(fields[7]) if fields[7] else 1.0, _LEAST_HDOP)
-    yield "gnss", drive.GnssFix(stamp_ns=stamp_ns, position=position, std_m=std_m)
+    hdop = float(fields[7]) if fields[7] else 1.0
+    yield "gnss", NmeaPosition(stamp_ns, position, quality, hdop, True)
 
 
 def _vtg(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iterator[Sample]:
@@ -252,12 +225,14 @@ def _velocity(stamp_ns: int, speed_mps: float, course: str, found: _Found) -> It
     """Yield a speed, and the course over ground where it is the only heading and means one."""
     yield "speed", drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=speed_mps)
     if course and speed_mps >= MIN_COURSE_MPS and "HDT" not in found.formatters:
-        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=_yaw_rad(course))
+        yaw_rad = yaw_rad_of(float(course))
+        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw_rad)
 
 
 def _hdt(fields: Fields, stamp_ns: int, _found: _Found, _skipped: Skipped) -> Iterator[Sample]:
     if fields[0]:
-        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=_yaw_rad(fields[0]))
+        yaw_rad = yaw_rad_of(float(fields[0]))
+        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw_rad)
 
 
 _READERS: dict[str, Callable[[Fields, int, _Found, Skipped], Iterator[Sample]]] = {

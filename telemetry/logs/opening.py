@@ -67,8 +67,8 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
 
         return open_bag(path, declaration=declaration)
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
-    if suffix != ".csv" and declaration is None and is_nmea(text):
-        return open_nmea(path)
+    if suffix != ".csv" and is_nmea(text):
+        return open_nmea(path, declaration=declaration)
     if is_smartloc(text):
         check_undeclared(path, declaration, "smartLoc's ground truth")
         return open_smartloc(path)

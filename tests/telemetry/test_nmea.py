@@ -13,9 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.telemetry.logs import Log, LogError, open_log
-from foretwin.telemetry.logs.nmea import CHECKSUM_WRONG, Sentence, sentence_of
+from foretwin.telemetry.logs.nmea_sentences import (
+    CHECKSUM_WRONG,
+    Sentence,
+    sentence_of,
+    yaw_rad_of,
+)
 
-COVERS = ("foretwin.telemetry.logs.nmea",)
+COVERS = (
+    "foretwin.telemetry.logs.nmea",
+    "foretwin.telemetry.logs.nmea_positions",
+    "foretwin.telemetry.logs.nmea_sentences",
+)
 
 NOON_NS = 1_772_366_400 * 10**9
 """2026-03-01T12:00:00Z."""
@@ -29,8 +38,8 @@ def rmc(time: str, date: str, *, knots: str = "10.0", course: str = "90.0") -> s
     return line(f"GNRMC,{time},A,5230.6000,N,01323.4000,E,{knots},{course},{date},,,A")
 
 
-def gga(time: str, *, quality: int = 4) -> str:
-    return line(f"GPGGA,{time},5230.6000,S,01323.4000,W,{quality},12,0.6,34.5,M,44.5,M,,")
+def gga(time: str, *, quality: int = 4, half: str = "S", lon: str = "W") -> str:
+    return line(f"GPGGA,{time},5230.6000,{half},01323.4000,{lon},{quality},12,0.6,34.5,M,44.5,M,,")
 
 
 def opened(tmp_path: Path, *lines: str) -> tuple[Log, dict[str, list[Any]]]:
@@ -70,9 +79,7 @@ def test_minutes_knots_and_course(tmp_path: Path) -> None:
 
 @given(st.floats(0.0, 359.999))
 def test_degrees_clockwise_from_north_become_yaw_from_east(course_deg: float) -> None:
-    from foretwin.telemetry.logs.nmea import _yaw_rad
-
-    yaw = _yaw_rad(repr(course_deg))
+    yaw = yaw_rad_of(course_deg)
     assert -math.pi <= yaw <= math.pi
     # East and north of a unit vector, both ways.
     assert math.cos(yaw) == pytest.approx(math.sin(math.radians(course_deg)), abs=1e-9)
@@ -166,13 +173,55 @@ def test_what_is_refused_is_counted(tmp_path: Path) -> None:
         "sentence before any time": 1,
         "checksum wrong": 1,
         "receiver without fix": 3,
-        "unreadable row": 1,
+        "unreadable row": 2,
     }
-    assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS + 6 * 10**9]
+    assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS, NOON_NS + 6 * 10**9]
 
 
-def test_a_log_without_a_date_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"drive\.nmea: no RMC or ZDA sentence with a date"):
-        opened(tmp_path, gga("120000"))
+def test_the_positions_of_rmc_fill_what_gga_leaves_out(tmp_path: Path) -> None:
+    """As receivers log that tell RMC four times as often as GGA."""
+    lines = []
+    for tick in range(8):
+        time = f"12000{tick // 4}.{25 * (tick % 4):02d}"
+        lines += [rmc(time, "010326"), *([gga(time, half="N", lon="E")] if tick % 4 == 0 else [])]
+    log, found = opened(tmp_path, *lines)
+
+    stamps = [fix.stamp_ns for fix in found["gnss"]]
+    assert stamps == [NOON_NS + tick * 250_000_000 for tick in range(8)]
+    assert not log.skipped
+    # Between two GGAs altitude and HDOP are the last one's, the quality that of RMC's mode: alone.
+    assert {fix.position.alt_m for fix in found["gnss"]} == {34.5 + 44.5}
+    assert [fix.std_m for fix in found["gnss"][:3]] == pytest.approx([0.009, 1.26, 1.26])
+
+
+def test_an_hdop_of_long_ago_promises_nothing(tmp_path: Path) -> None:
+    _, found = opened(tmp_path, rmc("120000", "010326"), gga("120000"), rmc("120011", "010326"))
+    assert [fix.std_m for fix in found["gnss"]] == [pytest.approx(0.009), None]
+
+
+def test_a_log_without_a_date_counts_from_its_first_time_and_says_so(tmp_path: Path) -> None:
+    log, found = opened(tmp_path, gga("235959.50"), gga("000000.50"))
+    assert [fix.stamp_ns for fix in found["gnss"]] == [0, 10**9]
+    assert (log.info.time_base, log.info.source) == ("log", "drive.nmea (date unknown)")
+
+
+def test_the_date_can_be_declared(tmp_path: Path) -> None:
+    (tmp_path / "drive.nmea.toml").write_text(
+        "date = 2026-03-01\nbody_from_antenna_m = [1.0, 0.0, 1.5]\n"
+    )
+    log, found = opened(tmp_path, gga("120000.00"))
+    assert found["gnss"][0].stamp_ns == NOON_NS
+    assert (log.info.time_base, log.info.source) == ("utc", "drive.nmea")
+    assert log.info.body_from_antenna_m == (1.0, 0.0, 1.5)
+    with pytest.raises(LogError, match=r"drive\.nmea: .*2026-03-02, and 2026-03-01 is declared"):
+        opened(tmp_path, rmc("120000", "020326"))
+    (tmp_path / "drive.nmea.toml").write_text("date = 7\n")
+    with pytest.raises(LogError, match=r"drive\.nmea\.toml: .*date"):
+        opened(tmp_path, gga("120000.00"))
+
+
+def test_a_log_without_a_time_or_a_fix_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"drive\.nmea: no RMC, GGA or ZDA sentence with a time"):
+        opened(tmp_path, line("HEHDT,12.0,T"))
     with pytest.raises(LogError, match=r"drive\.nmea: no RMC or GGA sentence with a fix"):
         opened(tmp_path, gga("120000", quality=0), line("GPZDA,120000,01,03,2026,00,00"))

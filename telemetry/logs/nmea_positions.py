@@ -1,0 +1,57 @@
+"""Positions of NMEA-0183: RMC and GGA of one instant joined, and how good they promise to be."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+
+import msgspec
+
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.logs.log import Sample
+from foretwin.telemetry.logs.merge import stamp_ns_of
+
+_HELD_NS = 10_000_000_000
+"""So long an HDOP is believed: satellites come and go by the minute, bridges by the second."""
+STD_M = {"1": 2.1, "2": 1.7, "3": 2.1, "4": 0.015, "5": 0.3, "9": 1.7}
+"""One standard deviation on each axis at an HDOP of 1, by GGA's quality: 2.5 m CEP alone and 2 m
+with SBAS (u-blox NEO-M8 data sheet, over 1.177), 1 cm + 1 ppm CEP with RTK (ZED-F9P data sheet);
+floating RTK is chosen."""
+_LEAST_HDOP = 0.5
+QUALITY_OF_MODE = {"A": "1", "D": "2", "P": "3", "R": "4", "F": "5"}
+"""GGA's quality by RMC's mode indicator: alone, differential, precise, RTK fixed and floating."""
+
+
+class NmeaPosition(msgspec.Struct, frozen=True):
+    """A position of GGA or RMC, which tells no altitude and no HDOP, before instants are joined."""
+
+    stamp_ns: int
+    position: GeoPoint
+    quality: str
+    hdop: float | None
+    is_gga: bool
+
+
+def joined(samples: Iterable[Sample]) -> Iterator[Sample]:
+    """Give each instant's position once, and RMC's what only GGA tells."""
+    gga: NmeaPosition | None = None
+    for _, instant in itertools.groupby(samples, key=stamp_ns_of):
+        at_once = list(instant)
+        known = any(isinstance(said, NmeaPosition) and said.is_gga for _, said in at_once)
+        for channel, said in at_once:
+            if not isinstance(said, NmeaPosition):
+                yield channel, said
+            elif said.is_gga or not known:
+                gga = said if said.is_gga else gga
+                yield channel, _fix(said, gga)
+
+
+def _fix(said: NmeaPosition, gga: NmeaPosition | None) -> drive.GnssFix:
+    position, quality, hdop = said.position, said.quality, said.hdop
+    if gga is not None and not said.is_gga:
+        position = GeoPoint(position.lat_deg, position.lon_deg, gga.position.alt_m)
+        if said.stamp_ns - gga.stamp_ns <= _HELD_NS:
+            quality, hdop = quality or gga.quality, gga.hdop
+    std_m = None if hdop is None else STD_M[quality] * max(hdop, _LEAST_HDOP)
+    return drive.GnssFix(stamp_ns=said.stamp_ns, position=position, std_m=std_m)
