@@ -111,7 +111,7 @@ def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Ta
         unreadable = 0
         stamp_of = _stamp_reader(declared.time.unit or "")
         for row in reader:
-            if not row:
+            if not any(map(str.strip, row)):
                 continue
             stamp_ns = (
                 stamp_of(row[places[declared.time.column]]) if len(row) >= len(header) else None
@@ -176,10 +176,12 @@ def _is_new(table: Table, section: Section) -> Flags:
     if not section.new_when:
         return np.ones(len(table.stamp_ns), dtype=bool)
     new = np.zeros(len(table.stamp_ns), dtype=bool)
-    new[0] = True
     for name in section.new_when:
-        cells = np.array(table.cells[name])
-        new[1:] |= cells[1:] != cells[:-1]
+        latest = ""
+        for row, cell in enumerate(table.cells[name]):
+            # An empty cell says nothing: the value before it stands.
+            new[row] |= bool(cell.strip()) and cell != latest
+            latest = cell if cell.strip() else latest
     return new
 
 

@@ -110,6 +110,19 @@ def test_without_a_declaration_nothing_is_guessed(tmp_path: Path) -> None:
         open_log(drive(tmp_path, declaration=None))
 
 
+def test_blank_cells_and_rows_are_no_change(tmp_path: Path) -> None:
+    """Sources that repeat old values, or leave them out, give each once."""
+    rows = (
+        "t,lat,lon,v,wheel,fix\n0.0,52.5,13.4,10,1,a\n0.1,52.5,13.4,11,1,a\n ,, ,,,\n\n"
+        "0.2,52.5,13.4,12,1,\n0.3,52.5,13.4,13,1,a\n0.4,52.6,13.4,14,1,b\n"
+    )
+    new_when = DECLARATION.replace("[position]", '[position]\nnew_when = ["fix"]')
+    log = open_log(drive(tmp_path, rows, new_when))
+    stamps = [m.stamp_ns for channel, m in log.samples() if channel == "gnss"]  # type: ignore[attr-defined]
+    assert stamps == [0, 400_000_000]
+    assert not log.skipped
+
+
 def test_grid_headings_become_true_ones(tmp_path: Path) -> None:
     # Away from the central meridian of zone 33 (15° E), grid north points east of true north.
     declaration = """
