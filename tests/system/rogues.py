@@ -133,7 +133,7 @@ def _token(process: str) -> Act:
 
 
 def _deletes(session: zenoh.Session, run: str) -> None:
-    session.delete(key("round", run=run))
+    session.delete(key("round", run=run), congestion_control=zenoh.CongestionControl.BLOCK)
 
 
 def _listens_to_all(session: zenoh.Session, run: str) -> Any:
