@@ -17,14 +17,15 @@ from foretwin.telemetry.logs.road_users import (
     detections_of,
     log_of_detections,
 )
-from foretwin.telemetry.logs.smartloc import is_smartloc, open_smartloc
+from foretwin.telemetry.logs.smartloc import is_smartloc, open_smartloc, smartloc_texts
 
 BAG_MAGIC, SQLITE_MAGIC = b"#ROSBAG V", b"SQLite format 3\0"
 
 KINDS = (
     "MCAP with ROS messages (.mcap), ROS 1 bag (.bag), ROS 2 bag (folder or .db3), "
     "NMEA-0183 (.nmea), CSV with a declaration (.csv), GPX (.gpx), "
-    "GeoJSON lines (.geojson, .json), smartLoc ground truth (point3 text), comma2k19 segment folder"
+    "GeoJSON lines (.geojson, .json), smartLoc text or folder (point3, odom3), "
+    "comma2k19 segment folder"
 )
 
 
@@ -48,9 +49,12 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
             from foretwin.telemetry.logs.ros_log import open_bag
 
             return open_bag(path, declaration=declaration)
+        if smartloc_texts(path):
+            check_undeclared(path, declaration, "a smartLoc drive")
+            return open_smartloc(path)
         raise LogError(
-            f"{path}: a folder that is no comma2k19 segment and no ROS 2 bag (it has no"
-            f" metadata.yaml); known logs: {KINDS}"
+            f"{path}: a folder that is no comma2k19 segment, no smartLoc drive and no ROS 2 bag (it"
+            f" has no metadata.yaml); known logs: {KINDS}"
         )
     head = _head(path)
     if not head:
@@ -70,7 +74,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if suffix != ".csv" and is_nmea(text):
         return open_nmea(path, declaration=declaration)
     if is_smartloc(text):
-        check_undeclared(path, declaration, "smartLoc's ground truth")
+        check_undeclared(path, declaration, "a smartLoc text")
         return open_smartloc(path)
     if suffix == ".gpx" or (text.startswith("<") and "<gpx" in text):
         check_undeclared(path, declaration, "a GPX file")

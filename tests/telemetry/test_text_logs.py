@@ -14,7 +14,6 @@ COVERS = (
     "foretwin.telemetry.logs",
     "foretwin.telemetry.logs.geojson",
     "foretwin.telemetry.logs.gpx",
-    "foretwin.telemetry.logs.smartloc",
     "foretwin.telemetry.logs.route_line",
     "foretwin.telemetry.logs.opening",
 )
@@ -111,29 +110,6 @@ def test_geojson_without_a_line(tmp_path: Path, text: str, told: str) -> None:
 def test_geojson_times_must_fit_the_line(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="3 times for a line of 2 positions"):
         open_log(write(tmp_path, "drive.geojson", feature(times=[1, 2, 3])))
-
-
-def test_smartloc_counts_what_it_cannot_use(tmp_path: Path) -> None:
-    good = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
-    text = (
-        good.format("0")
-        + "point3 0.2 x y z\n"
-        + "point3 0.4 0 0 0\n"
-        + "point3 0.6 nan 901246.3 5037714.1\n"
-        + good.format("0.8") * 2
-        + good.format("0.5")
-        + good.format("1.0")
-        + "point3 1.2\n"
-    )
-    log = open_log(write(tmp_path, "dirty.txt", text))
-    stamps = [message.stamp_ns for _, message in log.samples()]  # type: ignore[attr-defined]
-    assert stamps == [0, 800_000_000, 1_000_000_000]
-    assert log.skipped == {
-        "unreadable row": 2,
-        "position not finite": 2,
-        "time doubled": 1,
-        "time backwards": 1,
-    }
 
 
 def test_files_that_are_no_log(tmp_path: Path) -> None:
