@@ -22,13 +22,17 @@ _PLANE_95, _LINE_95 = 2.4477, 1.95996
 _START_S = 5.0
 """Left out: no filter knows speed and heading with its first fixes."""
 _SLIP_S = 1.0
-"""So long after a slip of the reference the position says nothing against it."""
+"""So long after a slip of the reference the position says nothing against it, and so long after
+it was torn nothing does."""
+_BEFORE_S = 0.3
+"""The reference's smoothed track bends so long before it slips or is torn."""
 
 
 class Consistency(NamedTuple):
     """Figures of one drive; shares are those within what states call 95 %.
 
-    `false_standstills_s` and `yaw_losses_s` are when they begin, in seconds since the first fix.
+    `false_standstills_s` and `yaw_losses_s` are when they begin, in seconds since the first fix;
+    those in `torn_s` would have counted, but the reference is no car's motion there.
     """
 
     false_standstills_s: tuple[float, ...]
@@ -42,6 +46,7 @@ class Consistency(NamedTuple):
     speed_within: float
     seconds: float
     us_per_sample: float
+    torn_s: tuple[float, ...] = ()
 
 
 def consistency_of(states: States, truth: Truth) -> Consistency:
@@ -59,20 +64,26 @@ def consistency_of(states: States, truth: Truth) -> Consistency:
     moving = np.minimum(true_speed, _lasting(true_speed, time_s)) > MOVING_MPS
     driving = true_speed > DRIVING_MPS
     calm = ~_soon_after(stamps, truth.slips)
+    whole = ~_soon_after(stamps, truth.torn)
     stands = (np.abs(speed) < STANDING_MPS) & moving
     lost = (np.degrees(turned) > WORST_YAW_DEG) & driving
+    standstills = _runs(time_s, stands & whole, longer_than_s=LONGEST_STANDSTILL_S)
+    losses = _runs(time_s, lost & whole, longer_than_s=0.0)
+    all_losses = _runs(time_s, lost, longer_than_s=0.0)
+    driving = driving & whole
     return Consistency(
-        _runs(time_s, stands, longer_than_s=LONGEST_STANDSTILL_S),
-        _runs(time_s, lost, longer_than_s=0.0),
-        _rms(faster),
+        standstills,
+        losses,
+        _rms(faster[whole]),
         _rms(away[calm]),
         float(np.percentile(away[calm], 95)),
         float(np.degrees(np.percentile(turned[driving], 95))) if driving.any() else np.nan,
         float(np.mean((away < _PLANE_95 * states.position_std_m[inside])[calm])),
         _share((turned < _LINE_95 * states.yaw_std_rad[inside])[driving]),
-        float(np.mean(np.abs(faster) < _LINE_95 * states.speed_std_mps[inside])),
+        float(np.mean((np.abs(faster) < _LINE_95 * states.speed_std_mps[inside])[whole])),
         float(time_s[-1] - time_s[0]),
         states.us_per_sample,
+        tuple(sorted(set(all_losses) - set(losses))),
     )
 
 
@@ -91,8 +102,8 @@ def _soon_after(
     latest = np.searchsorted(slips, stamps, side="right") - 1
     since = stamps - slips[np.maximum(latest, 0)]
     soon: npt.NDArray[np.bool_] = (latest >= 0) & (since < _SLIP_S * 1e9)
-    # The reference's own track bends a little before it slips.
-    return soon | (np.min(np.abs(stamps[:, None] - slips[None, :]), axis=1) < 0.3e9)
+    following = slips[np.minimum(latest + 1, len(slips) - 1)] - stamps
+    return soon | (np.abs(following) < _BEFORE_S * 1e9)
 
 
 def _runs(

@@ -128,6 +128,10 @@ def _given(data: Path) -> Iterator[RealDrive]:
             declaration=DECLARATIONS / "dresden.csv.toml",
         )
         yield _alone(name, dresden, position_std_m=1.0)
+        even = partial(
+            other_receivers.by_receivers_clock, dresden, data / "drive-dresden-imu" / file
+        )
+        yield _alone(f"{name}-own-clock", even, position_std_m=1.0)
     for trial in ("3", "4", "5", "13_c", "14_c", "15_c"):
         file_of = data / "traffic-mcity-rtk" / "gts" / f"gps_data_{trial}.json"
         yield _alone(f"mcity-{trial}", partial(other_receivers.mcity_car, file_of))

@@ -1,11 +1,12 @@
 """Other receivers of the same drives: what was recorded beside the reference, as logs.
 
-Odometry and pseudoranges of smartLoc, the u-blox receiver of comma2k19, cars at Mcity, and the
-positions of a log alone.
+Odometry and pseudoranges of smartLoc, the u-blox receiver of comma2k19, cars at Mcity, Dresden's
+logger by its receiver's clock, and the positions of a log alone.
 """
 
 from __future__ import annotations
 
+import csv
 import gzip
 import json
 from collections.abc import Callable, Iterable, Iterator
@@ -95,6 +96,35 @@ def with_ublox(pose: Callable[[], Log], segment: Path) -> Log:
     opened = pose()
     kept = [s for s in opened.samples() if s[0] in ("imu", "speed", "steering")]
     return _log(opened.info, [*fixes, *kept])
+
+
+def by_receivers_clock(log: Callable[[], Log], path: Path) -> Log:
+    """Return Dresden's log as its receiver stamped it: `time` is hhmmss and milliseconds, in UTC.
+
+    The declared clock is that of the computer that wrote the rows, which stood still and hurried
+    by up to 4.5 s against the receiver's. Its rows are even between two times; coordinates come
+    some rows after the time that they belong to, so that the declared log has those before.
+    """
+    written, epochs = list[float](), list[float]()
+    with path.open(encoding="utf-8") as text:
+        for row in csv.DictReader(text):
+            clock = int(row["time"])
+            minutes_s = 3600.0 * (clock // 10_000_000) + 60.0 * (clock // 100_000 % 100)
+            written.append(float(row["millis"]) * 1e6)
+            epochs.append(minutes_s + clock % 100_000 * 1e-3)
+    first = [k for k, time_s in enumerate(epochs) if k == 0 or time_s != epochs[k - 1]]
+    even = np.interp(np.arange(len(epochs)), first, [epochs[k] for k in first])
+    opened, start_ns = log(), round(written[0])
+    samples: list[Sample] = []
+    for channel, message in opened.samples():
+        row_at = int(np.argmin(np.abs(np.array(written) - message.stamp_ns)))
+        epoch = int(np.searchsorted(first, row_at, side="right")) - 1
+        if channel == "gnss" and epoch == 0:
+            continue
+        time_s = epochs[first[epoch - 1]] if channel == "gnss" else even[row_at]
+        stamp_ns = start_ns + round((time_s - epochs[0]) * 1e9)
+        samples.append((channel, msgspec.structs.replace(message, stamp_ns=stamp_ns)))
+    return _log(opened.info, samples)
 
 
 def mcity_car(path: Path, *, car: int = 0) -> Log:

@@ -14,7 +14,7 @@ from tests.telemetry.position_track import FRAME, info
 from tests.trust.consistency import consistency_of
 from tests.trust.drives import given_drives
 from tests.trust.states import States, states_of
-from tests.trust.truth import Truth, slips_of, smoothed, truth_of
+from tests.trust.truth import Truth, slips_of, smoothed, torn_at, truth_of
 
 STAMPS = (np.arange(0.0, 40.0, 0.2) * 1e9).astype(np.int64)
 
@@ -56,6 +56,25 @@ def test_slips_leave_the_true_speed_alone() -> None:
     assert truth.track.xy_m[5:-5] == pytest.approx(slipped[5:-5], abs=0.1)
 
 
+def test_a_reference_that_was_bridged_by_a_chord_is_torn_at_its_ends_and_a_bend_is_not() -> None:
+    clean = driven()
+    bridged = clean.copy()
+    share = np.linspace(0.0, 1.0, 12)[:, None]
+    bridged[60:72] = bridged[60] + share * (bridged[71] - bridged[60])
+    assert not torn_at(STAMPS, clean).any()
+    assert np.flatnonzero(torn_at(STAMPS, bridged)).tolist() == [59, 70]
+
+
+def test_where_the_reference_is_torn_it_says_nothing_against_a_state() -> None:
+    truth = smoothed(FRAME, STAMPS, driven(), position_std_m=0.01)
+    states = perfect(truth)
+    states.yaw_rad[120:122] += np.radians(25.0)
+    states.yaw_rad[150] += np.radians(25.0)
+    found = consistency_of(states, truth._replace(torn=STAMPS[[120]]))
+    assert found.yaw_losses_s == (pytest.approx(30.0),)
+    assert found.torn_s == (pytest.approx(24.0),)
+
+
 def test_states_that_are_true_are_found_faultless_and_others_not() -> None:
     truth = smoothed(FRAME, STAMPS, driven(), position_std_m=0.01)
     states = perfect(truth)
@@ -88,3 +107,17 @@ def test_a_survey_receivers_slips_are_found_on_a_real_drive(data_dir: Path) -> N
     off = truth.at(at, "speed_mps") - measured
     assert np.sqrt(np.mean(off**2)) < 0.3
     assert len(states_of(drive.log(), truth.frame).stamp_ns) > 1300
+
+
+@pytest.mark.real_data
+def test_by_its_receivers_clock_the_dresden_logger_drives_evenly(data_dir: Path) -> None:
+    """The computer's clock stands still and hurries: by it the car went 7 and 20 m/s at 15."""
+    speeds = {}
+    for name in ("dresden-2", "dresden-2-own-clock"):
+        drive = next(d for d in given_drives(data_dir) if d.name == name)
+        track = truth_of(drive).track
+        speeds[name] = np.ptp(track.speed_mps[20:-20])
+        samples = list(drive.log().samples())
+        assert [s[1].stamp_ns for s in samples] == sorted(s[1].stamp_ns for s in samples)
+    assert speeds["dresden-2"] > 10.0
+    assert speeds["dresden-2-own-clock"] < 3.0

@@ -25,18 +25,22 @@ _LEAST_SLIP_M = 0.08
 _CAR_MPS2 = 2.0
 """What a car's motion may differ from its neighbours' straight line: jerk and curvature."""
 JERK_DENSITY = 4.0
+_TYRES_MPS2 = 10.0
+"""No car on tyres accelerates, brakes or turns harder (1 g)."""
 
 
 class Truth(NamedTuple):
     """A car's motion in a frame at N stamps; `slip_m` (N, 2) is what the receiver has slipped.
 
     `track.xy_m` holds the slips. Headings come from the course; `moving` (N,) tells where it says
-    something. `still_reference_s` (K,) are the seconds since the start of each slip.
+    something. `torn` (K,) are the stamps at which the reference, without its slips, still moves as
+    no car can: there it was bridged or joined, and says nothing of heading and speed.
     """
 
     frame: LocalFrame
     track: SmoothedTrack
     slip_m: Array
+    torn: npt.NDArray[np.int64]
 
     def at(self, stamp_ns: npt.NDArray[np.int64], name: str) -> Array:
         """Return a field of the track, interpolated at (M,) stamps; positions are (M, 2)."""
@@ -85,7 +89,24 @@ def smoothed(
     track = smooth_positions(
         stamp_ns, xy_m - slip, position_std_m=position_std_m, jerk_density=JERK_DENSITY
     )
-    return Truth(frame, track._replace(xy_m=track.xy_m + slip), slip)
+    torn = torn_at(stamp_ns, xy_m - slip)
+    return Truth(frame, track._replace(xy_m=track.xy_m + slip), slip, stamp_ns[1:-1][torn])
+
+
+def torn_at(stamp_ns: npt.NDArray[np.int64], xy_m: Array) -> npt.NDArray[np.bool_]:
+    """Return (N - 2,) at which of N positions but first and last tyres could not hold the car.
+
+    Steps across a gap are bridges, not courses; of white noise as the positions' own third
+    differences have it five deviations are allowed for.
+    """
+    step_s = np.diff(stamp_ns) * 1e-9
+    between_s = 0.5 * (step_s[1:] + step_s[:-1])
+    accel = np.diff(np.diff(xy_m, axis=0) / step_s[:, None], axis=0) / between_s[:, None]
+    # Third differences of white noise have 20 times its variance; 0.6745 is a normal's median.
+    jolt = np.diff(accel, axis=0) * np.mean(between_s) ** 2
+    noise_m = np.median(np.abs(jolt)) / (0.6745 * np.sqrt(20.0)) if len(jolt) else 0.0
+    allowed = _TYRES_MPS2 + 5.0 * np.sqrt(6.0) * noise_m / between_s**2
+    return np.asarray(np.hypot(*accel.T) > allowed)
 
 
 def slips_of(stamp_ns: npt.NDArray[np.int64], xy_m: Array, *, position_std_m: float) -> Array:
