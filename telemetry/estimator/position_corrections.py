@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
+from foretwin.telemetry.estimator.facing import BACKING_MPS, CREEPING_MPS, Facing
 from foretwin.telemetry.estimator.innovations import PLANE_95, PositionInnovation, SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.map_aid import MapAid
@@ -52,12 +53,6 @@ _STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2 = 0.1, 1.0
 _ASTRAY = 3
 """So many fixes in a row that agree neither with it nor with each other: the filter is lost."""
 _PASSED_ON_M = 0.05
-_CREEPING_MPS, _BACKING_MPS, _BACKED_M = 1.0, 0.3, 0.3
-_TURNED_RAD, _BACKWARDS_RAD = 1.75, 2.5
-"""No car turns by the first within a metre: its heading was wrong; from the second on it backs."""
-_KNOWN_YAW_VAR = 0.15**2
-_FASTEST_REVERSE_MPS, _LONGEST_REVERSE_M = 3.0, 15.0
-"""A car that positions show going faster or farther backwards was facing that way. Chosen."""
 
 
 class Corrected(NamedTuple):
@@ -90,9 +85,9 @@ class PositionCorrections:
         self.noise = PositionNoise()
         self._doubted: tuple[_Doubted, ...] = ()
         """The latest fixes in a row that were held back."""
-        self._reversed_m = 0.0
         self._usual = 1.0
         self._surprises = surprises
+        self._facing = Facing(gate)
         self.slips = 0
         """How often the receiver has slipped."""
 
@@ -103,6 +98,7 @@ class PositionCorrections:
         other = shallow_copy(self)
         other._measured, other._gate = measured, gate
         other.noise, other._surprises = self.noise.copy(), surprises
+        other._facing = self._facing.copy(gate)
         return other
 
     @property
@@ -140,6 +136,8 @@ class PositionCorrections:
         impossible = _IMPOSSIBLE if alone else _UNBELIEVABLE * usual
         least_m = max(_LEAST_SLIP_M, turned_m(self._gate.recent) if alone else 0.0)
         astray = square > impossible and innovation.away_m > least_m
+        if alone and not wander and square > PLANE_95 and innovation.away_m > _LEAST_SLIP_M:
+            astray = astray or self._facing.goes_sideways(white)
         if astray or (self._doubted and self._slipped(innovation, white, standing=standing)):
             held = self._doubt(filter_, fix, xy_m, innovation, standing=standing)
             if held is not None:
@@ -151,7 +149,7 @@ class PositionCorrections:
         self._expect(filter_, square, white, alone=alone)
         yaw_before = filter_.mean[YAW]
         if (
-            abs(filter_.mean[SPEED]) < _CREEPING_MPS
+            abs(filter_.mean[SPEED]) < CREEPING_MPS
             and not wander
             and drift_sideways(filter_, xy_m, std, self._lever)
         ):
@@ -161,13 +159,14 @@ class PositionCorrections:
             noise = math.sqrt(white * white + (doubt - 1.0) * innovation.variance_m2(white))
         filter_.correct_position(innovation, noise, hold_yaw=wheels and standing)
         limit_turn(filter_, yaw_before, moved_m=self._gate.last_step_m)
+        self._facing.take(filter_)
         if wander:
             aid.watch(filter_, receiver_std_m=std)
         if not wheels:
-            stood, standing = standing, self._gate.standing(white)
-            standing = standing and abs(filter_.mean[SPEED]) < _CREEPING_MPS / 2.0
+            stood, standing = standing, self._gate.standing(self.noise.still_std_m(fix))
+            standing = standing and abs(filter_.mean[SPEED]) < CREEPING_MPS / 2.0
             if stood and not standing:
-                filter_.doubt_motion(_CREEPING_MPS, _MISJUDGED_MPS2, 0.0)
+                filter_.doubt_motion(CREEPING_MPS, _MISJUDGED_MPS2, 0.0)
             if standing:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
@@ -178,7 +177,7 @@ class PositionCorrections:
             return Corrected(standing)
         if not self._alone(fix):
             return Corrected(standing)
-        return Corrected(standing, self._turned(filter_, yaw_before, std))
+        return Corrected(standing, self._facing.turned(filter_, yaw_before, std))
 
     def move(self, filter_: KinematicFilter, fix: GnssFix, xy_m: Array) -> None:
         """Put the place where the fix says, and leave the motion: the receiver has jumped."""
@@ -242,13 +241,13 @@ class PositionCorrections:
             cos, sin = math.cos(filter_.mean[YAW]), math.sin(filter_.mean[YAW])
             along = cos * moved[0] + sin * moved[1]
             ahead = abs(along) > abs(cos * moved[1] - sin * moved[0])
-            can = abs(along) / step_s < _CREEPING_MPS + _MOST_MPS2 * (step_s + _SINCE_S)
+            can = abs(along) / step_s < CREEPING_MPS + _MOST_MPS2 * (step_s + _SINCE_S)
             if not alike and ahead and can and self._alone(fix):
                 # The car goes on along its heading, faster or slower than was thought.
                 self._gate.begin_anew(tuple(one.fix for one in self._doubted))
                 filter_.doubt_motion(abs(along) / step_s, _MISJUDGED_MPS2, step_s)
-                if filter_.mean[SPEED] + along / step_s < -_BACKING_MPS:
-                    self._reverse(filter_, along / step_s)
+                if filter_.mean[SPEED] + along / step_s < -BACKING_MPS:
+                    self._facing.reverse(filter_, along / step_s)
                 return None
         lasts_s = now.fix.time_s - self._doubted[0].fix.time_s
         if len(self._doubted) < _ASTRAY or (lasts_s < _LOST_S and self._erratic(fix)):
@@ -256,8 +255,7 @@ class PositionCorrections:
             return Corrected(standing)
         self._gate.begin_anew(tuple(one.fix for one in self._doubted), after_s=_SHORTLY_S)
         self.move(filter_, fix, xy_m)
-        far_m = _BACKED_M + 10.0 * self.noise.std_m(fix)
-        return Corrected(standing, self._gate.course(far_m, within_s=3.0))
+        return Corrected(standing, self._facing.backed_course(2.0 * self.noise.std_m(fix)))
 
     def _erratic(self, fix: GnssFix) -> bool:
         """Whether no car can go through the latest three fixes that were held back."""
@@ -266,33 +264,6 @@ class PositionCorrections:
         bend = three.xy_m - two.xy_m - (two.xy_m - one.xy_m) * (after_s / before_s)
         allowed_m = 0.5 * _MOST_MPS2 * after_s * (before_s + after_s)
         return math.hypot(*bend) > allowed_m + 4.0 * self.noise.white_std_m(fix)
-
-    def _turned(self, filter_: KinematicFilter, yaw_before: float, std_m: float) -> float | None:
-        """Return the course to begin anew along where positions alone go against the heading."""
-        speed_mps = float(filter_.mean[SPEED])
-        if filter_.may_reverse:
-            self._reversed_m += self._gate.last_step_m
-            if speed_mps > 0.5 * _CREEPING_MPS:
-                filter_.may_reverse = False
-            elif speed_mps < -_FASTEST_REVERSE_MPS or self._reversed_m > _LONGEST_REVERSE_M:
-                return self._gate.course(1.0 + 5.0 * std_m, within_s=3.0)
-            return None
-        known = filter_.covariance[YAW, YAW] < _KNOWN_YAW_VAR
-        course = self._gate.course((_BACKED_M if known else 1.0) + 5.0 * std_m, within_s=3.0)
-        if course is None:
-            return None
-        turned = abs(math.remainder(course - yaw_before, math.tau))
-        if known and turned > _BACKWARDS_RAD and speed_mps < _BACKING_MPS:
-            self._reverse(filter_, -self._gate.speed_mps())
-            return None
-        course = self._gate.course(1.0 + 5.0 * std_m, within_s=3.0)
-        if course is None or abs(math.remainder(course - yaw_before, math.tau)) <= _TURNED_RAD:
-            return None
-        return course
-
-    def _reverse(self, filter_: KinematicFilter, speed_mps: float) -> None:
-        self._reversed_m = 0.0
-        filter_.reverse(speed_mps)
 
     def _alone(self, fix: GnssFix) -> bool:
         """Whether nothing but positions tells of the direction."""

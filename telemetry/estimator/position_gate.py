@@ -22,6 +22,8 @@ shows in the fixes before."""
 _LONGEST_FROZEN_S = 3.0
 _CREEPING_MPS = 0.5
 _STANDING_MPS = 0.06
+_STEP_DEVIATIONS = 4.0
+"""Two fixes of a car that stands lie farther apart once in fifty times."""
 
 Verdict = Literal["use", "relocate", "skip"]
 
@@ -156,7 +158,10 @@ class PositionGate:
             self.recent.popleft()
 
     def standing(self, std_m: float) -> bool:
-        """Return whether the last fixes show nothing but jitter of `std_m` about one point."""
+        """Return whether the last fixes show nothing but jitter of `std_m` about one point.
+
+        Where they are rare the newest may show alone that the car has begun to roll.
+        """
         last: list[LocalFix] = []
         for fix in reversed(self.recent):
             last.append(fix)
@@ -164,6 +169,9 @@ class PositionGate:
             if span_s >= _STANDING_S and len(last) >= _STANDING_FIXES:
                 break
         else:
+            return False
+        step_s = last[0].time_s - last[1].time_s
+        if self.last_step_m > _STANDING_MPS * step_s + _STEP_DEVIATIONS * std_m:
             return False
         # Point by point: of a handful numpy takes five times as long.
         points = [(float(fix.xy_m[0]), float(fix.xy_m[1])) for fix in last]

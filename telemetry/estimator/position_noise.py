@@ -52,6 +52,7 @@ class PositionNoise:
         self._rough: tuple[float, ...] = ()
         self._jerked_m = 0.0
         self._surprises: tuple[float, ...] = ()
+        self._still: tuple[float, ...] = ()
         self._seen_m: float | None = None
         """The white noise that was seen; None before there is enough of it."""
 
@@ -72,7 +73,11 @@ class PositionNoise:
         span_s = last.time_s - first.time_s
         way_m = math.hypot(last.x_m - first.x_m, last.y_m - first.y_m)
         weights = _beyond_quadratic(*(one.time_s for one in self._last))
-        if way_m < _MOVING_MPS * span_s or weights is None:
+        if weights is None:
+            return
+        if way_m < _MOVING_MPS * span_s:
+            still = math.hypot(last.x_m - self._last[-2].x_m, last.y_m - self._last[-2].y_m)
+            self._still = (*self._still[1 - _LATEST :], still)
             return
         self._jerked_m = _JERK_MPS3 * (span_s / 3.0) ** 3 / math.sqrt(20.0)
         for off in (
@@ -106,6 +111,16 @@ class PositionNoise:
             return UNKNOWN_STD_M if self._seen_m is None else max(self._seen_m, LEAST_STD_M)
         stated = min(max(fix.std_m, 1e-3), 1e4)
         return max(stated, self._seen_beyond(stated))
+
+    def still_std_m(self, fix: GnssFix) -> float:
+        """Return how far its fixes jitter about a car that stands, as they have done lately.
+
+        That is less than they err on the move, and what they did there says nothing of it.
+        """
+        white = self.white_std_m(fix)
+        if len(self._still) < _LEAST_SEEN:
+            return white
+        return min(max(_middle(self._still), LEAST_STD_M), white)
 
     def white_std_m(self, fix: GnssFix) -> float:
         """Return what of it changes from fix to fix."""

@@ -72,3 +72,13 @@ def test_a_standing_car_teaches_nothing_and_a_copy_goes_on_by_itself() -> None:
     for k in range(40):
         other.take(30.0 + 0.2 * k, np.array([2.0 * k, 0.0]))
     assert other.std_m(fix()) < noise.std_m(fix()) == before
+
+
+def test_a_car_that_stands_shows_the_jitter_of_fixes_that_were_rough_on_the_move() -> None:
+    noise, random = driven(0.5), np.random.default_rng(4)
+    rough = noise.still_std_m(fix())
+    assert rough == noise.white_std_m(fix())
+    for k in range(14):
+        noise.take(12.0 + 0.2 * k, np.array([9.0, 0.0]) + random.normal(0.0, 0.02, 2))
+    assert noise.still_std_m(fix()) == pytest.approx(0.03, abs=0.02)
+    assert noise.white_std_m(fix()) > 0.2, "on the move it is as rough as it was"
