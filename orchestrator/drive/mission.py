@@ -188,7 +188,7 @@ class Mission:
             world_id=visit.world.id,
             path=path,
             cruise_speed_mps=self.way.cruise_speed_mps,
-            speed_ahead_mps=self.way.speeds_ahead(path, horizon_s=self._settings.horizon_s),
+            speed_ahead_mps=self.way.speeds_ahead(horizon_s=self._settings.horizon_s),
             off_lanes_m=self.way.off_lanes_m,
             next_junction=next(
                 ((a.junction.summary.control, a.distance_m) for a in self.way.junctions), None

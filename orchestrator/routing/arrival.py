@@ -1,14 +1,9 @@
 """When the car will be at the junctions ahead.
 
-For `FORESEEN_S` the present acceleration fades while the speed is drawn towards the driver's usual
-one, and bends that are known are braked for; from there on the road takes as long as at the usual
-speed. A car that stands is taken to set off now: nobody knows when it will, so what is shown says
-that it waits. Stops at the junctions on the way are not foreseen, so predictions far ahead tend to
-be early, which is the safe side for building worlds.
-
-Chosen on drives through Chemnitz and Boulder along drawn roads (tests/trust/drawn_road.py): 10 s
-before 234 arrivals without a stop the median error fell from 2.3 to 0.7 s, the 95th percentile from
-7.3 to 2.7 s. The law was an easing from the present speed to the usual one before.
+For `FORESEEN_S` the driver goes on as `going_on.py` has it, and is not held up; from there on the
+road takes as long as at the usual speed. A car that stands is taken to set off now: nobody knows
+when it will, so what is shown says that it waits. Stops at the junctions on the way are not
+foreseen, so predictions far ahead tend to be early, which is the safe side for building worlds.
 """
 
 from __future__ import annotations
@@ -19,20 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.orchestrator.routing.going_on import (
+    LEARN_FASTER_S,
+    LEARN_SLOWER_S,
+    UNHINDERED_S,
+    USUAL_SHARE,
+    fading_s,
+    going_on_mps2,
+)
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.route import Route
 from foretwin.sim_worker.driver_model import CURVE_TIME_S
 from foretwin.world_gen.junctions.intersections import Junction
 
-USUAL_SHARE = 0.75
-"""Of the speed limit: what is driven in towns, before the driver has shown a share of their own.
-Who has driven less was held up, and will be so less often than not."""
-LEARNING_S = 40.0
 FORESEEN_S = 20.0
-GAINING_S, BRAKING_S = 3.0, 1.5
-"""In which a present acceleration, or deceleration, fades by 1/e."""
-EASING_S = 6.0
-"""Time constant with which the usual speed is come back to."""
 SETTLING_S = 1.0
 """Time constant with which what is shown follows what is expected."""
 _STEP_S = 0.2
@@ -67,7 +62,7 @@ STRAIGHT = BendSpeeds(0.0, ())
 
 
 class DrivingPace:
-    """Learns which share of the speed limit the driver drives at while moving."""
+    """Learns which share of the speed limit the driver drives at when nothing is in the way."""
 
     def __init__(self) -> None:
         self.share = USUAL_SHARE
@@ -81,8 +76,9 @@ class DrivingPace:
         if before is None or speed_mps < _MOVING_MPS or speed_limit_mps <= 0.0:
             return
         elapsed_s = min(max((stamp_ns - before) / 1e9, 0.0), 1.0)
-        weight = 1.0 - math.exp(-elapsed_s / LEARNING_S)
-        self.share += weight * (min(speed_mps / speed_limit_mps, 1.5) - self.share)
+        more = min(speed_mps / speed_limit_mps, 1.5) - self.share
+        within_s = LEARN_FASTER_S if more > 0.0 else LEARN_SLOWER_S
+        self.share += more * -math.expm1(-elapsed_s / within_s)
 
     def seconds_to(
         self,
@@ -95,22 +91,25 @@ class DrivingPace:
     ) -> list[float]:
         """Return the expected seconds from a position of the route to later ones, in order."""
         limits = np.array([directed.edge.speed_limit_mps.value for directed in route.edges])
-        usual = np.maximum(max(self.share, USUAL_SHARE) * limits, _LEAST_SPEED_MPS)
+        usual = np.maximum(self.share * limits, _LEAST_SPEED_MPS)
         ends, speeds = route.start_m[1:].tolist(), usual.tolist()
         edge = min(int(np.searchsorted(route.start_m[1:], from_m, side="right")), len(ends) - 1)
         found: list[float] = []
         todo = iter(places_m)
         place = next(todo, None)
         s_m, speed, time_s = from_m, self.speed_mps, 0.0
-        fading_s = GAINING_S if acceleration_mps2 > 0.0 else BRAKING_S
+        fades_s = fading_s(acceleration_mps2)
         while place is not None and time_s < FORESEEN_S:
             while edge < len(ends) - 1 and s_m >= ends[edge]:
                 edge += 1
-            present = math.exp(-(time_s + _STEP_S / 2.0) / fading_s)
-            accel = (
-                acceleration_mps2 * present + (1.0 - present) * (speeds[edge] - speed) / EASING_S
+            accel = going_on_mps2(
+                speed,
+                acceleration_mps2,
+                math.exp(-(time_s + _STEP_S / 2.0) / fades_s),
+                wanted_mps=speeds[edge],
+                within_s=UNHINDERED_S,
+                bend_mps=bends.at(s_m + CURVE_TIME_S * speed),
             )
-            accel = min(accel, (bends.at(s_m + CURVE_TIME_S * speed) - speed) / CURVE_TIME_S)
             faster = max(speed + _STEP_S * accel, _CREEPING_MPS)
             mean_mps = (speed + faster) / 2.0
             while place is not None and place <= s_m + _STEP_S * mean_mps:

@@ -24,6 +24,7 @@ from foretwin.orchestrator.routing.arrival import (
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
 from foretwin.orchestrator.routing.driven_speeds import DrivenSpeeds
 from foretwin.orchestrator.routing.driving_path import SPACING_M, driving_path
+from foretwin.orchestrator.routing.going_on import stands
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
 from foretwin.orchestrator.routing.lane_chain import LaneGuide
 from foretwin.orchestrator.routing.map_matching import MapMatcher, Match, OffRoadStretch
@@ -31,7 +32,7 @@ from foretwin.orchestrator.routing.road_index import RoadIndex, legality
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import PlaceOnRoute, RouteFollower, RouteProgress
-from foretwin.orchestrator.routing.speed_ahead import bend_speeds, speeds_ahead, stands
+from foretwin.orchestrator.routing.speed_ahead import WaySpeeds, speeds_ahead, way_speeds
 from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
@@ -65,16 +66,15 @@ class WayAhead:
         self._pace = DrivingPace()
         self._cruise = CruiseSpeed()
         self._earlier = DrivenSpeeds(tracks, graph.frame) if tracks else None
-        self._driven_mps: Array | None = None
-        """Of earlier drives, at the points of the latest round's path."""
         self._given = bool(routes)
         self._match: Match | None = None
         self._progress: RouteProgress | None = None
         self._xy_m: Array = np.zeros(2)
         self._stamp_ns = 0
         self._lanes: WorldLanes | None = None
-        self._bends: BendSpeeds = STRAIGHT
+        self._speeds: WaySpeeds | None = None
         """Of the latest round's path, until the next one."""
+        self._bends: BendSpeeds = STRAIGHT
         self._countdown = Countdown()
         self.off_lanes_m = 0.0
         """So much of the latest path is driven in its World along none of its lanes."""
@@ -182,15 +182,16 @@ class WayAhead:
         return self._countdown.in_s
 
     @traced("speeds of a round")
-    def speeds_ahead(self, path: PathAhead, *, horizon_s: float) -> Array:
-        """Return (K,) what the nominal future is to drive along a path, from instant to instant."""
+    def speeds_ahead(self, *, horizon_s: float) -> Array:
+        """Return (K,) what the nominal future is to drive along the latest path, from instant to
+        instant."""
+        assert self._speeds is not None
         return speeds_ahead(
-            path,
+            self._speeds,
             speed_mps=self._cruise.speed_mps,
             acceleration_mps2=self._cruise.acceleration_mps2,
             usual_share=self._pace.share,
             horizon_s=horizon_s,
-            driven_mps=self._driven_mps,
         )
 
     @property
@@ -227,9 +228,11 @@ class WayAhead:
         off_lanes = inside(world, xy) & guide.without_lanes(geometry.s_m)
         self.off_lanes_m = SPACING_M * int(np.count_nonzero(off_lanes))
         path = PathAhead(xy_m=xy, speed_limit_mps=geometry.speed_limit_mps)
-        self._bends = BendSpeeds(self.s_m, bend_speeds(path))
+        driven_mps = None
         if self._earlier is not None:
-            self._driven_mps = self._earlier.along(
+            driven_mps = self._earlier.along(
                 geometry.xy_m, stamp_ns=self._stamp_ns, car_xy_m=self._xy_m
             )
+        self._speeds = way_speeds(path, driven_mps)
+        self._bends = BendSpeeds(self.s_m, self._speeds.bend_mps)
         return path

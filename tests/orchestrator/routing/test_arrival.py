@@ -8,14 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.orchestrator.routing.arrival import (
-    EASING_S,
-    USUAL_SHARE,
     Arrival,
     BendSpeeds,
     Countdown,
     DrivingPace,
     predict_arrivals,
 )
+from foretwin.orchestrator.routing.going_on import UNHINDERED_S, USUAL_SHARE
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.roads.road_graph import DirectedEdge
@@ -54,11 +53,17 @@ def test_a_driver_who_is_faster_than_usual_arrives_earlier() -> None:
 
 
 def test_who_was_held_up_is_expected_to_drive_as_usual_again() -> None:
-    slow = pace_at(5.0, seconds=200)
+    slow = pace_at(5.0, seconds=20)
     (in_s,) = seconds(slow, 900.0)
 
-    assert slow.share == pytest.approx(5.0 / LIMIT_MPS, abs=0.01)
-    assert 900.0 / USUAL_MPS < in_s < 900.0 / USUAL_MPS + 2.0 * EASING_S
+    assert 900.0 / USUAL_MPS < in_s < 900.0 / (0.95 * USUAL_MPS) + 2.0 * UNHINDERED_S
+
+
+def test_who_drives_slowly_for_long_is_believed() -> None:
+    slow = pace_at(5.0, seconds=900)
+
+    assert slow.share == pytest.approx(5.0 / LIMIT_MPS, abs=0.02)
+    assert seconds(slow, 900.0) == pytest.approx([900.0 / 5.0], rel=0.05)
 
 
 def test_a_car_that_brakes_comes_later_and_one_that_gains_earlier() -> None:
@@ -81,7 +86,7 @@ def test_bends_that_are_known_take_their_time() -> None:
 def test_a_standing_car_is_taken_to_set_off() -> None:
     (in_s,) = seconds(pace_at(0.0), 600.0)
 
-    assert 600.0 / USUAL_MPS + EASING_S < in_s < 600.0 / USUAL_MPS + 2.0 * EASING_S
+    assert 600.0 / USUAL_MPS + UNHINDERED_S < in_s < 600.0 / USUAL_MPS + 2.0 * UNHINDERED_S
 
 
 def test_creeping_below_and_above_the_speed_of_standing_hardly_differ() -> None:

@@ -183,7 +183,7 @@ def test_with_tracks_the_nominal_speed_heeds_how_the_road_was_driven() -> None:
             way.locate(state)
         path = way.path(EMPTY, speed_mps=10.0, horizon_s=8.0)
         assert path is not None
-        return np.asarray(way.speeds_ahead(path, horizon_s=8.0))
+        return np.asarray(way.speeds_ahead(horizon_s=8.0))
 
     assert speeds()[-1] > 9.5
     assert 5.0 < speeds(earlier)[-1] < 7.5
