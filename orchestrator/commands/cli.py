@@ -18,9 +18,12 @@ from foretwin.orchestrator.commands.cli_options import (
     DialectOption,
     EndpointOption,
     InsecureOption,
+    KeepOption,
     LeastFuturesOption,
+    MapAidingOption,
     MapArgument,
     OutOption,
+    ProgressTableOption,
     SecureOption,
     ServiceRoadsOption,
     TracksOption,
@@ -91,16 +94,13 @@ def drive(
     seed: Annotated[int | None, typer.Option(help="seed of the futures [default: 0]")] = None,
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
     tuning: TuningOption = None,
-    map_aiding: Annotated[
-        str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
-    ] = None,
+    progress_table: ProgressTableOption = None,
+    map_aiding: MapAidingOption = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
-    keep: Annotated[
-        str | None, typer.Option(help="the newest of a run that stay, such as 12h or 20GB")
-    ] = None,
+    keep: KeepOption = None,
     endpoint: EndpointOption = None,
     insecure: InsecureOption = False,
     trace: Annotated[

@@ -37,11 +37,24 @@ LeastFuturesOption = Annotated[
         "as many as --futures holds them fixed [default: a quarter]"
     ),
 ]
+KeepOption = Annotated[
+    str | None, typer.Option(help="the newest of a run that stay, such as 12h or 20GB")
+]
+MapAidingOption = Annotated[
+    str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
+]
 TuningOption = Annotated[
     str | None,
     typer.Option(
         help="parameters from the driving: off, report, apply [default: report; off where "
         "there are fewer processors than workers]"
+    ),
+]
+ProgressTableOption = Annotated[
+    str | None,
+    typer.Option(
+        help="how far the car will get: a table of foretwin learn-progress, or off "
+        "[default: the shipped one]"
     ),
 ]
 EndpointOption = Annotated[

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import zipfile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -94,8 +94,7 @@ def write_trees(table: QuantileTrees, file: Path) -> None:
 def read_trees(file: Path) -> QuantileTrees:
     """Read a table; raises UserError, naming the file, for one that cannot be used."""
     try:
-        with file.open("rb") as data, np.load(data, allow_pickle=False) as told:
-            found: dict[str, Any] = {name: told[name] for name in told.files}
+        found = _columns(file)
         version = int(found.pop("version"))
         if version != TABLE_VERSION:
             raise ValueError(f"version {version}; this foretwin reads version {TABLE_VERSION}")
@@ -106,6 +105,31 @@ def read_trees(file: Path) -> QuantileTrees:
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError) as error:
         raise UserError(f"{file}: no table of progress: {error}") from error
     return table
+
+
+def _columns(file: Path) -> dict[str, Any]:
+    """Return the columns in a table's file; raises ValueError for any other file.
+
+    numpy would offer to unpickle a file that it does not know, which runs what is in it.
+    """
+    with file.open("rb") as data:
+        if not zipfile.is_zipfile(data):
+            raise ValueError("a table is what foretwin learn-progress --out FILE.npz writes")
+        data.seek(0)
+        with zipfile.ZipFile(data) as archive:
+            found = {}
+            for name in archive.namelist():
+                with archive.open(name) as column:
+                    found[name.removesuffix(".npy")] = _column(column)
+    return found
+
+
+def _column(file: IO[bytes]) -> Any:
+    """Return one column of numbers or texts; raises ValueError for objects, and for no column."""
+    try:
+        return np.lib.format.read_array(file, allow_pickle=False)
+    except ValueError as error:
+        raise ValueError("it holds something else than columns of numbers and texts") from error
 
 
 def _check(table: QuantileTrees) -> None:

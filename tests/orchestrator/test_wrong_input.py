@@ -101,6 +101,14 @@ def test_a_vehicle_file_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixtu
     refused(["--vehicle", str(file)], "car.toml", tmp_path, capsys)
 
 
+@pytest.mark.parametrize("name", ["missing.npz", "town.gpx"])
+def test_a_progress_table_that_is_none(
+    name: str, tmp_path: Path, town_log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = str(town_log.parent / name)
+    refused(["--progress-table", table], f"{table}: no table of progress", tmp_path, capsys)
+
+
 def test_a_window_without_positions(
     tmp_path: Path, town_log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import pickle
+import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from foretwin.contracts.drive import VehicleState
@@ -91,6 +94,39 @@ def test_mistakes_are_one_line(
     assert run(["learn-progress", *(log if a == "LOG" else a for a in arguments)]) == EXIT_USER
     told = capsys.readouterr().err
     assert said in told.replace("\n", " ")
+
+
+def no_table(kind: str, file: Path) -> None:
+    """A file that is no table: a text, objects that numpy would have to unpickle, or a zip."""
+    objects = np.array([{"a": 1}], dtype=object)
+    if kind == "text":
+        file.write_text("no table\n")
+    elif kind == "pickle":
+        file.write_bytes(pickle.dumps({"version": 1}))
+    elif kind == "array of objects":
+        with file.open("wb") as data:
+            np.save(data, objects)
+    elif kind == "objects":
+        with file.open("wb") as data:
+            np.savez(data, version=objects)
+    else:
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("readme.txt", "no columns")
+
+
+@pytest.mark.parametrize("kind", ["text", "pickle", "array of objects", "objects", "zip"])
+def test_a_file_that_is_no_table_is_refused_without_a_word_of_unpickling(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.npz"
+    no_table(kind, file)
+    log = str(logs(tmp_path, minutes=0.5)[0])
+
+    assert run(["learn-progress", "--check", log, "--table", str(file)]) == EXIT_USER
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert f"{file}: no table of progress: " in told
+    assert "pickle" not in told
 
 
 def test_the_shipped_table_says_whose_drives_it_was_learnt_from() -> None:
