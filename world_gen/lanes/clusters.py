@@ -22,6 +22,7 @@ from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.cross_section import cross_section, widened
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, country_of, side_of
@@ -103,6 +104,7 @@ def surroundings(
         near = (*(graph.edges[i] for i in junction.inner), *legs)
         wanted.update(edge.index for edge in near if edge.drivable)
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
+    edges.update(ring_curves(edges))
     edges.update(moved)
     sections = _sections(index, edges)
     sections |= {i: widened(sections[i], factor) for i, factor in widths.items()}
