@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
+from foretwin.geometry.polyline import Flags
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_curves import LaneSet
 from foretwin.world_gen.polygon_areas import cut_out, lines_of
@@ -56,10 +57,12 @@ def _road_edges(
     lines = lines_of([line for road in lanes.roads for line in lanes.edges[road.id]])
     road = np.repeat(np.arange(len(lanes.roads)), 2)
     row, piece = tree.query(lines)
-    place_row = {c.key: len(paved.roads) + k for k, c in enumerate(paved.place_of)}
+    first = len(paved.roads)
+    place_row = {c.key: first + k for k, c in enumerate(paved.place_of) if not c.ring}
     ends = [(r.from_place or "", r.to_place or "") for r in lanes.roads]
     own = np.array([[place_row.get(key, -1) for key in pair] for pair in ends])[road[row]]
-    # A road's edge ends where its own places begin: nothing of it lies inside.
+    # A road's edge ends where its own places begin: nothing of it lies inside. In a ring what is
+    # swept into the next road reaches beyond the mouth of the ring's own.
     wanted = (road[row] != piece) & (own != piece[:, None]).all(axis=1)
     wanted &= layer[road[row]] == layer[piece]
     row, piece = row[wanted], piece[wanted]
@@ -75,16 +78,35 @@ def _place_borders(paved: Paved, tree: shapely.STRtree, layer: Array) -> list[sh
         return []
     rings, owner = shapely.get_rings(paved.places, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
+    of = len(paved.roads) + owner
     inside = ring[1:] == ring[:-1]
-    a, b = points[:-1][inside], points[1:][inside]
-    mine = len(paved.roads) + owner[ring[1:][inside]]
-    middle = (a + b) / 2
-    row, piece = tree.query(shapely.box(*(middle - OVERLAP_M).T, *(middle + OVERLAP_M).T))
+    a, b, mine = points[:-1][inside], points[1:][inside], of[ring[1:][inside]]
+    covered = _covered(points, of[ring], tree, layer)
+    ends = covered[:-1][inside] + 0 + covered[1:][inside]
+    middle = _covered((a + b) / 2, mine, tree, layer)
+    partly = (ends + middle > 0) & (ends + middle < 3)
+    segments = shapely.linestrings(np.stack([a, b], axis=1))
+    kerb, of_kerb = segments[ends + middle == 0], mine[ends + middle == 0]
+    pieces, row = shapely.get_coordinates(
+        shapely.segmentize(segments[partly], SHORTEST_M), return_index=True
+    )
+    same = row[1:] == row[:-1]
+    pairs, of_pair = np.stack([pieces[:-1], pieces[1:]], axis=1)[same], mine[partly][row[1:][same]]
+    free = ~_covered(pairs.mean(axis=1), of_pair, tree, layer)
+    segments = np.concatenate([kerb, shapely.linestrings(pairs[free])])
+    used, indices = np.unique(np.concatenate([of_kerb, of_pair[free]]), return_inverse=True)
+    order = np.argsort(indices, kind="stable")
+    if not len(used):
+        return []
+    return list(shapely.multilinestrings(segments[order], indices=indices[order]))
+
+
+def _covered(points: Array, mine: Indices, tree: shapely.STRtree, layer: Array) -> Flags:
+    """Return whether another piece than its own, of its level, lies at each point (N, 2)."""
+    row, piece = tree.query(shapely.box(*(points - OVERLAP_M).T, *(points + OVERLAP_M).T))
     other = (mine[row] != piece) & (layer[mine[row]] == layer[piece])
     row, piece = row[other], piece[other]
-    near = shapely.dwithin(shapely.points(middle[row]), tree.geometries[piece], OVERLAP_M)
-    open_ = np.ones(len(a), dtype=bool)
-    open_[row[near]] = False
-    segments = shapely.linestrings(np.stack([a, b], axis=1)[open_])
-    used, indices = np.unique(mine[open_], return_inverse=True)
-    return list(shapely.multilinestrings(segments, indices=indices)) if len(used) else []
+    near = shapely.dwithin(shapely.points(points[row]), tree.geometries[piece], OVERLAP_M)
+    found = np.zeros(len(points), dtype=bool)
+    found[row[near]] = True
+    return found

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import shapely
 
+import foretwin
 from foretwin.contracts.world import World
 from tests.world_gen.drawn_maps import CROSS, STREET, crossing, drawn_map, roundabout, world_of
 
@@ -43,3 +46,13 @@ def test_a_bridge_and_the_road_below_it_keep_their_kerbs():
     )
     under = kerbs(world_of(below)).intersection(shapely.box(46.0, -4.0, 54.0, 4.0))
     assert under.length == pytest.approx(4 * 8.0, abs=0.01)  # two edges of each road go through
+
+
+@pytest.mark.real_data
+def test_no_kerb_of_a_real_ring_stands_within_the_paved_ground(data_dir: Path):
+    town = foretwin.open_map(data_dir / "osm-badhersfeld/badhersfeld.osm.xml.gz")
+    world = town.world("n1900410660")  # roads of its arms meet the ring between two mouths
+    edge = paved(world).boundary
+    assert kerbs(world).difference(edge.buffer(0.15)).length < 0.1
+    # But for where roads end: beside the stretches of a ring as beside those that lead into it.
+    assert edge.difference(kerbs(world).buffer(0.15)).length < 40.0
