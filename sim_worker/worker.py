@@ -31,9 +31,9 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.futures.future_rows import future_rows, rows_as_bytes
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.futures.world_places import places_in
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
-from foretwin.sim_worker.scenarios.world_places import places_in
 from foretwin.sim_worker.world_file import load_world
 
 _IDLE_S = 0.2

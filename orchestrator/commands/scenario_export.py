@@ -11,12 +11,12 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, asked_junctions
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.planners.registry import check_planner
-from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import EXPORT_MARK, write_openscenario
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.map_index import index_map
@@ -92,7 +92,7 @@ def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
 
 
 def placed_case(request: CaseRequest) -> PlacedCase:
-    """Return a case at the first place of a junction where it can be cast."""
+    """Return a case at the first place of a junction where it can be played."""
     scenario = find_scenario(request.scenario)
     cases = draw_cases(scenario)
     if not 1 <= request.case <= len(cases):
@@ -103,12 +103,11 @@ def placed_case(request: CaseRequest) -> PlacedCase:
     opened, junctions = asked_junctions(request.where)
     index = index_map(opened.osm, opened.graph, opened.junctions)
     world = build_world(opened.osm, opened.graph, junctions[0], radius_m=RADIUS_M, index=index)
-    result = places(scenario, world, vehicle=vehicle)
-    reasons = [unplaced.reason for unplaced in result.unplaced]
-    for place in result.places:
-        played = cast(scenario, cases[request.case - 1], place, vehicle=vehicle)
-        if isinstance(played, StagedCase):
-            return PlacedCase(scenario, world, played)
-        reasons.append(played.reason)
-    where = junctions[0].summary
-    raise UserError(f"{scenario.id} has no place at {where.id} {where.name}: {reasons[0]}")
+    asked = cases[request.case - 1]
+    found = places(scenario, world, vehicle=vehicle, cases=[asked], most=1)
+    if found.unplaced:
+        where, reason = junctions[0].summary, found.unplaced[0].reason
+        raise UserError(f"{scenario.id} has no place at {where.id} {where.name}: {reason}")
+    played = found.cases[0][0]
+    assert isinstance(played, StagedCase)
+    return PlacedCase(scenario, world, played)

@@ -16,10 +16,11 @@ from foretwin.orchestrator.commands.output import print_json, print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.orchestrator.worlds.opening import OpenMap
+from foretwin.sim_worker.futures.playable import places, rehearsal_stage
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
-from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.intersections import Junction
@@ -31,8 +32,10 @@ RADIUS_M = 150.0
 class PlacedScenario(msgspec.Struct, kw_only=True):
     """Where one scenario takes place among the junctions that were looked at.
 
-    `places` names, by junction, the connections of the first place there; `unplaced` tells why
-    junctions that it applies to have none, `does_not_apply` counts the others by reason.
+    `places` names, by junction, the connections of the first place there; `cases` counts those
+    drawn there, `playable` how many of them can be played, `not_playable` the others by reason.
+    `unplaced` tells why junctions that it applies to have no place, `does_not_apply` counts the
+    others.
     """
 
     id: str
@@ -41,6 +44,9 @@ class PlacedScenario(msgspec.Struct, kw_only=True):
     looked_at: int = 0
     applies: int = 0
     placed: int = 0
+    cases: int = 0
+    playable: int = 0
+    not_playable: dict[str, int] = {}
     places: dict[str, str] = {}
     unplaced: dict[str, str] = {}
     does_not_apply: dict[str, int] = {}
@@ -121,18 +127,21 @@ def placed_on(
     """
     found = [PlacedScenario(id=s.id, title=s.title, source=s.source) for s in scenarios]
     index = index_map(opened.osm, opened.graph, opened.junctions)
-    vehicle = load_vehicle()
+    stage = rehearsal_stage(load_vehicle())
     for junction in junctions:
-        world = build_world(
-            opened.osm, opened.graph, junction, radius_m=RADIUS_M, index=index, ground=False
-        )
-        network = RoadNetwork(world)
+        world = build_world(opened.osm, opened.graph, junction, radius_m=RADIUS_M, index=index)
+        scenes = SceneMaker(world)
         for scenario, row in zip(scenarios, found, strict=True):
-            result = places(scenario, world, network=network, vehicle=vehicle, most=1)
+            result = places(scenario, world, scenes=scenes, stage=stage, most=1)
             row.looked_at += 1
-            for place in result.places:
+            for place, cases in zip(result.places, result.cases, strict=True):
                 row.placed += 1
                 row.places[place.junction_id] = place.name
+                row.cases += len(cases)
+                reasons = [case.reason for case in cases if isinstance(case, Unplaced)]
+                row.playable += len(cases) - len(reasons)
+                for reason in reasons:
+                    row.not_playable[reason] = row.not_playable.get(reason, 0) + 1
             for unplaced in result.unplaced:
                 if unplaced.applies:
                     row.unplaced[unplaced.junction_id] = unplaced.reason
@@ -154,8 +163,18 @@ def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:
         lines = [f"{count} unplaced: {reason}" for reason, count in reasons.most_common()]
         others = sorted(row.does_not_apply.items(), key=lambda item: -item[1])
         lines += [f"{count}: {reason}" for reason, count in others]
-        rows.append((row.id, row.placed, row.applies, row.looked_at, "\n".join(lines)))
-    columns = (Column("id", no_wrap=True), "placed", "applies to", "of", "elsewhere")
+        cases = sorted(row.not_playable.items(), key=lambda item: -item[1])
+        lines += [f"{count} cases: {reason}" for reason, count in cases]
+        played = f"{row.playable} of {row.cases}"
+        rows.append((row.id, row.placed, row.applies, row.looked_at, played, "\n".join(lines)))
+    columns = (
+        Column("id", no_wrap=True),
+        "placed",
+        "applies to",
+        "of",
+        "playable cases",
+        "why not",
+    )
     print_table(str(map_file), columns, rows)
 
 

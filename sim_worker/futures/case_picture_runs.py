@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.futures import RESULT_STEP_S, Future, FuturesResult, Job, PathAhead
+from foretwin.contracts.futures import RESULT_STEP_S, FuturesResult
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -17,6 +16,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import ego_rectangles
+from foretwin.sim_worker.futures.playable import job_at
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.roles import StagedCase
@@ -69,40 +69,11 @@ def planned_run(
     Raises ValueError where the planner fails.
     """
     stage = BatchSimulation(world, vehicle, nsim=1)
-    result = run_job(_job(played, scenario, world, planner), stage)
+    result = run_job(job_at(played.place, scenario, [played.values], world, planner=planner), stage)
     if result.left_out[0] or not result.outcome.valid[0]:
         reason = result.left_out[0] or ", ".join(result.outcome.failures)
         raise ValueError(f"{scenario.id} at {played.place.name}: {reason}")
     return _result_run(result, played, vehicle)
-
-
-def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> Job:
-    future = Future(
-        index=0,
-        name=scenario.id,
-        planner=planner,
-        scenario_id=scenario.id,
-        values=dict(played.values),
-        place=played.place.name,
-    )
-    # The place of the case says where it begins; the car is anywhere.
-    motion = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
-    anywhere: dict[str, Any] = dict.fromkeys(motion, 0.0)
-    return Job(
-        round_id=0,
-        job_index=0,
-        world_id=world.id,
-        state=VehicleState(vehicle_id="ego", stamp_ns=0, position=world.frame.origin, **anywhere),
-        path=PathAhead(
-            xy_m=played.place.ego.xy_m, speed_limit_mps=played.place.ego.speed_limit_mps
-        ),
-        futures=(future,),
-        horizon_s=math.ceil(scenario.horizon_s / RESULT_STEP_S - 1e-9) * RESULT_STEP_S,
-        step_s=RESULT_STEP_S,
-        seed=0,
-        cruise_speed_mps=played.ego_speed_mps,
-        scenarios=(scenario,),
-    )
 
 
 def _result_run(result: FuturesResult, played: StagedCase, vehicle: VehicleParameters) -> Run:

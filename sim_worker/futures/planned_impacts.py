@@ -10,7 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.futures import Accident, PlannedImpacts
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.futures.ego_dry_run import off_plan_m
+from foretwin.sim_worker.futures.driven_touch import off_plan_m
 from foretwin.sim_worker.scenarios.roles import StagedCase
 
 

@@ -115,9 +115,9 @@ class SceneMaker:
     def __init__(self, world: World) -> None:
         self.world = world
         self._rules = JunctionRules(world)
-        self._network = RoadNetwork(world)
-        self._seen = SeenActors(self._network)
-        self.scenarios = KnownScenarios(self._network)
+        self.network = RoadNetwork(world)
+        self._seen = SeenActors(self.network)
+        self.scenarios = KnownScenarios(self.network)
         self.rehearsed: dict[tuple[object, ...], Any] = {}
         """Drives of egos alone that cases were cast on."""
 

@@ -25,9 +25,9 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.driver_model import UNKNOWN_LIMIT_MPS
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.staged import staged_start

@@ -31,6 +31,7 @@ from foretwin.sim_worker.scenarios.roles import (
     StagedCase,
     Staging,
 )
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 __all__ = ["StagedActor", "StagedCase", "cast", "cast_all"]
 
@@ -137,20 +138,24 @@ def _cast(
 def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
     """Return where base_link starts: so long before the impact, or the junction, as is meant.
 
-    It starts later where its lane begins later, or where it would begin in a bend that is
-    too tight for its speed.
+    It starts later where its lane begins later, or that of who meets it, or where it would begin in
+    a bend that is too tight for its speed.
     """
     scenario, place, ego = staging.scenario, staging.place, staging.ego
     end, time_s = place.ego.entry_m - staging.ego.front_m, scenario.lead_time_s
     for part in scenario.actors:
         if part.name in meetings:
-            end = meetings[part.name].impact.ego_arc_m
+            impact, way = meetings[part.name]
+            end = impact.ego_arc_m
+            room_m = impact.actor_arc_m - way.first_m - KINDS[part.kind].length_m / 2.0
+            late_s = staging.number(part, "arrives_after_s")
+            time_s = min(time_s, room_m / max(staging.number(part, "speed_mps"), 1e-6) - late_s)
             break
         if part.relation == "ahead" and not place.reverse:
             time_s = closing_time_s(part, staging) or time_s
             break
     room_s = (end - place.ego.first_m - staging.ego.length_m) / ego.speed_mps
-    start = end - ego.speed_mps * min(time_s, max(room_s, 2 * LEAST_TIME_S))
+    start = end - ego.speed_mps * max(min(time_s, room_s), 2 * LEAST_TIME_S)
     return _past_bend(ego, start, end - 2 * LEAST_TIME_S * ego.speed_mps)
 
 

@@ -1,4 +1,4 @@
-"""Puts scenarios where they can take place: on the junctions and roads of any World."""
+"""Where scenarios could take place: on the junctions and roads of any World."""
 
 from __future__ import annotations
 
@@ -11,19 +11,15 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import Scenario
-from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.contracts.world import IntersectionSummary, World
+from foretwin.contracts.world import IntersectionSummary
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import headings_rad
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places, place_in
-from foretwin.sim_worker.scenarios.casting import cast
-from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.places import Placement, ScenarioPlace, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.relations import ways_of
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
 from foretwin.sim_worker.scenarios.roles import ALONG
 from foretwin.sim_worker.scenarios.ways import unlike_its_turn
-from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0
 """Who drives no farther on average from a connection's middle takes it."""
@@ -33,47 +29,13 @@ _NEAR_PATH_M = 60.0
 _BEHIND_PATH_M = 15.0
 
 
-def places(
-    scenario: Scenario,
-    world: World,
-    *,
-    network: RoadNetwork | None = None,
-    vehicle: VehicleParameters | None = None,
-    most: int | None = None,
-) -> Placement:
-    """Return where a scenario can take place: on the World's own junction, in a region on all.
-
-    A place counts when the middle one of the scenario's cases can be cast there. `most` ends the
-    search of a junction after so many places.
-    """
-    network = network or RoadNetwork(world)
-    vehicle = vehicle or load_vehicle()
-    cases = draw_cases(scenario)
-    case = cases[len(cases) // 2]
-    found: list[ScenarioPlace] = []
-    unplaced: list[Unplaced] = []
-    for junction_id, candidates, reason in _candidates(scenario, network):
-        here: list[ScenarioPlace] = []
-        failure: Unplaced | None = None
-        for place in candidates:
-            played = cast(scenario, case, place, vehicle=vehicle)
-            if isinstance(played, Unplaced):
-                failure = failure or played
-                continue
-            here.append(place)
-            if most is not None and len(here) >= most:
-                break
-        found += here
-        if not here:
-            unplaced.append(failure or Unplaced(junction_id, reason, False))
-    return Placement(tuple(found), tuple(unplaced))
-
-
-_Candidates = tuple[str, Iterator[ScenarioPlace], str]
+Candidates = tuple[str, Iterator[ScenarioPlace], str]
 """A junction, its places for a scenario, and why there is none if so."""
 
 
-def _candidates(scenario: Scenario, network: RoadNetwork) -> Iterator[_Candidates]:
+def candidates(scenario: Scenario, network: RoadNetwork) -> Iterator[Candidates]:
+    """Yield where relations and roads let a scenario take place: on the World's own junction, in a
+    region on all. Whether it can be played there is asked by `futures.playable`."""
     own = network.world.intersection
     if scenario.where.setting != "junction":
         yield (own.id, *other_places(scenario, network))
@@ -139,6 +101,7 @@ def _places_of(
         yield place_in(network, scenario, name, ego, chosen)._replace(
             junction_id=passage.junction_id,
             edges_m=network.edges_beside(passage.connections[0].from_lane_id),
+            road_classes=network.classes_of(passage),
         )
 
 

@@ -27,6 +27,8 @@ class ScenarioPlace(NamedTuple):
     """The ego drives its way backwards."""
     walls: Walls | None = None
     """Where those who come on foot or by bicycle cannot come from."""
+    road_classes: tuple[str, ...] = ()
+    """Of the roads by which the ego comes and leaves, as the map has them."""
     edges_m: tuple[float, float] = (10.0, -10.0)
     """How far left and, negative, right of the ego's way the road reaches where it comes from."""
 
@@ -50,10 +52,3 @@ class Unplaced(NamedTuple):
     junction_id: str
     reason: str
     applies: bool
-
-
-class Placement(NamedTuple):
-    """Every place of a scenario in a World, and the reason for each junction without one."""
-
-    places: tuple[ScenarioPlace, ...]
-    unplaced: tuple[Unplaced, ...]

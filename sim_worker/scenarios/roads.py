@@ -164,6 +164,12 @@ class RoadNetwork:
         right = road.right_m - lane.left_of_reference_m
         return (-right, -left) if lane.reverse else (left, right)
 
+    def classes_of(self, passage: Passage) -> tuple[str, ...]:
+        """Return the classes of the roads that a passage comes by and leaves by."""
+        ends = passage.connections[0].from_lane_id, passage.connections[-1].to_lane_id
+        roads = (self.roads.get(self.lanes[lane].road_id) for lane in ends)
+        return tuple(road.road_class for road in roads if road is not None)
+
     def lanes_to_kerb(self, passage: Passage) -> int:
         """Return how many lanes driven the same way lie between a passage's entry and the kerb."""
         lane, count = self.lanes[passage.connections[0].from_lane_id], 0

@@ -13,10 +13,10 @@ from foretwin.sim_worker.futures.case_picture import caption, write_case_picture
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_picture import write_future_picture
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, job

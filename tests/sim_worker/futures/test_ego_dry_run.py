@@ -11,25 +11,22 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.frames import GeoPoint
-from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
+from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.future_rows import future_rows
+from foretwin.sim_worker.futures.playable import job_at, places
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
-from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
-from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.test_real_junctions import SMALL, worlds_of
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
 
 COVERS = (
+    "foretwin.sim_worker.futures.driven_touch",
     "foretwin.sim_worker.futures.driven_line",
     "foretwin.sim_worker.futures.planned_impacts",
     "foretwin.sim_worker.scenarios.staged",
@@ -66,33 +63,15 @@ def play(world: World, scenario_id: str, planner: str = "constant_speed") -> Pla
     _WORLDS[world.id] = world
     stage, maker = _stage(world.id)
     scenario = catalogue()[scenario_id]
-    found = places(scenario, world, network=RoadNetwork(world), vehicle=CAR, most=1).places
-    if not found:
+    found = places(scenario, world, vehicle=CAR, most=1)
+    if not found.places:
         return None
-    drawn = draw_cases(scenario)
-    here = world.frame.origin
-    job = Job(
-        round_id=0, job_index=0, world_id=world.id,
-        state=VehicleState(
-            vehicle_id="car", stamp_ns=0, position=GeoPoint(here.lat_deg, here.lon_deg),
-            yaw_rad=0.0, speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
-        ),
-        path=PathAhead(
-            xy_m=found[0].ego.xy_m, speed_limit_mps=found[0].ego.speed_limit_mps
-        ),
-        futures=tuple(
-            Future(
-                index=i, name=scenario_id, planner=planner, scenario_id=scenario_id,
-                values=values, place=found[0].name,
-            )
-            for i, values in enumerate(drawn[:: -(-len(drawn) // CASES)])
-        ),
-        horizon_s=round(scenario.horizon_s, 1), step_s=0.1, seed=0, cruise_speed_mps=8.0,
-        scenarios=(scenario,), accidents=True,
-    )  # fmt: skip
-    cases = list(staged_cases(job, stage, maker).values())
-    assert all(isinstance(case, StagedCase) for case in cases)
-    return Played(cases, run_job(job, stage, scenes=maker), job)  # type: ignore[arg-type]
+    cases = [case for case in found.cases[0] if isinstance(case, StagedCase)]
+    cases = cases[:: -(-len(cases) // CASES)]
+    job = job_at(found.places[0], scenario, [case.values for case in cases], world, planner=planner)
+    job = msgspec.structs.replace(job, accidents=True)
+    assert all(isinstance(case, StagedCase) for case in staged_cases(job, stage, maker).values())
+    return Played(cases, run_job(job, stage, scenes=maker), job)
 
 
 def off_m(played: Played, row: int) -> float:

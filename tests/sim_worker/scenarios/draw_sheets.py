@@ -35,11 +35,10 @@ from foretwin.sim_worker.futures.case_picture import (
     draw_case_legend,
 )
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
-from foretwin.sim_worker.scenarios.casting import StagedCase, cast
+from foretwin.sim_worker.futures.playable import places
+from foretwin.sim_worker.scenarios.casting import StagedCase
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
-from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.export.picture_style import (
@@ -147,21 +146,16 @@ def choose_tiles(data: Path) -> dict[str, list[Tile]]:
 
 
 def tile_of(scenario: Scenario, world: World, where: str) -> Tile | None:
-    """Return a case of a scenario in a World, the middle one if that can be cast.
+    """Return a case of a scenario in a World, the middle one if that can be played.
 
     Of several places that counts whose roads the World holds farthest.
     """
     vehicle = load_vehicle()
     if TYPICAL.get(scenario.id, world.intersection.kind) != world.intersection.kind:
         return None
-    found = places(scenario, world, network=RoadNetwork(world), vehicle=vehicle, most=4).places
-    cases = draw_cases(scenario)
-    played = [
-        case
-        for place in found
-        for case in [cast(scenario, cases[len(cases) // 2], place, vehicle=vehicle)]
-        if isinstance(case, StagedCase)
-    ]
+    drawn = draw_cases(scenario)
+    found = places(scenario, world, vehicle=vehicle, cases=[drawn[len(drawn) // 2]], most=4)
+    played = [case for (case,) in found.cases if isinstance(case, StagedCase)]
     best = min(played, key=lambda case: round(case.off_lanes_m / 5.0), default=None)
     if best is None or best.off_lanes_m > MOST_OFF_M:
         return None

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import clearance
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast, cast_all
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.ways import lengthened

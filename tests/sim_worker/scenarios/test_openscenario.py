@@ -14,11 +14,11 @@ from lxml import etree
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import overlapping, separations
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
 from foretwin.sim_worker.scenarios.openscenario_entities import AXLES
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS

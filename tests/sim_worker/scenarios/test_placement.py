@@ -13,9 +13,10 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Where
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import passage_on_path, places
+from foretwin.sim_worker.scenarios.placement import passage_on_path
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
@@ -219,7 +220,7 @@ def test_the_connection_that_a_path_takes_is_found_by_its_shape(world: World, tu
 def test_who_joins_the_ring_enters_where_the_ego_passes() -> None:
     scenario = Scenario(
         id="x", title="x", shows="x.", source="x",
-        where=Where(kinds=("roundabout",)), ego=EgoPart(turn="straight", speed_mps=6.0),
+        where=Where(kinds=("roundabout",)), ego=EgoPart(turn="straight", speed_mps=4.0),
         actors=(ActorPart(name="other", relation="joins_ring", speed_mps=6.0, impact_share=0.0),),
     )  # fmt: skip
     result = places(scenario, ring(), vehicle=VEHICLE)
@@ -236,7 +237,7 @@ def test_the_clearest_turn_comes_first() -> None:
     world = tee((0.0, 180.0, 235.0, 270.0))
     network = RoadNetwork(world)
     for id_ in ("cbta", "cpta"):
-        first = places(catalogue()[id_], world, network=network).places[0]
+        first = places(catalogue()[id_], world).places[0]
         passages = {p.name: p for p in network.passages(first.junction_id)}
         offs = [
             unlike_its_turn(p.turn, p.exit_heading_rad - p.entry_heading_rad)

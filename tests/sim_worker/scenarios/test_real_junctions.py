@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.world import World
+from foretwin.sim_worker.futures.playable import places
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
-from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
@@ -59,9 +59,9 @@ def count(
     world: World, counts: Counts, reasons: Counts, *, check: bool, most_cases: int = 3
 ) -> None:
     """Place the whole catalogue on a World's junction; `check` plays its cases as well."""
-    network, vehicle = RoadNetwork(world), load_vehicle()
+    vehicle, scenes = load_vehicle(), SceneMaker(world)
     for id_, scenario in catalogue().items():
-        result = places(scenario, world, network=network, vehicle=vehicle, most=1)
+        result = places(scenario, world, scenes=scenes, vehicle=vehicle, most=1)
         counts[id_]["placed"] += len(result.places)
         for unplaced in result.unplaced:
             counts[id_]["unplaced" if unplaced.applies else "elsewhere"] += 1

@@ -9,7 +9,16 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from tests.world_gen.drawn_maps import GERMANY, IRELAND, crossing, drawn_map, roundabout, world_of
+from tests.world_gen.drawn_maps import (
+    AVENUE,
+    GERMANY,
+    IRELAND,
+    STREET,
+    crossing,
+    drawn_map,
+    roundabout,
+    world_of,
+)
 
 SIGNALS = {"highway": "traffic_signals"}
 ROAD = {"highway": "secondary", "name": "High Road", "lanes": "2"}
@@ -18,8 +27,11 @@ ROAD = {"highway": "secondary", "name": "High Road", "lanes": "2"}
 @functools.cache
 def cross(*, left_hand: bool = False, signals: bool = False) -> World:
     """Four arms of 100 m to the east, north, west and south."""
-    tags = {0: SIGNALS} if signals else None
-    return world_of(crossing(origin=_origin(left_hand), node_tags=tags))
+    tags, main = {0: SIGNALS} if signals else None, {"maxspeed": "50"}
+    osm = crossing(
+        street=STREET | main, avenue=AVENUE | main, origin=_origin(left_hand), node_tags=tags
+    )
+    return world_of(osm)
 
 
 @functools.cache

@@ -17,21 +17,21 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.scenarios.live import KnownScenarios
-from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.futures.playable import places, rehearsal_stage
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.places import Unplaced
-from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 
 def places_in(world: World, request: PlaceRequest, vehicle: VehicleParameters) -> WorldPlaces:
     """Return where the requested scenarios take place in a World, for a vehicle."""
-    network = RoadNetwork(world)
+    scenes = SceneMaker(world)
     if request.starts:
-        return _places_recorded(network, request, vehicle)
+        return _places_recorded(scenes, request, vehicle)
+    stage = rehearsal_stage(vehicle)
     placed, unplaced = [], []
     ways: dict[str, PathAhead] = {}
     for scenario in request.scenarios:
-        found = places(scenario, world, network=network, vehicle=vehicle, most=request.most)
+        found = places(scenario, world, scenes=scenes, stage=stage, most=request.most)
         for here in found.places:
             ego = here.ego
             placed.append(_placed(scenario, here.junction_id, here.name, ego.name))
@@ -41,10 +41,10 @@ def places_in(world: World, request: PlaceRequest, vehicle: VehicleParameters) -
 
 
 def _places_recorded(
-    network: RoadNetwork, request: PlaceRequest, vehicle: VehicleParameters
+    scenes: SceneMaker, request: PlaceRequest, vehicle: VehicleParameters
 ) -> WorldPlaces:
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
-    world, known = network.world, KnownScenarios(network)
+    world, known = scenes.world, scenes.scenarios
     placed, unplaced = [], []
     for number, start in request.starts:
         path = FrenetPath(start.path(world.frame).xy_m)

@@ -7,9 +7,9 @@ import numpy as np
 
 from foretwin.contracts.frames import GeoPoint, geo_from_local
 from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, RecordedStart
-from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.futures.playable import places
+from foretwin.sim_worker.futures.world_places import places_in
 from foretwin.sim_worker.scenarios.reading import catalogue
-from foretwin.sim_worker.scenarios.world_places import places_in
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import state_at
 from tests.sim_worker.scenarios.worlds import cross

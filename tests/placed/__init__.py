@@ -1,0 +1,1 @@
+"""Whether what is called placed can be played: measured on maps, judged from their raw data."""
