@@ -162,7 +162,9 @@ def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
         raise LogError(f"{path}: holds no telemetry")
     info = own.info(path)
     if info is not None:
-        info = msgspec.structs.replace(info, end_stamp_ns=contents.last_ns)
+        # Another's recorder stamps with its own clock, which may be far from the vehicle's.
+        end_ns = contents.last_ns if info.end_stamp_ns is None else info.end_stamp_ns
+        info = msgspec.structs.replace(info, end_stamp_ns=min(end_ns, contents.last_ns))
     else:
         info = drive.VehicleInfo(
             vehicle_id="car",

@@ -77,6 +77,8 @@ class BagWriter:
             self._connections[topic] = self._writer.add_connection(topic, kind, **definition)
         if self._ros1:
             data = bytes(typestore().cdr_to_ros1(data, kind))
+            # To ROS 1 the time 0 is none: `rosbag play` would leave it out (TIME_MIN is 1 ns).
+            stamp_ns = max(stamp_ns, 1)
         self._writer.write(self._connections[topic], stamp_ns, data)
 
 
