@@ -74,7 +74,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if suffix != ".csv" and is_nmea(text):
         return open_nmea(path, declaration=declaration)
     if is_smartloc(text):
-        check_undeclared(path, declaration, "a smartLoc text")
+        check_undeclared(path, declaration, "smartLoc's text")
         return open_smartloc(path)
     if suffix == ".gpx" or (text.startswith("<") and "<gpx" in text):
         check_undeclared(path, declaration, "a GPX file")
