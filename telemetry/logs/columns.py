@@ -115,15 +115,17 @@ def table_log(
     reference_point: str,
     body_from_antenna_m: drive.Vector3 | None = None,
     unreadable: int = 0,
+    refused: Mapping[str, int] | None = None,
 ) -> Log:
     """Return the log of streams by channel; the drive lasts from the first stamp to the latest.
 
-    `unreadable` rows are counted with what is refused.
+    `unreadable` rows, and what a reader has `refused` by reason, are counted with what is refused.
     """
 
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if unreadable:
             skipped[UNREADABLE_ROW] += unreadable
+        skipped.update(refused or {})
         return merged(*(_samples(channel, stream) for channel, stream in streams.items()))
 
     return Log(

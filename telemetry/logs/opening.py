@@ -8,6 +8,7 @@ from foretwin.contracts.drive import RoadUsers
 from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
 from foretwin.telemetry.logs.geojson import open_geojson
 from foretwin.telemetry.logs.gpx import open_gpx
+from foretwin.telemetry.logs.kitti_oxts import is_kitti_oxts, open_kitti_oxts
 from foretwin.telemetry.logs.log import Log, LogError, check_undeclared
 from foretwin.telemetry.logs.mcity import is_mcity, read_mcity
 from foretwin.telemetry.logs.nmea import is_nmea, open_nmea
@@ -18,14 +19,15 @@ from foretwin.telemetry.logs.road_users import (
     log_of_detections,
 )
 from foretwin.telemetry.logs.smartloc import is_smartloc, open_smartloc, smartloc_texts
+from foretwin.telemetry.logs.ubx import is_ubx, open_ubx
 
-BAG_MAGIC, SQLITE_MAGIC = b"#ROSBAG V", b"SQLite format 3\0"
+BAG_MAGIC, SQLITE_MAGIC, ZIP_MAGIC = b"#ROSBAG V", b"SQLite format 3\0", b"PK\x03\x04"
 
 KINDS = (
     "MCAP with ROS messages (.mcap), ROS 1 bag (.bag), ROS 2 bag (folder or .db3), "
-    "NMEA-0183 (.nmea), CSV with a declaration (.csv), GPX (.gpx), "
-    "GeoJSON lines (.geojson, .json), smartLoc text or folder (point3, odom3), "
-    "comma2k19 segment folder"
+    "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV with a declaration (.csv), GPX (.gpx), "
+    "GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, "
+    "smartLoc text or folder (point3, odom3), comma2k19 segment folder"
 )
 
 
@@ -49,12 +51,15 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
             from foretwin.telemetry.logs.ros_log import open_bag
 
             return open_bag(path, declaration=declaration)
+        if is_kitti_oxts(path):
+            check_undeclared(path, declaration, "KITTI's oxts")
+            return open_kitti_oxts(path)
         if smartloc_texts(path):
             check_undeclared(path, declaration, "a smartLoc drive")
             return open_smartloc(path)
         raise LogError(
-            f"{path}: a folder that is no comma2k19 segment, no smartLoc drive and no ROS 2 bag (it"
-            f" has no metadata.yaml); known logs: {KINDS}"
+            f"{path}: a folder that is no comma2k19 segment, no drive of KITTI or smartLoc and no"
+            f" ROS 2 bag (it has no metadata.yaml); known logs: {KINDS}"
         )
     head = _head(path)
     if not head:
@@ -70,6 +75,11 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         from foretwin.telemetry.logs.ros_log import open_bag
 
         return open_bag(path, declaration=declaration)
+    if head.startswith(ZIP_MAGIC):
+        return _open_zip(path, declaration)
+    if suffix == ".ubx" or is_ubx(head):
+        check_undeclared(path, declaration, "a UBX file")
+        return open_ubx(path)
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
     if suffix != ".csv" and is_nmea(text):
         return open_nmea(path, declaration=declaration)
@@ -87,6 +97,13 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
 
         return open_csv(path, declaration=declaration)
     raise LogError(f"{path}: no known log; known are {KINDS}")
+
+
+def _open_zip(path: Path, declaration: Path | None) -> Log:
+    if not is_kitti_oxts(path):
+        raise LogError(f"{path}: a zip without a folder oxts (KITTI's); unpack other recordings")
+    check_undeclared(path, declaration, "KITTI's oxts")
+    return open_kitti_oxts(path)
 
 
 def _head(path: Path) -> bytes:

@@ -48,7 +48,7 @@ class Signal(NamedTuple):
 class MotionProof:
     """What a log's positions say of its other channels."""
 
-    def __init__(self, log: Log) -> None:
+    def __init__(self, log: Log, *, slowest_mps: float = _SLOWEST_MPS) -> None:
         self.found: dict[str, list[Any]] = {}
         for channel, message in log.samples():
             self.found.setdefault(channel, []).append(message)
@@ -68,7 +68,7 @@ class MotionProof:
         after = np.clip(np.searchsorted(time_s, grid_s), 1, len(time_s) - 1)
         held = time_s[after] - time_s[after - 1] < _LONGEST_GAP_S
         self.speed = Signal(grid_s, np.where(held, np.hypot(x, y) / WINDOW_S, np.nan))
-        moving = self.speed.values > _SLOWEST_MPS
+        moving = self.speed.values > slowest_mps
         course = np.where(moving, np.arctan2(y, x), np.nan)
         self.course = Signal(grid_s, course)
         half = round(0.5 * WINDOW_S / _STEP_S)

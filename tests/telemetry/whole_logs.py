@@ -13,6 +13,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs.convert import convert
 from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.drive_messages import INFO, START_NS
+from tests.telemetry.logs import test_kitti_oxts, test_smartloc, test_ubx
 from tests.telemetry.test_comma2k19 import save
 from tests.telemetry.test_foreign_mcap import LAG_NS, ForeignFile, control, fix, velocity
 from tests.telemetry.test_nmea import gga, rmc
@@ -92,7 +93,16 @@ def whole_logs(folder: Path) -> list[Path]:
         kind = "autoware_control_msgs/msg/Control"
         foreign.add("/control", kind, control(at_ns, 0.1, 0.2), at_ns + LAG_NS)
     logs.append(foreign.close())
-    return [*logs, _segment(folder / "segment40")]
+    ubx = folder / "drive.ubx"
+    ubx.write_bytes(b"".join(test_ubx.pvt(second) for second in range(20)))
+    (folder / "kitti").mkdir()
+    (folder / "smartloc").mkdir()
+    odometry = "".join(test_smartloc.ODOMETRY.format(n / 10, 5.0 + n, 0.1) for n in range(20))
+    kitti = test_kitti_oxts.drive(folder / "kitti")
+    return [
+        *logs, ubx, kitti, test_kitti_oxts.zipped(kitti),
+        test_smartloc.drive(folder / "smartloc", odometry), _segment(folder / "segment40"),
+    ]  # fmt: skip
 
 
 def _segment(folder: Path) -> Path:
