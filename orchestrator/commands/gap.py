@@ -41,7 +41,7 @@ from foretwin.sim_worker.analysis.gap.verdict import FaultDetector, without_manu
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import estimator_of
-from foretwin.telemetry.estimator.motion_track import StateConsistency
+from foretwin.telemetry.estimator.reported_state import StateConsistency
 from foretwin.telemetry.logs.log import Log, Sample
 from foretwin.telemetry.logs.opening import open_log
 

@@ -6,8 +6,8 @@ from collections import Counter
 from typing import Any
 
 from foretwin.telemetry.estimator.estimator import ClockReport, StateEstimator
-from foretwin.telemetry.estimator.motion_track import StateConsistency
 from foretwin.telemetry.estimator.mounting import Learnt
+from foretwin.telemetry.estimator.reported_state import StateConsistency
 
 REARM_NS = 5_000_000_000
 """A channel that was overdue must have come for this long before it is named once more."""
@@ -92,6 +92,9 @@ def estimate_object(found: StateConsistency) -> dict[str, Any]:
             for channel, one in found.surprises.items()
         },
         "spreads_widened": round(float(found.widened), 3),
+        "spreads_stretched": {
+            name: round(float(by), 3) for name, by in found.stretched._asdict().items()
+        },
         "position_noise_m": None
         if found.position_noise_m is None
         else round(float(found.position_noise_m), 3),

@@ -17,8 +17,9 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
 from foretwin.telemetry.estimator.map_aid import RoadLine
-from foretwin.telemetry.estimator.motion_track import MotionTrack, StateConsistency
+from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import Reordering
+from foretwin.telemetry.estimator.reported_state import StateConsistency
 from foretwin.telemetry.estimator.staleness import Staleness
 
 _STATE_PERIOD_NS = 20_000_000

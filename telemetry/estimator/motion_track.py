@@ -4,43 +4,31 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
 from foretwin.contracts.frames import GeoPoint, base_from_sensor
-from foretwin.telemetry.estimator.innovations import SurpriseCount, Surprises
+from foretwin.telemetry.estimator.innovations import SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import MotionCorrections
-from foretwin.telemetry.estimator.mounting import Mounting
 from foretwin.telemetry.estimator.position_corrections import PositionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
-from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
+from foretwin.telemetry.estimator.reported_state import (
+    StateConsistency,
+    moving_state,
+    unmoved_state,
+)
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 _UNKNOWN_PLACE_M = 1000.0
 _MOST_FASTER_MPS = 5.0
 """A second and a half of a car's hardest pulling away (0.35 g)."""
-
-
-class StateConsistency(NamedTuple):
-    """Whether an estimate is as good as it says.
-
-    `surprises` by channel; the spreads that states tell are `widened` so many times now;
-    `position_noise_m` is what the newest fix is taken for, None before there is one; the receiver
-    has slipped `slips` times, and sits as `mounting` says.
-    """
-
-    surprises: dict[str, Surprises]
-    widened: float
-    position_noise_m: float | None
-    slips: int
-    mounting: Mounting
 
 
 class MotionTrack:
@@ -162,9 +150,10 @@ class MotionTrack:
         expected = recent[-1].xy_m if recent else None
         if filter_ is not None:
             expected = filter_.sensor_xy(lever)
-            late_s = max(0.0, (self._filter_stamp_ns - fix.stamp_ns) * 1e-9)
-            course = filter_.mean[YAW]
-            xy = xy + filter_.mean[SPEED] * late_s * np.array([math.cos(course), math.sin(course)])
+            late_ns = self._filter_stamp_ns - fix.stamp_ns
+            if late_ns > 0:
+                way_m, course = filter_.mean[SPEED] * late_ns * 1e-9, filter_.mean[YAW]
+                xy = xy + way_m * np.array([math.cos(course), math.sin(course)])
         verdict = self._gate.judge(time_s, xy, expected)
         if verdict == "skip":
             return False
@@ -181,6 +170,8 @@ class MotionTrack:
             self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
         else:
             self._correct(filter_, xy, fix, verdict)
+        if self._filter is not None:
+            self._positions.check_told(self._filter, fix, time_s, xy)
         return True
 
     def _known_speed_mps(self, stamp_ns: int) -> float:
@@ -276,6 +267,7 @@ class MotionTrack:
             standing=self._standing,
             map_shift_m=self._aid.shift_m,
             overconfidence=self._positions.overconfidence,
+            stretched=self._positions.stretched,
         )
 
     @property
@@ -290,5 +282,10 @@ class MotionTrack:
         noise_m = None if fix is None else found.noise.std_m(fix)
         mounting = self._corrections.mounting.mounting
         return StateConsistency(
-            self._surprises.counts, found.overconfidence, noise_m, found.slips, mounting
+            self._surprises.counts,
+            found.overconfidence,
+            found.stretched,
+            noise_m,
+            found.slips,
+            mounting,
         )

@@ -14,7 +14,13 @@ from typing import NamedTuple
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
 from foretwin.telemetry.estimator.facing import BACKING_MPS, CREEPING_MPS, Facing
-from foretwin.telemetry.estimator.innovations import PLANE_95, PositionInnovation, SurpriseCount
+from foretwin.telemetry.estimator.innovations import (
+    DOWN,
+    PLANE_95,
+    UP,
+    PositionInnovation,
+    SurpriseCount,
+)
 from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.map_aid import MapAid
 from foretwin.telemetry.estimator.measured import MotionSamples
@@ -24,6 +30,7 @@ from foretwin.telemetry.estimator.position_noise import PositionNoise
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 from foretwin.telemetry.estimator.slow_motion import drift_sideways, limit_turn
 from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse, turned_m
+from foretwin.telemetry.estimator.told_spreads import Stretched, ToldSpreads
 
 _DOUBTFUL, _UNBELIEVABLE = 9.0, 25.0
 """Normalised squares (three and five standard deviations) from which a fix counts for less, and
@@ -31,9 +38,7 @@ for nothing until the next one bears it out."""
 _IMPOSSIBLE = 25.0
 """The same where fixes are alone: how hard a driver may brake and turn is in what is expected."""
 _BY_CHANCE = 1.5
-_UP, _DOWN = 1.2, 1.2 ** (-1.0 / 19.0)
-"""What of 100 fixes the 5 beyond their 95 % bound, and the 95 within it, make of what is usual
-(Gibbs, Candes 2021). Where sources contradict each other all the time, no single fix is a
+"""So much of what is usual. Where sources contradict each other all the time, no single fix is a
 glitch, and no spread is as small as said."""
 _LEAST_SLIP_M = 0.1
 _SHOWS_TURNING_M = 0.2
@@ -88,6 +93,7 @@ class PositionCorrections:
         self._usual = 1.0
         self._surprises = surprises
         self._facing = Facing(gate)
+        self._spreads = ToldSpreads()
         self.slips = 0
         """How often the receiver has slipped."""
 
@@ -98,7 +104,7 @@ class PositionCorrections:
         other = shallow_copy(self)
         other._measured, other._gate = measured, gate
         other.noise, other._surprises = self.noise.copy(), surprises
-        other._facing = self._facing.copy(gate)
+        other._facing, other._spreads = self._facing.copy(gate), self._spreads.copy()
         return other
 
     @property
@@ -110,6 +116,25 @@ class PositionCorrections:
     def skipped(self) -> Counter[str]:
         """How many samples were refused, by reason."""
         return self._gate.skipped
+
+    @property
+    def stretched(self) -> Stretched:
+        """How large errors were found to be of what states told."""
+        return self._spreads.stretched
+
+    def check_told(
+        self, filter_: KinematicFilter, fix: GnssFix, time_s: float, xy_m: Array
+    ) -> None:
+        """Let a fix, which the filter has taken, show how good the states before it were."""
+        self._spreads.take(
+            time_s,
+            xy_m,
+            filter_,
+            self._lever,
+            noise_m=self.noise.seen_m,
+            overconfidence=self.overconfidence,
+            heading=self._measured.fresh("yaw_rad", fix.stamp_ns),
+        )
 
     def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
         """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
@@ -145,7 +170,7 @@ class PositionCorrections:
             innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
             square = innovation.square(white)
         borne_out, self._doubted = bool(self._doubted), ()
-        self._usual = max(self._usual * (_UP if square > PLANE_95 * self._usual else _DOWN), 1.0)
+        self._usual = max(self._usual * (UP if square > PLANE_95 * self._usual else DOWN), 1.0)
         self._expect(filter_, square, white, alone=alone)
         yaw_before = filter_.mean[YAW]
         if (

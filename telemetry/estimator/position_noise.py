@@ -53,7 +53,7 @@ class PositionNoise:
         self._jerked_m = 0.0
         self._surprises: tuple[float, ...] = ()
         self._still: tuple[float, ...] = ()
-        self._seen_m: float | None = None
+        self.seen_m: float | None = None
         """The white noise that was seen; None before there is enough of it."""
 
     def copy(self) -> PositionNoise:
@@ -103,12 +103,12 @@ class PositionNoise:
             square = bound - self._jerked_m * self._jerked_m
         else:
             square = min(bound, _middle(self._surprises) / _PLANE_MEDIAN)
-        self._seen_m = math.sqrt(max(square, 0.0))
+        self.seen_m = math.sqrt(max(square, 0.0))
 
     def std_m(self, fix: GnssFix) -> float:
         """Return one standard deviation of a fix on each axis, all that is known together."""
         if fix.std_m is None or not math.isfinite(fix.std_m):
-            return UNKNOWN_STD_M if self._seen_m is None else max(self._seen_m, LEAST_STD_M)
+            return UNKNOWN_STD_M if self.seen_m is None else max(self.seen_m, LEAST_STD_M)
         stated = min(max(fix.std_m, 1e-3), 1e4)
         return max(stated, self._seen_beyond(stated))
 
@@ -128,13 +128,13 @@ class PositionNoise:
         if not self.wanders(fix):
             return std
         white = _WHITE_SHARE * min(max(fix.std_m or 0.0, 1e-3), 1e4)
-        if self._seen_m is not None and self._jerked_m < _CLEAR * white:
-            return max(self._seen_m, LEAST_STD_M)
+        if self.seen_m is not None and self._jerked_m < _CLEAR * white:
+            return max(self.seen_m, LEAST_STD_M)
         return max(white, self._seen_beyond(white))
 
     def _seen_beyond(self, stated_m: float) -> float:
         """Return what was seen where it gives the lie to `stated_m`, 0 elsewhere."""
-        seen = self._seen_m or 0.0
+        seen = self.seen_m or 0.0
         return seen if seen > max(_LIES * stated_m, LEAST_STD_M) else 0.0
 
     def wanders(self, fix: GnssFix) -> bool:

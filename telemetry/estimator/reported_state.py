@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from typing import NamedTuple
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, wrap_angle
+from foretwin.telemetry.estimator.innovations import Surprises
 from foretwin.telemetry.estimator.kinematic_filter import (
     ACCEL,
     CURVATURE,
@@ -19,6 +19,25 @@ from foretwin.telemetry.estimator.kinematic_filter import (
 )
 from foretwin.telemetry.estimator.map_aid import ALIKE_M
 from foretwin.telemetry.estimator.measured import MotionSamples
+from foretwin.telemetry.estimator.mounting import Mounting
+from foretwin.telemetry.estimator.told_spreads import Stretched
+
+
+class StateConsistency(NamedTuple):
+    """Whether an estimate is as good as it says.
+
+    `surprises` by channel; the spreads that states tell are `widened` so many times now because
+    sources contradict each other, and `stretched` because they were too small or too large;
+    `position_noise_m` is what the newest fix is taken for, None before there is one; the receiver
+    has slipped `slips` times, and sits as `mounting` says.
+    """
+
+    surprises: dict[str, Surprises]
+    widened: float
+    stretched: Stretched
+    position_noise_m: float | None
+    slips: int
+    mounting: Mounting
 
 
 def unmoved_state(
@@ -58,19 +77,23 @@ def moving_state(
     standing: bool,
     map_shift_m: tuple[float, float] | None,
     overconfidence: float = 1.0,
+    stretched: Stretched,
 ) -> VehicleState:
     """Return the state of a car whose heading is known.
 
-    `overconfidence` is by how much the filter's spreads were too small so far. `convergence_rad`
-    is the angle of the filter's frame against east; a car that stands has no
+    `overconfidence` is by how much the filter's spreads are too small while its sources contradict
+    each other, `stretched` what its states' errors were found to be of what is told.
+    `convergence_rad` is the angle of the filter's frame against east; a car that stands has no
     speed, turning or acceleration. Fields without a fresh sample are named in `estimated`.
     """
     estimated = measured.estimated(stamp_ns)
     angle = None if "tire_angle_rad" in estimated else measured.tire_angle_rad
     if angle is None:
         angle = math.atan(wheelbase_m * filter_.mean[CURVATURE])
-    spread = overconfidence * np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
-    position_std_m = math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)
+    variance = filter_.covariance.item
+    position_std_m = (
+        overconfidence * stretched.place * math.sqrt(0.5 * (variance(X, X) + variance(Y, Y)))
+    )
     if map_shift_m is not None:
         position_std_m = math.hypot(position_std_m, ALIKE_M)
     return VehicleState(
@@ -84,8 +107,8 @@ def moving_state(
         tire_angle_rad=angle,
         steering_wheel_rad=measured.steering_wheel_rad,
         position_std_m=position_std_m,
-        yaw_std_rad=float(spread[YAW]),
-        speed_std_mps=float(spread[SPEED]),
+        yaw_std_rad=overconfidence * stretched.yaw * math.sqrt(variance(YAW, YAW)),
+        speed_std_mps=overconfidence * stretched.speed * math.sqrt(variance(SPEED, SPEED)),
         map_shift_m=map_shift_m,
         estimated=estimated,
     )

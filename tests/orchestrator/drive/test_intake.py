@@ -14,8 +14,9 @@ from foretwin.contracts.mailbox import Mailbox, Received
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.telemetry_watch import estimate_object
 from foretwin.telemetry.estimator.innovations import Surprises
-from foretwin.telemetry.estimator.motion_track import StateConsistency
 from foretwin.telemetry.estimator.mounting import Learnt, Mounting
+from foretwin.telemetry.estimator.reported_state import StateConsistency
+from foretwin.telemetry.estimator.told_spreads import Stretched
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
@@ -173,11 +174,13 @@ def test_in_lock_step_times_of_receipt_mean_nothing() -> None:
 def test_what_is_said_of_trust_is_of_plain_numbers() -> None:
     """A record is told while a drive goes on: numbers of numpy's would end it."""
     imu = Surprises(taken=4, within=np.float64(3.0))
+    stretched = Stretched(np.float64(1.0), np.float64(0.5), np.float64(2.0))
     learnt = Mounting(*(Learnt(np.float64(1.0), np.float64(0.1), True) for _ in range(3)), turns=1)
-    found = StateConsistency({"imu": imu}, np.float64(1.5), np.float64(0.02), 0, learnt)
+    found = StateConsistency({"imu": imu}, np.float64(1.5), stretched, np.float64(0.02), 0, learnt)
     said = msgspec.json.decode(msgspec.json.encode(estimate_object(found)))
     assert said["within_95"] == {"imu": {"share": 0.75, "count": 4}}
     assert (said["spreads_widened"], said["position_noise_m"]) == (1.5, 0.02)
+    assert said["spreads_stretched"] == {"place": 1.0, "speed": 0.5, "yaw": 2.0}
     assert said["antenna_forward_m"] == said["fixes_late_s"] == {"value": 1.0, "std": 0.1}
 
 
