@@ -24,7 +24,7 @@ GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
 SIZE = 12
 ROAD_OFFSET = SIZE
 """Metres to the left of the map's line; only in a filter that has been told of one."""
-_IDENTITY = np.eye(SIZE + 1)
+_IDENTITIES = {size: np.eye(size) for size in (SIZE, SIZE + 1)}
 
 _MAX_STEP_S = 0.05
 _STANDING_CURVATURE_PM = 0.1
@@ -87,7 +87,7 @@ class KinematicFilter:
         by_curvature = distance * (0.5 * distance - slip * speed * speed)
         by_slip = -distance * speed * speed * curvature
         # Number by number: to put two into a slice takes numpy eight times as long.
-        jacobian = _IDENTITY[:size, :size].copy()
+        jacobian = _IDENTITIES[size].copy()
         jacobian[X, YAW], jacobian[X, SPEED] = -distance * sin, dt * cos - side * sin
         jacobian[Y, YAW], jacobian[Y, SPEED] = distance * cos, dt * sin + side * cos
         jacobian[X, ACCEL], jacobian[X, CURVATURE] = (
@@ -111,7 +111,8 @@ class KinematicFilter:
         wandering = motion_noise.densities(
             speed, slip=self._slip_density, calm=self.calm, steady=self.steady
         )
-        noise[YAW : ACCEL_BIAS + 1] += dt * np.array(wandering)
+        for index, density in enumerate(wandering, start=YAW):
+            noise[index] += dt * density
         if self._gnss_std_m:
             noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
         self.covariance = covariance
@@ -137,8 +138,10 @@ class KinematicFilter:
 
     def sensor_xy(self, lever_m: tuple[float, float]) -> Array:
         """Return where a sensor at `lever_m` (forward, left) of base_link is, shape (2,)."""
-        cos, sin = math.cos(self.mean[YAW]), math.sin(self.mean[YAW])
         forward, left = lever_m
+        if forward == left == 0.0:
+            return self.mean[:2].copy()
+        cos, sin = math.cos(self.mean[YAW]), math.sin(self.mean[YAW])
         offset: Array = np.array([cos * forward - sin * left, sin * forward + cos * left])
         return self.mean[:2] + offset
 

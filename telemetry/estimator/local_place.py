@@ -57,7 +57,8 @@ class LocalPlace(NamedTuple):
 @functools.lru_cache(maxsize=256)
 def _projected(frame: LocalFrame, lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
     """Return x, y and the grid's convergence; samples out of order ask for the same once more."""
-    xy = local_from_geo(frame, lat_deg, lon_deg)
-    # Beyond the frame's reach the projection says infinity: just somewhere far away.
-    xy = np.nan_to_num(xy, nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M)
-    return float(xy[0]), float(xy[1]), float(grid_convergence(frame, lat_deg, lon_deg))
+    x_m, y_m = local_from_geo(frame, lat_deg, lon_deg).tolist()
+    if not math.isfinite(x_m + y_m):
+        # Beyond the frame's reach the projection says infinity: just somewhere far away.
+        x_m = y_m = _FAR_M
+    return x_m, y_m, float(grid_convergence(frame, lat_deg, lon_deg))
