@@ -16,7 +16,8 @@ from foretwin.orchestrator.commands.output import print_json, print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.orchestrator.worlds.opening import OpenMap
-from foretwin.sim_worker.futures.playable import places, rehearsal_stage
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.places import Unplaced

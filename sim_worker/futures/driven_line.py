@@ -9,11 +9,11 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import apart, arc_lengths
+from foretwin.geometry.polyline import apart, arc_lengths, unit
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.ways import Way
 
-_KEEPS_SPEED, _KEEPS_TO_M = 0.35, 1.5
+KEEPS_SPEED, _KEEPS_TO_M = 0.35, 1.5
 """A car whose speed differs by more of what the case says, or that is farther from its path, does
 something else."""
 
@@ -41,11 +41,15 @@ def driven_lines(
         arc = arc_lengths(xy)
         moved = apart(xy, tolerance_m=1e-6)
         limit = path.at_nodes(np.minimum(path.speed_limit_mps, 1e3), arc)
-        # The lines of egos beside their paths are moved back: casting moves them aside again.
-        line = FrenetPath(xy[moved], limit[moved])
         if case.ego_lateral_m:
-            xy = line.point_at(arc, -case.ego_lateral_m)
-            line = FrenetPath(xy[moved], limit[moved])
+            # The lines of egos beside their paths are moved back: casting moves them aside again.
+            xy = FrenetPath(xy[moved], limit[moved]).point_at(arc, -case.ego_lateral_m)
+        if len(before) > 1:
+            # Chords are shorter than the bends behind it: it is to begin at the same arc length.
+            missing_m = case.ego_arc_m - float(arc_lengths(xy)[len(before)])
+            xy[0] += missing_m * unit(xy[0] - xy[1])
+        arc = arc_lengths(xy)
+        line = FrenetPath(xy[moved], limit[moved])
         yield DrivenLine(
             way=way._replace(xy_m=xy[moved], speed_limit_mps=limit[moved], path=line),
             time_s=np.arange(float(len(driven))) * tick_s,
@@ -63,7 +67,7 @@ def drives_as_cast(case: StagedCase, line: DrivenLine, path: FrenetPath) -> bool
     before = (line.arc_m[:-1] >= case.ego_arc_m) & (line.arc_m[:-1] < until_m)
     speed = (np.diff(line.arc_m) / np.diff(line.time_s))[before]
     off_m = path.locate(line.states[:-1, :2][before]).offset_m - case.ego_lateral_m
-    keeps_speed = np.abs(speed / case.ego_speed_mps - 1.0).max(initial=0.0) < _KEEPS_SPEED
+    keeps_speed = np.abs(speed / case.ego_speed_mps - 1.0).max(initial=0.0) < KEEPS_SPEED
     return bool(keeps_speed and np.abs(off_m).max(initial=0.0) < _KEEPS_TO_M)
 
 

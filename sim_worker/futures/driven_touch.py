@@ -20,8 +20,9 @@ AFTER_S = 1.0
 """Lines go on for so long after the last impact."""
 _WATCHED_S = 1.0
 """Before it, one who drives alone is looked at for touches."""
-_ON_FRONT_M = 0.02
-"""Points of the ego's front that are so near the other touch it."""
+_ON_FRONT_M, _NEAR_FRONT_M = 0.02, 0.07
+"""Points of the ego's front that are so near the other touch it, or do so within a tick: a point
+that is promised is met within 0.1 m however control ticks fall."""
 _OTHER_SHARE, _MOVED_M = 0.12, 0.5
 """So far along the front, and on the ground, a touch is still the one that was planned: a car that
 runs wide or brakes is a little aside, and late."""
@@ -72,10 +73,12 @@ def _met(
     shares = np.clip(case.impact_share + np.linspace(-_OTHER_SHARE, _OTHER_SHARE, 25), 0.0, 1.0)
     points = hit_point_m(case, state, vehicle, shares)
     gaps = clearance(Rectangles(points, np.full(len(points), other.yaw_rad), 0.0, 0.0), other)
-    touching = np.flatnonzero(gaps <= _ON_FRONT_M)
-    if not len(touching):
+    off = np.abs(shares - case.impact_share)
+    touching = gaps <= _ON_FRONT_M
+    # Where a front meets a flank, the least angle between them decides which end is first.
+    best = int(np.where(touching, off, np.inf).argmin() if touching.any() else off.argmin())
+    if gaps[best] > _NEAR_FRONT_M:
         return None
-    best = touching[np.abs(shares[touching] - case.impact_share).argmin()]
     if np.hypot(*(points[best] - case.impact_point_m)) > _MOVED_M:
         return None
     return case._replace(impact_point_m=points[best], impact_share=float(shares[best]))

@@ -18,9 +18,12 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import EGO, FAULTS
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.closed_loop import drive
 from foretwin.sim_worker.futures.driven_line import (
+    KEEPS_SPEED,
     DrivenLine,
     driven_lines,
     drives_as_cast,
@@ -29,7 +32,7 @@ from foretwin.sim_worker.futures.driven_line import (
 from foretwin.sim_worker.futures.driven_touch import AFTER_S, met_as_driven
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.swept_ground import met_on_the_way
-from foretwin.sim_worker.scenarios.fitting import short_run_up, unfit
+from foretwin.sim_worker.scenarios.fitting import ill_timed, unfit
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.staged import staged_start
@@ -57,14 +60,33 @@ class _Ego(NamedTuple):
     start_m: float
 
 
+def rehearsal_stage(
+    vehicle: VehicleParameters, *, nsim: int = 32, control_hz: float = 20.0
+) -> BatchSimulation:
+    """Return a stage on which egos of any World drive alone: open ground, as what stands in a
+    World is asked of the World itself, and who follows them drives on behind the impact."""
+    return BatchSimulation(None, vehicle, nsim=nsim, control_hz=control_hz)
+
+
+def rehearsed_cases(
+    job: Job, vehicle: VehicleParameters, maker: SceneMaker
+) -> dict[int, StagedCase | Unplaced]:
+    """Return `staged_cases` on a stage made for a job, if any of its rows names a place."""
+    count = sum(bool(future.place) for future in job.futures)
+    if not count:
+        return {}
+    return staged_cases(job, rehearsal_stage(vehicle, nsim=count, control_hz=job.control_hz), maker)
+
+
 def staged_cases(
     job: Job, stage: BatchSimulation, maker: SceneMaker
 ) -> dict[int, StagedCase | Unplaced]:
     """Return the cases of the rows that name their place, met where the car really drives.
 
-    A function of the job, as what it leads to: the drives of one job are driven together, and kept
-    for jobs that ask for the very same.
+    `stage` is a `rehearsal_stage`. A function of the job, as what it leads to: its drives are
+    driven together, and kept for jobs that ask for the very same.
     """
+    stage.slopes = slopes_of(maker.world)
     scenarios = {scenario.id: scenario for scenario in job.scenarios}
     played = maker.staged_cases(job, stage.vehicle)
     for row, case in played.items():
@@ -82,7 +104,7 @@ def staged_cases(
         if isinstance(case, StagedCase):
             scenario = scenarios[job.futures[row].scenario_id]
             line = lines[_ego(bent[row])] if row in bent else None
-            reason = short_run_up(case) or met_on_the_way(
+            reason = ill_timed(scenario, case) or met_on_the_way(
                 case, line, stage.vehicle, horizon_s=scenario.horizon_s
             )
             played[row] = _refused(case, reason) if reason else case
@@ -177,7 +199,7 @@ def _lines(
         ego = _ego(case)
         first.setdefault(ego, case._replace(ego_arc_m=ego.start_m))
         until_s = case.impact_time_s + (case.ego_arc_m - ego.start_m) / case.ego_speed_mps
-        last_s = max(last_s, until_s)
+        last_s = max(last_s, until_s / (1.0 - KEEPS_SPEED))
     egos = sorted(first)
     ticks = math.ceil((last_s + AFTER_S) / stage.control_dt_s)
     way = first[egos[0]].place.ego

@@ -15,10 +15,9 @@ from foretwin.contracts.futures import RESULT_STEP_S, Future, Job, PathAhead
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.driver_model import LEAST_START_MPS
-from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage, staged_cases
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.fitting import not_for
@@ -26,9 +25,6 @@ from foretwin.sim_worker.scenarios.placement import candidates
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-
-_SIDE_BY_SIDE = 32
-"""Egos that one stage drives alone at once."""
 
 
 class Placement(NamedTuple):
@@ -42,12 +38,6 @@ class Placement(NamedTuple):
     places: tuple[ScenarioPlace, ...]
     cases: tuple[tuple[StagedCase | Unplaced, ...], ...]
     unplaced: tuple[Unplaced, ...]
-
-
-def rehearsal_stage(vehicle: VehicleParameters) -> BatchSimulation:
-    """Return a stage on which egos drive alone in any World: open ground, whose slope is asked of
-    each World."""
-    return BatchSimulation(None, vehicle, nsim=_SIDE_BY_SIDE)
 
 
 def places(
@@ -103,7 +93,6 @@ def playable(
     stage: BatchSimulation,
 ) -> tuple[StagedCase | Unplaced, ...]:
     """Return each case as a job plays it at a place, or why it cannot be played there."""
-    stage.slopes = slopes_of(scenes.world)
     reasons = [not_for(scenario, case, place) for case in cases]
     played: list[StagedCase | Unplaced] = [
         Unplaced(place.junction_id, reason, False) for reason in reasons

@@ -41,7 +41,7 @@ from foretwin.sim_worker.batch.accident import (
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
-from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.ego_dry_run import rehearsed_cases
 from foretwin.sim_worker.futures.measuring import measure
 from foretwin.sim_worker.futures.outcomes import (
     OVERLAP_STEPS,
@@ -78,7 +78,7 @@ def run_job(
     check_job(job, stage)
     ticks, every = _ticks(job, stage)
     maker = SceneMaker(world) if scenes is None else scenes
-    job, staged, unplaced = _placed(job, staged_cases(job, stage, maker))
+    job, staged, unplaced = _placed(job, rehearsed_cases(job, stage.vehicle, maker))
     time_s = np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s
     if job.futures:
         played = _play(job, staged, stage, maker, ticks=ticks, every=every)

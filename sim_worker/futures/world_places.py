@@ -17,7 +17,8 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.futures.playable import places, rehearsal_stage
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
+from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.places import Unplaced
 

@@ -72,7 +72,7 @@ def unfit(scenario: Scenario, case: StagedCase) -> str:
         return reason
     if case.off_lanes_m > _OFF_LANES_M:
         return "a road is too short for the way up to the impact"
-    if reason := short_run_up(case):
+    if reason := ill_timed(scenario, case):
         return reason
     for part, actor in zip(scenario.actors, case.actors, strict=True):
         if part.name == case.impact_with and crosses(scenario.ego, part):
@@ -80,10 +80,12 @@ def unfit(scenario: Scenario, case: StagedCase) -> str:
     return ""
 
 
-def short_run_up(case: StagedCase) -> str:
-    """Return that an impact comes too soon for anybody to react, where it does."""
+def ill_timed(scenario: Scenario, case: StagedCase) -> str:
+    """Return that an impact comes too soon for anybody to react, or after the end, if it does."""
     if case.impact_with and case.impact_time_s < LEAST_RUN_UP_S:
         return f"a road leaves less than {LEAST_RUN_UP_S:g} s before the impact"
+    if case.impact_with and case.impact_time_s > scenario.horizon_s:
+        return f"the impact would be after the end at {scenario.horizon_s:g} s"
     return ""
 
 

@@ -20,6 +20,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.placed", description=__doc__)
     parser.add_argument("maps", nargs="+", type=Path)
     parser.add_argument("--most", type=int, help="of a map's junctions, drawn by a seed")
+    parser.add_argument("--kind", help="junctions of this kind alone, such as roundabout")
     parser.add_argument("--seed", type=int, default=7, help="of the draw")
     parser.add_argument("--cases", type=Path, help="where to write each case as a line of JSON")
     given = parser.parse_args()
@@ -27,7 +28,7 @@ def main() -> None:
     shares = collections.Counter[tuple[str, str]]()
     for file in given.maps:
         raw, start = read_raw(file), time.perf_counter()
-        result = played_map(file, raw, most=given.most, seed=given.seed)
+        result = played_map(file, raw, most=given.most, seed=given.seed, kind=given.kind)
         junctions = result.junctions
         took_s = time.perf_counter() - start
         placing_s = sum(j.placing_s for j in junctions)

@@ -13,7 +13,8 @@ import msgspec
 from foretwin.contracts.futures import Job
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.playable import job_at, places, rehearsal_stage
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
+from foretwin.sim_worker.futures.playable import job_at, places
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values
@@ -61,13 +62,17 @@ class PlayedMap(NamedTuple):
     known_nodes: frozenset[int]
 
 
-def played_map(file: Path, raw: RawMap, *, most: int | None, seed: int = 7) -> PlayedMap:
-    """Place and play the catalogue on all junctions of a map, or a sample of `most`."""
+def played_map(
+    file: Path, raw: RawMap, *, most: int | None, seed: int = 7, kind: str | None = None
+) -> PlayedMap:
+    """Place and play the catalogue on all junctions of a map, or of a kind, or `most` of them."""
     osm = read_map(file)
     graph = build_road_graph(osm)
     junctions = find_intersections(osm, graph)
     index = index_map(osm, graph, junctions)
     known = frozenset(node for junction in junctions for node in junction.summary.osm_nodes)
+    if kind is not None:
+        junctions = [junction for junction in junctions if junction.summary.kind == kind]
     if most is not None and most < len(junctions):
         junctions = tuple(random.Random(seed).sample(list(junctions), most))
     rehearsal, played = rehearsal_stage(load_vehicle()), []
