@@ -17,8 +17,9 @@ from foretwin.contracts.forecast import ProgressForecast, rising, share_below, v
 
 HALF_LIFE_S = 240.0
 """After so much of the drive what came counts half."""
-PRIOR_ROUNDS = 20.0
-"""The table counts as much as so many rounds: neighbours of 2 Hz tell about the same."""
+PRIOR_ROUNDS_PER_S = 10.0
+"""The table counts as much as so many rounds for each second that a forecast reaches: rounds of
+2 Hz whose seconds overlap tell about the same."""
 MOST_BACK_S = 1.0
 """Stamps of a live car come a little out of order; a clock that steps back starts another drive."""
 LEAST_SHARE = 1e-9
@@ -30,11 +31,10 @@ _GRID = 1.0 / (1.0 + np.exp(-np.linspace(-20.8, 20.8, 417)))
 class Calibration:
     """What came of forecasts so far, by instant; what it holds may be copied and goes on."""
 
-    def __init__(
-        self, instants: int, *, half_life_s: float = HALF_LIFE_S, prior: float = PRIOR_ROUNDS
-    ) -> None:
-        self._half_life_s, self._prior = half_life_s, prior
-        self._came = np.zeros((instants, len(_GRID) + 1))
+    def __init__(self, time_s: Array) -> None:
+        """Take the instants (T,) of the forecasts to come."""
+        self._prior = PRIOR_ROUNDS_PER_S * time_s[:, None]
+        self._came = np.zeros((len(time_s), len(_GRID) + 1))
         """Weights between the places of the grid, as of `_at_s`."""
         self._at_s: float | None = None
 
@@ -52,7 +52,7 @@ class Calibration:
             passed_s = drive_time_s - self._at_s
             if -MOST_BACK_S <= passed_s < 0.0:
                 return
-            self._came *= 0.0 if passed_s < 0.0 else 0.5 ** (passed_s / self._half_life_s)
+            self._came *= 0.0 if passed_s < 0.0 else 0.5 ** (passed_s / HALF_LIFE_S)
         self._at_s = drive_time_s
 
     def calibrated(self, forecast: ProgressForecast) -> ProgressForecast:

@@ -35,13 +35,15 @@ class Examples(NamedTuple):
     """N examples of one drive.
 
     `stamp_ns` (N,), `features` (N, F) with the way ahead and `blind` (N, F) without, `speed_mps`
-    (N,), `distance_m` (N, T) at `PROGRESS_TIMES_S`.
+    (N,) and its standard deviation (N,), 0 where unknown, `distance_m` (N, T) at
+    `PROGRESS_TIMES_S`.
     """
 
     stamp_ns: Array
     features: Array
     blind: Array
     speed_mps: Array
+    speed_std_mps: Array
     distance_m: Array
 
 
@@ -59,6 +61,7 @@ class _Known(NamedTuple):
 
     stamp_ns: int
     blind: Array
+    speed_std_mps: float
     history_m: float
     stretch: int
 
@@ -90,13 +93,14 @@ def examples_of(states: Iterable[VehicleState]) -> Examples:
                 yaw_rate_radps=state.yaw_rate_radps,
                 ahead=AheadFacts(),
             )
-            known.append(_Known(state.stamp_ns, row, now.travelled_m, now.stretch))
+            std_mps = state.speed_std_mps or 0.0
+            known.append(_Known(state.stamp_ns, row, std_mps, now.travelled_m, now.stretch))
     return _labelled(known, {stretch: np.array(rows) for stretch, rows in track.items()})
 
 
 def _labelled(known: list[_Known], tracks: dict[int, Array]) -> Examples:
     times_s = np.array(PROGRESS_TIMES_S)
-    stamps, seeing, blind, distances = [], [], [], []
+    stamps, seeing, blind, stds, distances = [], [], [], [], []
     ways = {stretch: _way(track) for stretch, track in tracks.items()}
     for one in known:
         track, way = tracks[one.stretch], ways[one.stretch]
@@ -105,6 +109,7 @@ def _labelled(known: list[_Known], tracks: dict[int, Array]) -> Examples:
             continue
         stamps.append(one.stamp_ns)
         blind.append(one.blind)
+        stds.append(one.speed_std_mps)
         seeing.append(one.blind if way is None else _with_bends(one.blind, way, one.history_m))
         distances.append(np.interp(until, track[:, 0], track[:, 1]) - one.history_m)
     width = len(known[0].blind) if known else 0
@@ -113,6 +118,7 @@ def _labelled(known: list[_Known], tracks: dict[int, Array]) -> Examples:
         features=np.array(seeing).reshape(-1, width),
         blind=np.array(blind).reshape(-1, width),
         speed_mps=np.array([row[1] for row in blind]),
+        speed_std_mps=np.array(stds),
         distance_m=np.array(distances).reshape(-1, len(times_s)),
     )
 

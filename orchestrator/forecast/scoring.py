@@ -12,6 +12,7 @@ from foretwin.contracts.forecast import pinball
 from foretwin.orchestrator.forecast.calibration import Calibration, shares_of
 from foretwin.orchestrator.forecast.examples import Examples
 from foretwin.orchestrator.forecast.features import FEATURES
+from foretwin.orchestrator.forecast.own_error import with_own_error
 from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.sim_worker.driver_model import STANDING_MPS
 
@@ -50,9 +51,10 @@ def score(
 ) -> DriveScore:
     """Return how a drive's forecasts come out, in its order; `blind` without the way ahead.
 
-    Scored by `truth_m` (N, T) where that is known, calibrated by what the car itself measured.
+    Calibrated by what the car itself measured, and scored by it: what that errs is nothing that a
+    drive can see. With `truth_m` (N, T) scored by this, and widened by the car's own error.
     """
-    calibration = Calibration(len(model.time_s))
+    calibration = Calibration(model.time_s)
     waiting: deque[tuple[int, int, float]] = deque()
     times_ns = np.round(model.time_s * 1e9).astype(np.int64)
     rows: list[tuple[Array, ...]] = []
@@ -70,6 +72,8 @@ def score(
                 waiting.append((due_ns, instant, share))
         table = model.forecast(features[place])
         told = calibration.calibrated(table)
+        if truth_m is not None:
+            told = with_own_error(told, float(drive.speed_std_mps[place]))
         measured_share = shares_of(table, came[:, None])[:, 0]
         speed, accel = drive.speed_mps[place], features[place, accel_place]
         rows.append(

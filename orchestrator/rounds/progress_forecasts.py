@@ -28,6 +28,7 @@ from foretwin.orchestrator.forecast.features import (
     lead_on,
 )
 from foretwin.orchestrator.forecast.motion_history import MotionHistory
+from foretwin.orchestrator.forecast.own_error import with_own_error
 from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.orchestrator.instructions import RoundIntent
 from foretwin.orchestrator.rounds.path_from_car import CAR_WITHIN_M
@@ -37,10 +38,10 @@ from foretwin.sim_worker.futures.likelihood import travelled_m
 
 
 class _Given(NamedTuple):
-    """A round's forecasts: as the table has it, calibrated, and as its futures spread (T, Q)."""
+    """A round's forecasts of what the car will measure: as the table has it, and calibrated."""
 
     table: ProgressForecast
-    told: ProgressForecast
+    calibrated: ProgressForecast
     stamp_ns: int
     travelled_m: float
     stretch: int
@@ -64,7 +65,7 @@ class ProgressForecasts:
         self._model = model
         self._instants = [k for k, t in enumerate(model.time_s) if t <= horizon_s + 1e-9]
         self.history = MotionHistory()
-        self.calibration = Calibration(len(model.time_s))
+        self.calibration = Calibration(model.time_s)
         self._given: dict[int, _Given] = {}
         self._waiting: list[_NotYet] = []
 
@@ -108,12 +109,12 @@ class ProgressForecasts:
             ahead=_ahead(intent, state, users, frame),
         )
         table = self._model.forecast(features)
-        told = table
-        if now.speed_mps >= STANDING_MPS:
-            told = self.calibration.calibrated(table)
-            given = _Given(table, told, now.stamp_ns, now.travelled_m, now.stretch)
-            self._given[round_id] = given
-        return told
+        if now.speed_mps < STANDING_MPS:
+            return table
+        calibrated = self.calibration.calibrated(table)
+        given = _Given(table, calibrated, now.stamp_ns, now.travelled_m, now.stretch)
+        self._given[round_id] = given
+        return with_own_error(calibrated, state.speed_std_mps or 0.0)
 
     def take_round(self, done: RoundDone) -> None:
         """Take a complete round: its forecast counts from when its instants have come."""
@@ -123,7 +124,7 @@ class ProgressForecasts:
         now = self.history.now
         if given is None or now is None or given.stretch != now.stretch:
             return
-        spread = _spread_of_futures(done, given.told, self._instants)
+        spread = _spread_of_futures(done, given.calibrated, self._instants)
         for instant in self._instants:
             due_ns = given.stamp_ns + round(self._model.time_s[instant] * 1e9)
             at = spread[instant]
@@ -135,8 +136,8 @@ class ProgressForecasts:
     def _settled(self, one: _NotYet, drive_time_s: float) -> ForecastOutcome:
         given, k = one.given, one.instant
         travelled = self.history.travelled_at(one.due_ns) - given.travelled_m
-        levels = np.array(given.told.levels)
-        sides = np.stack([given.told.distance_m[k], given.table.distance_m[k], one.futures])
+        levels = np.array(given.calibrated.levels)
+        sides = np.stack([given.calibrated.distance_m[k], given.table.distance_m[k], one.futures])
         share, table_share = share_below(levels, sides[:2], np.full((2, 1), travelled))[:, 0]
         self.calibration.take(k, drive_time_s, float(table_share))
         crps = 2.0 * pinball(levels, sides, np.full(3, travelled)).mean(axis=1)
@@ -145,7 +146,7 @@ class ProgressForecasts:
             round_id=one.round_id,
             stamp_ns=given.stamp_ns,
             intersection_id=one.intersection_id,
-            horizon_s=float(given.told.time_s[k]),
+            horizon_s=float(given.calibrated.time_s[k]),
             travelled_m=travelled,
             p10_m=p10,
             p50_m=p50,

@@ -14,6 +14,7 @@ from foretwin.contracts.forecast import PROGRESS_LEVELS, ProgressForecast
 from foretwin.orchestrator.forecast.calibration import HALF_LIFE_S, Calibration, shares_of
 
 LEVELS = np.array(PROGRESS_LEVELS)
+ONE_S = np.array([1.0])
 
 
 def forecast(width_m: float = 10.0, instants: int = 1) -> ProgressForecast:
@@ -44,7 +45,7 @@ def test_a_band_that_is_too_narrow_too_wide_or_aside_comes_to_hold_its_share(
     random = np.random.default_rng(5)
     came = 20.0 + bias_m + true_width_m * (random.random(3000) - 0.5)
 
-    assert held(Calibration(1), came, forecast()) == pytest.approx(0.8, abs=0.04)
+    assert held(Calibration(ONE_S), came, forecast()) == pytest.approx(0.8, abs=0.04)
 
 
 def test_a_driver_who_changes_is_followed_within_some_half_lives() -> None:
@@ -52,7 +53,7 @@ def test_a_driver_who_changes_is_followed_within_some_half_lives() -> None:
     half = round(4 * HALF_LIFE_S / 0.5)
     calm = 20.0 + 4.0 * (random.random(half) - 0.5)
     hasty = 26.0 + 20.0 * (random.random(half) - 0.5)
-    calibration = Calibration(1)
+    calibration = Calibration(ONE_S)
     held(calibration, calm, forecast())
 
     assert calibration.calibrated(forecast()).median_m[0] == pytest.approx(20.0, abs=0.5)
@@ -63,7 +64,7 @@ def test_a_driver_who_changes_is_followed_within_some_half_lives() -> None:
 
 
 def test_before_anything_came_a_forecast_is_as_it_was_and_instants_are_apart() -> None:
-    calibration, told = Calibration(2), forecast(instants=2)
+    calibration, told = Calibration(np.arange(1.0, 3.0)), forecast(instants=2)
     assert calibration.calibrated(told) is told
     for k in range(200):
         calibration.take(1, 0.5 * k, 0.9)
@@ -73,9 +74,22 @@ def test_before_anything_came_a_forecast_is_as_it_was_and_instants_are_apart() -
     assert now.median_m[1] > told.median_m[1] + 2.0
 
 
+def test_a_forecast_that_reaches_farther_is_moved_by_less() -> None:
+    """Rounds overlap: those of 8 s say eight times less each than those of 1 s."""
+    told = forecast(instants=1)
+    moved = []
+    for reach_s in (1.0, 8.0):
+        calibration = Calibration(np.array([reach_s]))
+        for k in range(20):
+            calibration.take(0, 0.5 * k, 0.9)
+        moved.append(float(calibration.calibrated(told).median_m[0]) - 20.0)
+
+    assert moved[0] > 2.0 * moved[1] > 0.0
+
+
 @given(st.lists(st.tuples(st.integers(0, 2), st.floats(0.0, 1.0)), max_size=60))
 def test_whatever_came_quantiles_rise_and_no_car_goes_back(came: list) -> None:
-    calibration, told = Calibration(3), forecast(40.0, instants=3)
+    calibration, told = Calibration(np.arange(1.0, 4.0)), forecast(40.0, instants=3)
     for k, (instant, share) in enumerate(came):
         calibration.take(instant, 0.5 * k, share)
     distance = calibration.calibrated(told).distance_m
@@ -85,7 +99,7 @@ def test_whatever_came_quantiles_rise_and_no_car_goes_back(came: list) -> None:
 
 
 def test_a_copy_and_one_that_travelled_go_on_to_the_same_bits() -> None:
-    one = Calibration(1)
+    one = Calibration(ONE_S)
     for k in range(30):
         one.take(0, 0.7 * k, (0.37 * k) % 1.0)
     others = copy.deepcopy(one), pickle.loads(pickle.dumps(one))
@@ -97,7 +111,7 @@ def test_a_copy_and_one_that_travelled_go_on_to_the_same_bits() -> None:
 
 
 def test_where_time_steps_back_what_came_is_forgotten() -> None:
-    calibration = Calibration(1)
+    calibration = Calibration(ONE_S)
     for k in range(50):
         calibration.take(0, 100.0 + k, 0.99)
     calibration.take(0, 1.0, 0.5)
@@ -106,7 +120,7 @@ def test_where_time_steps_back_what_came_is_forgotten() -> None:
 
 
 def test_a_stamp_a_little_out_of_order_costs_nothing() -> None:
-    one, other = Calibration(1), Calibration(1)
+    one, other = Calibration(ONE_S), Calibration(ONE_S)
     for k in range(50):
         for calibration in (one, other):
             calibration.take(0, 100.0 + k, 0.9)

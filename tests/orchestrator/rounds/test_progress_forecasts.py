@@ -32,12 +32,14 @@ INTENT = RoundIntent(
 )
 
 
-def state(time_s: float, speed_mps: float = 10.0) -> VehicleState:
+def state(
+    time_s: float, speed_mps: float = 10.0, *, speed_std_mps: float | None = None
+) -> VehicleState:
     lat, lon = geo_from_local(FRAME, np.array([max(0.0, speed_mps * time_s), 0.0]))
     return VehicleState(
         vehicle_id="ego", stamp_ns=START_NS + round(time_s * 1e9),
         position=GeoPoint(float(lat), float(lon)), yaw_rad=0.0, speed_mps=speed_mps,
-        yaw_rate_radps=0.0, accel_mps2=0.0,
+        yaw_rate_radps=0.0, accel_mps2=0.0, speed_std_mps=speed_std_mps,
     )  # fmt: skip
 
 
@@ -49,13 +51,14 @@ def drive(
     speed_mps: float = 10.0,
     rounds: bool = True,
     skip: tuple[float, float] = (np.inf, np.inf),
+    speed_std_mps: float | None = None,
 ) -> list[ForecastOutcome]:
     """States at 10 Hz, a round each half second, complete at once."""
     found: list[ForecastOutcome] = []
     for k in range(round(from_s * 10), round(until_s * 10) + 1):
         if skip[0] < k / 10 < skip[1]:
             continue
-        now = state(k / 10, speed_mps)
+        now = state(k / 10, speed_mps, speed_std_mps=speed_std_mps)
         found += forecasts.take_state(now, START_NS)
         if rounds and k % 5 == 0:
             told = forecasts.forecast(k, INTENT, now, (), FRAME)
@@ -116,6 +119,21 @@ def test_cutting_the_drive_changes_nothing_before_the_cut() -> None:
 def test_a_standing_car_has_a_forecast_that_does_not_count() -> None:
     forecasts = fresh()
     assert drive(forecasts, until_s=12.0, speed_mps=0.2) == []
+
+
+def test_a_car_that_is_unsure_of_its_speed_is_told_a_wider_band_and_calibrates_alike() -> None:
+    sure, unsure = fresh(), fresh()
+    found = drive(sure, until_s=30.0), drive(unsure, until_s=30.0, speed_std_mps=1.0)
+    told = [
+        one.forecast(999, INTENT, state(30.0, speed_std_mps=std_mps), (), FRAME)
+        for one, std_mps in ((sure, None), (unsure, 1.0))
+    ]
+
+    assert told[0] is not None
+    assert told[1] is not None
+    width = [float((one.at(0.9) - one.at(0.1))[0]) for one in told if one is not None]
+    assert width[1] > 2.0 * width[0]
+    assert found[0] == found[1]
 
 
 def test_before_any_motion_there_is_no_forecast() -> None:
