@@ -25,7 +25,8 @@ from foretwin.world_gen.roads.road_classes import road_class
 
 CORNER_AT_RAD = np.radians([30.0, 45.0, 60.0, 75.0, 90.0, 120.0, 135.0, 150.0, 180.0])
 CORNER_M = np.array([18.0, 15.0, 12.0, 11.0, 9.0, 6.0, 6.0, 5.5, 4.5])
-"""Radius of the edge of the road by how far is turned: AASHTO, passenger cars."""
+"""Radius of the edge of the road by how far is turned: AASHTO, passenger cars; from memory,
+not held against a copy of the table."""
 LEAVING_SHARE, ALIKE_SHARE, REACHING_SHARE = 12.0 / 9.0, 10.0 / 9.0, 8.0 / 9.0
 """Of it out of a main road, between roads alike, and into one: RASt's 12 and 8 m at a right angle,
 and between them."""
