@@ -98,14 +98,15 @@ class DrivingPace:
         todo = iter(places_m)
         place = next(todo, None)
         s_m, speed, time_s = from_m, self.speed_mps, 0.0
-        fades_s = fading_s(acceleration_mps2)
+        left = math.exp(-_STEP_S / fading_s(acceleration_mps2))
+        present = math.sqrt(left)
         while place is not None and time_s < FORESEEN_S:
             while edge < len(ends) - 1 and s_m >= ends[edge]:
                 edge += 1
             accel = going_on_mps2(
                 speed,
                 acceleration_mps2,
-                math.exp(-(time_s + _STEP_S / 2.0) / fades_s),
+                present,
                 wanted_mps=speeds[edge],
                 within_s=UNHINDERED_S,
                 bend_mps=bends.at(s_m + CURVE_TIME_S * speed),
@@ -116,6 +117,7 @@ class DrivingPace:
                 found.append(time_s + max(place - s_m, 0.0) / mean_mps)
                 place = next(todo, None)
             s_m, speed, time_s = s_m + _STEP_S * mean_mps, faster, time_s + _STEP_S
+            present *= left
         if place is not None:
             far = np.array([place, *todo])
             bounds = np.clip(route.start_m, s_m, None)
