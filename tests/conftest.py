@@ -17,6 +17,10 @@ settings.register_profile("foretwin", CALM, derandomize=True)
 settings.register_profile("explore", CALM)
 settings.load_profile("foretwin")
 
+# Tests are spread over the cores: threads of scikit-learn beside them wait for each other in loops
+# (learning a small table took over 300 s on two busy cores, 56 s with one thread).
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # Under nohup it would be ignored by all that tests start, those that must end by it too.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
