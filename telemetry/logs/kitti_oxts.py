@@ -12,6 +12,7 @@ yaw rate 1.05 of the course's change, acceleration 1.00 of the speed's, heading 
 
 from __future__ import annotations
 
+import errno
 import zipfile
 import zlib
 from collections import Counter
@@ -33,6 +34,8 @@ _NUMBERS = 30
 _MOST_ROW_BYTES = 4096
 _MOST_TIMES_BYTES = 1 << 26
 """A day at 10 Hz is 26 MB."""
+_DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError)
+"""What zipfile raises over bytes that are damaged, packed otherwise or encrypted."""
 _COLUMNS = {
     "gnss": (0, 1, 2, 23),
     "heading": (5, 22),
@@ -57,7 +60,7 @@ def is_kitti_oxts(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as packed:
             return _member_folder(packed) is not None
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+    except (*_DAMAGED, OSError, ValueError):
         return False
 
 
@@ -146,7 +149,10 @@ def _files(path: Path) -> Iterator[_Files]:
                 lambda: read("timestamps.txt", _MOST_TIMES_BYTES),
                 lambda name: read(f"data/{name}"),
             )
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except (*_DAMAGED, OSError) as error:
+        if isinstance(error, OSError) and error.errno != errno.EINVAL:
+            raise
+        # EINVAL: a place that the zip says it has and has not.
         raise LogError(f"{path}: damaged zip: {one_line(error)}") from None
 
 

@@ -7,11 +7,13 @@ from pathlib import Path
 from foretwin.contracts.drive import RoadUsers
 from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
 from foretwin.telemetry.logs.geojson import open_geojson
+from foretwin.telemetry.logs.gnss_logger import is_gnss_logger, open_gnss_logger
 from foretwin.telemetry.logs.gpx import open_gpx
 from foretwin.telemetry.logs.kitti_oxts import is_kitti_oxts, open_kitti_oxts
 from foretwin.telemetry.logs.log import Log, LogError, check_undeclared
 from foretwin.telemetry.logs.mcity import is_mcity, read_mcity
 from foretwin.telemetry.logs.nmea import is_nmea, open_nmea
+from foretwin.telemetry.logs.nuscenes_can import is_nuscenes_can, open_nuscenes_can, scenes_in
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
     RoadUserLog,
@@ -26,7 +28,8 @@ BAG_MAGIC, SQLITE_MAGIC, ZIP_MAGIC = b"#ROSBAG V", b"SQLite format 3\0", b"PK\x0
 KINDS = (
     "MCAP with ROS messages (.mcap), ROS 1 bag (.bag), ROS 2 bag (folder or .db3), "
     "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV with a declaration (.csv), GPX (.gpx), "
-    "GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, "
+    "GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, GnssLogger text, "
+    "nuScenes CAN bus JSON (scene-0001_pose.json), "
     "smartLoc text or folder (point3, odom3), comma2k19 segment folder"
 )
 
@@ -54,12 +57,14 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         if is_kitti_oxts(path):
             check_undeclared(path, declaration, "KITTI's oxts")
             return open_kitti_oxts(path)
+        if scenes_in(path):
+            return open_nuscenes_can(path, declaration=declaration)
         if smartloc_texts(path):
             check_undeclared(path, declaration, "a smartLoc drive")
             return open_smartloc(path)
         raise LogError(
-            f"{path}: a folder that is no comma2k19 segment, no drive of KITTI or smartLoc and no"
-            f" ROS 2 bag (it has no metadata.yaml); known logs: {KINDS}"
+            f"{path}: a folder that is no comma2k19 segment, no drive of KITTI, nuScenes or"
+            f" smartLoc and no ROS 2 bag (it has no metadata.yaml); known logs: {KINDS}"
         )
     head = _head(path)
     if not head:
@@ -86,6 +91,10 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if is_smartloc(text):
         check_undeclared(path, declaration, "smartLoc's text")
         return open_smartloc(path)
+    if is_gnss_logger(text):
+        return open_gnss_logger(path, declaration=declaration)
+    if is_nuscenes_can(path):
+        return open_nuscenes_can(path, declaration=declaration)
     if suffix == ".gpx" or (text.startswith("<") and "<gpx" in text):
         check_undeclared(path, declaration, "a GPX file")
         return open_gpx(path)

@@ -128,7 +128,8 @@ def _imu(odometry: Array) -> dict[str, Array]:
     time_s, speed_mps = odometry[:, 0], odometry[:, 1]
     step_s = np.diff(time_s, prepend=np.nan)
     usable = (step_s > 0.0) & (step_s < _NEXT_S)  # false for NaN
-    forward = np.diff(speed_mps, prepend=np.nan) / np.where(usable, step_s, np.nan)
+    with np.errstate(over="ignore", invalid="ignore"):  # of numbers that were damaged
+        forward = np.diff(speed_mps, prepend=np.nan) / np.where(usable, step_s, np.nan)
     still = np.zeros(len(odometry))
     return {
         "accel_x": forward,

@@ -13,7 +13,13 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs.convert import convert
 from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.drive_messages import INFO, START_NS
-from tests.telemetry.logs import test_kitti_oxts, test_smartloc, test_ubx
+from tests.telemetry.logs import (
+    test_gnss_logger,
+    test_kitti_oxts,
+    test_nuscenes_can,
+    test_smartloc,
+    test_ubx,
+)
 from tests.telemetry.test_comma2k19 import save
 from tests.telemetry.test_foreign_mcap import LAG_NS, ForeignFile, control, fix, velocity
 from tests.telemetry.test_nmea import gga, rmc
@@ -99,8 +105,14 @@ def whole_logs(folder: Path) -> list[Path]:
     (folder / "smartloc").mkdir()
     odometry = "".join(test_smartloc.ODOMETRY.format(n / 10, 5.0 + n, 0.1) for n in range(20))
     kitti = test_kitti_oxts.drive(folder / "kitti")
+    scene = test_nuscenes_can.scene(folder / "can_bus", seconds=1).parent
+    phone = folder / "gnss_log.txt"
+    rows = [test_gnss_logger.fix(n) + test_gnss_logger.sensor("Gyro", 10 * n, "0,0.1,0")
+            + test_gnss_logger.sensor("Accel", 10 * n, "0,9.8,0") for n in range(9)]  # fmt: skip
+    phone.write_text(test_gnss_logger.V2 + "".join(rows))
+    (folder / "gnss_log.txt.toml").write_text('forward = "-z"\nup = "y"\n')
     return [
-        *logs, ubx, kitti, test_kitti_oxts.zipped(kitti),
+        *logs, ubx, scene, phone, kitti, test_kitti_oxts.zipped(kitti),
         test_smartloc.drive(folder / "smartloc", odometry), _segment(folder / "segment40"),
     ]  # fmt: skip
 
