@@ -14,9 +14,6 @@ from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 LINE_95, PLANE_95 = 3.841, 5.991
 """95 % of chi-square with one and two degrees of freedom."""
-UP, DOWN = 1.2, 1.2 ** (-1.0 / 19.0)
-"""What of 100 errors the 5 beyond their 95 % bound, and the 95 within it, make of what is taken for
-usual (Gibbs, Candes 2021)."""
 
 
 class Surprises(NamedTuple):

@@ -15,9 +15,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
 from foretwin.telemetry.estimator.facing import BACKING_MPS, CREEPING_MPS, Facing
 from foretwin.telemetry.estimator.innovations import (
-    DOWN,
     PLANE_95,
-    UP,
     PositionInnovation,
     SurpriseCount,
 )
@@ -40,6 +38,9 @@ _IMPOSSIBLE = 25.0
 _BY_CHANCE = 1.5
 """So much of what is usual. Where sources contradict each other all the time, no single fix is a
 glitch, and no spread is as small as said."""
+_UP, _DOWN = 1.2, 1.2 ** (-1.0 / 19.0)
+"""What of 100 fixes the 5 beyond their 95 % bound, and the 95 within it, make of what is usual
+(Gibbs, Candes 2021)."""
 _LEAST_SLIP_M = 0.1
 _SHOWS_TURNING_M = 0.2
 """Fixes rougher than this show no wheel being turned, only the bend that comes of it. Chosen."""
@@ -170,7 +171,7 @@ class PositionCorrections:
             innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
             square = innovation.square(white)
         borne_out, self._doubted = bool(self._doubted), ()
-        self._usual = max(self._usual * (UP if square > PLANE_95 * self._usual else DOWN), 1.0)
+        self._usual = max(self._usual * (_UP if square > PLANE_95 * self._usual else _DOWN), 1.0)
         self._expect(filter_, square, white, alone=alone)
         yaw_before = filter_.mean[YAW]
         if (

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
-from foretwin.telemetry.estimator.innovations import DOWN, LINE_95, PLANE_95, UP
+from foretwin.telemetry.estimator.innovations import LINE_95, PLANE_95
 from foretwin.telemetry.estimator.kinematic_filter import (
     CURVATURE,
     SPEED,
@@ -35,6 +35,9 @@ _MOVING_MPS, _COURSE_MPS = 0.5, 2.0
 """A slower car has no course that its fixes would tell."""
 _CLEAR = 0.7
 """What fixes show must be better known than the state, by so much. Chosen."""
+_UP, _DOWN = 1.1, 1.1 ** (-1.0 / 19.0)
+"""What of 100 checks the 5 beyond the 95 % bound and the 95 within it make of a spread: less than
+of single fixes, for neighbouring checks share most of theirs. Chosen."""
 _LEAST, _MOST = 0.3, 30.0
 _LEAST_NOISE_M = 0.003
 """Of a survey receiver's fixes among each other: seen so on six of them."""
@@ -161,4 +164,4 @@ def _cubic(a: float, b: float, c: float, d: float, e: float, f: float, g: float)
 
 
 def _stretched(by: float, beyond: bool, *, least: float) -> float:
-    return min(max(by * (UP if beyond else DOWN), least), _MOST)
+    return min(max(by * (_UP if beyond else _DOWN), least), _MOST)

@@ -24,7 +24,8 @@ class RealDrive(NamedTuple):
     """A drive: what the car sends, and the log whose positions are the reference for it.
 
     `position_std_m` is the reference's white noise, for the smoother. With `true_heading` its
-    heading was measured with its positions, and is the truth instead of the course.
+    heading was measured with its positions, and is the truth instead of the course, with
+    `gyro_heading` its turning was.
     """
 
     name: str
@@ -33,6 +34,7 @@ class RealDrive(NamedTuple):
     reference: Callable[[], Log]
     position_std_m: float = 0.02
     true_heading: bool = False
+    gyro_heading: bool = False
 
 
 class _Public(NamedTuple):
@@ -96,12 +98,15 @@ def _given(data: Path) -> Iterator[RealDrive]:
     for name, path in smartloc.items():
         yield _alone(name, partial(open_log, data / path))
     truth = partial(open_log, data / smartloc["potsdamer-platz"])
-    measured = data / "drive-berlin-potsdamer-platz" / "Berlin_Potsdamer_Platz_Input.txt.gz"
-    for name, read in (
-        ("potsdamer-platz-odometry", other_receivers.with_odometry),
-        ("potsdamer-platz-pseudoranges", other_receivers.with_pseudoranges),
-    ):
-        yield RealDrive(name, "tuning", partial(read, truth, measured), truth)
+    potsdamer = data / "drive-berlin-potsdamer-platz"
+    odometry = partial(open_log, potsdamer)
+    yield RealDrive("potsdamer-platz-odometry", "tuning", odometry, truth)
+    measured = partial(
+        other_receivers.with_pseudoranges,
+        odometry,
+        potsdamer / "Berlin_Potsdamer_Platz_Input.txt.gz",
+    )
+    yield RealDrive("potsdamer-platz-pseudoranges", "tuning", measured, truth)
     boreas = partial(
         open_log,
         next((data / "drive-boreas-toronto").glob("*.csv")),
@@ -127,11 +132,11 @@ def _given(data: Path) -> Iterator[RealDrive]:
             data / "drive-dresden-imu" / file,
             declaration=DECLARATIONS / "dresden.csv.toml",
         )
-        yield _alone(name, dresden, position_std_m=1.0)
+        yield RealDrive(name, "tuning", dresden, dresden, 1.0, gyro_heading=True)
         even = partial(
             other_receivers.by_receivers_clock, dresden, data / "drive-dresden-imu" / file
         )
-        yield _alone(f"{name}-own-clock", even, position_std_m=1.0)
+        yield RealDrive(f"{name}-own-clock", "tuning", even, even, 1.0, gyro_heading=True)
     for trial in ("3", "4", "5", "13_c", "14_c", "15_c"):
         file_of = data / "traffic-mcity-rtk" / "gts" / f"gps_data_{trial}.json"
         yield _alone(f"mcity-{trial}", partial(other_receivers.mcity_car, file_of))

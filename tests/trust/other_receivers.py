@@ -1,6 +1,6 @@
 """Other receivers of the same drives: what was recorded beside the reference, as logs.
 
-Odometry and pseudoranges of smartLoc, the u-blox receiver of comma2k19, cars at Mcity, Dresden's
+Pseudoranges of smartLoc, the u-blox receiver of comma2k19, cars at Mcity, Dresden's
 logger by its receiver's clock, and the positions of a log alone.
 """
 
@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import GnssFix, ImuSample, SpeedSample, VehicleInfo
+from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.frames import GeoPoint, geo_from_ecef
 from foretwin.telemetry.logs import Log
 from foretwin.telemetry.logs.log import Sample
@@ -43,26 +43,8 @@ def once_a_second(log: Callable[[], Log]) -> Log:
     return _log(opened.info, kept)
 
 
-def with_odometry(truth: Callable[[], Log], measured: Path) -> Log:
-    """Return smartLoc's positions with the wheels' speed and the yaw rate of its odometry."""
-    opened = truth()
-    beside: list[Sample] = []
-    for row in _rows(measured, "odom3"):
-        stamp_ns = round(row[0] * 1e9)
-        beside.append(("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=row[1])))
-        beside.append(
-            (
-                "imu",
-                ImuSample(
-                    stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.81), rate_radps=(0.0, 0.0, row[6])
-                ),
-            )
-        )
-    return _log(opened.info, [*opened.samples(), *beside])
-
-
-def with_pseudoranges(truth: Callable[[], Log], measured: Path) -> Log:
-    """Return fixes computed from smartLoc's pseudoranges, epoch by epoch, with its odometry.
+def with_pseudoranges(odometry: Callable[[], Log], measured: Path) -> Log:
+    """Return fixes computed from smartLoc's pseudoranges, epoch by epoch, in place of a log's.
 
     Least squares for the place and a clock for each satellite system; the standard deviation
     stated is the formal one, which knows nothing of reflected signals.
@@ -75,8 +57,8 @@ def with_pseudoranges(truth: Callable[[], Log], measured: Path) -> Log:
         fix = _single_point(np.array(rows), round(time_s * 1e9))
         if fix is not None:
             fixes.append(("gnss", fix))
-    beside = [s for s in with_odometry(truth, measured).samples() if s[0] != "gnss"]
-    return _log(truth().info, [*fixes, *beside])
+    opened = odometry()
+    return _log(opened.info, [*fixes, *(s for s in opened.samples() if s[0] != "gnss")])
 
 
 def with_ublox(pose: Callable[[], Log], segment: Path) -> Log:

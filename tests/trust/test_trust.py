@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ImuSample
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import FRAME, info
+from tests.telemetry.smoothing import SmoothedTrack
 from tests.trust.consistency import consistency_of
 from tests.trust.drives import given_drives
 from tests.trust.states import States, states_of
-from tests.trust.truth import Truth, slips_of, smoothed, torn_at, truth_of
+from tests.trust.truth import Truth, slips_of, smoothed, torn_at, truth_of, turned_by_gyro
 
 STAMPS = (np.arange(0.0, 40.0, 0.2) * 1e9).astype(np.int64)
 
@@ -63,6 +65,25 @@ def test_a_reference_that_was_bridged_by_a_chord_is_torn_at_its_ends_and_a_bend_
     bridged[60:72] = bridged[60] + share * (bridged[71] - bridged[60])
     assert not torn_at(STAMPS, clean).any()
     assert np.flatnonzero(torn_at(STAMPS, bridged)).tolist() == [59, 70]
+
+
+def test_a_bend_that_the_receiver_has_smoothed_is_as_sharp_in_the_truth_as_the_gyro_felt_it() -> (
+    None
+):
+    time_s = np.arange(0.0, 120.0, 0.1)
+    rate = np.where(np.abs(time_s - 60.0) < 1.5, np.pi / 6.0, 0.0)
+    yaw = np.cumsum(rate) * 0.1
+    late = np.interp(time_s, [0.0, 58.0, 66.0, 120.0], [0.0, 0.0, yaw[-1], yaw[-1]])
+    stamps = (time_s * 1e9).astype(np.int64)
+    speed, still = np.full(len(stamps), 8.0), np.zeros(len(stamps))
+    track = SmoothedTrack(stamps, np.zeros((len(stamps), 2)), late, speed, rate, still)
+    drifting = [
+        ImuSample(stamp_ns=int(at), accel_mps2=(0.0, 0.0, 9.8), rate_radps=(0.0, 0.0, turn + 0.002))
+        for at, turn in zip(stamps, rate, strict=True)
+    ]
+    told = turned_by_gyro(track, drifting).yaw_rad
+    assert np.abs(late - yaw).max() > np.radians(40.0)
+    assert np.abs(told - yaw).max() < np.radians(4.0)
 
 
 def test_where_the_reference_is_torn_it_says_nothing_against_a_state() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import GnssFix, HeadingSample
+from foretwin.contracts.drive import GnssFix, HeadingSample, ImuSample
 from foretwin.contracts.frames import LocalFrame, grid_convergence, local_from_geo
 from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.trust.drives import RealDrive
@@ -25,6 +25,9 @@ _LEAST_SLIP_M = 0.08
 _CAR_MPS2 = 2.0
 """What a car's motion may differ from its neighbours' straight line: jerk and curvature."""
 JERK_DENSITY = 4.0
+_STRAIGHT_S, _STRAIGHT_MPS, _STRAIGHT_RAD = 5.0, 4.0, 0.1
+"""Who has been so fast and has turned no farther for so long before and after goes straight."""
+_DRIFT_S = 15.0
 _TYRES_MPS2 = 10.0
 """No car on tyres accelerates, brakes or turns harder (1 g)."""
 
@@ -72,6 +75,9 @@ def truth_of(drive: RealDrive) -> Truth:
     truth = smoothed(
         frame, stamps, local_from_geo(frame, lat, lon), position_std_m=drive.position_std_m
     )
+    if drive.gyro_heading:
+        turning = [message for message in samples if isinstance(message, ImuSample)]
+        return truth._replace(track=turned_by_gyro(truth.track, turning))
     if not drive.true_heading:
         return truth
     said = [message for message in samples if isinstance(message, HeadingSample)]
@@ -79,6 +85,28 @@ def truth_of(drive: RealDrive) -> Truth:
     measured = np.interp(stamps, [one.stamp_ns for one in said], yaw)
     yaw = measured + np.asarray(grid_convergence(frame, lat, lon))
     return truth._replace(track=truth.track._replace(yaw_rad=yaw))
+
+
+def turned_by_gyro(track: SmoothedTrack, samples: list[ImuSample]) -> SmoothedTrack:
+    """Return the track with the gyro's turning, and the course's direction over half a minute.
+
+    For positions that their receiver has smoothed itself: a bend of 3 s takes 7 in them. Where the
+    car is fast and goes straight before and after, course and gyro differ by the gyro's drift.
+    """
+    start_ns = track.stamp_ns[0]
+    time_s = (track.stamp_ns - start_ns) * 1e-9
+    at_s = np.array([(one.stamp_ns - start_ns) * 1e-9 for one in samples])
+    rate = np.array([one.rate_radps[2] for one in samples])
+    mean_rate = 0.5 * (rate[1:] + rate[:-1])
+    turned = np.concatenate([[0.0], np.cumsum(mean_rate * np.diff(at_s))])
+    turned = np.interp(time_s, at_s, turned)
+    known = []
+    for now_s, speed in zip(time_s, track.speed_mps, strict=True):
+        around = turned[np.abs(time_s - now_s) < _STRAIGHT_S]
+        known.append(float(speed > _STRAIGHT_MPS and np.ptp(around) < _STRAIGHT_RAD))
+    drift = np.exp(1j * (track.yaw_rad - turned))
+    weight = np.exp(-0.5 * ((time_s[:, None] - time_s) / _DRIFT_S) ** 2) * np.array(known)
+    return track._replace(yaw_rad=np.unwrap(turned + np.angle(weight @ drift)))
 
 
 def smoothed(
