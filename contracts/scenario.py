@@ -30,8 +30,9 @@ ego enters, `joins_ring` enters where the ego circulates, `crosses_exit` and `cr
 foot or wheels over the arm that the ego leaves or enters by, `parked` beside its path.
 """
 Conduct = Literal["heedless", "law_abiding", "stops", "parked", "overtakes"]
-"""`heedless` keeps its speed whatever happens, `law_abiding` follows, waits and gives way,
-`stops` keeps its speed, then brakes, `parked` stands, `overtakes` passes who is slower."""
+"""`heedless` keeps its speed whatever happens, but in bends that ask for less, `law_abiding`
+follows, waits and gives way, `stops` keeps its speed, then brakes, `parked` stands, `overtakes`
+passes who is slower."""
 Setting = Literal["junction", "road", "motorway", "circuit", "parking_bay"]
 
 EGO = "ego"

@@ -6,8 +6,10 @@ index arithmetic and a vehicle never runs out of path.
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
+import operator
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +28,8 @@ _MANY = 32
 """Points, from which on a tree of the nodes is searched faster than all of them."""
 _SMOOTH_NODES = 2
 """Curvature is the heading change over this many nodes on either side."""
+_EASED_NODES = 2
+"""A car cuts corners by as much as means over so many nodes on either side do: it is so long."""
 
 
 class FrenetPoint(NamedTuple):
@@ -74,23 +78,8 @@ class FrenetPath:
         self.first_arc_m = -before * SPACING_M
         self.arc_m: Array = np.arange(-before, after + 1, dtype=np.float64) * SPACING_M
         """(M,) arc length of the nodes."""
-        self._x = _prolonged(self.arc_m, arc, points[:, 0])
-        self._y = _prolonged(self.arc_m, arc, points[:, 1])
-        heading = np.unwrap(np.arctan2(np.gradient(self._y), np.gradient(self._x)))
-        self._heading = heading
-        # Tables have a row for each quantity: a look-up gives columns that lie in order.
-        self._nodes = np.stack([self._x, self._y, -np.sin(heading), np.cos(heading)])
-        """(4, M) x, y and the unit vector to the left."""
-        self._pieces = _with_steps(self._nodes)
         self._last = len(self.arc_m) - 1
-        step = np.diff(self._nodes[:2])
-        length = np.hypot(*step)
-        cos, sin = step / length
-        self._segments = np.stack(
-            [*self._nodes[:2, :-1], cos / length, -sin, sin / length, cos, self.arc_m[:-1]]
-        )
-        """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
-        length."""
+        self._lay(*(_prolonged(self.arc_m, arc, column) for column in points.T))
         if speed_limit_mps is None:
             self.speed_limit_mps = np.full(len(self.arc_m), np.inf)
         else:
@@ -100,10 +89,30 @@ class FrenetPath:
             self.speed_limit_mps = limit[nearest]
         """(M,) limits at the nodes, infinite where unknown."""
 
+    def _lay(self, x_m: Array, y_m: Array) -> None:
+        """Lay the nodes (M,) where they are."""
+        self._x, self._y = x_m, y_m
+        self._heading = np.unwrap(np.arctan2(np.gradient(y_m), np.gradient(x_m)))
+        # Tables have a row for each quantity: a look-up gives columns that lie in order.
+        self._nodes = np.stack([x_m, y_m, -np.sin(self._heading), np.cos(self._heading)])
+        """(4, M) x, y and the unit vector to the left."""
+        self._pieces = _with_steps(self._nodes)
+        step = np.diff(self._nodes[:2])
+        length = np.hypot(*step)
+        cos, sin = step / length
+        self._segments = np.stack(
+            [*self._nodes[:2, :-1], cos / length, -sin, sin / length, cos, self.arc_m[:-1]]
+        )
+        """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
+        length."""
+
     def __reduce__(self) -> tuple[object, tuple[object, ...]]:
         """Travel to another process as what the path was made of."""
-        *given, before_m = self._given
-        return functools.partial(FrenetPath, before_m=before_m), tuple(given)
+        xy_m, speed_limit_mps, before_m = self._given
+        if self.__dict__.get("eased") is self:
+            plain = FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
+            return operator.attrgetter("eased"), (plain,)
+        return functools.partial(FrenetPath, before_m=before_m), (xy_m, speed_limit_mps)
 
     @property
     def node_poses(self) -> Array:
@@ -124,6 +133,40 @@ class FrenetPath:
         reach what lies ahead.
         """
         return np.asarray(self.with_curve_speeds(lateral_accel_mps2, decel_mps2)[len(self._nodes)])
+
+    @functools.cached_property
+    def eased(self) -> FrenetPath:
+        """The path as a vehicle drives it that does not turn at once where the line has a corner:
+        each node is moved to the mean of those a car's length around it, and keeps its arc length.
+        """
+        path = copy.copy(self)
+        for found in ("_profiles", "_bounds", "curvature_pm"):
+            path.__dict__.pop(found, None)
+        path.__dict__["eased"] = path
+        path._lay(_eased(self._x), _eased(self._y))
+        return path
+
+    def bounded_squares(
+        self, *, lateral_accel_mps2: float, decel_mps2: float, accel_mps2: float
+    ) -> Array:
+        """Return (M,) the square of the speed at each node that accelerations allow, in (m/s)².
+
+        a_lat / |κ|, where κ is how much the heading turns between two nodes, lowered so that
+        `decel_mps2` reaches what lies ahead, and `accel_mps2` does from what lies behind.
+        """
+        key = (lateral_accel_mps2, decel_mps2, accel_mps2)
+        if key not in self._bounds:
+            turn = np.pad(np.abs(np.diff(self._heading)) / SPACING_M, 1, mode="edge")
+            square = lateral_accel_mps2 / np.maximum(np.maximum(turn[1:], turn[:-1]), 1e-6)
+            slope = 2.0 * decel_mps2 * self.arc_m
+            square = np.minimum.accumulate((square + slope)[::-1])[::-1] - slope
+            slope = 2.0 * accel_mps2 * self.arc_m
+            self._bounds[key] = np.minimum.accumulate(square - slope) + slope
+        return self._bounds[key]
+
+    @functools.cached_property
+    def _bounds(self) -> dict[tuple[float, float, float], Array]:
+        return {}
 
     @functools.cached_property
     def _profiles(self) -> dict[tuple[float, float], Array]:
@@ -209,6 +252,14 @@ class FrenetPath:
         found = np.empty((2, xy.shape[1]))
         compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
         return FrenetPoint(found[0], found[1])
+
+
+def _eased(values: Array) -> Array:
+    """Return means of values (M,) over a car's length; both ends are straight."""
+    k = _EASED_NODES
+    whole = np.pad(values, k, mode="reflect", reflect_type="odd")
+    sums = np.cumsum(np.pad(whole, (1, 0)))
+    return np.asarray((sums[2 * k + 1 :] - sums[: -2 * k - 1]) / (2 * k + 1))
 
 
 def _with_steps(values: Array) -> Array:

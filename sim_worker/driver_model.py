@@ -17,10 +17,16 @@ LATERAL_ACCEL_MPS2 = 2.5
 """In bends. Chosen: half of the 4.89 m/s² up to which nuPlan calls human driving comfortable."""
 COMFORT_DECEL_MPS2 = 2.0
 """IDM's b. Chosen: the paper has 1.67 m/s²; AASHTO's stopping sight distances suppose 3.4 m/s²."""
+HEEDLESS_BRISKNESS = 1.6
+"""By so much the accelerations of who heeds nobody exceed an ordinary driver's in bends. Chosen:
+4.0 m/s² across are half of what holds a car on a dry road."""
 CURVE_TIME_S = 0.5
 """So far ahead a bend's speed counts: it is to be driven by then. Chosen."""
 MAX_DECEL_MPS2 = 8.0
 """In emergencies. Chosen: what tyres give on dry asphalt, less a margin; friction limits it too."""
+EMERGENCY_DECEL_MPS2 = 7.5
+"""Other road users never brake harder. Chosen: 0.76 g, a full application of the brakes of a car on
+dry asphalt by an ordinary driver."""
 MAX_ACCEL_MPS2 = 1.5
 """IDM's a, in town. Chosen: the paper has 0.73 m/s² for motorways; ISO 15622 lets adaptive cruise
 control take 2.0 m/s²."""

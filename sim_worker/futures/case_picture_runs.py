@@ -51,8 +51,8 @@ def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: f
     others = []
     for actor in played.actors:
         moving = actor.moving(FrenetPath(actor.xy_m))
-        others.append(moving.rectangles(actor.start_arc_m + moving.travelled_m(time)))
-    boxes = ego.rectangles(played.ego_arc_m + ego.travelled_m(time))
+        others.append(moving.rectangles(moving.arc_after(actor.start_arc_m, time)))
+    boxes = ego.rectangles(ego.arc_after(played.ego_arc_m, time))
     return _run(time, boxes, tuple(others), played.impact_time_s, played.impact_with)
 
 

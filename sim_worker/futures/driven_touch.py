@@ -14,7 +14,7 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import first_touches
 from foretwin.sim_worker.futures.driven_line import DrivenLine, time_at
 from foretwin.sim_worker.scenarios.impact import ego_box
-from foretwin.sim_worker.scenarios.roles import StagedCase
+from foretwin.sim_worker.scenarios.roles import ALONG, StagedCase
 
 AFTER_S = 1.0
 """Lines go on for so long after the last impact."""
@@ -26,6 +26,9 @@ that is promised is met within 0.1 m however control ticks fall."""
 _OTHER_SHARE, _MOVED_M = 0.12, 0.5
 """So far along the front, and on the ground, a touch is still the one that was planned: a car that
 runs wide or brakes is a little aside, and late."""
+_MOVED_ALONG_M = 10.0
+"""Who is ahead brakes for bends as its own line bends, not the ego's: it is met a second sooner or
+later, at the same place of the front."""
 
 
 def met_as_driven(
@@ -46,7 +49,7 @@ def met_as_driven(
         way = case.place.way_named(actor.way)
         box = actor.moving(way.path)
         since_s = np.asarray(ticks * tick_s - from_s, dtype=np.float64)
-        at = box.rectangles(actor.start_on(way) + box.travelled_m(since_s))
+        at = box.rectangles(box.arc_after(actor.start_on(way), since_s))
         states.append(line.states[ticks])
         users.append(np.column_stack([at.centre_m, at.yaw_rad])[:, None])
         sizes.append([(box.length_m, box.width_m)])
@@ -79,7 +82,8 @@ def _met(
     best = int(np.where(touching, off, np.inf).argmin() if touching.any() else off.argmin())
     if gaps[best] > _NEAR_FRONT_M:
         return None
-    if np.hypot(*(points[best] - case.impact_point_m)) > _MOVED_M:
+    along = any(a.name == case.impact_with and a.relation in ALONG for a in case.actors)
+    if np.hypot(*(points[best] - case.impact_point_m)) > (_MOVED_ALONG_M if along else _MOVED_M):
         return None
     return case._replace(impact_point_m=points[best], impact_share=float(shares[best]))
 

@@ -19,6 +19,7 @@ from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import EGO, FAULTS
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.closed_loop import drive
@@ -257,7 +258,8 @@ def _on_time(case: StagedCase, line: DrivenLine, way: Way) -> StagedCase:
 
 def _from_line(actor: StagedActor, later_s: float, line: DrivenLine, way: Way) -> StagedActor:
     if actor.relation not in ALONG:
-        return actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
+        box = actor.moving(FrenetPath(actor.xy_m))
+        return actor._replace(start_arc_m=float(box.arc_after(actor.start_arc_m, -later_s)))
     if actor.way != way.name:
         return actor
     arc = np.array([actor.start_on(line.way)])

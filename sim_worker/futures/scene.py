@@ -202,7 +202,7 @@ class SceneMaker:
         if crowd.crowd.present.any():
             tracks = () if crowd.replay is None else crowd.replay.tracks
             table = PathTable(crowd.paths, tracks)
-            traffic = Traffic(crowd.crowd, table, rules, crowd.replay)
+            traffic = Traffic(crowd.crowd, table, rules, crowd.paces, crowd.replay)
             sight = Sight(
                 traffic,
                 table.along(path),

@@ -43,7 +43,7 @@ def met_on_the_way(
             # Who leads or follows the ego goes where it goes, for longer than is looked at.
             continue
         box = actor.moving(way.path)
-        boxes = box.rectangles(actor.start_on(way) + box.travelled_m(time_s))
+        boxes = box.rectangles(box.arc_after(actor.start_on(way), time_s))
         drives = actor.speed_mps > 0.0 and actor.kind not in ("pedestrian", "bicycle")
         if (met := walls.first_met(boxes, drives=drives)) is not None:
             return _words(actor.name, met, False)

@@ -12,6 +12,7 @@ from foretwin.contracts.futures import RecordedRoadUser
 from foretwin.contracts.scenario import Conduct
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.road_users.crowd import Crowd
+from foretwin.sim_worker.road_users.paces import Paces, briskness
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
@@ -21,7 +22,8 @@ KIND_NAMES: tuple[RoadUserKind, ...] = tuple(KINDS)
 class Player(NamedTuple):
     """One road user of one future; arc lengths are those of its box centre on its own path.
 
-    `size_m` is length and width where measured, else that of its kind. Who stops does so
+    `speed_mps` is what it drives where no bend asks for less, of the law-abiding the one to begin
+    with.     `size_m` is length and width where measured, else that of its kind. Who stops does so
     `acts_after_s` after the start; `hidden_by` names another actor of the future; `known` is who
     the real car perceives, whatever the map says.
     """
@@ -44,12 +46,14 @@ class Player(NamedTuple):
 class RoadUserArrays(NamedTuple):
     """The crowd of a job, and the paths that it moves on.
 
-    `paths` are all that are driven on, the ego's first; `replay` has where those are who come
+    `paths` are all that are driven on, the ego's first; `paces` how those get on along them who
+    react to nobody; `replay` has where those are who come
     first in every future, if they were recorded.
     """
 
     crowd: Crowd
     paths: tuple[FrenetPath, ...]
+    paces: Paces
     replay: Replay | None = None
 
 
@@ -82,24 +86,36 @@ def casting(
     for player in players:
         paths.setdefault(id(player.path), player.path)
     places = {path: place for place, path in enumerate(paths)}
-    rows = [_ABSENT, *(_player_row(player, places[id(player.path)]) for player in players)]
+    paced = [p for p in players if p.speed_mps > 0.0 and p.conduct not in ("law_abiding", "parked")]
+    pace_of = {id(player): number for number, player in enumerate(paced)}
+    rows = [
+        _ABSENT,
+        *(_player_row(p, places[id(p.path)], pace_of.get(id(p), _NO_PACE)) for p in players),
+    ]
     which[:, :first] = len(rows) + np.arange(first)
     rows += [_row(user.kind, user.size_m, len(paths) + k) for k, user in enumerate(replayed)]
     columns = np.moveaxis(np.array(rows)[which], -1, 0).copy()
     present, lawful, walks, known = columns[:4] > 0.0
-    path_of, kinds = columns[4:6].astype(np.intp)
+    path_of, kinds, pace = columns[4:7].astype(np.intp)
     crowd = Crowd._make(
-        [present, lawful, *columns[6:8], path_of, *columns[8:], walks, kinds, known, hidden]
+        [present, lawful, *columns[7:9], path_of, pace, *columns[9:], walks, kinds, known, hidden]
+    )
+    paces = Paces(
+        tuple(paths.values()),
+        np.array([places[id(p.path)] for p in paced], dtype=np.intp),
+        np.array([p.speed_mps for p in paced]),
+        np.array([briskness(p.conduct, p.decel_mps2) for p in paced]),
     )
     replay = Replay(replayed) if replayed else None
-    return RoadUserArrays(crowd, tuple(paths.values()), replay)
+    return RoadUserArrays(crowd, tuple(paths.values()), paces, replay)
 
 
 _Row = tuple[float, ...]
-"""Of one player: 1 where present, lawful, walking, known; places of path and kind; columns of
-`Crowd` from its length on, without the path."""
+"""Of one player: 1 where present, lawful, walking, known; places of path, kind and pace; columns of
+`Crowd` from its length on, without path and pace."""
+_NO_PACE = -1
 _STILL: _Row = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
-_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, *_STILL)
+_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_PACE, 1.0, 1.0, *_STILL)
 
 
 def _row(
@@ -109,15 +125,16 @@ def _row(
     *,
     lawful: bool = False,
     known: bool = True,
+    pace: int = _NO_PACE,
     motion: _Row = _STILL,
 ) -> _Row:
     traits = KINDS[kind]
     size = size_m or (traits.length_m, traits.width_m)
     kind_place = KIND_NAMES.index(kind)
-    return (1.0, lawful, not traits.keeps_lane, known, path, kind_place, *size, *motion)
+    return (1.0, lawful, not traits.keeps_lane, known, path, kind_place, pace, *size, *motion)
 
 
-def _player_row(player: Player, path: int) -> _Row:
+def _player_row(player: Player, path: int, pace: int) -> _Row:
     traits = KINDS[player.kind]
     motion = (
         player.lateral_m,
@@ -131,4 +148,5 @@ def _player_row(player: Player, path: int) -> _Row:
     )
     lawful = player.conduct == "law_abiding"
     known = player.known
-    return _row(player.kind, player.size_m, path, lawful=lawful, known=known, motion=motion)
+    size = player.size_m
+    return _row(player.kind, size, path, lawful=lawful, known=known, pace=pace, motion=motion)

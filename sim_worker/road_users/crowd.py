@@ -12,7 +12,8 @@ class Crowd(NamedTuple):
 
     `path_of` is a place in the `PathTable`; `lateral_m` lies to its left. `desired_mps` is the
     speed on a free road. From `brakes_at_s` on, infinite for most, it brakes by `brakes_by_mps2`.
-    `lawful` ones react to others, the rest keep their speed. `walks` is true of those who keep to
+    `lawful` ones react to others, the rest move as `pace_of` in the `Paces` says, or, where it is
+    -1, not at all. `walks` is true of those who keep to
     no lane, `kinds` are places in `KIND_NAMES`, `hidden_by` the column of who hides it, or -1.
     `known` ones were perceived by the real car: no wall of the map hides them.
     """
@@ -22,6 +23,7 @@ class Crowd(NamedTuple):
     length_m: Array
     width_m: Array
     path_of: Indices
+    pace_of: Indices
     lateral_m: Array
     start_arc_m: Array
     start_speed_mps: Array

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
-from foretwin.geometry.speed_profile import speed_in_bends_mps
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.path_table import PathTable
@@ -54,6 +53,7 @@ class LawAbiding:
         self._width = crowd.width_m[s, r]
         self._decel, self._most = crowd.decel_mps2[s, r], crowd.accel_mps2[s, r]
         self._desired = crowd.desired_mps[s, r]
+        self._hardest = np.minimum(2.0 * self._decel, driver.EMERGENCY_DECEL_MPS2)
         self._parts = [
             slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(s), _ROWS_AT_ONCE)
         ]
@@ -72,11 +72,16 @@ class LawAbiding:
         wanted = driver.STANDSTILL_GAP_M * (~nearer) + driver.dynamic_gap_m(
             speed, lead_speed, driver.BRISK_TIME_GAP_S, most, decel
         )
-        curve = speed_in_bends_mps(bend, driver.LATERAL_ACCEL_MPS2)
-        allowed = np.minimum(self._desired, curve)
-        free = 1.0 - (speed / np.maximum(allowed, 0.1)) ** driver.ACCEL_EXPONENT
+        free = 1.0 - (speed / np.maximum(self._desired, 0.1)) ** driver.ACCEL_EXPONENT
         accel = most * (free - np.square(wanted / np.maximum(gap, 0.1)))
-        return np.clip(accel, -2.0 * decel, most)
+        accel = np.minimum(accel, self._for_bends(arc, speed))
+        return np.clip(accel, -self._hardest, most)
+
+    def _for_bends(self, arc: Array, speed: Array) -> Array:
+        """Return what brings a driver to the speed that bends allow where it decides next."""
+        there = self._table.place(self._on, arc + speed * driver.DECIDE_EVERY_S)
+        allowed = np.sqrt(self._table.square_bound(there))
+        return np.asarray((allowed - speed) / driver.DECIDE_EVERY_S)
 
     def _bend(self, arc: Array) -> Array:
         """Return (K,) the mean curvature of the own path over the next metres."""
@@ -164,7 +169,7 @@ class LawAbiding:
     def _before(self, lines_m: Array, arc: Array, speed: Array) -> Array:
         """Return how far ahead the next of the lines (K, L) is that can still be stopped at."""
         ahead = lines_m - (arc + self._half)[:, None]
-        reach = np.square(speed) / (4.0 * self._decel)
+        reach = np.square(speed) / (2.0 * driver.LINE_DECEL_MPS2)
         ahead = np.where(ahead > reach[:, None] - driver.LINE_GAP_M, ahead, np.inf)
         return np.asarray(ahead.min(axis=1, initial=np.inf)) - driver.LINE_GAP_M
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,15 +10,16 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
+from foretwin.sim_worker.road_users.paces import square_bound
 
 
 class OnPaths(NamedTuple):
-    """Paths of any number of places (…): their first nodes in the table, where these are, and the
-    last place short of the end."""
+    """Paths of any number of places (…): their first nodes in the table, where these are, and how
+    many nodes on the last but one is."""
 
     begin: Indices
     first_arc_m: Array
-    last: Array
+    last: Indices
 
 
 class PathPlace(NamedTuple):
@@ -30,7 +32,7 @@ class PathPlace(NamedTuple):
 class PathTable:
     """The nodes of P paths in one array, so that look-ups for all road users are one call.
 
-    Beyond a path's ends, places stay at the end. After the paths come `tracks` of poses (N, 3)
+    Beyond a path's ends, places go on straight. After the paths come `tracks` of poses (N, 3)
     without jumps of yaw, whose nodes are those of a clock instead of an arc length: the
     time gives the place on them.
     """
@@ -43,7 +45,7 @@ class PathTable:
         counts = np.array([len(poses) for poses in nodes])
         self._begin: Indices = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
         self._first_arc = np.array([path.arc_m[0] for path in paths] + [0.0] * len(tracks))
-        self._last = counts - 1.0
+        self._last: Indices = np.maximum(counts - 2, 0)
         self._poses: Array = np.concatenate(nodes)
         """(M, 3) x, y and heading without jumps, of all nodes."""
         self._steps = np.diff(self._poses, axis=0, append=self._poses[-1:])
@@ -53,14 +55,12 @@ class PathTable:
 
     def on(self, path_of: Indices) -> OnPaths:
         """Return what places on these paths (…) have in common, to be looked up once."""
-        last = self._last[path_of] - 1e-9
-        return OnPaths(self._begin[path_of], self._first_arc[path_of], last)
+        return OnPaths(self._begin[path_of], self._first_arc[path_of], self._last[path_of])
 
     def place(self, on: OnPaths, arc_m: Array) -> PathPlace:
         """Return where arc lengths (…) are on their paths."""
         place = (arc_m - on.first_arc_m) / SPACING_M
-        place = np.minimum(np.maximum(place, 0.0), on.last)
-        index = place.astype(np.intp)
+        index = np.minimum(np.maximum(place, 0.0).astype(np.intp), on.last)
         return PathPlace(on.begin + index, place - index)
 
     def poses(self, place: PathPlace, lateral_m: Array | None = None) -> Array:
@@ -78,6 +78,16 @@ class PathTable:
         return np.asarray(
             self._steps[:, 2].take(place.node) * place.share + self._poses[:, 2].take(place.node)
         )
+
+    @functools.cached_property
+    def _square_bounds(self) -> Array:
+        bounds = [square_bound(path) for path in self.paths]
+        return np.concatenate([*bounds, np.full(len(self._poses) - sum(map(len, bounds)), np.inf)])
+
+    def square_bound(self, place: PathPlace) -> Array:
+        """Return (…) the square of the speed that bends let an ordinary driver have at places."""
+        low, high = self._square_bounds.take(place.node), self._square_bounds.take(place.node + 1)
+        return np.asarray(low + np.minimum(np.maximum(place.share, 0.0), 1.0) * (high - low))
 
     def along(self, path: FrenetPath) -> PathProjection:
         """Project every node on another path, so that road users can be found on it at once."""

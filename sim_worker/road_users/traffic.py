@@ -1,8 +1,8 @@
 """Other road users of S futures, up to R in each, moved together along paths of their own.
 
 Their motion along a path is all there is to it: arc length and speed. Law-abiding ones decide a few
-times a second, as people do, and keep the acceleration in between. Recorded ones are where they
-were at the time.
+times a second, as people do, and keep the acceleration in between. Those who heed nobody are where
+their pace has them at the time, recorded ones where they were.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.law_abiding import LawAbiding, Now
+from foretwin.sim_worker.road_users.paces import Paces
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.road_users.right_of_way import PathRules
@@ -24,17 +25,28 @@ class Traffic:
     """
 
     def __init__(
-        self, crowd: Crowd, table: PathTable, rules: PathRules, replay: Replay | None = None
+        self,
+        crowd: Crowd,
+        table: PathTable,
+        rules: PathRules,
+        paces: Paces,
+        replay: Replay | None = None,
     ) -> None:
         self.crowd, self.table, self.replay, self._rules = crowd, table, replay, rules
+        self._paces = paces
         self._on = table.on(crowd.path_of)
         self._now_s: float | Array = 0.0
         self._absent = None if crowd.present.all() else ~crowd.present
         self.arc_m = crowd.start_arc_m.copy()
         self.speed_mps = np.where(crowd.present, crowd.start_speed_mps, 0.0)
+        self._paced = np.nonzero(crowd.pace_of >= 0)
+        self._motion = crowd.pace_of[self._paced]
+        # Their own clocks as the future begins.
+        self._clock_s = paces.time_at(self._motion, self.arc_m[self._paced])
+        self._brakes_at_s = self._clock_s + crowd.brakes_at_s[self._paced]
+        self._pace()
         self._put()
         self._accel = np.zeros_like(self.arc_m)
-        self._brakes = bool(np.isfinite(crowd.brakes_at_s[crowd.present]).any())
         self._lawful = LawAbiding(crowd, table, rules)
         self.reacts = len(self._lawful.rows) > 0
         """Whether any of them does anything but keep a speed."""
@@ -60,7 +72,7 @@ class Traffic:
     def begun(self, futures: Indices) -> Traffic:
         """Return traffic (K, R) that begins as that of these futures did."""
         crowd = Crowd._make(f[futures] for f in self.crowd)
-        return Traffic(crowd, self.table, self._rules, self.replay)
+        return Traffic(crowd, self.table, self._rules, self._paces, self.replay)
 
     def carry_on(self, before: Traffic, futures: Flags) -> None:
         """Let the `futures` (S,) go on from where traffic of the same paths has them."""
@@ -70,26 +82,27 @@ class Traffic:
             (self._accel, before._accel),
         ):
             mine[futures] = theirs[futures]
-        if self.replay is not None:
-            self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
+        self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
         self._put()
 
     def step(self, *, time_s: float | Array, dt_s: float) -> None:
         """Advance by `dt_s` from `time_s`, one or (S, 1), with what was decided last."""
-        crowd = self.crowd
         self._now_s = time_s + dt_s
-        if self.reacts or self._brakes:
-            accel = self._accel
-            if self._brakes:
-                accel = np.where(time_s >= crowd.brakes_at_s - 1e-9, -crowd.brakes_by_mps2, accel)
-            after = np.maximum(self.speed_mps + accel * dt_s, 0.0)
+        if self.reacts:
+            after = np.maximum(self.speed_mps + self._accel * dt_s, 0.0)
             self.arc_m += 0.5 * (self.speed_mps + after) * dt_s
             self.speed_mps = after
-        else:
-            self.arc_m += self.speed_mps * dt_s
+        self._pace()
         if self.replay is not None:
             self.arc_m[:, : len(self.replay)] = 0.0
         self._put()
+
+    def _pace(self) -> None:
+        """Put those who heed nobody where they are now."""
+        now_s = np.broadcast_to(self._now_s, self.arc_m.shape)[self._paced] + self._clock_s
+        brakes_by = self.crowd.brakes_by_mps2[self._paced]
+        now = self._paces.braked(self._motion, now_s, self._brakes_at_s, brakes_by)
+        self.arc_m[self._paced], self.speed_mps[self._paced] = now
 
     def decide(self, ego: EgoBoxes, red_arcs_m: Array) -> None:
         """Let law-abiding road users choose their accelerations; `red_arcs_m` (P, K) of paths, or

@@ -10,8 +10,8 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.scenario import ActorPart
-from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import corners
+from foretwin.sim_worker.road_users.paces import briskness
 from foretwin.sim_worker.scenarios.impact import (
     TOLERANCE_M,
     MovingBox,
@@ -20,7 +20,7 @@ from foretwin.sim_worker.scenarios.impact import (
     front_point,
     gap_m,
 )
-from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging
+from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging, moving_box
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
@@ -86,18 +86,34 @@ def beside_bay(part: ActorPart, staging: Staging, way: Way) -> StagedActor:
     return staging.actor(part, way.xy_m, arc, 0.0, way.name)
 
 
-def closing_time_s(part: ActorPart, staging: Staging) -> float | None:
-    """Return after how many seconds a steady ego closes the gap to who is ahead, if it does."""
+def closing_time_s(part: ActorPart, staging: Staging, end_m: float) -> float | None:
+    """Return after how many seconds a steady ego closes the gap to who is ahead, if it does: having
+    begun so early that base_link is at `end_m` then."""
+    ego, gap, decel = staging.ego, staging.number(part, "gap_m"), staging.number(part, "decel_mps2")
     time = np.arange(0.0, staging.scenario.horizon_s, 0.01)
-    after = staging.number(part, "acts_after_s") if part.conduct == "stops" else math.inf
-    speed, decel = staging.number(part, "speed_mps"), staging.number(part, "decel_mps2")
-    ahead = MovingBox(_ANYWHERE, speed, 0.0, 0.0, 0.0, after, decel).travelled_m(time)
-    gap = staging.number(part, "gap_m") + ahead - staging.ego.speed_mps * time
-    closed = np.flatnonzero(gap <= 0.0)
-    return float(time[closed[0]]) if len(closed) else None
+    box = moving_box(
+        part.kind,
+        ego.path,
+        staging.number(part, "speed_mps"),
+        brisk=briskness(part.conduct, decel),
+    )
+    if part.conduct == "stops":
+        brakes_after = staging.number(part, "acts_after_s")
+        box = box._replace(brakes_after_s=brakes_after, decel_mps2=decel)
+    found = staging.scenario.lead_time_s
+    # Where it begins, the other may have a bend ahead: both are found together.
+    for _ in range(_ROUNDS):
+        start = end_m - ego.speed_mps * found
+        other = start + ego.front_m + gap + box.length_m / 2.0
+        left = gap + box.arc_after(other, time) - other - ego.speed_mps * time
+        closed = np.flatnonzero(left <= 0.0)
+        if not len(closed):
+            return None
+        found = float(time[closed[0]])
+    return found
 
 
-_ANYWHERE = FrenetPath(np.array([[0.0, 0.0], [1.0, 0.0]]))
+_ROUNDS = 4
 
 
 def _touch(

@@ -152,7 +152,7 @@ def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
             time_s = min(time_s, room_m / max(staging.number(part, "speed_mps"), 1e-6) - late_s)
             break
         if part.relation == "ahead" and not place.reverse:
-            time_s = closing_time_s(part, staging) or time_s
+            time_s = closing_time_s(part, staging, end) or time_s
             break
     room_s = (end - place.ego.first_m - staging.ego.length_m) / ego.speed_mps
     start = end - ego.speed_mps * max(min(time_s, room_s), 2 * LEAST_TIME_S)

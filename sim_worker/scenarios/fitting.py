@@ -100,7 +100,7 @@ def _beside_each_other(case: StagedCase, actor: StagedActor) -> str:
     """Return that two cars do not cross, where they do not."""
     ego, way = case.place.ego, case.place.way_named(actor.way)
     met_m = np.array([case.ego_arc_m + case.ego_speed_mps * case.impact_time_s])
-    actor_m = np.array([actor.start_on(way) + actor.speed_mps * case.impact_time_s])
+    actor_m = actor.moving(way.path).arc_after(actor.start_on(way), np.array([case.impact_time_s]))
     yaw = ego.path.pose_at(met_m).yaw_rad, way.path.pose_at(actor_m).yaw_rad
     if abs(float(wrap_angle(yaw[0] - yaw[1])[0])) < _CROSS_RAD:
         return f"{actor.name} would meet the ego beside it, not across"

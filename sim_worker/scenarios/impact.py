@@ -1,9 +1,9 @@
 """Where two road users must be so that the ego's front touches the other at a planned point.
 
-Neither slows down nor swerves: both follow their paths at their speeds. The point of the front
-that is to be hit draws a curve along the ego's path, each point of the other's outline one along
-the other's; where two such curves cross, the two points can meet. Of all such meetings those
-count before which the boxes touch nowhere else, which a simulation in closed form finds.
+Neither reacts or swerves: the ego keeps its speed, the other slows down for bends alone. The point
+of the front that is to be hit draws a curve along the ego's path, each point of the other's outline
+one along the other's; where two such curves cross, the two points can meet. Of all such meetings
+those count before which the boxes touch nowhere else, which a simulation in closed form finds.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.rectangles import Rectangles, overlapping
+from foretwin.sim_worker.road_users.paces import Paces
 
 TOLERANCE_M = 0.08
 """How far from its plan the first touch may be, in place and from the front's point."""
@@ -46,7 +47,8 @@ Span = tuple[float, float]
 
 
 class MovingBox(NamedTuple):
-    """A box that keeps its speed along a path, `offset_m` to the left of it, until it brakes.
+    """A box that moves along a path, `offset_m` to the left of it, until it brakes: at its pace, or
+    else with one speed.
 
     From the point of it that follows the path, its leading end lies `front_m` ahead and its centre
     `centre_m`: base_link of the ego, the centre itself of others.
@@ -61,14 +63,23 @@ class MovingBox(NamedTuple):
     decel_mps2: float = 0.0
     front_m: float = 0.0
     centre_m: float = 0.0
+    paces: Paces | None = None
+    """Its motion, the first of them."""
 
-    def travelled_m(self, time_s: Array) -> Array:
-        """Return how far it has come after (…) seconds."""
-        if np.isinf(self.brakes_after_s) or self.decel_mps2 <= 0.0:
-            return self.speed_mps * time_s
-        braking = np.clip(time_s - self.brakes_after_s, 0.0, self.speed_mps / self.decel_mps2)
-        steady = np.minimum(time_s, self.brakes_after_s)
-        return np.asarray(self.speed_mps * (steady + braking) - self.decel_mps2 * braking**2 / 2.0)
+    def arc_after(self, start_m: Array | float, time_s: Array | float) -> Array:
+        """Return the arc length (…) at which it is so many seconds after it was at `start_m`.
+
+        Before that, it came as it moves.
+        """
+        brakes_after, decel = self.brakes_after_s, self.decel_mps2
+        if decel <= 0.0:
+            brakes_after, decel = math.inf, 1.0
+        if self.paces is not None:
+            clock_s = self.paces.time_at(0, np.asarray(start_m))
+            return self.paces.braked(0, clock_s + time_s, clock_s + brakes_after, decel).arc_m
+        braking = np.clip(np.asarray(time_s) - brakes_after, 0.0, self.speed_mps / decel)
+        steady = np.minimum(time_s, brakes_after)
+        return np.asarray(start_m + self.speed_mps * (steady + braking) - decel * braking**2 / 2.0)
 
     def rectangles(self, arc_m: Array) -> Rectangles:
         """Return the box at arc lengths (…)."""
@@ -158,8 +169,8 @@ def find_impact(
     which, ego_share, actor_share = found
     ego_arc = ego_span[0] + ego_share * _SPACING_M
     actor_arc = actor_span[0] + actor_share * _SPACING_M
-    ego_start = ego_arc - ego.speed_mps * lead_time_s
-    actor_start = actor_arc - actor.speed_mps * lead_time_s
+    ego_start = ego.arc_after(ego_arc, -lead_time_s)
+    actor_start = actor.arc_after(actor_arc, -lead_time_s)
     touch = first_touch(
         ego, actor, ego_start, actor_start, until_s=lead_time_s + _AFTER_S, early_ticks=True
     )
@@ -169,8 +180,8 @@ def find_impact(
     good &= gap_m(met, actor, touch.actor_arc_m) <= TOLERANCE_M
     # Boxes that press into each other after the touch do not merely brush.
     good &= overlapping(
-        ego.rectangles(touch.ego_arc_m + ego.speed_mps * _PRESS_S),
-        actor.with_room(-_BRUSH_M / 2).rectangles(touch.actor_arc_m + actor.speed_mps * _PRESS_S),
+        ego.rectangles(ego.arc_after(touch.ego_arc_m, _PRESS_S)),
+        actor.with_room(-_BRUSH_M / 2).rectangles(actor.arc_after(touch.actor_arc_m, _PRESS_S)),
     )
     order, wider = np.lexsort((ego_arc, which, ~good)), actor.with_room(_CLEAR_M)
     for best in order[: int(good.sum())].tolist():
@@ -231,8 +242,8 @@ def first_touch(
     )
 
     def touching(time_s: Array, rows: slice | Indices) -> Flags:
-        ego_at = ego_from[rows, None] + ego.travelled_m(time_s)
-        actor_at = actor_from[rows, None] + actor.travelled_m(time_s)
+        ego_at = ego.arc_after(ego_from[rows, None], time_s)
+        actor_at = actor.arc_after(actor_from[rows, None], time_s)
         return overlapping(ego.rectangles(ego_at), actor.rectangles(actor_at))
 
     hit = touching(ticks[None, :], slice(None))
@@ -247,7 +258,7 @@ def first_touch(
     time = np.full(len(ego_from), np.inf)
     time[rows] = late
     end = np.minimum(time, until_s)
-    return Touch(time, ego_from + ego.travelled_m(end), actor_from + actor.travelled_m(end))
+    return Touch(time, ego.arc_after(ego_from, end), actor.arc_after(actor_from, end))
 
 
 def gap_m(point: Array, actor: MovingBox, arc_m: Array) -> Array:

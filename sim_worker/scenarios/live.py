@@ -176,4 +176,5 @@ class PathScenarios(NamedTuple):
 
 
 def _coming(actor: StagedActor, way: Way, later_s: float) -> Player:
-    return player_on(actor, way.path, actor.start_on(way) - actor.speed_mps * later_s)
+    start = actor.moving(way.path).arc_after(actor.start_on(way), -later_s)
+    return player_on(actor, way.path, float(start))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from foretwin.contracts.scenario import ActorPart
-from foretwin.sim_worker.scenarios.impact import MovingBox, find_impact
-from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging
+from foretwin.sim_worker.scenarios.impact import find_impact
+from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging, moving_box
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
@@ -39,12 +39,12 @@ def meet(
     walks = part.relation in ("crosses_exit", "crosses_entry")
     before, after = (2.0, 2.0) if walks else (10.0, 30.0)
     walled = False
-    size, speed = KINDS[part.kind], staging.number(part, "speed_mps")
+    speed = staging.number(part, "speed_mps")
     for share in sorted({wished, *_SHARES}, key=lambda other: abs(other - wished)):
         for way in ways:
             impact = find_impact(
                 ego,
-                MovingBox(way.path, speed, size.length_m, size.width_m),
+                moving_box(part.kind, way.path, speed),
                 ego_span=(low, high),
                 actor_span=(way.entry_m - before, way.exit_m + after),
                 share=share,
@@ -68,7 +68,8 @@ def _through_walls(part: ActorPart, staging: Staging, meeting: PlannedMeeting) -
     (_, met_m, *_), way = meeting
     on_the_way_s = staging.scenario.lead_time_s + staging.number(part, "arrives_after_s")
     traits = KINDS[part.kind]
-    from_m = met_m - staging.number(part, "speed_mps") * on_the_way_s - traits.length_m / 2.0
+    box = moving_box(part.kind, way.path, staging.number(part, "speed_mps"))
+    from_m = float(box.arc_after(met_m, -on_the_way_s)) - traits.length_m / 2.0
     return staging.place.walls.block(way.path, from_m, met_m, width_m=traits.width_m)
 
 
@@ -77,5 +78,6 @@ def incoming(part: ActorPart, staging: Staging, meeting: PlannedMeeting) -> Stag
     impact, way = meeting
     until_s = (impact.ego_arc_m - staging.start_m) / staging.ego.speed_mps
     until_s += staging.number(part, "arrives_after_s")
-    start = impact.actor_arc_m - staging.number(part, "speed_mps") * until_s
+    box = moving_box(part.kind, way.path, staging.number(part, "speed_mps"))
+    start = float(box.arc_after(impact.actor_arc_m, -until_s))
     return staging.actor(part, way.xy_m, start, 0.0, way.name)

@@ -72,17 +72,23 @@ def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
 
 
 def actor_motion(actor: StagedActor, *, horizon_s: float) -> EntityMotion:
-    """Return another road user's motion as its conduct has it without reactions."""
-    path, speed = FrenetPath(actor.xy_m), actor.speed_mps
+    """Return another road user's motion as its conduct has it without reactions.
+
+    Who stops is timed, too, where bends ask for other speeds before it stands.
+    """
+    moving, speed = actor.moving(FrenetPath(actor.xy_m)), actor.speed_mps
     behind = reference_behind_centre_m(actor.kind)
-    stops = actor.conduct == "stops" and speed > 0.0
+    time, steady = _instants(horizon_s), moving._replace(paces=None)
+    slower_m = np.abs(
+        moving.arc_after(actor.start_arc_m, time) - steady.arc_after(actor.start_arc_m, time)
+    )
+    stops = actor.conduct == "stops" and speed > 0.0 and slower_m.max() <= _MOST_DRIFT_M
     if speed <= 0.0:
         time = np.zeros(1)
     elif stops:
-        time = _spaced(speed * horizon_s) / speed
-    else:
-        time = _instants(horizon_s)
-    pose = _reference(path.pose_at(actor.start_arc_m + speed * time, actor.lateral_m), behind)
+        time, moving = _spaced(speed * horizon_s) / speed, steady._replace(brakes_after_s=math.inf)
+    arc = moving.arc_after(actor.start_arc_m, time)
+    pose = _reference(moving.path.pose_at(arc, actor.lateral_m), behind)
     if not stops:
         return EntityMotion(actor.name, pose, time, True, number(speed), {})
     numbers = {

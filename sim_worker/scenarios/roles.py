@@ -10,8 +10,10 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import ActorPart, Conduct, Relation, Scenario
-from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
 from foretwin.geometry.polyline import length
+from foretwin.sim_worker.driver_model import HEEDLESS_BRISKNESS
+from foretwin.sim_worker.road_users.paces import Paces, briskness
 from foretwin.sim_worker.scenarios.drawing import Values
 from foretwin.sim_worker.scenarios.impact import Impact, MovingBox
 from foretwin.sim_worker.scenarios.places import ScenarioPlace
@@ -50,15 +52,11 @@ class StagedActor(NamedTuple):
 
     def moving(self, path: FrenetPath) -> MovingBox:
         """Return it as it moves on a path unless something intervenes."""
-        size, brakes = self.traits, self.acts_after_s if self.conduct == "stops" else math.inf
-        return MovingBox(
-            path,
-            self.speed_mps,
-            size.length_m,
-            size.width_m,
-            self.lateral_m,
-            brakes,
-            self.decel_mps2,
+        brakes = self.acts_after_s if self.conduct == "stops" else math.inf
+        brisk = briskness(self.conduct, self.decel_mps2)
+        box = moving_box(self.kind, path, self.speed_mps, brisk=brisk)
+        return box._replace(
+            offset_m=self.lateral_m, brakes_after_s=brakes, decel_mps2=self.decel_mps2
         )
 
     @property
@@ -89,6 +87,17 @@ class StagedCase(NamedTuple):
     """How far beyond the World's lanes the ego or an actor starts, on a road prolonged."""
 
 
+def moving_box(
+    kind: RoadUserKind, path: FrenetPath, speed_mps: float, *, brisk: float = HEEDLESS_BRISKNESS
+) -> MovingBox:
+    """Return the box of a road user that drives along a path as it does on its own."""
+    size, path = KINDS[kind], path.eased
+    paces = None
+    if speed_mps > 0.0:
+        paces = Paces([path], np.zeros(1, np.intp), np.array([speed_mps]), np.array([brisk]))
+    return MovingBox(path, speed_mps, size.length_m, size.width_m, paces=paces)
+
+
 class PlannedMeeting(NamedTuple):
     """Where the ego and an actor meet, and by which way the actor comes."""
 
@@ -114,10 +123,11 @@ class Staging(NamedTuple):
     ) -> StagedActor:
         """Return an actor that starts on a path, led straight back where it starts before it."""
         if start_arc_m < _LEAST_ARC_M:
-            more = _LEAST_ARC_M - start_arc_m
+            # By whole steps: the nodes of the longer path are those of the shorter one.
+            more = math.ceil((_LEAST_ARC_M - start_arc_m) / SPACING_M) * SPACING_M
             back = (xy_m[0] - xy_m[1]) / max(float(np.hypot(*(xy_m[0] - xy_m[1]))), 1e-9)
             xy_m = np.concatenate([(xy_m[0] + more * back)[None], xy_m])
-            start_arc_m = _LEAST_ARC_M
+            start_arc_m += more
         return StagedActor(
             name=part.name,
             kind=part.kind,

@@ -44,7 +44,7 @@ class SeenActors:
         if lane is None:
             return None
         if lane.id not in self._path_of_lane:
-            self._path_of_lane[lane.id] = self._network.lane_way(lane).path
+            self._path_of_lane[lane.id] = self._network.lane_way(lane).path.eased
         return self._path_of_lane[lane.id]
 
 

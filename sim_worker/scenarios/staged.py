@@ -8,6 +8,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.road_users.cast import Player
+from foretwin.sim_worker.road_users.paces import square_bound
 from foretwin.sim_worker.scenarios.roles import StagedActor, StagedCase
 from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
 
@@ -24,12 +25,18 @@ def staged_players(played: StagedCase, path: FrenetPath) -> tuple[Player, ...]:
 
 def player_on(actor: StagedActor, path: FrenetPath, start_arc_m: float) -> Player:
     """Return an actor of a case as one that starts at `start_arc_m` of a path."""
+    path, lawful = path.eased, actor.conduct == "law_abiding"
+    speed = actor.speed_mps
+    if lawful:
+        node = int(np.argmin(np.abs(path.arc_m - start_arc_m)))
+        speed = min(speed, float(np.sqrt(square_bound(path)[node])))
     return Player(
         name=actor.name,
         kind=actor.kind,
         path=path,
         start_arc_m=start_arc_m,
-        speed_mps=actor.speed_mps,
+        speed_mps=speed,
+        desired_mps=actor.speed_mps if lawful else None,
         conduct=actor.conduct,
         lateral_m=actor.lateral_m,
         acts_after_s=actor.acts_after_s,

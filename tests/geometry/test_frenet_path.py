@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -71,3 +72,35 @@ def test_repeated_points_are_no_harm_and_a_single_one_is_refused() -> None:
         FrenetPath(np.zeros((3, 2)))
     with pytest.raises(ValueError, match="finite"):
         FrenetPath(np.array([[0.0, 0.0], [np.nan, 1.0]]))
+
+
+def test_an_eased_corner_is_cut_by_a_car_that_turns_on_the_way() -> None:
+    corner = FrenetPath(np.array([[-40.0, 0.0], [0.0, 0.0], [0.0, 40.0]]))
+    turn = np.abs(np.diff(corner.eased.node_poses[:, 2]))
+    assert np.abs(np.diff(corner.node_poses[:, 2])).max() > 2.0 * turn.max()
+    assert turn.sum() == pytest.approx(math.pi / 2)
+    cut = corner.eased.point_at(np.array([40.0]))[0]
+    assert float(np.hypot(*cut)) < 1.2
+    assert cut[0] < 0.0 < cut[1]
+    # Away from the corner nothing changes, and arc lengths stay.
+    assert corner.eased.point_at(np.array([20.0, 60.0])) == pytest.approx(
+        corner.point_at(np.array([20.0, 60.0]))
+    )
+    assert corner.eased.eased is corner.eased
+
+
+def test_an_eased_path_travels_to_other_processes() -> None:
+    again = pickle.loads(pickle.dumps(CIRCLE.eased))
+    assert again.node_poses == pytest.approx(CIRCLE.eased.node_poses)
+    assert pickle.loads(pickle.dumps(CIRCLE)).node_poses == pytest.approx(CIRCLE.node_poses)
+
+
+def test_the_bound_of_speeds_holds_between_nodes_and_grows_with_accelerations() -> None:
+    bounds = {"lateral_accel_mps2": 2.0, "decel_mps2": 1.5, "accel_mps2": 1.0}
+    square = CIRCLE.bounded_squares(**bounds)
+    turn = np.abs(np.diff(CIRCLE.node_poses[:, 2]))
+    assert (np.maximum(square[1:], square[:-1]) * turn).max() <= 2.0 + 1e-9
+    assert np.diff(square).min() >= -2.0 * 1.5 - 1e-6
+    assert np.diff(square).max() <= 2.0 * 1.0 + 1e-6
+    twice = CIRCLE.bounded_squares(**{name: 2.0 * value for name, value in bounds.items()})
+    assert twice == pytest.approx(2.0 * square)

@@ -10,6 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
+from foretwin.sim_worker.road_users.paces import Paces
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules
 from foretwin.sim_worker.road_users.traffic import Traffic
@@ -78,6 +79,7 @@ def traffic(
         length_m=4.5 * row,
         width_m=1.8 * row,
         path_of=np.arange(len(paths))[None],
+        pace_of=np.where(np.array(lawful) | (speed == 0.0), -1, np.arange(len(paths))),
         lateral_m=0.0 * row,
         start_arc_m=start,
         start_speed_mps=speed,
@@ -91,7 +93,9 @@ def traffic(
         known=row > 0,
         hidden_by=np.full(row.shape, -1),
     )
-    return Traffic(crowd, PathTable(paths), rules.between([rules.taken(p) for p in paths]))
+    paces = Paces(paths, np.arange(len(paths)), speed[0], np.ones(len(paths)))
+    between = rules.between([rules.taken(p) for p in paths])
+    return Traffic(crowd, PathTable(paths), between, paces)
 
 
 def run(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,10 +35,14 @@ def test_poses_are_those_of_each_path_alone(which: list[int], arc: float, latera
         assert row[:2] == pytest.approx(alone.xy_m[0], abs=2e-3)
 
 
-def test_beyond_its_end_a_place_stays_at_the_end() -> None:
-    last = STRAIGHT.arc_m[-1]
-    found = TABLE.poses(TABLE.place(TABLE.on(np.array([1, 1])), np.array([last, last + 50.0])))
-    assert found[0] == pytest.approx(found[1], abs=1e-6)
+def test_beyond_their_ends_paths_go_on_straight() -> None:
+    first, last = STRAIGHT.arc_m[[0, -1]]
+    arcs = np.array([first - 30.0, first, last, last + 50.0])
+    found = TABLE.poses(TABLE.place(TABLE.on(np.ones(4, dtype=np.intp)), arcs))
+    assert np.diff(found[:, :2], axis=0).tolist() == [
+        pytest.approx(row) for row in ([0.0, 30.0], [0.0, last - first], [0.0, 50.0])
+    ]
+    assert found[:, 2] == pytest.approx(np.full(4, math.pi / 2))
 
 
 def test_a_crossing_road_is_found_on_the_other_path_without_a_search() -> None:

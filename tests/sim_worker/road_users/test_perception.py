@@ -32,7 +32,7 @@ def sight(
     cast = casting([players], ego_path=EGO_PATH)
     table = PathTable(cast.paths)
     rules = JunctionRules(None).between([()] * len(cast.paths))
-    traffic = Traffic(cast.crowd, table, rules)
+    traffic = Traffic(cast.crowd, table, rules, cast.paces)
     columns = {name: np.zeros(1) for name in PerceptionFaults._fields}
     columns |= {name: np.array([value]) for name, value in faults.items()}
     faulty = PerceptionFaults(**columns)

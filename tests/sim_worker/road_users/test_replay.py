@@ -49,7 +49,7 @@ def _traffic(*users: RecordedRoadUser, futures: int = 2) -> Traffic:
     assert cast.replay is not None
     table = PathTable(cast.paths, cast.replay.tracks)
     taken = [()] * (len(cast.paths) + len(users))
-    return Traffic(cast.crowd, table, JunctionRules(None).between(taken), cast.replay)
+    return Traffic(cast.crowd, table, JunctionRules(None).between(taken), cast.paces, cast.replay)
 
 
 def _there(time_s: float) -> bool:

@@ -10,7 +10,7 @@ import pytest
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from tests.sim_worker.road_users.crossroads import centre_arc, crossroads, run, straight_on, traffic
 
-COVERS = ("foretwin.sim_worker.road_users.crowd", "foretwin.sim_worker.road_users.law_abiding")
+COVERS = ("foretwin.sim_worker.road_users.crowd",)
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
 

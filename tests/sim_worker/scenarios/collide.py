@@ -6,6 +6,7 @@ touch is found by stepping.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,10 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance, overlapping
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.scenarios.casting import StagedActor, StagedCase
 
-TICK_S = 0.002
+TICK_S, STEP_S = 0.002, 0.01
 
 
 class Collision(NamedTuple):
@@ -77,12 +79,44 @@ def front_point(played: StagedCase, vehicle: VehicleParameters, time_s: Array) -
 
 
 def actor_boxes(actor: StagedActor, time_s: Array) -> Rectangles:
-    travelled = actor.speed_mps * time_s
-    if actor.conduct == "stops":
-        braking = np.clip(time_s - actor.acts_after_s, 0.0, actor.speed_mps / actor.decel_mps2)
-        travelled = (
-            actor.speed_mps * (np.minimum(time_s, actor.acts_after_s) + braking)
-            - actor.decel_mps2 * braking**2 / 2.0
-        )
-    pose = FrenetPath(actor.xy_m).pose_at(actor.start_arc_m + travelled, actor.lateral_m)
+    path = FrenetPath(actor.xy_m).eased
+    arc = driven_arcs(actor, path, time_s)
+    pose = path.pose_at(arc, actor.lateral_m)
     return Rectangles(pose.xy_m, pose.yaw_rad, actor.traits.length_m, actor.traits.width_m)
+
+
+def driven_arcs(actor: StagedActor, path: FrenetPath, time_s: Array) -> Array:
+    """Return where an actor is at times, stepping its speed through bends."""
+    brisk = driver.HEEDLESS_BRISKNESS
+    if actor.conduct == "stops":
+        brisk = min(brisk, actor.decel_mps2 / driver.COMFORT_DECEL_MPS2)
+    speed, arc, braked = bend_speeds(path, actor.speed_mps, brisk), actor.start_arc_m, math.inf
+    instants = np.arange(0.0, float(np.max(time_s)) + STEP_S, STEP_S)
+    arcs = [arc]
+    for now in instants[:-1].tolist():
+        free = float(np.interp(arc, path.arc_m, speed))
+        free = float(np.interp(arc + free * STEP_S / 2.0, path.arc_m, speed))
+        before = min(braked, free)
+        if actor.conduct == "stops" and now >= actor.acts_after_s - 1e-9:
+            braked = max(before - actor.decel_mps2 * STEP_S, 0.0)
+        after = min(braked, free)
+        arc += (before + after) / 2.0 * STEP_S if actor.speed_mps > 0.0 else 0.0
+        arcs.append(arc)
+    return np.interp(time_s, instants, arcs)
+
+
+def bend_speeds(path: FrenetPath, speed_mps: float, brisk: float) -> Array:
+    """Return the speeds at a path's nodes that a heedless driver has who wants `speed_mps`."""
+    yaw = path.node_poses[:, 2].tolist()
+    found = [speed_mps] * len(yaw)
+    for i in range(len(yaw) - 1):
+        turn = max(abs(yaw[i + 1] - yaw[i]), 1e-9)
+        most = math.sqrt(brisk * driver.LATERAL_ACCEL_MPS2 / turn)
+        found[i], found[i + 1] = min(found[i], most), min(found[i + 1], most)
+    for i in range(1, len(found)):
+        reached = math.sqrt(found[i - 1] ** 2 + 2.0 * brisk * driver.MAX_ACCEL_MPS2)
+        found[i] = min(found[i], reached)
+    for i in reversed(range(len(found) - 1)):
+        needed = math.sqrt(found[i + 1] ** 2 + 2.0 * brisk * driver.COMFORT_DECEL_MPS2)
+        found[i] = min(found[i], needed)
+    return np.array(found)
