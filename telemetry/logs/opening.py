@@ -6,6 +6,7 @@ from pathlib import Path
 
 from foretwin.contracts.drive import RoadUsers
 from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
+from foretwin.telemetry.logs.comma_log import is_comma_log, open_comma_log
 from foretwin.telemetry.logs.geojson import open_geojson
 from foretwin.telemetry.logs.gnss_logger import is_gnss_logger, open_gnss_logger
 from foretwin.telemetry.logs.gpx import open_gpx
@@ -30,7 +31,8 @@ KINDS = (
     "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV with a declaration (.csv), GPX (.gpx), "
     "GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, GnssLogger text, "
     "nuScenes CAN bus JSON (scene-0001_pose.json), "
-    "smartLoc text or folder (point3, odom3), comma2k19 segment folder"
+    "smartLoc text or folder (point3, odom3), comma2k19 segment folder, "
+    "openpilot rlog or qlog (plain, .bz2, .zst)"
 )
 
 
@@ -70,6 +72,9 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if not head:
         raise LogError(f"{path}: the file is empty")
     suffix = path.suffix.lower()
+    if is_comma_log(path):
+        check_undeclared(path, declaration, "openpilot's log")
+        return open_comma_log(path)
     if head.startswith(b"\x89MCAP0") or suffix == ".mcap":
         from foretwin.telemetry.logs.ros_log import open_mcap
 

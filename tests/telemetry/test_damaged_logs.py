@@ -47,7 +47,7 @@ def test_the_whole_logs_are_read(originals: list[Path]) -> None:
             road_users_of(path)
         else:
             samples_of(path)
-    assert len(names) == 18
+    assert len(names) == 19
 
 
 def test_a_damaged_log_is_read_or_refused(originals: list[Path], tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import msgspec
@@ -112,9 +113,14 @@ def whole_logs(folder: Path) -> list[Path]:
     phone.write_text(test_gnss_logger.V2 + "".join(rows))
     (folder / "gnss_log.txt.toml").write_text('forward = "-z"\nup = "y"\n')
     return [
-        *logs, ubx, scene, phone, kitti, test_kitti_oxts.zipped(kitti),
-        test_smartloc.drive(folder / "smartloc", odometry), _segment(folder / "segment40"),
+        *logs, _copied(folder, "circle--rlog.bz2"), ubx, scene, phone, kitti,
+        test_kitti_oxts.zipped(kitti), test_smartloc.drive(folder / "smartloc", odometry),
+        _segment(folder / "segment40"),
     ]  # fmt: skip
+
+
+def _copied(folder: Path, name: str) -> Path:
+    return Path(shutil.copy(Path(__file__).parents[1] / "data" / "comma" / name, folder))
 
 
 def _segment(folder: Path) -> Path:
