@@ -19,8 +19,9 @@ LEAST_RUN_UP_S = 2.5
 EGO_OVER_LIMIT, OTHERS_OVER_LIMIT = 1.1, 1.5
 """Of a road's limit: the ego drives as people ordinarily do, others may be what goes wrong. Chosen;
 beyond 1.5 a road of 30 km/h would carry what is driven on main roads."""
-_CROSS_RAD = math.radians(20.0)
-"""Cars whose headings differ by less as they meet do not cross. Chosen."""
+_CROSS_RAD, _SQUARE_RAD = math.radians(20.0), math.radians(50.0)
+"""Cars whose headings differ by less as they meet do not cross; where both go straight on, neither
+do those that meet within so much of the same or the opposite heading. Chosen."""
 _ASIDE_M, _BEYOND_M = 1.5, 5.0
 """So far on either side of the ego's way is who crosses it, so far from the junction."""
 _OFF_LANES_M = 1.0
@@ -49,9 +50,10 @@ def not_for(scenario: Scenario, values: Values, place: ScenarioPlace) -> str:
     return ""
 
 
-def _limit_mps(way: Way) -> float:
-    """Return the lowest limit of the lanes by which a way comes to its junction."""
-    from_m = max(way.first_m, way.entry_m - _APPROACH_M)
+def _limit_mps(way: Way, from_m: float | None = None) -> float:
+    """Return the lowest limit of the lanes by which a way comes to its junction, from an arc length
+    on, or over the last metres."""
+    from_m = max(way.first_m, way.entry_m - _APPROACH_M if from_m is None else from_m)
     nodes = (way.path.arc_m >= from_m) & (way.path.arc_m <= max(way.entry_m - 1.0, from_m))
     at_entry = np.interp(from_m, way.path.arc_m, way.path.speed_limit_mps)
     return float(way.path.speed_limit_mps[nodes].min(initial=float(at_entry)))
@@ -70,13 +72,17 @@ def unfit(scenario: Scenario, case: StagedCase) -> str:
     """Return why a case that was cast does not fit its roads, or nothing."""
     if reason := not_for(scenario, case.values, case.place):
         return reason
+    limit = _limit_mps(case.place.ego, case.ego_arc_m)
+    if not case.place.reverse and case.ego_speed_mps > EGO_OVER_LIMIT * limit:
+        return _too_fast("the ego", case.ego_speed_mps, limit)
     if case.off_lanes_m > _OFF_LANES_M:
         return "a road is too short for the way up to the impact"
     if reason := ill_timed(scenario, case):
         return reason
     for part, actor in zip(scenario.actors, case.actors, strict=True):
         if part.name == case.impact_with and crosses(scenario.ego, part):
-            return _beside_each_other(case, actor)
+            both_straight = scenario.ego.turn == part.turn == "straight"
+            return _beside_each_other(case, actor, both_straight=both_straight)
     return ""
 
 
@@ -96,14 +102,15 @@ def crosses(ego: EgoPart, part: ActorPart) -> bool:
     return (_FROM[part.relation] + _QUARTERS[part.turn] - _QUARTERS[ego.turn]) % 4 != 0
 
 
-def _beside_each_other(case: StagedCase, actor: StagedActor) -> str:
+def _beside_each_other(case: StagedCase, actor: StagedActor, *, both_straight: bool) -> str:
     """Return that two cars do not cross, where they do not."""
     ego, way = case.place.ego, case.place.way_named(actor.way)
     met_m = np.array([case.ego_arc_m + case.ego_speed_mps * case.impact_time_s])
     actor_m = actor.moving(way.path).arc_after(actor.start_on(way), np.array([case.impact_time_s]))
     yaw = ego.path.pose_at(met_m).yaw_rad, way.path.pose_at(actor_m).yaw_rad
-    if abs(float(wrap_angle(yaw[0] - yaw[1])[0])) < _CROSS_RAD:
-        return f"{actor.name} would meet the ego beside it, not across"
+    turned = abs(float(wrap_angle(yaw[0] - yaw[1])[0]))
+    if turned < _CROSS_RAD or (both_straight and math.sin(turned) < math.sin(_SQUARE_RAD)):
+        return f"{actor.name} would meet the ego along its way, not across it"
     ends = way.path.point_at(np.array([way.entry_m - _BEYOND_M, way.exit_m + _BEYOND_M]))
     before, after = ego.path.locate(ends).offset_m
     if before * after >= 0.0 or min(abs(before), abs(after)) < _ASIDE_M:

@@ -199,6 +199,9 @@ def _no_crossing(
     which = [a.name for a in scenario.actors].index(meant)
     last = int(until.sum()) - 1
     turned = abs(math.remainder(float(poses[last, which, 2] - states[last, 2]), math.tau))
-    if not turned >= _LEAST_ANGLE_RAD:
+    if turned < _LEAST_ANGLE_RAD:
         return ["the two meet at less than 20°: a merge"]
+    both_straight = scenario.ego.turn == scenario.actors[which].turn == "straight"
+    if both_straight and not math.pi / 4 <= turned <= 3 * math.pi / 4:
+        return ["both go straight on, and do not meet across"]
     return []

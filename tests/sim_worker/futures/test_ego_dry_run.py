@@ -13,7 +13,9 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures.driven_line import driven_lines, time_at
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.playable import job_at, places
@@ -133,6 +135,22 @@ def test_the_case_gives_the_start() -> None:
         pose = case.place.ego.path.pose_at(np.array([case.ego_arc_m]))
         assert start[:2] == pytest.approx(pose.xy_m[0], abs=1e-3)
         assert start[2] == pytest.approx(pose.yaw_rad[0], abs=1e-3)
+
+
+def test_a_driven_line_begins_where_its_case_does() -> None:
+    """Chords behind the start are shorter than the bend that they follow."""
+    angle = np.linspace(0.0, 3.0, 200)
+    bend = 15.0 * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
+    case = places(catalogue()["scp"], cross(), vehicle=CAR, most=1).cases[0][0]
+    assert isinstance(case, StagedCase)
+    way = case.place.ego._replace(xy_m=bend, path=FrenetPath(bend))
+    begun = case._replace(place=case.place._replace(ego=way), ego_arc_m=30.0)
+    pose = way.path.pose_at(30.0 + 0.3 * np.arange(40.0))
+    states = np.zeros((1, 40, 8))
+    states[0, :, :2], states[0, :, 2], states[0, :, 3] = pose.xy_m, pose.yaw_rad, 6.0
+    (line,) = driven_lines([begun], states, tick_s=0.05)
+    assert line.arc_m[0] == pytest.approx(30.0, abs=1e-6)
+    assert time_at(line, 30.0, 6.0) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_lorries_are_come_up_to_on_a_motorway_and_slower_cars_on_a_race_track() -> None:

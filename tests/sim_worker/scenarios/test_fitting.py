@@ -51,8 +51,28 @@ def test_who_comes_to_the_egos_own_arm_does_not_cross_it() -> None:
     reason = unfit(scenario, case._replace(place=place))
     assert reason in (
         "oncoming_car does not cross the ego's way: the two merge",
-        "oncoming_car would meet the ego beside it, not across",
+        "oncoming_car would meet the ego along its way, not across it",
     )
+
+
+def test_straight_crossing_paths_are_about_square() -> None:
+    """Turned by 60° where it meets the ego, a car still crosses; by 30° it comes along the road."""
+    scenario, case = catalogue()["scp"], staged("scp")
+    way, ego = case.place.actor_ways[0][0], case.place.ego
+    met = ego.path.point_at(np.array([case.ego_arc_m + case.ego_speed_mps * case.impact_time_s]))
+    own = float(ego.path.pose_at(np.array([case.ego_arc_m])).yaw_rad[0])
+    for turned_deg, fits in ((-60.0, True), (-120.0, True), (-30.0, False), (-150.0, False)):
+        yaw = own + np.radians(turned_deg)
+        arcs = np.arange(-150.0, 120.0, 5.0)[:, None]
+        line = met + arcs * np.array([np.cos(yaw), np.sin(yaw)])
+        path = type(way.path)(line)
+        actor = case.actors[0]
+        start = 150.0 - actor.speed_mps * case.impact_time_s
+        moved = way._replace(xy_m=line, path=path, entry_m=140.0, exit_m=160.0)
+        place = case.place._replace(actor_ways=((moved,),))
+        turned = actor._replace(xy_m=line, start_arc_m=start)
+        reason = unfit(scenario, case._replace(place=place, actors=(turned,)))
+        assert (reason == "") == fits, (turned_deg, reason)
 
 
 def test_short_run_ups_and_roads_that_end_are_told() -> None:
