@@ -246,7 +246,9 @@ class RoadNetwork:
         arc_all = arc_lengths(xy)
         entry = float(arc_all[count]) if middle else float(arc_all[-1])
         exit_ = float(arc_all[count + inside - 1]) if middle else entry
-        xy, limit = xy[keep], limit[keep]
+        # One point lies where a part ends and the next begins: from there on, the next one counts.
+        kept = np.flatnonzero(keep)
+        xy, limit = xy[kept], limit[np.append(kept[1:], len(xy)) - 1]
         return lengthened(name, xy, limit, entry, exit_)
 
     def _between(self, before: Connection, after: Connection) -> list[str]:

@@ -13,6 +13,7 @@ from foretwin.contracts.world import World
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, traffic_turn
 from tests.sim_worker.scenarios.worlds import cross, motorway, ring, tee
+from tests.world_gen.drawn_maps import AVENUE, STREET, crossing, world_of
 
 COVERS = ("foretwin.sim_worker.scenarios.ways",)
 
@@ -57,6 +58,21 @@ def test_ways_reach_back_and_on_without_jumps(world: World) -> None:
         assert way.path.point_at(np.array([way.entry_m]))[0] == pytest.approx(first, abs=0.1)
         last = passage.connections[-1].centerline[-1]
         assert way.path.point_at(np.array([way.exit_m]))[0] == pytest.approx(last, abs=0.1)
+
+
+def test_a_limit_holds_from_where_its_lane_begins() -> None:
+    """A straight lane of two points begins where the one before ends."""
+    slow, fast = STREET | {"maxspeed": "30"}, AVENUE | {"maxspeed": "70"}
+    roads, junction = network(world_of(crossing(street=slow, avenue=fast)))
+    for passage in roads.passages(junction):
+        way = roads.way(passage)
+        for lane_id, arc_m in (
+            (passage.connections[0].from_lane_id, way.entry_m - 10.0),
+            (passage.connections[-1].to_lane_id, way.exit_m + 10.0),
+        ):
+            node = np.searchsorted(way.path.arc_m, arc_m)
+            lane = roads.lanes[lane_id]
+            assert way.path.speed_limit_mps[node] == lane.speed_limit_mps.value
 
 
 @pytest.mark.parametrize("left_hand", [False, True])
