@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -204,8 +205,8 @@ def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
     """Yield every cell with what it holds, in the order given."""
     order = np.argsort(cells, kind="stable")
     cells, held = cells[order], held[order]
-    cuts = np.flatnonzero(np.diff(cells, prepend=-1))
-    for begin, end in zip(cuts.tolist(), [*cuts[1:].tolist(), len(cells)], strict=True):
+    cuts = [*np.flatnonzero(np.diff(cells, prepend=-1)).tolist(), len(cells)]
+    for begin, end in pairwise(cuts):
         yield int(cells[begin]), held[begin:end]
 
 

@@ -81,6 +81,16 @@ def test_all_of_it_is_the_map_read_whole(tmp_path: Path, shuffled: bool) -> None
     assert store.meta.notes == tuple(n for n in whole.notes if n.startswith("relation 61"))
 
 
+def test_a_map_whose_ways_are_all_without_nodes_is_refused(tmp_path: Path) -> None:
+    sketch = Sketch()
+    sketch.node(1, 0.0, 0.0)
+    sketch.road(10, [888, 889])
+    path = tmp_path / "gone.osm"
+    path.write_text(sketch.xml(), encoding="utf-8")
+    with pytest.raises(MapError, match="holds no roads"):
+        MapStore.open(path, tmp_path / "index")
+
+
 def test_a_clip_holds_what_touches_it_and_no_more(tmp_path: Path) -> None:
     store = MapStore.open(town(tmp_path), tmp_path / "index")
     corners = geo_from_local(Sketch().frame, np.array([[41.0, -1.0], [42.0, 42.0]]))
