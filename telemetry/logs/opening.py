@@ -88,8 +88,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if head.startswith(ZIP_MAGIC):
         return _open_zip(path, declaration)
     if suffix == ".ubx" or is_ubx(head):
-        check_undeclared(path, declaration, "a UBX file")
-        return open_ubx(path)
+        return _open_receiver(path, declaration)
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
     if suffix != ".csv" and is_nmea(text):
         return open_nmea(path, declaration=declaration)
@@ -111,6 +110,19 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
 
         return open_csv(path, declaration=declaration)
     raise LogError(f"{path}: no known log; known are {KINDS}")
+
+
+def _open_receiver(path: Path, declaration: Path | None) -> Log:
+    """Open a log of u-blox's, which may hold NMEA beside UBX, or for positions alone."""
+    try:
+        log = open_ubx(path)
+    except LogError as no_positions:
+        try:
+            return open_nmea(path, declaration=declaration)
+        except LogError:
+            raise no_positions from None
+    check_undeclared(path, declaration, "a UBX file")
+    return log
 
 
 def _open_zip(path: Path, declaration: Path | None) -> Log:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import datetime
 import math
 import struct
+from array import array
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -50,11 +51,21 @@ _EPOCH = datetime.datetime(1970, 1, 1)
 
 
 class _Rows(NamedTuple):
-    """Samples as rows: of positions lat, lon, alt, std; of the others one number."""
+    """Samples of a channel: stamps, and the numbers of each after the other's."""
 
-    gnss: list[tuple[int, float, float, float, float]]
-    speed: list[tuple[int, float]]
-    heading: list[tuple[int, float]]
+    stamps_ns: array[int]
+    numbers: array[float]
+
+    def add(self, stamp_ns: int, *numbers: float) -> None:
+        self.stamps_ns.append(stamp_ns)
+        self.numbers.extend(numbers)
+
+    def stream(self, channel: str) -> Stream:
+        table = np.frombuffer(self.numbers).reshape(len(self.stamps_ns), -1)
+        return stream_of(channel, np.frombuffer(self.stamps_ns, dtype=np.int64), table)
+
+
+_Channels = dict[str, _Rows]
 
 
 def is_ubx(head: bytes) -> bool:
@@ -74,17 +85,17 @@ def is_ubx(head: bytes) -> bool:
 def open_ubx(path: Path) -> Log:
     """Open a UBX log; raises LogError where it has no NAV-PVT with a fix."""
     refused: Counter[str] = Counter()
-    rows = _Rows([], [], [])
+    rows = {name: _Rows(array("q"), array("d")) for name in ("gnss", "speed", "heading")}
     seen = 0
     for payload in _positions(path, refused):
         seen += 1
         if (fault := _take(payload, rows)) is not None:
             refused[fault] += 1
-    if not rows.gnss:
+    if not rows["gnss"].stamps_ns:
         why = ", ".join(f"{count} x {reason}" for reason, count in refused.items())
         told = f"no NAV-PVT with a fix ({why})" if seen or why else "no NAV-PVT message in it"
         raise LogError(f"{path}: {told}; u-blox receivers send positions as UBX-NAV-PVT")
-    streams = {name: _stream(name, found) for name, found in rows._asdict().items() if found}
+    streams = {name: found.stream(name) for name, found in rows.items() if found.stamps_ns}
     return table_log(
         path.name,
         streams,
@@ -93,11 +104,6 @@ def open_ubx(path: Path) -> Log:
         reference_point="antenna",
         refused=refused,
     )
-
-
-def _stream(channel: str, rows: list[tuple[float, ...]]) -> Stream:
-    table = np.array([row[1:] for row in rows], dtype=float).reshape(len(rows), -1)
-    return stream_of(channel, np.array([row[0] for row in rows], dtype=np.int64), table)
 
 
 def _size(data: bytes | bytearray, at: int) -> int | None:
@@ -121,9 +127,11 @@ def _positions(path: Path, refused: Counter[str]) -> Iterator[bytes]:
     """Yield the payload of every NAV-PVT; what is damaged is counted, and the next one sought."""
     with path.open("rb") as file:
         data, at, ended = bytearray(), 0, False
+        whole_to = 0
         while True:
             if not ended and len(data) - at < _MOST_FRAME_BYTES:
                 del data[:at]
+                whole_to -= at
                 at = 0
                 more = file.read(_CHUNK_BYTES)
                 data += more
@@ -138,23 +146,27 @@ def _positions(path: Path, refused: Counter[str]) -> Iterator[bytes]:
             wanted = data[at + 2 : at + 4] == _PVT
             size = _size(data, at)
             if size is None or at + size > len(data):
-                if wanted and (size is None or size - 8 in _PVT_BYTES):
+                # Where the last message, or a line of NMEA, ended one begins; elsewhere it may be a
+                # number.
+                begins = at == whole_to or data[max(at - 2, 0) : at] == b"\r\n"
+                if begins or (wanted and size is not None and size - 8 in _PVT_BYTES):
                     refused[FILE_CUT_SHORT] += 1
                 at += 2
             elif not wanted:
                 after = data[at + size] if at + size < len(data) else SYNC[0]
                 at += size if after in _AFTER_FRAME else 2
+                whole_to = at if after in _AFTER_FRAME else whole_to
             elif size - 8 in _PVT_BYTES and _checksum(data[at + 2 : at + size - 2]) == bytes(
                 data[at + size - 2 : at + size]
             ):
                 yield bytes(data[at + 6 : at + size - 2])
-                at += size
+                at = whole_to = at + size
             else:
                 refused[CHECKSUM_WRONG] += 1
                 at += 2
 
 
-def _take(payload: bytes, rows: _Rows) -> str | None:
+def _take(payload: bytes, rows: _Channels) -> str | None:
     """Add what a NAV-PVT says to the rows, or return why nothing of it is used."""
     (_, year, month, day, hour, minute, second, valid, _, nano, kind, flags, _, _, lon, lat, height,
      _, h_acc, _, _, _, _, speed, course, *_) = _LAYOUT.unpack_from(payload)  # fmt: skip
@@ -169,15 +181,15 @@ def _take(payload: bytes, rows: _Rows) -> str | None:
         return TIME_UNKNOWN
     stamp_ns = round(whole.total_seconds() + second) * 10**9 + nano
     std_m = h_acc * 1e-3
-    rows.gnss.append((stamp_ns, lat * 1e-7, lon * 1e-7, height * 1e-3, std_m))
+    rows["gnss"].add(stamp_ns, lat * 1e-7, lon * 1e-7, height * 1e-3, std_m)
     speed_mps, course_deg = speed * 1e-3, course * 1e-5
     if flags & _VEHICLE_HEADING_KNOWN and len(payload) > _VEHICLE_HEADING_AT:
         vehicle_deg = struct.unpack_from("<i", payload, _VEHICLE_HEADING_AT)[0] * 1e-5
         backwards = math.cos(math.radians(course_deg - vehicle_deg)) < 0.0
-        rows.speed.append((stamp_ns, -speed_mps if backwards else speed_mps))
-        rows.heading.append((stamp_ns, yaw_rad_of(vehicle_deg)))
+        rows["speed"].add(stamp_ns, -speed_mps if backwards else speed_mps)
+        rows["heading"].add(stamp_ns, yaw_rad_of(vehicle_deg))
         return None
-    rows.speed.append((stamp_ns, speed_mps))
+    rows["speed"].add(stamp_ns, speed_mps)
     if speed_mps >= MIN_COURSE_MPS:
-        rows.heading.append((stamp_ns, yaw_rad_of(course_deg)))
+        rows["heading"].add(stamp_ns, yaw_rad_of(course_deg))
     return None

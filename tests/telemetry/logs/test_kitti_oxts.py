@@ -62,6 +62,13 @@ def test_channels_units_and_times(tmp_path: Path, packed: bool, inner: bool) -> 
     assert (log.info.time_base, log.info.reference_point) == ("log", "OXTS RT3003")
 
 
+def test_a_fraction_of_a_second_may_have_fewer_digits(tmp_path: Path) -> None:
+    folder = drive(tmp_path, rows=2)
+    times = "2011-09-26 13:02:44.9\n2011-09-26 13:02:45.25\n"
+    (folder / "oxts" / "timestamps.txt").write_text(times)
+    assert [one.stamp_ns for one in by_channel(open_log(folder))["gnss"]] == [0, 350_000_000]
+
+
 def test_what_is_missing_or_damaged_is_counted(tmp_path: Path) -> None:
     folder = drive(tmp_path, rows=7, times=6)
     data = folder / "oxts" / "data"

@@ -91,6 +91,15 @@ def test_the_channels_tell_of_one_motion(tmp_path: Path) -> None:
     assert abs(shown.heading_offset_deg()) < 0.2
 
 
+def test_the_yaw_of_a_car_that_leans(tmp_path: Path) -> None:
+    path = scene(tmp_path, seconds=1)
+    messages = json.loads(path.read_text())
+    (cy, sy), (cr, sr) = ((math.cos(angle / 2), math.sin(angle / 2)) for angle in (1.1, 0.2))
+    messages[0]["orientation"] = [cy * cr, cy * sr, sy * sr, sy * cr]  # turned, then rolled
+    path.write_text(json.dumps(messages))
+    assert by_channel(open_log(path))["heading"][0].yaw_rad == pytest.approx(1.1)
+
+
 def test_the_map_comes_from_nuscenes_own_tables(tmp_path: Path) -> None:
     path = scene(tmp_path / "can_bus", located=False)
     with pytest.raises(

@@ -94,6 +94,23 @@ def test_other_messages_and_damage_between_cost_no_position(tmp_path: Path) -> N
     assert log.skipped == {"checksum wrong": 2, "file cut short": 1}
 
 
+def test_a_file_cut_off_within_another_message_says_so(tmp_path: Path) -> None:
+    raw = frame(b"\x02\x15", bytes(2000))
+    for end in (3, 7, 1200):
+        log, found = opened(tmp_path, pvt(0), raw, pvt(1), raw[:end])
+        assert len(found["gnss"]) == 2
+        assert log.skipped == {"file cut short": 1}
+        log, _ = opened(tmp_path, pvt(0), rmc("120000", "010326").encode(), raw[:end])
+        assert log.skipped == {"file cut short": 1}
+
+
+def test_positions_that_stand_in_nmea_alone_are_read_too(tmp_path: Path) -> None:
+    raw = frame(b"\x02\x15", bytes(range(256)) * 8)
+    log, found = opened(tmp_path, raw, rmc("120000", "010326").encode(), raw, raw)
+    assert [one.stamp_ns for one in found["gnss"]] == [NOON_NS]
+    assert not log.skipped
+
+
 def test_what_is_no_fix_is_counted(tmp_path: Path) -> None:
     log, _ = opened(
         tmp_path, pvt(0), pvt(1, fix=0), pvt(2, flags=0), pvt(3, fix=5), pvt(4, valid=1)
@@ -116,8 +133,10 @@ def test_a_real_walk_of_boulder_and_half_of_it(tmp_path: Path) -> None:
     assert speed.slope == pytest.approx(1.0, abs=0.02)
     assert abs(speed.lag_s) < 0.11
 
-    data = bytearray(path.read_bytes()[:700_000])
+    data = bytearray(path.read_bytes())
+    del data[data.find(b"\xb5\x62\x02\x15", 690_000) + 500 :]
     data[300_000:300_400] = bytes(400)
     (tmp_path / "half.ubx").write_bytes(data)
     log = open_log(tmp_path / "half.ubx")
     assert 200 < sum(channel == "gnss" for channel, _ in log.samples()) < 260
+    assert log.skipped["file cut short"] == 1
