@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.orchestrator.routing.going_on import (
+    FADING_S,
     LEARN_FASTER_S,
     LEARN_SLOWER_S,
     UNHINDERED_S,
     USUAL_SHARE,
-    fading_s,
     going_on_mps2,
 )
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
@@ -98,7 +98,7 @@ class DrivingPace:
         todo = iter(places_m)
         place = next(todo, None)
         s_m, speed, time_s = from_m, self.speed_mps, 0.0
-        left = math.exp(-_STEP_S / fading_s(acceleration_mps2))
+        left = math.exp(-_STEP_S / FADING_S)
         present = math.sqrt(left)
         while place is not None and time_s < FORESEEN_S:
             while edge < len(ends) - 1 and s_m >= ends[edge]:

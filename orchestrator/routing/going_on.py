@@ -1,12 +1,13 @@
 """How a driver goes on: first as now, then as usual. One law, for futures and for arrivals.
 
-The present acceleration fades by 1/e in `GAINING_S` or `BRAKING_S`, and as it fades the speed is
-drawn towards the one that is wanted. Bends ahead are braked for as the planners brake for them. The
+The present acceleration fades by 1/e in `FADING_S`, and as it fades the speed is drawn towards the
+one that is wanted. Bends ahead are braked for as the planners brake for them. The
 form is the linear prediction with damped trend of Gardner and McKenzie (1985), "Forecasting trends
 in time series".
 
 The numbers were chosen together on the drives through Chemnitz, Boulder and Karlsruhe (KITTI 00 and
-05), along the way that was driven there, and are measured on others (docs/trust.md). What the law
+05), for the countdown with limits that are right and wrong by half, and for futures with the learnt
+half of their speeds; they are measured on others (docs/trust.md). What the law
 is asked decides how fast the usual speed comes: a future may wait on its way, while the seconds to
 a junction are those of a car that does not.
 """
@@ -17,11 +18,11 @@ import math
 
 from foretwin.sim_worker.driver_model import CURVE_TIME_S, MAX_DECEL_MPS2, STANDING_MPS
 
-GAINING_S, BRAKING_S = 2.0, 1.5
-"""In which a present acceleration, or deceleration, fades by 1/e."""
+FADING_S = 3.0
+"""In which a present acceleration fades by 1/e."""
 USUAL_S = 24.0
 """Time constant towards the usual speed, of a car that may be held up as others were."""
-UNHINDERED_S = 6.0
+UNHINDERED_S = 3.0
 """The same of one that is not."""
 DRIVEN_S = 5.0
 """Time constant towards what was driven there before."""
@@ -37,11 +38,6 @@ PULLING_AWAY_MPS2 = 0.15
 def stands(speed_mps: float, acceleration_mps2: float) -> bool:
     """Return whether a car stands and does not pull away."""
     return speed_mps < STANDING_MPS and acceleration_mps2 < PULLING_AWAY_MPS2
-
-
-def fading_s(acceleration_mps2: float) -> float:
-    """Return in which time an acceleration fades by 1/e."""
-    return GAINING_S if acceleration_mps2 > 0.0 else BRAKING_S
 
 
 def going_on_mps2(

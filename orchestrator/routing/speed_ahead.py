@@ -14,8 +14,8 @@ from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.going_on import (
     DRIVEN_S,
+    FADING_S,
     USUAL_S,
-    fading_s,
     going_on_mps2,
     stands,
 )
@@ -75,7 +75,6 @@ def speeds_ahead(
         return np.asarray(np.maximum(speed_mps - COMFORT_DECEL_MPS2 * at_s, 0.0))
     last = len(way.bend_mps) - 1
     most_mps = max(speed_mps, way.limit_mps[0])
-    fades_s = fading_s(acceleration_mps2)
     speeds, gone_m = [max(speed_mps, 0.0)], 0.0
     for step in range(steps):
         speed, here = speeds[-1], min(int(gone_m), last)
@@ -85,7 +84,7 @@ def speeds_ahead(
         accel = going_on_mps2(
             speed,
             acceleration_mps2,
-            math.exp(-(step + 0.5) * _STEP_S / fades_s),
+            math.exp(-(step + 0.5) * _STEP_S / FADING_S),
             wanted_mps=wanted_mps,
             within_s=within_s,
             bend_mps=way.bend_mps[min(int(gone_m + CURVE_TIME_S * speed), last)],

@@ -41,7 +41,13 @@ def test_what_really_came_is_what_is_scored() -> None:
     farther = score(progress_model(), drive, blind=True, truth_m=1.1 * drive.distance_m)
     moved = drive.distance_m[drive.speed_mps >= 0.5]
 
-    assert np.array_equal(right.width_m, farther.width_m)
+    sure = drive._replace(speed_std_mps=np.zeros_like(drive.speed_std_mps))
+    unsure = drive._replace(speed_std_mps=np.full_like(drive.speed_std_mps, 0.5))
+    widths = [
+        score(progress_model(), one, truth_m=one.distance_m).width_m for one in (sure, unsure)
+    ]
+    assert widths[1][:, 0].mean() > 1.5 * widths[0][:, 0].mean()
+    assert np.array_equal(right.width_m, score(progress_model(), unsure, blind=True).width_m)
     assert farther.share.mean() > right.share.mean() + 0.02
     steady = drive.speed_mps[drive.speed_mps >= 0.5][:, None] * np.array(PROGRESS_TIMES_S)
     assert np.allclose(farther.constant_speed_off_m, np.abs(steady - 1.1 * moved))

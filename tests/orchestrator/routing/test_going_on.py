@@ -6,13 +6,7 @@ import math
 
 import pytest
 
-from foretwin.orchestrator.routing.going_on import (
-    BRAKING_S,
-    GAINING_S,
-    fading_s,
-    going_on_mps2,
-    stands,
-)
+from foretwin.orchestrator.routing.going_on import going_on_mps2, stands
 
 
 def accel(
@@ -42,11 +36,6 @@ def test_a_bend_is_braked_for_and_never_pushes() -> None:
     assert accel(8.0, bend_mps=7.0) == pytest.approx(-2.0)
     assert accel(8.0, bend_mps=20.0) == 0.0
     assert accel(30.0, bend_mps=1.0) == -8.0
-
-
-def test_braking_fades_sooner_than_gaining() -> None:
-    assert (fading_s(1.0), fading_s(-1.0)) == (GAINING_S, BRAKING_S)
-    assert GAINING_S > BRAKING_S
 
 
 def test_a_car_that_pulls_away_does_not_stand() -> None:

@@ -168,6 +168,22 @@ def test_the_nominal_speed_is_the_cars_own_and_no_more_than_allowed() -> None:
     assert fast.cruise_speed_mps == pytest.approx(20.0)  # it is not slowed down by the limit
 
 
+def test_arrivals_heed_the_bends_of_the_rounds_path() -> None:
+    """Along a row and up a column: the second junction lies behind the corner."""
+    turning = Route(tuple(DirectedEdge(GRID.edges[index], False) for index in (4, 5, 23, 24)), 0.0)
+    *before, last = states_along(FRAME, drive([(110, 100), (150, 100)]), speed_mps=10.0)
+    way = WayAhead(GRID, CORNERS, (turning,))
+    for state in before:
+        way.take_speed(state)
+        way.locate(state)
+    straight_s = way.junctions[1].in_s
+    assert way.path(EMPTY, speed_mps=10.0, horizon_s=8.0) is not None
+    way.take_speed(last)
+    way.locate(last)
+
+    assert way.junctions[1].in_s > straight_s + 1.0
+
+
 def test_with_tracks_the_nominal_speed_heeds_how_the_road_was_driven() -> None:
     line = np.column_stack([np.arange(100.0, 400.0), np.full(300, 98.5)])
     lat, lon = geo_from_local(FRAME, line).T
