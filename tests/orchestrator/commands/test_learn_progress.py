@@ -127,6 +127,7 @@ def test_a_file_that_is_no_table_is_refused_without_a_word_of_unpickling(
     assert told.count("\n") == 1
     assert f"{file}: no table of progress: " in told
     assert "pickle" not in told
+    assert ("learn-progress --out" in told) == (kind in ("text", "pickle", "array of objects"))
 
 
 def test_the_shipped_table_says_whose_drives_it_was_learnt_from() -> None:
