@@ -30,7 +30,7 @@ from foretwin.world_gen.junctions.intersections import Junction
 FORESEEN_S = 20.0
 SETTLING_S = 1.0
 """Time constant with which what is shown follows what is expected."""
-_STEP_S = 0.2
+_STEP_S = 0.25
 _MOVING_MPS = 1.5
 _LEAST_SPEED_MPS = 2.0
 _CREEPING_MPS = 0.3

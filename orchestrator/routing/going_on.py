@@ -57,4 +57,7 @@ def going_on_mps2(
     accel = present_mps2 * present
     if wanted_mps != math.inf:
         accel += (1.0 - present) * (wanted_mps - speed_mps) / within_s
-    return max(min(accel, (bend_mps - speed_mps) / CURVE_TIME_S), -MAX_DECEL_MPS2)
+    bend_mps2 = (bend_mps - speed_mps) / CURVE_TIME_S
+    if bend_mps2 < accel:  # min and max would cost as much as all the rest
+        accel = bend_mps2
+    return accel if accel > -MAX_DECEL_MPS2 else -MAX_DECEL_MPS2
