@@ -15,8 +15,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.shifted_fit import shifted, shifted_fit
 from foretwin.sim_worker.analysis.gap.pairs import FASTEST_MPS, smooth
-from foretwin.sim_worker.analysis.gap.shifted_fit import shifted, shifted_fit
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
 _GROUND_OVER_S = 0.4
@@ -62,6 +62,11 @@ def on_one_clock(
     return sorted(moved, key=lambda one: one[1].stamp_ns)
 
 
+def on_tick(column: Array, shift_s: float) -> Array:
+    """Return a signal (N,) of the record's grid as it comes `shift_s` later."""
+    return shifted(column, shift_s, period_s=PERIOD_S)
+
+
 def speed_offset(record: MotionRecord) -> ClockOffset | None:
     """Return the offset of speeds, from the acceleration ahead; None where nothing tells it."""
     speed = np.where(record.speed_mps > _ROLLS_MPS, record.speed_mps, np.nan)
@@ -86,7 +91,7 @@ def position_offset(record: MotionRecord, speed: ClockOffset) -> ClockOffset | N
     ground = gone / (2 * half * PERIOD_S)
     # A fix that leaps says nothing of time.
     ground = np.where((ground > _ROLLS_MPS) & (ground < FASTEST_MPS), ground, np.nan)
-    wheels = smooth(shifted(record.speed_mps, -speed.late_s), half)
+    wheels = smooth(on_tick(record.speed_mps, -speed.late_s), half)
     found = _offset(np.where(wheels > _ROLLS_MPS, wheels, np.nan), ground, open_s=_GRID_S)
     return None if found is None else found._replace(std_s=math.hypot(found.std_s, speed.std_s))
 
@@ -100,6 +105,7 @@ def _offset(unit: Array, sensor: Array, *, open_s: float) -> ClockOffset | None:
         fit = shifted_fit(
             _change(unit, half),
             columns,
+            period_s=PERIOD_S,
             around=np.array([1.0, 0.0]),
             prior_std=np.array([_GAIN_STD, np.inf]),
         )

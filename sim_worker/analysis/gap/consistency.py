@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.shifted_fit import TOGETHER_S
 from foretwin.sim_worker.analysis.gap.fitting import (
-    TOGETHER_S,
     DelayedLine,
     Line,
     delayed_line,

@@ -14,10 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.shifted_fit import TOGETHER_S
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
-
-TOGETHER_S = 0.3
-"""Samples nearer to each other than this err alike."""
 
 
 class Line(NamedTuple):

@@ -15,8 +15,10 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.shifted_fit import ShiftedFit, shifted_fit
 from foretwin.sim_worker.analysis.gap.clock_offsets import (
     ClockOffset,
+    on_tick,
     position_offset,
     speed_offset,
     turning_offset,
@@ -24,7 +26,6 @@ from foretwin.sim_worker.analysis.gap.clock_offsets import (
 from foretwin.sim_worker.analysis.gap.findings import GAIN_LEFT_OPEN
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner, start_states, tire_angles
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
-from foretwin.sim_worker.analysis.gap.shifted_fit import ShiftedFit, shifted, shifted_fit
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.vehicle.lag import without_lags
 
@@ -121,12 +122,13 @@ def turning_gap(record: MotionRecord, vehicle: VehicleParameters) -> TurningGap 
     clock = ClockOffset(clock.late_s + more.late_s, more.std_s)
     by_speed_s = clock.late_s if speed_clock is None else speed_clock.late_s
     model = turning_of_model(runner, record, tire_rad=tire, late_s=(clock.late_s, by_speed_s))
-    speed = shifted(record.speed_mps, -by_speed_s)
+    speed = on_tick(record.speed_mps, -by_speed_s)
     columns = np.stack([model, speed / vehicle.wheelbase_m.value, np.ones(len(model))], axis=1)
     bias, bias_std = _at_standstill(record)
     fit = shifted_fit(
         gyro,
         columns,
+        period_s=PERIOD_S,
         around=np.array([1.0, 0.0, bias]),
         prior_std=np.array([*_prior(vehicle), bias_std]),
         shift_prior_s=clock.std_s,
@@ -179,11 +181,8 @@ def _response_std_s(vehicle: VehicleParameters, speed_mps: float) -> float:
 
 
 def as_commands(tire_rad: Array, late_s: float) -> Array:
-    """Return measured tyre angles (N,) as what a model is told at each instant of the grid.
-
-    It has turned its tyres so far at the end of the tick that begins there.
-    """
-    return shifted(tire_rad, -late_s - PERIOD_S)
+    """Return measured tyre angles (N,) as what a model is told, which turns so far in a tick."""
+    return on_tick(tire_rad, -late_s - PERIOD_S)
 
 
 def turning_of_model(
@@ -194,7 +193,7 @@ def turning_of_model(
     `late_s` is by how much steering and speed are stamped late. Runs begin each second as the car
     moves and last two, of which the second counts.
     """
-    tire, speed = as_commands(tire_rad, late_s[0]), shifted(record.speed_mps, -late_s[1])
+    tire, speed = as_commands(tire_rad, late_s[0]), on_tick(record.speed_mps, -late_s[1])
     count = len(speed)
     known = np.isfinite(tire) & np.isfinite(speed) & (speed > _ROLLS_MPS)
     starts = np.arange(0, count - _RUN, _SECOND)
@@ -229,7 +228,7 @@ def _told(
     speed_clock: ClockOffset | None,
     response_std_s: float,
 ) -> TurningGap | None:
-    rows = np.stack([shifted(column, fit.shift_s) for column in columns.T], axis=1)
+    rows = np.stack([on_tick(column, fit.shift_s) for column in columns.T], axis=1)
     slope = -np.gradient(rows @ fit.sizes) / PERIOD_S
     gyro = record.yaw_rate_radps
     usable = (fit.block >= 0) & np.isfinite(rows).all(axis=1) & np.isfinite(slope)

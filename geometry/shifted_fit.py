@@ -12,15 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.sim_worker.analysis.gap.fitting import TOGETHER_S
-from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
+TOGETHER_S = 0.3
+"""Samples of a car's motion nearer to each other than this err alike."""
 BLOCK_S = 6.0
 """Of driving that is left out at once: longer than a bend, in which a model errs alike."""
 LONGEST_SHIFT_S = 1.0
 """Sought for either way. Chosen: what telephones and adapters send is late by up to 0.6 s."""
 _LEAST_BLOCKS = 5
-_MOST = round(LONGEST_SHIFT_S / PERIOD_S)
 _ROUNDS = 3
 
 
@@ -48,9 +47,9 @@ class ShiftedFit(NamedTuple):
         return float(np.sqrt(self.covariance[index, index]))
 
 
-def shifted(column: Array, shift_s: float) -> Array:
-    """Return a signal (N,) on the grid as it comes `shift_s` later, NaN where unknown."""
-    at = np.arange(len(column)) - shift_s / PERIOD_S
+def shifted(column: Array, shift_s: float, *, period_s: float) -> Array:
+    """Return a signal (N,) on a grid as it comes `shift_s` later, NaN where unknown."""
+    at = np.arange(len(column)) - shift_s / period_s
     before = np.floor(at).astype(np.intp)
     part = at - before
     inside = (before >= 0) & (before < len(column) - 1)
@@ -63,29 +62,35 @@ def shifted_fit(
     y: Array,
     columns: Array,
     *,
+    period_s: float,
     around: Array,
     prior_std: Array,
     shift_prior_s: float = float("inf"),
+    longest_s: float = LONGEST_SHIFT_S,
 ) -> ShiftedFit | None:
-    """Fit y (N,) by columns (N, C), shifted together.
+    """Fit y (N,) by columns (N, C), shifted together by up to `longest_s`; grid of `period_s`.
 
     Sizes are `around` (C,) give or take `prior_std` (C,), infinite where nothing is known, and the
     shift is 0 give or take `shift_prior_s`. None for less than 30 s that can be compared.
     """
-    known = np.isfinite(y) & _known_around(columns)
-    block = _blocks(known)
-    if known.sum() * PERIOD_S < _LEAST_BLOCKS * BLOCK_S:
+    longest = round(longest_s / period_s)
+    known = np.isfinite(y) & _known_around(columns, longest)
+    block = _blocks(known, period_s)
+    if known.sum() * period_s < _LEAST_BLOCKS * BLOCK_S:
         return None
     count = int(block.max()) + 1
-    most = 0 if np.isfinite(shift_prior_s) else _MOST
-    shift_s, variance = _best_on_grid(y, columns, known, most)
+    most = 0 if np.isfinite(shift_prior_s) else longest
+    late, variance = _best_on_grid(y, columns, known, most)
+    shift_s = late * period_s
     theta, without, covariance = np.zeros(0), np.zeros(0), np.zeros(0)
     for _ in range(_ROUNDS):
-        rows = np.stack([shifted(column, shift_s) for column in columns.T], axis=1)
-        slope = -np.gradient(rows @ (theta[:-1] if len(theta) else around)) / PERIOD_S
+        rows = np.stack(
+            [shifted(column, shift_s, period_s=period_s) for column in columns.T], axis=1
+        )
+        slope = -np.gradient(rows @ (theta[:-1] if len(theta) else around)) / period_s
         design = np.column_stack([rows, slope])
         used = known & np.isfinite(design).all(axis=1)
-        weight = PERIOD_S / TOGETHER_S / variance
+        weight = period_s / TOGETHER_S / variance
         each = np.zeros((count, design.shape[1], design.shape[1] + 1))
         joined = np.column_stack([design, y])
         for number in range(count):
@@ -100,7 +105,7 @@ def shifted_fit(
         variance = max(float(np.mean((y[used] - design[used] @ theta) ** 2)), 1e-12)
         moved_s = float(np.clip(theta[-1], -0.1, 0.1))
         without[:, -1] += shift_s
-        shift_s = float(np.clip(shift_s + moved_s, -LONGEST_SHIFT_S, LONGEST_SHIFT_S))
+        shift_s = float(np.clip(shift_s + moved_s, -longest_s, longest_s))
     return ShiftedFit(theta[:-1], shift_s, covariance, without, block)
 
 
@@ -109,28 +114,28 @@ def _solve(normal: Array, prior: Array, wanted: Array) -> Array:
     return np.asarray(found)
 
 
-def _known_around(columns: Array) -> Flags:
+def _known_around(columns: Array, most: int) -> Flags:
     """Return where all columns (N, C) are known, the longest shift before and after too."""
     unknown = np.concatenate([[0], np.cumsum(~np.isfinite(columns).all(axis=1))])
     count = len(columns)
     at = np.arange(count)
-    first, last = at - _MOST - 1, at + _MOST + 1
+    first, last = at - most - 1, at + most + 1
     inside = (first >= 0) & (last < count)
     first, last = np.clip(first, 0, count - 1), np.clip(last, 0, count - 1)
     return np.asarray(inside & (unknown[last + 1] == unknown[first]))
 
 
-def _blocks(known: Flags) -> Indices:
+def _blocks(known: Flags, period_s: float) -> Indices:
     """Number the stretches of driving (N,) by what of them can be compared."""
-    return np.where(known, (np.cumsum(known) - 1) // round(BLOCK_S / PERIOD_S), -1)
+    return np.where(known, (np.cumsum(known) - 1) // round(BLOCK_S / period_s), -1)
 
 
-def _best_on_grid(y: Array, columns: Array, known: Flags, most: int) -> tuple[float, float]:
-    """Return the shift that leaves least of y, and the mean square left."""
+def _best_on_grid(y: Array, columns: Array, known: Flags, most: int) -> tuple[int, float]:
+    """Return the shift in ticks that leaves least of y, and the mean square left."""
     at = np.flatnonzero(known)
     best = (np.inf, 0)
     for late in range(-most, most + 1):
         rows = columns[at - late]
         sizes, *_ = np.linalg.lstsq(rows, y[at], rcond=None)
         best = min(best, (float(np.mean((y[at] - rows @ sizes) ** 2)), late))
-    return best[1] * PERIOD_S, max(best[0], 1e-12)
+    return best[1], max(best[0], 1e-12)

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.shifted_fit import (
+from foretwin.geometry.shifted_fit import (
     LONGEST_SHIFT_S,
     ShiftedFit,
     shifted,
     shifted_fit,
 )
-from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
+PERIOD_S = 0.02
 TIME_S = np.arange(3500) * PERIOD_S
 ONE = np.ones(len(TIME_S))
 FREE = np.array([np.inf, np.inf])
@@ -32,6 +32,7 @@ def fitted(
     return shifted_fit(
         y,
         columns,
+        period_s=PERIOD_S,
         around=np.array([1.0, 0.0]),
         prior_std=prior_std,
         shift_prior_s=shift_prior_s,
@@ -77,10 +78,10 @@ def test_less_than_half_a_minute_says_nothing() -> None:
 
 
 def test_a_shifted_signal_is_between_its_samples_and_unknown_beyond_them() -> None:
-    late = shifted(TIME_S, 0.03)
+    late = shifted(TIME_S, 0.03, period_s=PERIOD_S)
     assert late[10:-10] == pytest.approx(TIME_S[10:-10] - 0.03)
     assert np.isnan(late[0])
-    assert np.isnan(shifted(TIME_S, -LONGEST_SHIFT_S)[-1])
+    assert np.isnan(shifted(TIME_S, -LONGEST_SHIFT_S, period_s=PERIOD_S)[-1])
 
 
 def test_each_stretch_is_left_out_once() -> None:
