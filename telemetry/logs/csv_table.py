@@ -1,8 +1,7 @@
-"""Reader of CSV files whose columns are declared (see foretwin.telemetry.logs.declaration)."""
+"""Reader of tables, CSV and Parquet, whose columns are declared (see declaration.py)."""
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
 from decimal import Decimal, InvalidOperation
@@ -13,8 +12,14 @@ import numpy as np
 import numpy.typing as npt
 import pyproj
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.frames import geo_from_ecef, wrap_angle
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
+from foretwin.contracts.frames import (
+    GeoPoint,
+    LocalFrame,
+    geo_from_ecef,
+    geo_from_local,
+    wrap_angle,
+)
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.columns import Stream, stream_of, table_log
 from foretwin.telemetry.logs.declaration import (
@@ -30,9 +35,13 @@ from foretwin.telemetry.logs.declaration import (
 )
 from foretwin.telemetry.logs.gpx import representable_ns, stamp_ns_from_iso
 from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.table_cells import Cells, read_cells
 
-Cells = list[str]
-Flags = npt.NDArray[np.bool_]
+_MANY_ROWS = 20_000
+"""From so many on another parser is worth its import."""
+_AT_REST = {"accel_y": 0.0, "accel_z": units.STANDARD_GRAVITY_MPS2, "rate_x": 0.0, "rate_y": 0.0}
+"""What a unit that measures forwards and about the vertical alone is taken to say besides: nothing
+of ours reads it."""
 
 
 class Table(NamedTuple):
@@ -41,11 +50,12 @@ class Table(NamedTuple):
     path: Path
     stamp_ns: npt.NDArray[np.int64]
     cells: dict[str, Cells]
+    decimal: str
     unreadable_rows: int
 
 
 def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
-    """Open a CSV by its declaration, `NAME.csv.toml` beside it unless another is given.
+    """Open a table by its declaration, `NAME.csv.toml` beside it unless another is given.
 
     Raises LogError where there is no declaration or it does not fit the columns.
     """
@@ -53,19 +63,25 @@ def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
     if not declaration_path.is_file():
         raise LogError(
             f"{path}: units not declared; write {declaration_path.name} beside it"
-            " (columns, units, frame, time base), or name a declaration"
+            " (columns, units, frame, time base; `foretwin declare` proposes one and says what of"
+            " it the data prove), or name a declaration"
         )
     declared = read_declaration(declaration_path)
     table = _read_table(path, declared, declaration_path)
     values: dict[str, dict[str, Array]] = {}
     unreadable = table.unreadable_rows
     picks: dict[str, npt.NDArray[np.int64]] = {}
-    for channel, section in sections_of(declared).items():
+    sections = sections_of(declared)
+    if not sections:
+        raise LogError(f"{declaration_path}: declares no section but [time]: nothing to read")
+    for channel, section in sections.items():
         values[channel], usable, broken = _numbers(table, section, declaration_path)
         unreadable += broken
         picks[channel] = np.flatnonzero(usable & _is_new(table, section))
-    geo = _positions(declaration_path, declared.position, values["gnss"])
-    values["gnss"] |= stream_of("gnss", table.stamp_ns, geo).columns
+    geo = np.zeros((0, 3))
+    if declared.position is not None:
+        geo = _positions(declaration_path, declared.position, values["gnss"])
+        values["gnss"] |= stream_of("gnss", table.stamp_ns, geo).columns
     if (speed := values.get("speed")) is not None and "forward" not in speed:
         speed["forward"] = np.hypot(speed["east"], speed["north"])
     if declared.heading is not None:
@@ -77,7 +93,7 @@ def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
     if declared.imu is not None:
         _turn_axes(declared.imu, values["imu"])
     streams = {
-        channel: Stream(table.stamp_ns[rows], {n: v[rows] for n, v in values[channel].items()})
+        channel: _stream(table.stamp_ns, rows, values[channel], late_s=sections[channel].late_s)
         for channel, rows in picks.items()
     }
     return table_log(
@@ -91,50 +107,48 @@ def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
     )
 
 
+def _stream(
+    stamps_ns: Stamps, rows: Indices, columns: dict[str, Array], *, late_s: float
+) -> Stream:
+    """Return a channel's samples, moved by what they are late; none is before the drive's start."""
+    moved_ns = stamps_ns - round(late_s * 1e9)
+    rows = rows[(moved_ns[rows] >= stamps_ns[0]) | (late_s == 0.0)]
+    return Stream(moved_ns[rows], {name: column[rows] for name, column in columns.items()})
+
+
 def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Table:
     wanted = {declared.time.column}
     for section in sections_of(declared).values():
         wanted.update(column.column for column in columns_of(section).values())
         wanted.update(section.new_when)
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as text:
-        reader = csv.reader(text, delimiter=declared.delimiter)
-        header = [name.strip() for name in next(reader, [])]
-        missing = sorted(wanted - set(header))
-        if missing:
-            raise LogError(
-                f"{path}: line 1: no column {missing[0]!r}, which {declaration_path.name} declares;"
-                f" columns: {', '.join(header)}"
-            )
-        places = {name: header.index(name) for name in wanted}
-        stamps: list[int] = []
-        cells: dict[str, Cells] = {name: [] for name in wanted}
-        unreadable = 0
-        stamp_of = _stamp_reader(declared.time.unit or "")
-        for row in reader:
-            if not any(map(str.strip, row)):
-                continue
-            stamp_ns = (
-                stamp_of(row[places[declared.time.column]]) if len(row) >= len(header) else None
-            )
-            if stamp_ns is None:
-                unreadable += 1
-                continue
-            stamps.append(stamp_ns)
-            for name, place in places.items():
-                cells[name].append(row[place])
-    if not stamps:
+    cells, unreadable = read_cells(
+        path,
+        wanted=sorted(wanted),
+        declared_in=declaration_path.name,
+        delimiter=declared.delimiter,
+        header=declared.header,
+    )
+    stamp_of = _stamp_reader(declared.time.unit or "", declared.decimal)
+    stamps = [stamp_of(text) for text in cells[declared.time.column]]
+    if None in stamps:
+        kept = [row for row, stamp_ns in enumerate(stamps) if stamp_ns is not None]
+        unreadable += len(stamps) - len(kept)
+        cells = {name: [column[row] for row in kept] for name, column in cells.items()}
+    known = np.array([stamp_ns for stamp_ns in stamps if stamp_ns is not None], dtype=np.int64)
+    if not len(known):
         raise LogError(f"{path}: no row with a readable time in column {declared.time.column!r}")
-    return Table(path, np.array(stamps, dtype=np.int64), cells, unreadable)
+    return Table(path, known, cells, declared.decimal, unreadable)
 
 
-def _stamp_reader(unit: str) -> Callable[[str], int | None]:
+def _stamp_reader(unit: str, decimal: str) -> Callable[[str], int | None]:
     if unit == units.ISO_TIME:
         return lambda text: stamp_ns_from_iso(text.strip())
     factor = units.TIME_NS[unit]
 
     def read(text: str) -> int | None:
         try:
-            return representable_ns(int((Decimal(text.strip()) * factor).to_integral_value()))
+            number = Decimal(text.strip().replace(decimal, "."))
+            return representable_ns(int((number * factor).to_integral_value()))
         except (InvalidOperation, ValueError, OverflowError):
             return None
 
@@ -152,7 +166,7 @@ def _numbers(
     rows = len(table.stamp_ns)
     broken, empties = np.zeros(rows, dtype=bool), np.zeros(rows, dtype=int)
     for field, column in columns_of(section).items():
-        numbers, empty, no_number = _floats(table.cells[column.column])
+        numbers, empty, no_number = _floats(table.cells[column.column], table.decimal)
         arrays[field] = numbers * factor_of(declaration_path, field, column)
         empties += empty
         broken |= no_number
@@ -161,9 +175,17 @@ def _numbers(
     return arrays, ~broken & ~all_empty, int(broken.sum())
 
 
-def _floats(cells: Cells) -> tuple[Array, Flags, Flags]:
-    numbers = np.full(len(cells), math.nan)
-    empty, no_number = np.zeros(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)
+def _floats(cells: Cells, decimal: str) -> tuple[Array, Flags, Flags]:
+    if decimal != ".":
+        cells = [cell.replace(decimal, ".") for cell in cells]
+    rows = len(cells)
+    empty, no_number = np.zeros(rows, dtype=bool), np.zeros(rows, dtype=bool)
+    if rows > _MANY_ROWS and (parsed := _parsed_at_once(cells)) is not None:
+        return parsed, empty, no_number
+    try:
+        return np.array([float(cell) for cell in cells]), empty, no_number
+    except ValueError:
+        numbers = np.full(rows, math.nan)
     for row, cell in enumerate(cells):
         try:
             numbers[row] = float(cell)
@@ -172,17 +194,38 @@ def _floats(cells: Cells) -> tuple[Array, Flags, Flags]:
     return numbers, empty, no_number
 
 
+def _parsed_at_once(cells: Cells) -> Array | None:
+    """Return the numbers of cells that all hold one, plainly written; None where one does not."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    try:
+        numbers = pc.cast(pa.array(cells, pa.string()), pa.float64())
+    except pa.ArrowInvalid:
+        return None
+    return np.array(numbers, dtype=np.float64)
+
+
 def _is_new(table: Table, section: Section) -> Flags:
+    rows = len(table.stamp_ns)
     if not section.new_when:
-        return np.ones(len(table.stamp_ns), dtype=bool)
-    new = np.zeros(len(table.stamp_ns), dtype=bool)
+        return np.ones(rows, dtype=bool)
+    new = np.zeros(rows, dtype=bool)
     for name in section.new_when:
-        latest = ""
+        before = ""
         for row, cell in enumerate(table.cells[name]):
-            # An empty cell says nothing: the value before it stands.
-            new[row] |= bool(cell.strip()) and cell != latest
-            latest = cell if cell.strip() else latest
+            if cell != before and cell.strip():
+                new[row], before = True, cell
+    if section.again_s > 0.0:
+        since_ns = table.stamp_ns - table.stamp_ns[_latest(new)]
+        times = since_ns // round(section.again_s * 1e9)
+        new[1:] |= (times[1:] > 0) & (times[1:] != times[:-1])
     return new
+
+
+def _latest(flags: Flags) -> Indices:
+    """Return for each row the latest that is flagged, up to it."""
+    return np.maximum.accumulate(np.where(flags, np.arange(len(flags)), 0))
 
 
 def _positions(path: Path, position: PositionSection, columns: dict[str, Array]) -> Array:
@@ -195,6 +238,10 @@ def _positions(path: Path, position: PositionSection, columns: dict[str, Array])
         except pyproj.exceptions.CRSError as error:
             raise LogError(f"{path}: [position] epsg {position.epsg}: {error}") from None
         lon_deg, lat_deg = convert.transform(columns["easting"], columns["northing"])
+    elif position.origin is not None:
+        plane = LocalFrame(GeoPoint(*position.origin).validate())
+        xy_m = np.stack([columns["x"], columns["y"]], axis=1)
+        lat_deg, lon_deg = geo_from_local(plane, xy_m).T
     else:
         lat_deg, lon_deg = columns["latitude"], columns["longitude"]
     altitude = columns.get("altitude", np.zeros(len(lat_deg)))
@@ -202,13 +249,13 @@ def _positions(path: Path, position: PositionSection, columns: dict[str, Array])
 
 
 def _true_yaw(
-    position: PositionSection, heading: HeadingSection, angle_rad: Array, geo: Array
+    position: PositionSection | None, heading: HeadingSection, angle_rad: Array, geo: Array
 ) -> Array:
     """Return yaw counter-clockwise from true east of angles in the declared convention."""
     angle = angle_rad + np.radians(heading.offset_deg)
     ccw = -angle if heading.direction == "clockwise" else angle
     yaw = ccw + (0.5 * np.pi if heading.zero == "north" else 0.0)
-    if heading.north == "grid":
+    if heading.north == "grid" and position is not None:
         # Meridian convergence: the angle from true to grid north, positive clockwise.
         factors = pyproj.Proj(position.epsg).get_factors(geo[:, 1], geo[:, 0], errcheck=False)
         yaw = yaw - np.radians(factors.meridian_convergence)
@@ -217,5 +264,7 @@ def _true_yaw(
 
 def _turn_axes(imu: ImuSection, columns: dict[str, Array]) -> None:
     if imu.axes == "forward-right-down":
-        for name in ("accel_y", "accel_z", "rate_y", "rate_z"):
+        for name in {"accel_y", "accel_z", "rate_y", "rate_z"} & columns.keys():
             columns[name] = -columns[name]
+    for name, at_rest in _AT_REST.items():
+        columns.setdefault(name, np.full(len(columns["accel_x"]), at_rest))

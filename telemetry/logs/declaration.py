@@ -15,7 +15,8 @@ forward = { column = "speed", unit = "km/h" } # or east and north, whose length 
 ```
 
 `negate = true` turns a column's sign. `new_when = ["column", …]` in a section yields a sample only
-where one of these columns differs from the row before, for sources that repeat old values.
+where one of these columns differs from what it was before, for sources that repeat old values; an
+empty cell is no change. docs/logs.md has all keys; `foretwin declare` writes a declaration.
 """
 
 from __future__ import annotations
@@ -42,9 +43,12 @@ class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every section may hold."""
+    """What every section may hold: which rows are new, and how late its samples are stamped."""
 
     new_when: tuple[str, ...] = ()
+    again_s: float = 0.0
+    """With `new_when`: what has not changed for so long is a sample again; 0: never."""
+    late_s: float = 0.0
 
 
 class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -56,10 +60,14 @@ class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class PositionSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Positions; `epsg` is the code of a projected system, such as 32633 for UTM zone 33N."""
+    """Positions; `epsg` is the code of a projected system, such as 32633 for UTM zone 33N.
 
-    frame: Literal["wgs84", "ecef", "projected"]
+    `origin` is the latitude and longitude in degrees of a plane's zero: x east, y north.
+    """
+
+    frame: Literal["wgs84", "ecef", "projected", "local"]
     epsg: int | None = None
+    origin: tuple[float, float] | None = None
     latitude: Column | None = None
     longitude: Column | None = None
     easting: Column | None = None
@@ -98,15 +106,18 @@ class HeadingSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class ImuSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Specific force (+9.8 m/s² upwards at rest) and rates along the named body axes."""
+    """Specific force (+9.8 m/s² upwards at rest) and rates along the named body axes.
+
+    Of a unit that measures in the plane alone what is missing is taken as at rest.
+    """
 
     axes: Literal["forward-left-up", "forward-right-down"]
     accel_x: Column
-    accel_y: Column
-    accel_z: Column
-    rate_x: Column
-    rate_y: Column
     rate_z: Column
+    accel_y: Column | None = None
+    accel_z: Column | None = None
+    rate_x: Column | None = None
+    rate_y: Column | None = None
 
 
 class SteeringSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -128,10 +139,13 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """The declaration of one kind of CSV."""
 
     time: TimeSection
-    position: PositionSection
     reference_point: str
+    position: PositionSection | None = None
     body_from_antenna_m: tuple[float, float, float] | None = None
     delimiter: str = ","
+    decimal: Literal[".", ","] = "."
+    header: bool = True
+    """Without a line of names the columns are called c1, c2 and so on."""
     speed: SpeedSection | None = None
     heading: HeadingSection | None = None
     imu: ImuSection | None = None
@@ -158,7 +172,10 @@ def read_declaration(path: Path) -> Declaration:
     except msgspec.DecodeError as error:
         raise LogError(f"{path}: {error}") from None
     _known_unit(path, declaration.time, (*units.TIME_NS, units.ISO_TIME))
-    _check_position(path, declaration.position, declaration.heading)
+    if declaration.position is not None:
+        _check_position(path, declaration.position, declaration.heading)
+    elif declaration.heading is not None and declaration.heading.north == "grid":
+        raise LogError(f"{path}: [heading] north = 'grid' needs a position in frame 'projected'")
     if declaration.speed is not None:
         present = set(columns_of(declaration.speed))
         if present not in ({"forward"}, {"east", "north"}):
@@ -206,6 +223,7 @@ def _check_position(path: Path, position: PositionSection, heading: HeadingSecti
         "wgs84": ("latitude", "longitude"),
         "ecef": ("x", "y", "z"),
         "projected": ("easting", "northing"),
+        "local": ("x", "y"),
     }[position.frame]
     present = set(columns_of(position)) - {"std", "altitude"}
     if present != set(needed) or (position.frame == "ecef" and position.altitude is not None):
@@ -215,5 +233,7 @@ def _check_position(path: Path, position: PositionSection, heading: HeadingSecti
         )
     if (position.frame == "projected") != (position.epsg is not None):
         raise LogError(f"{path}: [position] epsg belongs to frame 'projected', and to it alone")
+    if (position.frame == "local") != (position.origin is not None):
+        raise LogError(f"{path}: [position] origin belongs to frame 'local', and to it alone")
     if heading is not None and heading.north == "grid" and position.epsg is None:
         raise LogError(f"{path}: [heading] north = 'grid' needs a position in frame 'projected'")

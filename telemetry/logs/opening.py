@@ -24,12 +24,14 @@ from foretwin.telemetry.logs.road_users import (
 from foretwin.telemetry.logs.smartloc import is_smartloc, open_smartloc, smartloc_texts
 from foretwin.telemetry.logs.ubx import is_ubx, open_ubx
 
+TABLES = (".csv", ".tsv", ".parquet")
+"""Their columns mean what a declaration says."""
 BAG_MAGIC, SQLITE_MAGIC, ZIP_MAGIC = b"#ROSBAG V", b"SQLite format 3\0", b"PK\x03\x04"
 
 KINDS = (
     "MCAP with ROS messages (.mcap), ROS 1 bag (.bag), ROS 2 bag (folder or .db3), "
-    "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV with a declaration (.csv), GPX (.gpx), "
-    "GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, GnssLogger text, "
+    "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV or Parquet with a declaration (.csv, .tsv, .parquet), "
+    "GPX (.gpx), GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, GnssLogger text, "
     "nuScenes CAN bus JSON (scene-0001_pose.json), "
     "smartLoc text or folder (point3, odom3), comma2k19 segment folder, "
     "openpilot rlog or qlog (plain, .bz2, .zst)"
@@ -105,7 +107,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if suffix in (".geojson", ".json") or text.startswith("{"):
         check_undeclared(path, declaration, "a GeoJSON file")
         return open_geojson(path)
-    if suffix == ".csv" or declaration is not None:
+    if suffix in TABLES or declaration is not None or path.with_name(path.name + ".toml").is_file():
         from foretwin.telemetry.logs.csv_table import open_csv
 
         return open_csv(path, declaration=declaration)

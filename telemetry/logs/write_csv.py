@@ -9,24 +9,44 @@ from __future__ import annotations
 
 import csv
 import itertools
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
-from foretwin.telemetry.logs.declaration import UNITS
+from foretwin.telemetry.logs.declaration import (
+    UNITS,
+    Column,
+    ControlSection,
+    Declaration,
+    HeadingSection,
+    ImuSection,
+    PositionSection,
+    SpeedSection,
+    SteeringSection,
+    TimeSection,
+)
 from foretwin.telemetry.logs.log import LogError, Sample
+from foretwin.telemetry.logs.write_declaration import declaration_toml
 
-_MORE = {
-    "gnss": 'frame = "wgs84"\n',
-    "heading": 'zero = "east"\ndirection = "counterclockwise"\n',
-    "imu": 'axes = "forward-left-up"\n',
+_MORE: dict[str, dict[str, str]] = {
+    "gnss": {"frame": "wgs84"},
+    "heading": {"zero": "east", "direction": "counterclockwise"},
+    "imu": {"axes": "forward-left-up"},
 }
-"""Further lines of a channel's section in the declaration."""
+"""Further keys of a channel's section in the declaration."""
+_SECTIONS: dict[str, Callable[..., Any]] = {
+    "gnss": PositionSection,
+    "speed": SpeedSection,
+    "heading": HeadingSection,
+    "imu": ImuSection,
+    "steering": SteeringSection,
+    "control": ControlSection,
+}
 DECLARATION_MARK = "# Written by foretwin convert"
 """How a declaration begins that `convert` may replace."""
 
@@ -95,15 +115,20 @@ def _rows(
 
 
 def _declaration(info: VehicleInfo, kept: dict[str, tuple[str, ...]]) -> str:
-    # JSON's strings are TOML's.
-    text = f"{DECLARATION_MARK}, which replaces it with its CSV; without this line it is kept.\n"
-    text += f"reference_point = {json.dumps(info.reference_point)}\n"
-    if info.body_from_antenna_m is not None:
-        text += f"body_from_antenna_m = {list(map(float, info.body_from_antenna_m))}\n"
-    text += f'\n[time]\ncolumn = "stamp_ns"\nunit = "ns"\nbase = "{info.time_base}"\n'
-    for channel, fields in kept.items():
-        text += f"\n[{CHANNEL_COLUMNS[channel].section}]\n{_MORE.get(channel, '')}"
-        for field in fields:
-            own_unit = next(iter(UNITS[field]))
-            text += f'{field} = {{ column = "{channel}_{field}", unit = "{own_unit}" }}\n'
-    return text
+    sections = {
+        CHANNEL_COLUMNS[channel].section: _SECTIONS[channel](
+            **{field: Column(f"{channel}_{field}", next(iter(UNITS[field]))) for field in fields},
+            **_MORE.get(channel, {}),
+        )
+        for channel, fields in kept.items()
+    }
+    declaration = Declaration(
+        reference_point=info.reference_point,
+        body_from_antenna_m=info.body_from_antenna_m,
+        time=TimeSection(column="stamp_ns", unit="ns", base=info.time_base),
+        **sections,
+    )
+    return (
+        f"{DECLARATION_MARK}, which replaces it with its CSV; without this line it is kept.\n"
+        + declaration_toml(declaration)
+    )

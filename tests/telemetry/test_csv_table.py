@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
-from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.declaration import (
+    UNITS,
+    Column,
+    ControlSection,
+    Declaration,
+    HeadingSection,
+    ImuSection,
+    PositionSection,
+    Section,
+    SpeedSection,
+    SteeringSection,
+    TimeSection,
+)
 
 COVERS = (
     "foretwin.telemetry.logs.csv_table",
     "foretwin.telemetry.logs.declaration",
     "foretwin.telemetry.logs.units",
     "foretwin.telemetry.logs.columns",
+    "foretwin.telemetry.logs.table_cells",
 )
 
 DECLARATION = """
@@ -149,3 +165,141 @@ north = "grid"
     course = math.atan2(north_m, east_m)
     assert found["heading"][0].yaw_rad == pytest.approx(course, abs=1e-6)
     assert math.degrees(course) < 88.0
+
+
+def with_keys(section: str, *lines: str) -> str:
+    return DECLARATION.replace(f"[{section}]", "\n".join((f"[{section}]", *lines)))
+
+
+def test_what_stands_for_long_is_new_again(tmp_path: Path) -> None:
+    rows = "t,lat,lon,v,wheel\n" + "".join(
+        f"{row / 10},52.5,13.4,{v},1\n" for row, v in enumerate([5, 6, 6, 6, 6, 6, 7])
+    )
+    lines = 'new_when = ["v"]', "again_s = 0.2"
+    found = channels(drive(tmp_path, rows, with_keys("speed", *lines)))
+    assert [m.stamp_ns // 10**8 for m in found["speed"]] == [0, 1, 3, 5, 6]
+
+
+def test_late_samples_are_moved_and_none_is_before_the_start(tmp_path: Path) -> None:
+    rows = "t,lat,lon,v,wheel\n" + "".join(f"{10 + row / 10},52.5,13.4,5,1\n" for row in range(5))
+    found = channels(drive(tmp_path, rows, with_keys("speed", "late_s = 0.15")))
+    assert [m.stamp_ns // 10**6 for m in found["speed"]] == [10050, 10150, 10250]
+    assert len(found["gnss"]) == 5
+
+
+def test_decimal_commas_and_columns_without_names(tmp_path: Path) -> None:
+    declaration = 'delimiter = ";"\ndecimal = ","\nheader = false\n' + DECLARATION
+    for number, name in enumerate(("t", "lat", "lon", "v", "wheel"), start=1):
+        declaration = declaration.replace(f'column = "{name}"', f'column = "c{number}"')
+    path = drive(tmp_path, "0,5;52,5;13,4;10;90\n0,6;52,5;13,4;20;-45\n", declaration)
+    found = channels(path)
+    assert [m.stamp_ns for m in found["gnss"]] == [500_000_000, 600_000_000]
+    assert found["gnss"][0].position.lat_deg == 52.5
+    assert found["steering"][1].steering_wheel_rad == pytest.approx(math.pi / 4)
+
+
+PLANE = """
+reference_point = "rear axle"
+[time]
+column = "t"
+unit = "s"
+base = "log"
+[position]
+frame = "local"
+origin = [52.5, 13.4]
+x = { column = "lat", unit = "m" }
+y = { column = "lon", unit = "m" }
+"""
+
+
+def test_metres_in_a_plane_around_an_origin(tmp_path: Path) -> None:
+    path = drive(tmp_path, "t,lat,lon,v,wheel\n0,100,0,1,1\n1,0,200,1,1\n", PLANE)
+    places = [fix.position for fix in channels(path)["gnss"]]
+    origin = LocalFrame(GeoPoint(52.5, 13.4))
+    xy = [local_from_geo(origin, place.lat_deg, place.lon_deg) for place in places]
+    assert xy[0] == pytest.approx([100.0, 0.0], abs=1e-3)
+    assert xy[1] == pytest.approx([0.0, 200.0], abs=1e-3)
+    with pytest.raises(LogError, match="origin belongs to frame 'local'"):
+        open_log(drive(tmp_path, declaration=PLANE.replace("origin = [52.5, 13.4]\n", "")))
+
+
+def test_an_inertial_unit_of_the_plane_is_at_rest_besides(tmp_path: Path) -> None:
+    imu = (
+        '[imu]\naxes = "forward-right-down"\naccel_x = { column = "v", unit = "g" }\n'
+        'rate_z = { column = "wheel", unit = "deg/s" }\n'
+    )
+    found = channels(drive(tmp_path, declaration=DECLARATION + imu))["imu"]
+    assert found[0].accel_mps2 == pytest.approx((98.0665, 0.0, 9.80665))
+    assert found[0].rate_radps == pytest.approx((0.0, 0.0, -math.pi / 2))
+
+
+def test_a_table_without_positions_is_read(tmp_path: Path) -> None:
+    kept = DECLARATION[: DECLARATION.index("[position]")]
+    speed = DECLARATION[DECLARATION.index("[speed]") :]
+    assert channels(drive(tmp_path, declaration=kept + speed)).keys() == {"speed", "steering"}
+    with pytest.raises(LogError, match="declares no section but"):
+        open_log(drive(tmp_path, declaration=kept))
+
+
+def test_parquet_is_read_as_its_text_would_be(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = {"t": [0.0, 0.1], "lat": [52.5, None], "lon": [13.4, None], "v": [10, 20],
+             "wheel": [90.0, -45.0]}  # fmt: skip
+    path = tmp_path / "drive.parquet"
+    pq.write_table(pa.table(table), path)
+    path.with_name("drive.parquet.toml").write_text(DECLARATION)
+    found = channels(path)
+    assert [len(found[name]) for name in ("gnss", "speed")] == [1, 2]
+    assert found["speed"][1].speed_mps == pytest.approx(8.9408)
+    path.write_bytes(path.read_bytes()[:60])
+    with pytest.raises(LogError, match="no Parquet table that can be read"):
+        open_log(path)
+
+
+def test_many_rows_are_read_as_few_are(tmp_path: Path) -> None:
+    rows = [f"{row},52.5,13.4,{row % 50}.25,1" for row in range(20_500)]
+    rows[7] = "7,52.5,13.4,,1"
+    found = channels(drive(tmp_path, "t,lat,lon,v,wheel\n" + "\n".join(rows) + "\n"))
+    assert len(found["speed"]) == 20_499
+    assert len(found["steering"]) == 20_500
+    assert found["speed"][-1].speed_mps == pytest.approx(49.25 * 0.44704)
+
+
+DOCS = Path(__file__).parents[2] / "docs" / "logs.md"
+SECTIONS = {
+    "": Declaration, "time": TimeSection, "position": PositionSection, "speed": SpeedSection,
+    "heading": HeadingSection, "imu": ImuSection, "steering": SteeringSection,
+    "control": ControlSection, "any section": Section, "column": Column,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_documentation_has_every_key_with_its_default(section: str) -> None:
+    told = {}
+    called = {"": "top", "any section": section, "column": section}.get(section, f"`[{section}]`")
+    for line in DOCS.read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == 4 and cells[0] == called:
+            told[cells[1].strip("`")] = cells[2].strip("`")
+    shared = () if section == "any section" else ("new_when", "again_s", "late_s")
+    fields = {
+        field.name: field
+        for field in msgspec.structs.fields(SECTIONS[section])
+        if field.name not in shared and field.name not in (SECTIONS if not section else ())
+    }
+    assert told.keys() == fields.keys()
+    for name, field in fields.items():
+        if field.required:
+            assert told[name] == "needed", name
+        elif field.default not in (None, ()):
+            assert told[name] == json.dumps(field.default), name
+        else:
+            assert told[name] == "none", name
+
+
+def test_the_documentation_has_every_unit() -> None:
+    text = DOCS.read_text(encoding="utf-8")
+    for kind in UNITS.values():
+        assert ", ".join(f"`{unit}`" for unit in kind) in text
