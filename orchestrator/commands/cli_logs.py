@@ -27,6 +27,46 @@ def convert(
     convert_log(source, target, to=to, declaration=declaration)
 
 
+def declare(
+    table: Annotated[Path, typer.Argument(metavar="FILE", help="CSV, TSV or Parquet of a drive")],
+    out: Annotated[
+        Path | None, typer.Option(help="the declaration [default: FILE.toml, where it is found]")
+    ] = None,
+    answer: Annotated[
+        list[str] | None,
+        typer.Option(help="KEY=VALUE of time, latitude, x, epsg, origin or reference_point"),
+    ] = None,
+) -> None:
+    """Find out what a table's columns are, prove it, and write the declaration it is read by."""
+    from foretwin.orchestrator.commands.declare import declare as declare_table
+
+    declare_table(table, out=out, answers=tuple(answer or ()))
+
+
+def merge(
+    first: Annotated[
+        Path, typer.Argument(metavar="LOG_A", help="recorded drive, whose clock holds")
+    ],
+    second: Annotated[
+        Path, typer.Argument(metavar="LOG_B", help="another recording of the same drive")
+    ],
+    target: Annotated[Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder")],
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares LOG_A; else LOG_A.toml"),
+    ] = None,
+    other_declaration: Annotated[
+        Path | None,
+        typer.Option("--other-declaration", help="TOML that declares LOG_B; else LOG_B.toml"),
+    ] = None,
+) -> None:
+    """Put two recordings of one drive on one clock, by how the car moved, and write them as one."""
+    asked = locals()
+    from foretwin.orchestrator.commands.recordings import merge_logs
+
+    merge_logs(**asked)
+
+
 def identify(
     log: Annotated[Path, typer.Argument(help="recorded drive")],
     vehicle: Annotated[
@@ -139,5 +179,5 @@ def compare(
     compare_drives(**asked)
 
 
-ABOUT_LOGS = (convert, identify, gap, compare, judge, recover, repeat)
+ABOUT_LOGS = (declare, convert, merge, identify, gap, compare, judge, recover, repeat)
 """In the order in which help lists them."""

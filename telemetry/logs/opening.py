@@ -30,7 +30,7 @@ BAG_MAGIC, SQLITE_MAGIC, ZIP_MAGIC = b"#ROSBAG V", b"SQLite format 3\0", b"PK\x0
 
 KINDS = (
     "MCAP with ROS messages (.mcap), ROS 1 bag (.bag), ROS 2 bag (folder or .db3), "
-    "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV or Parquet with a declaration (.csv, .tsv, .parquet), "
+    "NMEA-0183 (.nmea), u-blox UBX (.ubx), CSV, TSV or Parquet with a declaration, "
     "GPX (.gpx), GeoJSON lines (.geojson, .json), KITTI oxts folder or zip, GnssLogger text, "
     "nuScenes CAN bus JSON (scene-0001_pose.json), "
     "smartLoc text or folder (point3, odom3), comma2k19 segment folder, "

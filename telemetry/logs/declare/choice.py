@@ -1,0 +1,173 @@
+"""Which of several readings of positions holds: by sensors, by the land, by names, by the user.
+
+Turned round, latitude and longitude make a track that is mirrored and stretched: speeds and
+headings do not fit it. Where nothing else was measured, names and coasts are left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.telemetry.logs.declare.motion import GridMotion, on_grid
+from foretwin.telemetry.logs.declare.names import FIELDS
+from foretwin.telemetry.logs.declare.places import Place
+from foretwin.telemetry.logs.declare.roles import ROLES, fits_of, heading_of
+from foretwin.telemetry.logs.declare.sensors import ChangingColumn
+
+CountryOf = Callable[[float, float], str]
+"""The country at latitude and longitude, "" at sea."""
+
+_PLAINLY = 2.0
+"""One reading leaves so many times as much unexplained as another: it does not hold."""
+_SPEED = tuple(role for role in ROLES if role.section == "speed")
+
+
+class OpenQuestion(NamedTuple):
+    """What data cannot answer: `key` is answered by one of `choices`, or freely where empty."""
+
+    key: str
+    text: str
+    choices: tuple[str, ...] = ()
+
+
+class Chosen(NamedTuple):
+    """A reading and why it, or the question that is left."""
+
+    place: Place | None
+    evidence: str
+    proven: bool
+    question: OpenQuestion | None = None
+
+
+def chosen_place(
+    places: list[Place],
+    sensors: dict[str, ChangingColumn],
+    *,
+    country_of: CountryOf | None,
+    answers: dict[str, str],
+) -> Chosen:
+    """Return the reading that holds.
+
+    `sensors` are all columns that change, those of positions among them.
+    """
+    scores = _misfits(places, sensors)
+    groups = {frozenset(place.fields.values()) for place in places}
+
+    def best_of(group: frozenset[str]) -> tuple[float, int]:
+        mine = [row for row in zip(scores, places, strict=True)
+                if frozenset(row[1].fields.values()) == group]  # fmt: skip
+        return min(score for score, _ in mine), -max(len(place.rows) for _, place in mine)
+
+    answered = {answers[key] for key in ("latitude", "x") if key in answers}
+    wanted = [group for group in groups if not answered or answered & group]
+    if not wanted:
+        return Chosen(None, f"no column {answered.pop()!r} that positions can be in", False)
+    wanted.sort(key=best_of)
+    group = wanted[0]
+    # Another receiver's columns are another reading; the same ones with a stranger are none.
+    rivals = [one for one in wanted if one & group]
+    if len(rivals) > 1 and best_of(rivals[1])[0] < _PLAINLY * best_of(group)[0]:
+        named = {
+            one: max(p.called(FIELDS) for p in places if frozenset(p.fields.values()) == one)
+            for one in rivals
+        }
+        rivals.sort(key=lambda one: -named[one])
+        group = rivals[0]
+        if named[rivals[0]] == named[rivals[1]]:
+            first = next(iter(places[0].fields))
+            names = sorted({place.fields[first] for place in places
+                            if frozenset(place.fields.values()) in rivals})  # fmt: skip
+            text = f"positions may lie in {' or in '.join(map(_listed, rivals))}: what is {first}?"
+            return Chosen(None, "", False, OpenQuestion(first, text, tuple(names)))
+    rows = [
+        (score, place)
+        for score, place in zip(scores, places, strict=True)
+        if frozenset(place.fields.values()) == group
+    ]
+    others = sorted(_listed(other) for other in groups - {group} if not other & group)
+    also = f"; other positions: {'; '.join(others)}" if others else ""
+    chosen = _order_of(rows, country_of=country_of, answers=answers)
+    return chosen._replace(evidence=chosen.evidence + also)
+
+
+def _listed(group: frozenset[str]) -> str:
+    return " and ".join(sorted(group))
+
+
+def _order_of(
+    rows: list[tuple[float, Place]], *, country_of: CountryOf | None, answers: dict[str, str]
+) -> Chosen:
+    rows = sorted(rows, key=lambda row: row[0])
+    first = next(iter(rows[0][1].fields))
+    if first in answers:
+        for _, place in rows:
+            if place.fields[first] == answers[first]:
+                return Chosen(place, f"{first} as answered", True)
+        return Chosen(None, f"{answers[first]} cannot be {first}", False)
+    if len(rows) == 1:
+        return Chosen(rows[0][1], "the only order of these columns that is on Earth", True)
+    if np.isfinite(rows[0][0]) and rows[0][0] * _PLAINLY < rows[1][0]:
+        said = f"{rows[1][0] / rows[0][0]:.1f} times" if np.isfinite(rows[1][0]) else "not at all"
+        return Chosen(
+            rows[0][1],
+            f"with {first} and the other turned round, what sensors say of speed and heading"
+            f" fits {said}{' as badly' if np.isfinite(rows[1][0]) else ''}",
+            True,
+        )
+    if country_of is not None and rows[0][1].middle_deg is not None:
+        on_land = [place for _, place in rows if country_of(*(place.middle_deg or (0.0, 0.0)))]
+        if len(on_land) == 1:
+            return Chosen(on_land[0], "the other order lies in the sea, or nowhere", True)
+    named = sorted(((place.called(FIELDS), place) for _, place in rows), key=lambda row: -row[0])
+    if named[0][0] > named[1][0]:
+        said = "by names alone: nothing in the table proves the order of its columns"
+        return Chosen(named[0][1], said, False)
+    names = tuple(dict.fromkeys(place.fields[first] for _, place in rows))
+    text = f"positions lie in {', '.join(rows[0][1].fields.values())}: which of them is {first}?"
+    return Chosen(None, "", False, OpenQuestion(first, text, names))
+
+
+def _misfits(places: list[Place], sensors: dict[str, ChangingColumn]) -> list[float]:
+    """Return what the best speed leaves unexplained with each, or else the best heading.
+
+    Infinite where none fits.
+    """
+    speeds = [_by_speed(place, _beside(place, sensors)) for place in places]
+    if np.isfinite(speeds).any():
+        return speeds
+    return [_by_heading(place, _beside(place, sensors)) for place in places]
+
+
+def _beside(place: Place, sensors: dict[str, ChangingColumn]) -> dict[str, ChangingColumn]:
+    return {name: column for name, column in sensors.items() if name not in place.fields.values()}
+
+
+def _by_speed(place: Place, beside: dict[str, ChangingColumn]) -> float:
+    return min(
+        (
+            max(fit.like.left, 1e-5)
+            for name, column in beside.items()
+            for fit in fits_of(
+                place.motion, name, on_grid(place.motion, column.time_s, column.values), _SPEED
+            )
+        ),
+        default=np.inf,
+    )
+
+
+def _by_heading(place: Place, beside: dict[str, ChangingColumn]) -> float:
+    spreads = (_heading_spread(place.motion, name, column) for name, column in beside.items())
+    return min((max(spread, 1e-5) for spread in spreads if spread is not None), default=np.inf)
+
+
+def _heading_spread(motion: GridMotion, name: str, column: ChangingColumn) -> float | None:
+    for turn in (2.0 * np.pi, 360.0):
+        if np.ptp(column.values) < 1.3 * turn:
+            angle = on_grid(motion, column.time_s, np.unwrap(column.values, period=turn))
+            found = heading_of(motion, name, angle, np.arange(-16, 17, 8))
+            if found is not None:
+                return found.spread_rad**2
+    return None

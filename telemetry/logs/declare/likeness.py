@@ -1,0 +1,149 @@
+"""How a column is like a signal of the motion: by what size, how late, and whether by chance."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.shifted_fit import shifted_fit
+from foretwin.telemetry.logs.declare.motion import GRID_S, GridMotion
+
+_LATEST_S = 1.2
+"""A column is sought so late, or early: telephones and adapters send up to 0.6 s late."""
+_STEP = 2
+SURE = 25.0
+"""Square of five standard deviations: by chance once in a million columns."""
+_MUCH, _LITTLE, _RULED_OUT = 0.3, 0.1, 16.0
+"""Another reading leaves so much more unexplained; or less, and four deviations beyond noise."""
+_LEVER_M, _LEVER_STD_M = 0.8, 3.0
+"""Receivers sit so far ahead of the rear axle, give or take: the drive tells it, within a car."""
+_LEVER_DOUBT_M = 0.3
+"""What of that stays, at the usual speed: the smoothing of positions does not know of it."""
+LEAST_LATE_S = 0.05
+"""Less is not worth correcting: a tick of the grid."""
+
+
+class Likeness(NamedTuple):
+    """A column as `sizes` of reference signals, `late_s` later; what of its variance is left."""
+
+    sizes: Array
+    left: float
+    """Share of the variance that stays, 0 to 1."""
+    chance: float
+    """Square of the standard deviations by which the first signal is in it."""
+    late_s: float
+    together: float
+    """Seconds that were compared."""
+    independent: float
+    """How many samples of them count anew."""
+
+    def plainer_than(self, other: Likeness) -> bool:
+        """Tell whether another reading of the same column can be ruled out against this one."""
+        more = other.left / max(self.left, 1e-9) - 1.0
+        return more > _MUCH or (more > _LITTLE and more * self.independent > _RULED_OUT)
+
+
+def likeness(column: Array, signals: Array) -> Likeness | None:
+    """Fit a column (G,) on the grid by signals (G, K) and a level, at the best lateness.
+
+    None where there is too little of both to say anything.
+    """
+    most = round(_LATEST_S / GRID_S)
+    every = max(len(column) // 3000, 2)
+    inner = np.arange(most, len(column) - most, every)
+    best: tuple[float, int, Array] | None = None
+    design = np.column_stack([signals[inner], np.ones(len(inner))])
+    for late in range(-most, most + 1, _STEP):
+        # Later in the column: what the motion did before.
+        y = column[inner + late]
+        used = np.isfinite(y) & np.isfinite(design).all(axis=1)
+        if used.sum() * every * GRID_S < 8.0:
+            continue
+        rows, wanted = design[used], y[used]
+        total = float(np.var(wanted))
+        if total <= 1e-18:
+            return None
+        sizes, *_ = np.linalg.lstsq(rows, wanted, rcond=None)
+        left = float(np.mean((wanted - rows @ sizes) ** 2)) / total
+        if best is None or left < best[0]:
+            best = (left, late, np.asarray(sizes, dtype=np.float64))
+            together = float(used.sum() * every * GRID_S)
+            without, *_ = np.linalg.lstsq(rows[:, 1:], wanted, rcond=None)
+            alone = float(np.mean((wanted - rows[:, 1:] @ without) ** 2)) / total
+    if best is None:
+        return None
+    left, late, sizes = best
+    # What it leaves errs alike for so long: only what is farther apart counts anew.
+    alike_s = _lasts(column[inner + late] - design @ sizes) * every * GRID_S
+    independent = together / max(2.0 * alike_s, 1.0)
+    chance = (alone - left) / max(left, 1e-12) * max(independent - len(sizes), 0.0)
+    return Likeness(sizes, left, chance, late * GRID_S, together, independent)
+
+
+def _lasts(values: Array) -> int:
+    """Return for how many samples a signal stays like itself: its correlation falls to a third."""
+    around = np.nan_to_num(values - np.nanmean(values))
+    power = float(around @ around)
+    for lag in range(1, len(around) // 4):
+        if float(around[lag:] @ around[:-lag]) < power / 3.0:
+            return lag
+    return max(len(around) // 4, 1)
+
+
+class Lateness(NamedTuple):
+    """A column is stamped `late_s` later than positions, with a standard deviation."""
+
+    late_s: float
+    std_s: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is there, and large enough to matter."""
+        return abs(self.late_s) > max(3.0 * self.std_s, LEAST_LATE_S)
+
+
+def lateness(
+    motion: GridMotion, column: Array, signals: Array, *, size: float, lever: Array | None = None
+) -> Lateness | None:
+    """Return by how much a column follows signals (G, K) late; None where nothing tells it.
+
+    A receiver ahead of the rear axle turns before the car does, which looks like lateness: `lever`
+    (G,) is what a metre of that adds to the signal, `size` the first signal's in the column.
+    """
+    columns, around, prior = [*signals.T], [0.0] * signals.shape[1], [np.inf] * signals.shape[1]
+    if lever is not None:
+        columns.append(lever)
+        around.append(-_LEVER_M * size)
+        prior.append(_LEVER_STD_M * abs(size))
+    found = []
+    for over_s in (0.4, 0.8):
+        apart = max(round(over_s / GRID_S), motion.half)
+        rows = np.column_stack([_change(signal, apart) for signal in columns])
+        if not np.isfinite(rows).all(axis=1).any():
+            return None
+        fit = shifted_fit(
+            _change(column, apart),
+            rows,
+            period_s=GRID_S,
+            around=np.array(around),
+            prior_std=np.array(prior),
+            longest_s=_LATEST_S,
+        )
+        if fit is None:
+            return None
+        found.append((fit.shift_std_s, fit.shift_s))
+    std_s, late_s = min(found)
+    apart_s = max(abs(late_s - other) for _, other in found)
+    doubts_s = [std_s, 0.5 * apart_s, GRID_S / np.sqrt(12.0)]
+    if lever is not None:
+        doubts_s.append(_LEVER_DOUBT_M / float(np.nanmedian(motion.speed_mps[motion.moves])))
+    return Lateness(late_s, float(np.linalg.norm(doubts_s)))
+
+
+def _change(values: Array, apart: int) -> Array:
+    out = np.full(len(values), np.nan)
+    if len(values) > apart:
+        out[apart // 2 : apart // 2 + len(values) - apart] = values[apart:] - values[:-apart]
+    return out

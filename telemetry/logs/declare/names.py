@@ -1,0 +1,62 @@
+"""What names of columns say: told as such, and given up where data say otherwise."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+
+FIELDS = {
+    "latitude": re.compile(r"lat(?!er)|breite|^b$|^phi$", re.IGNORECASE),
+    "longitude": re.compile(
+        r"lon(?!git.*acc)|lng|l.{1,2}nge(?!.*beschl)|^l$|^lambda$", re.IGNORECASE
+    ),
+    "easting": re.compile(r"east|^e$|rechts|ost|^x|utm_?x|_x$", re.IGNORECASE),
+    "northing": re.compile(r"north|^n$|hoch|nord|^y|utm_?y|_y$", re.IGNORECASE),
+    "x": re.compile(r"^x|x$|east|^e$|ost", re.IGNORECASE),
+    "y": re.compile(r"^y|y$|north|^n$|nord", re.IGNORECASE),
+    "z": re.compile(r"^z|z$", re.IGNORECASE),
+}  # fmt: skip
+"""By field of a position: what a column of it may be called, in English and German."""
+ALTITUDE = re.compile(r"alt(?!er)|h..?he|^h$|height|elev|^hgt|^z$", re.IGNORECASE)
+STD = re.compile(r"std|sigma|stdev|h_?acc|accuracy|genauigkeit|^acc$|eph$", re.IGNORECASE)
+_FEET = re.compile(r"ft\b|feet|fu.{1,2}$", re.IGNORECASE)
+EPSG = re.compile(r"epsg\D{0,3}(\d{4,5})", re.IGNORECASE)
+ZONE = re.compile(r"(?:utm|zone)\D{0,2}(\d{1,2})\s*([C-X]?)", re.IGNORECASE)
+
+
+def altitude_of(columns: dict[str, Array]) -> str | None:
+    """Return the column that is called an altitude and could be one in metres."""
+    for name, values in columns.items():
+        known = values[np.isfinite(values)]
+        plausible = len(known) > 20 and known.min() > -430.0 and known.max() < 9000.0
+        if (
+            ALTITUDE.search(name)
+            and not _FEET.search(name)
+            and plausible
+            and np.ptp(known) < 2000.0
+        ):
+            return name
+    return None
+
+
+def std_of(columns: dict[str, Array]) -> str | None:
+    """Return the column that is called an error of positions and could be one in metres."""
+    for name, values in columns.items():
+        known = values[np.isfinite(values)]
+        if STD.search(name) and len(known) > 20 and known.min() > 0.0 and known.max() < 500.0:
+            return name
+    return None
+
+
+def epsg_of(columns: dict[str, Array], northern: bool) -> int | None:
+    """Return the code of a projected system that a column's name tells, such as `UTM33_east`."""
+    for name in columns:
+        if (code := EPSG.search(name)) is not None:
+            return int(code[1])
+        if (zone := ZONE.search(name)) is not None and 1 <= int(zone[1]) <= 60:
+            south = zone[2].upper() < "N" if zone[2] else not northern
+            return (32700 if south else 32600) + int(zone[1])
+    return None

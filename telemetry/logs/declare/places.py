@@ -1,0 +1,222 @@
+"""Which columns are positions, in what frame: each reading by which a car moves as cars do."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array, Flags, Indices
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_ecef, local_from_geo
+from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs.declare.motion import FASTEST_MPS, GridMotion, changes, motion_of
+
+_LEAST_P90_MPS = 1.5
+"""A drive is faster than that for a tenth of its time, and never faster than 90 m/s for long."""
+_LEAST_WAY_M = 30.0
+_ROUGH = 1.6
+"""A way from row to row is so much longer than over each fifth: positions are smooth."""
+_LEAST_CHANGES = 15
+_TOGETHER = 0.6
+"""Columns of one receiver change in the same rows, of all in which one does."""
+_EVENLY = 0.9
+_WHOLE_UNIT, _LEAST_WHOLE = "1e-7 deg", 20_000.0
+"""Smaller whole numbers are revolutions and the like: 200 m around where both are nought."""
+_ROWS_LOOKED_AT = 20_000
+_EARTH_M, _ELLIPSOID_M = (6.33e6, 6.40e6), (-500.0, 9000.0)
+_WITHIN_M = 3.0e5
+_UTM_EAST_M, _UTM_NORTH_M = (1.0e5, 9.0e5), (1.2e6, 1.0e7)
+"""Eastings are so; northings beyond belong to 11 degrees and more from the equator."""
+
+
+class Place(NamedTuple):
+    """A reading of columns as positions; `fields` name them as a declaration's section does."""
+
+    frame: str
+    fields: dict[str, str]
+    unit: str
+    rows: Indices
+    """Those that hold a new position."""
+    xy_m: Array
+    """Of these rows (R, 2), x east, y north, in a plane of the drive's own."""
+    motion: GridMotion
+    middle_deg: tuple[float, float] | None
+    """Latitude and longitude, where the frame tells them."""
+    alike: float
+    """Share of changes that all columns have together."""
+
+    def called(self, names: dict[str, re.Pattern[str]]) -> int:
+        """Return how many columns have the name that their field would have."""
+        return sum(
+            bool(names[field].search(column))
+            for field, column in self.fields.items()
+            if field in names
+        )
+
+
+def places_of(columns: dict[str, Array], time_s: Array) -> list[Place]:
+    """Return every reading that moves as a car does, in the frame that takes most to fit by chance.
+
+    `time_s` (N,) may be any scale's: a wrong one leaves none, since speeds are no car's.
+    """
+    lively = {
+        name: values
+        for name, values in columns.items()
+        if len(changes([values])) >= _LEAST_CHANGES and not counts(values)
+    }
+    new = _Changes(lively)
+    plane = _plane(lively, time_s, new)
+    grid = [place for place in plane if place.frame == "projected"]
+    return _ecef(lively, time_s, new) or grid or _geographic(lively, time_s, new) or plane
+
+
+def counts(values: Array) -> bool:
+    """Tell whether a column grows by ever the same, as numbers of rows and of messages do."""
+    steps = np.diff(values[changes([values])])
+    usual = float(np.median(steps))
+    return bool(np.mean(np.abs(steps - usual) < 1e-6 * max(abs(usual), 1e-9)) > _EVENLY)
+
+
+def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
+    found = []
+    for unit, degrees in units.GEOGRAPHIC_ANGLE.items():
+        fits = {}
+        for name, values in columns.items():
+            # The middle, since (0, 0) is what receivers say without a fix.
+            angle = values * degrees
+            low, high = np.nanpercentile(angle, (5.0, 95.0))
+            whole = unit != _WHOLE_UNIT or abs(np.nanmedian(values)) > _LEAST_WHOLE
+            if whole and low >= -180.0 and high <= 180.0 and 1e-5 < high - low < 4.0:
+                fits[name] = angle
+        for lat, lon in itertools.permutations(fits, 2):
+            if abs(np.nanmedian(fits[lat])) >= 89.0:
+                continue
+            rows, alike = new.common((lat, lon))
+            if alike < _TOGETHER:
+                continue
+            lat_deg, lon_deg = fits[lat][rows], fits[lon][rows]
+            middle = (float(np.median(lat_deg)), float(np.median(lon_deg)))
+            at = (np.abs(lat_deg - middle[0]) < 3.0) & (np.abs(lon_deg - middle[1]) < 3.0)
+            rows, lat_deg, lon_deg = rows[at], lat_deg[at], lon_deg[at]
+            if not _moves_like_a_car(
+                time_s[rows],
+                np.stack([lon_deg * math.cos(math.radians(middle[0])), lat_deg], axis=1)
+                * 111_195.0,
+            ):
+                continue
+            xy_m = local_from_geo(LocalFrame(GeoPoint(*middle)), lat_deg, lon_deg)
+            fields = {"latitude": lat, "longitude": lon}
+            found += _place("wgs84", fields, unit, rows, xy_m, time_s, middle, alike)
+    return found
+
+
+def _ecef(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
+    far = {
+        name: values
+        for name, values in columns.items()
+        if np.nanmax(np.abs(values)) < _EARTH_M[1] and np.nanstd(values) < _WITHIN_M
+    }
+    found = []
+    for names in itertools.combinations(far, 3):
+        rows, alike = new.common(names)
+        if alike < _TOGETHER:
+            continue
+        norm = float(np.sqrt(np.median(np.sum([far[name][rows] ** 2 for name in names], axis=0))))
+        if not _EARTH_M[0] < norm < _EARTH_M[1]:
+            continue
+        for order in itertools.permutations(names):
+            xyz = np.stack([far[name][rows] for name in order], axis=1)
+            geo = geo_from_ecef(xyz)
+            middle = (float(np.median(geo[:, 0])), float(np.median(geo[:, 1])))
+            if not _ELLIPSOID_M[0] < np.median(geo[:, 2]) < _ELLIPSOID_M[1]:
+                continue
+            xy_m = local_from_geo(LocalFrame(GeoPoint(*middle)), geo[:, 0], geo[:, 1])
+            if _moves_like_a_car(time_s[rows], xy_m):
+                fields = dict(zip("xyz", order, strict=True))
+                found += _place("ecef", fields, "m", rows, xy_m, time_s, middle, alike)
+    return found
+
+
+def _plane(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
+    """Return readings as UTM or the like, else as metres from somewhere."""
+    grid, near = [], []
+    for east, north in itertools.permutations(columns, 2):
+        rows, alike = new.common((east, north))
+        if alike < _TOGETHER:
+            continue
+        xy_m = np.stack([columns[east][rows], columns[north][rows]], axis=1)
+        if not _moves_like_a_car(time_s[rows], xy_m):
+            continue
+        x_m, y_m = (float(value) for value in np.median(xy_m, axis=0))
+        xy_m = xy_m - (x_m, y_m)
+        if _UTM_EAST_M[0] < x_m < _UTM_EAST_M[1] and _UTM_NORTH_M[0] < y_m < _UTM_NORTH_M[1]:
+            fields = {"easting": east, "northing": north}
+            grid += _place("projected", fields, "m", rows, xy_m, time_s, None, alike)
+        else:
+            fields = {"x": east, "y": north}
+            near += _place("local", fields, "m", rows, xy_m, time_s, None, alike)
+    return grid or near
+
+
+def _place(
+    frame: str, fields: dict[str, str], unit: str, rows: Indices, xy_m: Array, time_s: Array,
+    middle: tuple[float, float] | None, alike: float,
+) -> list[Place]:  # fmt: skip
+    rises = np.concatenate([[True], np.diff(np.maximum.accumulate(time_s[rows])) > 0.0])
+    rows, xy_m = rows[rises], xy_m[rises]
+    motion = motion_of(time_s[rows], xy_m)
+    if motion is None or not motion.moves.any():
+        return []
+    return [Place(frame, fields, unit, rows, xy_m, motion, middle, alike)]
+
+
+class _Changes:
+    """Which rows of each column hold something new, looked for once."""
+
+    def __init__(self, columns: dict[str, Array]) -> None:
+        self._known = {name: np.isfinite(values) for name, values in columns.items()}
+        self._new: dict[str, Flags] = {}
+        for name, values in columns.items():
+            new = np.zeros(len(values), dtype=bool)
+            new[changes([values])] = True
+            self._new[name] = new
+
+    def common(self, names: Sequence[str]) -> tuple[Indices, float]:
+        """Return the rows in which any is new and all are known; and how many are new in all."""
+        any_new = np.any([self._new[name] for name in names], axis=0)
+        all_new = np.all([self._new[name] for name in names], axis=0)
+        alike = float(all_new.sum() / max(any_new.sum(), 1))
+        if alike < _TOGETHER:
+            return np.zeros(0, dtype=np.intp), alike
+        known = np.all([self._known[name] for name in names], axis=0)
+        return np.flatnonzero(known & any_new), alike
+
+
+def _moves_like_a_car(time_s: Array, xy_m: Array) -> bool:
+    known = np.flatnonzero(np.isfinite(time_s))
+    known = known[:: max(len(known) // _ROWS_LOOKED_AT, 1)]
+    time_s, xy_m = time_s[known], xy_m[known]
+    if len(time_s) < _LEAST_CHANGES:
+        return False
+    step_s = np.diff(time_s)
+    step_m = np.hypot(*np.diff(xy_m, axis=0).T)
+    good = step_s > 0.0
+    if good.sum() < _LEAST_CHANGES:
+        return False
+    speed = step_m[good] / step_s[good]
+    fast_mps = float(np.percentile(speed, 90))
+    fifth = np.hypot(*(xy_m[5:] - xy_m[:-5]).T)
+    lasts_s = time_s[5:] - time_s[:-5]
+    far = fifth > np.percentile(fifth, 50)
+    along = np.convolve(step_m, np.ones(5), mode="valid")
+    return bool(
+        _LEAST_P90_MPS < fast_mps < FASTEST_MPS
+        and step_m.sum() > _LEAST_WAY_M
+        and (lasts_s[far] > 0.0).any()
+        and far.any()
+        and np.median(along[far] / fifth[far]) < _ROUGH
+    )

@@ -1,0 +1,220 @@
+"""A declaration of a table, from what its columns do: found, with its evidence, or left open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.telemetry.logs.declaration import Declaration, PositionSection, TimeSection
+from foretwin.telemetry.logs.declare.choice import Chosen, CountryOf, OpenQuestion, chosen_place
+from foretwin.telemetry.logs.declare.clock import ClockColumn, clocks_of
+from foretwin.telemetry.logs.declare.loose_table import LooseTable, read_loose_table
+from foretwin.telemetry.logs.declare.motion import GRID_S
+from foretwin.telemetry.logs.declare.names import altitude_of, epsg_of, std_of
+from foretwin.telemetry.logs.declare.places import Place, places_of
+from foretwin.telemetry.logs.declare.repeats import new_when, same_source
+from foretwin.telemetry.logs.declare.sections import Sections, col
+from foretwin.telemetry.logs.declare.sensors import FoundSensors, columns_beside, sensors_of
+from foretwin.telemetry.logs.log import LogError
+
+ANSWERS = {
+    "time": "the column of the rows' time",
+    "latitude": "the column of latitudes",
+    "x": "the column of x, of ECEF or of a plane",
+    "epsg": "the code of a projected system, such as 32633",
+    "origin": "LATITUDE,LONGITUDE of a plane's zero",
+    "reference_point": "what on the car the positions are of",
+}
+"""What a user may answer beforehand, by key."""
+_UNKNOWN_POINT = "unknown: positions do not tell what on the car they are of"
+_CLOCKS_TRIED = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proposal:
+    """A declaration, `evidence` by its sections, and what stays `unknown`, in a line each.
+
+    Or the one `question` without whose answer there is none.
+    """
+
+    declaration: Declaration | None
+    evidence: dict[str, list[str]] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+    question: OpenQuestion | None = None
+
+
+def propose(
+    path: Path, *, answers: dict[str, str] | None = None, country_of: CountryOf | None = None
+) -> Proposal:
+    """Propose the declaration of a table.
+
+    Raises LogError where the file is no table, has no time or no positions of a drive, or an answer
+    does not fit.
+    """
+    answers = answers or {}
+    for key in answers:
+        if key not in ANSWERS:
+            raise LogError(f"--answer {key}: no such question; known: {', '.join(ANSWERS)}")
+    table = read_loose_table(path)
+    clock, places = _clock_and_places(table, answers)
+    time_s = clock.time_s
+    everything = columns_beside(table.columns, time_s, {clock.column})
+    chosen = chosen_place(places, everything, country_of=country_of, answers=answers)
+    if chosen.question is not None:
+        return Proposal(declaration=None, question=chosen.question)
+    place = chosen.place
+    if place is None:
+        raise LogError(f"{path}: {chosen.evidence}")
+    frame, question, framed = _frame(place, table, answers)
+    if question is not None:
+        return Proposal(declaration=None, question=question)
+    without = {clock.column, *place.fields.values()}
+    sensors = sensors_of(place, {n: c for n, c in everything.items() if n not in without})
+    if clock.counts and not sensors.fits:
+        raise LogError(
+            f"{path}: column {clock.column!r} counts rows, and no other is their time: nothing says"
+            " how long a row lasts"
+        )
+    return _written(table, clock, chosen, frame, framed, sensors, answers)
+
+
+def _clock_and_places(
+    table: LooseTable, answers: dict[str, str]
+) -> tuple[ClockColumn, list[Place]]:
+    clocks = clocks_of(table)
+    if (named := answers.get("time")) is not None:
+        clocks = [clock for clock in clocks if clock.column == named]
+        if not clocks:
+            raise LogError(f"{table.path}: --answer time={named}: no column that is a time")
+    if not clocks:
+        raise LogError(
+            f"{table.path}: no column that rises as a time does (seconds to nanoseconds, or"
+            f" ISO 8601 dates); columns: {', '.join([*table.columns, *table.times, *table.texts])}"
+        )
+    for clock in clocks[:_CLOCKS_TRIED]:
+        columns = {name: column for name, column in table.columns.items() if name != clock.column}
+        if places := places_of(columns, clock.time_s):
+            return clock, places
+    raise LogError(
+        f"{table.path}: no columns that move as a car does (degrees, radians, ECEF or metres, at a"
+        f" time of {clocks[0].column!r} in {clocks[0].unit}): nothing to declare"
+    )
+
+
+def _frame(
+    place: Place, table: LooseTable, answers: dict[str, str]
+) -> tuple[dict[str, Any], OpenQuestion | None, str]:
+    """Return what the frame needs beside columns, or the question for it, and how it is known."""
+    if place.frame == "projected":
+        if "epsg" in answers:
+            if not answers["epsg"].isdigit():
+                raise LogError(f"--answer epsg={answers['epsg']}: no number such as 32633")
+            return {"epsg": int(answers["epsg"])}, None, "EPSG code as answered"
+        code = epsg_of(table.columns, northern=True)
+        if code is not None:
+            return {"epsg": code}, None, f"EPSG {code} by a column's name alone"
+        text = "positions are eastings and northings: of which projected system (EPSG code)?"
+        return {}, OpenQuestion("epsg", text), ""
+    if place.frame == "local":
+        if "origin" in answers:
+            try:
+                latitude, longitude = (float(part) for part in answers["origin"].split(","))
+            except ValueError:
+                raise LogError(
+                    f"--answer origin={answers['origin']}: no LATITUDE,LONGITUDE"
+                ) from None
+            return {"origin": (latitude, longitude)}, None, "origin as answered"
+        text = "positions are metres in a plane: at which LATITUDE,LONGITUDE is its zero?"
+        return {}, OpenQuestion("origin", text), ""
+    return {}, None, ""
+
+
+def _written(
+    table: LooseTable, clock: ClockColumn, chosen: Chosen, frame: dict[str, Any], framed: str,
+    sensors: FoundSensors, answers: dict[str, str],
+) -> Proposal:  # fmt: skip
+    place = chosen.place
+    assert place is not None
+    sections = Sections(table.columns, clock.time_s, _speed_of_rows(place, clock.time_s))
+    evidence = {"time": [_clock_said(table, clock, place)]}
+    given: dict[str, Any] = {name: col(column, place.unit) for name, column in place.fields.items()}
+    evidence["position"] = [_place_said(place, clock.time_s), chosen.evidence, framed]
+    _add_named(given, evidence["position"], sections, place)
+    told = new_when(
+        list(place.fields.values()), table.columns, clock.time_s, sections.moves, places=True
+    )
+    if told is not None:
+        given |= {"new_when": told.columns, "again_s": told.again_s}
+        evidence["position"].append(told.evidence)
+    position = PositionSection(frame=place.frame, **given, **frame)  # type: ignore[arg-type]
+    more, said, unknown = sections.of(sensors, place)
+    used = {
+        clock.column,
+        *(column.column for column in given.values() if hasattr(column, "column")),
+    }
+    used |= sections.used
+    rest = [name for name in table.columns if name not in used]
+    for name, text in sensors.doubts.items():
+        unknown.append(f"{name}: {text}")
+    left = [name for name in rest if name not in sensors.doubts]
+    if left:
+        unknown.append(f"not taken: {', '.join(left)}")
+    point = answers.get("reference_point", _UNKNOWN_POINT)
+    if "reference_point" not in answers:
+        unknown.insert(0, "reference_point: what on the car the positions are of (antenna, box, …)")
+    declaration = Declaration(
+        time=TimeSection(column=clock.column, unit=clock.unit, base=clock.base),
+        position=position,
+        reference_point=point,
+        delimiter=table.delimiter,
+        decimal=table.decimal,
+        header=table.header,
+        **more,
+    )
+    kept = {name: [line for line in lines if line] for name, lines in (evidence | said).items()}
+    return Proposal(declaration=declaration, evidence=kept, unknown=unknown)
+
+
+def _speed_of_rows(place: Place, time_s: Array) -> Array:
+    """Return the speed at each row (N,), NaN beyond the positions."""
+    motion = place.motion
+    return np.interp(time_s, motion.time_s, motion.speed_mps, left=np.nan, right=np.nan)
+
+
+def _clock_said(table: LooseTable, clock: ClockColumn, place: Place) -> str:
+    steps = np.diff(clock.time_s[np.isfinite(clock.time_s)])
+    steps = steps[steps > 0.0]
+    return (
+        f"{clock.column} in {clock.unit}: {clock.evidence}; {table.rows} rows every"
+        f" {float(np.median(steps)):.4g} s in the middle, as which the car drives up to"
+        f" {float(np.nanpercentile(place.motion.speed_mps, 99)):.1f} m/s"
+    )
+
+
+def _place_said(place: Place, time_s: Array) -> str:
+    lasts_s = float(time_s[place.rows[-1]] - time_s[place.rows[0]])
+    way_m = float(np.nansum(place.motion.speed_mps)) * GRID_S
+    where = ""
+    if place.middle_deg is not None:
+        where = f" around {place.middle_deg[0]:.4f}, {place.middle_deg[1]:.4f}"
+    return (
+        f"{len(place.rows)} positions in {lasts_s:.0f} s{where}, moving as a car does:"
+        f" {way_m:.0f} m"
+    )
+
+
+def _add_named(given: dict[str, Any], said: list[str], sections: Sections, place: Place) -> None:
+    """Add altitude and error where columns of the same receiver are called so."""
+    first = list(place.fields.values())
+    free = {n: v for n, v in sections.columns.items() if n not in first}
+    altitude = altitude_of(free) if place.frame != "ecef" else None
+    for name, column in (("altitude", altitude), ("std", std_of(free))):
+        if column is None or not sections.together([*first, column]):
+            continue
+        if same_source(free[column], [sections.columns[one] for one in first]):
+            given[name] = col(column, "m")
+            said.append(f"{name}: by its name alone, its unit too; nothing in the table proves it")
