@@ -1,14 +1,18 @@
-"""The commands that look at recordings: `convert` and `view`."""
+"""The commands that look at recordings: `convert`, `merge` and `view`."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.segments import first_left
 from foretwin.contracts.terminal import say
+
+if TYPE_CHECKING:
+    from foretwin.telemetry.logs.convert import ConvertReport
 
 
 def convert_log(
@@ -27,12 +31,48 @@ def convert_log(
         raise FileNotFoundError(f"recorded drive {source}: no such file or folder")
     if not target.parent.is_dir():
         raise UserError(f"{target}: folder {target.parent} does not exist")
-    report = convert(source, target, declaration=declaration, to=kind)
+    _say_written(target, convert(source, target, declaration=declaration, to=kind))
+
+
+def _say_written(target: Path, report: ConvertReport) -> None:
     kept = ", ".join(f"{count} {name}" for name, count in sorted(report.counts.items()))
     say(f"{target}: {kept}")
     if report.skipped:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.skipped.items()))
         say(f"left out: {left}")
+
+
+def merge_logs(
+    first: Path,
+    second: Path,
+    target: Path,
+    *,
+    declaration: Path | None = None,
+    other_declaration: Path | None = None,
+) -> None:
+    """Put two recordings of one drive on the first's clock, write them as one, and say how."""
+    from foretwin.telemetry.logs.clock_between import clock_between
+    from foretwin.telemetry.logs.convert import target_of, write_log
+    from foretwin.telemetry.logs.merge import together
+    from foretwin.telemetry.logs.opening import open_log
+
+    kind = target_of(target)
+    ours = open_log(first, declaration=declaration)
+    theirs = open_log(second, declaration=other_declaration)
+    taken = [name for name in theirs.info.sends if name not in ours.info.sends]
+    if not taken:
+        raise UserError(
+            f"{second}: has nothing that {first} lacks ({', '.join(theirs.info.sends)}); the order"
+            " of the two says whose channels are kept"
+        )
+    clock = clock_between(ours, theirs)
+    log = together(ours, theirs, stamp_ns=clock.first_from_second(ours.info.start_stamp_ns))
+    report = write_log(
+        log, target, kind=kind, read=((first, declaration), (second, other_declaration))
+    )
+    say(clock.said(str(second), str(first)))
+    say(f"taken from {second}: {', '.join(taken)}")
+    _say_written(target, report)
 
 
 def open_view(run_folder: Path) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -54,10 +54,21 @@ def convert(
     source, target = Path(source), Path(target)
     kind = target_of(target) if to is None else to
     log = open_log(source, declaration=declaration)
-    declared_in = _declaration_of(source) if declaration is None else declaration
+    return write_log(log, target, kind=kind, read=((source, declaration),))
+
+
+def write_log(
+    log: Log, target: Path, *, kind: Target, read: Sequence[tuple[Path, Path | None]]
+) -> ConvertReport:
+    """Write a log to `target`, complete or not at all, and over nothing that it is `read` from.
+
+    `read` are recordings, each with the declaration that was named for it. Raises what `convert`
+    raises of the target.
+    """
     written = (target, _declaration_of(target)) if kind == "csv" else (target,)
-    for file in written:
-        _check_not_read(file, source, declared_in)
+    for source, declaration in read:
+        for file in written:
+            _check_not_read(file, source, declaration or _declaration_of(source))
     if kind == "ros2" and target.exists():
         raise LogError(f"{target}: exists; name a folder that does not")
     if kind != "ros2" and target.is_dir():
@@ -67,7 +78,7 @@ def convert(
     if (trouble := trouble_with_folder(target.parent)) is not None:
         raise LogError(f"{target}: {trouble}")
     with named_in_errors(str(target)):
-        counts, left_out = _WRITERS[kind](source, log, target)
+        counts, left_out = _WRITERS[kind](read[0][0], log, target)
     return ConvertReport(counts=dict(counts), skipped=dict(left_out + log.skipped))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import msgspec
 
@@ -41,6 +41,30 @@ def reordered(samples: Iterable[Sample], *, window_ns: int) -> Iterator[Sample]:
             yield heapq.heappop(waiting)[2]
     while waiting:
         yield heapq.heappop(waiting)[2]
+
+
+def together(first: Log, second: Log, *, stamp_ns: Callable[[int], int]) -> Log:
+    """Return two recordings of one drive as one, on the first's clock.
+
+    `stamp_ns` turns the second's stamps into the first's. Of the second what the first does not
+    have is taken, as long as the first lasts: two receivers on one channel would be one that leaps.
+    """
+    taken = frozenset(second.info.sends) - frozenset(first.info.sends)
+    start_ns, end_ns = first.info.start_stamp_ns, first.info.end_stamp_ns
+
+    def moved(skipped: Counter[str]) -> Iterator[Sample]:
+        for channel, message in second.read(skipped):
+            if channel not in taken:
+                continue
+            at_ns = stamp_ns(message.stamp_ns)  # type: ignore[attr-defined]
+            if at_ns >= start_ns and (end_ns is None or at_ns <= end_ns):
+                yield channel, msgspec.structs.replace(message, stamp_ns=at_ns)
+
+    def read(skipped: Counter[str]) -> Iterator[Sample]:
+        return merged(first.read(skipped), moved(skipped))
+
+    sends = (*first.info.sends, *(name for name in second.info.sends if name in taken))
+    return Log(info=msgspec.structs.replace(first.info, sends=sends), read=read)
 
 
 def in_parts(logs: Sequence[Log], *, unreadable: int = 0) -> Log:
