@@ -123,7 +123,7 @@ def test_what_nothing_tells_is_asked_once_and_can_be_answered(tmp_path: Path) ->
 
 
 def test_the_sea_tells_which_is_latitude(tmp_path: Path) -> None:
-    gnss = drawn_drive(lat=52.5, lon=13.4)["gnss"]
+    gnss = drawn_drive(lat=48.1, lon=-3.0)["gnss"]
     path = tmp_path / "two.csv"
     rows = zip(gnss.stamps_ns, gnss.columns["longitude"], gnss.columns["latitude"], strict=True)
     path.write_text("".join(f"{t / 1e9:.3f},{a:.8f},{b:.8f}\n" for t, a, b in rows))
