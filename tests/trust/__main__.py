@@ -24,14 +24,18 @@ _HEAD = (
 
 
 def row(name: str, found: Consistency) -> str:
-    """Return a drive's figures as a row of the table."""
+    """Return a drive's figures as a row of the table.
+
+    Beside lost headings stands in brackets how often the reference itself was no car's motion.
+    """
     shares = ", ".join(
         "-" if np.isnan(share) else f"{100.0 * share:.0f}"
         for share in (found.position_within, found.yaw_within, found.speed_within)
     )
+    torn = f" (+{len(found.torn_s)})" if found.torn_s else ""
     return (
         f"| {name} | {found.seconds:.0f} | {len(found.false_standstills_s)} "
-        f"| {len(found.yaw_losses_s)} | {found.speed_rms_mps:.3f} "
+        f"| {len(found.yaw_losses_s)}{torn} | {found.speed_rms_mps:.3f} "
         f"| {found.position_rms_m:.3f} / {found.position_p95_m:.3f} | {found.yaw_p95_deg:.2f} "
         f"| {shares} | {found.us_per_sample:.0f} |"
     )
