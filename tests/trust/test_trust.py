@@ -50,6 +50,13 @@ def test_a_lasting_slip_and_a_single_wrong_fix_are_found_and_a_bend_is_none() ->
     assert slip[-1] == pytest.approx([0.6, -0.4], abs=0.15)
 
 
+def test_a_tight_bend_of_fixes_once_a_second_is_no_slip() -> None:
+    seldom = (np.arange(0.0, 60.0) * 1e9).astype(np.int64)
+    angle = np.clip(np.arange(0.0, 60.0) - 30.0, 0.0, 3.0) * np.pi / 6.0
+    steps = 5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    assert not slips_of(seldom, np.cumsum(steps, axis=0), position_std_m=0.01).any()
+
+
 def test_slips_leave_the_true_speed_alone() -> None:
     slipped = driven()
     slipped[60:] += [0.6, -0.4]

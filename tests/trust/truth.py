@@ -21,6 +21,8 @@ from tests.trust.drives import RealDrive
 
 _REACH = 4
 """Intervals before and after one that say what it should have been."""
+_DENSE_S = 0.5
+"""Between fixes that come more seldom a car turns as far as a receiver slips."""
 _LEAST_SLIP_M = 0.08
 _CAR_MPS2 = 2.0
 """What a car's motion may differ from its neighbours' straight line: jerk and curvature."""
@@ -141,14 +143,15 @@ def slips_of(stamp_ns: npt.NDArray[np.int64], xy_m: Array, *, position_std_m: fl
     """Return (N, 2) how far each position has slipped since the first.
 
     An interval has slipped where its velocity lies further off what its neighbours' medians say
-    than a car could go in it; two that undo each other are a single wrong fix.
+    than a car could go in it; two that undo each other are a single wrong fix. Of positions that
+    come once a second none is found: nothing parts a slip from a bend.
     """
     step_s = np.diff(stamp_ns) * 1e-9
     velocity = np.diff(xy_m, axis=0) / step_s[:, None]
     middle = (stamp_ns[1:] + stamp_ns[:-1]) * 0.5e-9
     count = len(velocity)
     slip = np.zeros_like(xy_m)
-    if count < 2 * _REACH + 1:
+    if count < 2 * _REACH + 1 or float(np.median(step_s)) > _DENSE_S:
         return slip
     index = np.arange(count)
     before = np.clip(index[:, None] - np.arange(1, _REACH + 1), 0, count - 1)
