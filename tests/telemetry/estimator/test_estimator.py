@@ -26,7 +26,6 @@ from tests.telemetry.standin_drive import whole_drive
 COVERS = (
     "foretwin.telemetry.estimator.motion_track",
     "foretwin.telemetry.estimator.reported_state",
-    "foretwin.telemetry.estimator.local_place",
 )
 
 

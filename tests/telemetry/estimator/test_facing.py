@@ -75,6 +75,29 @@ def test_a_slip_across_a_car_that_pulls_away_does_not_turn_it() -> None:
         assert abs(yaw(state)) < 0.15, state.stamp_ns
 
 
+def pulling_away(*, jitter_m: float, rate_hz: float, rolls_s: float = 12.0) -> list[float]:
+    """Speeds from then on of a car that came rough, stands from 6 s on, and pulls away."""
+    random = np.random.default_rng(5)
+
+    def place(time_s: float) -> tuple[float, float]:
+        t, rolled = min(time_s, 6.0), max(0.0, time_s - rolls_s)
+        off = random.normal(0.0, jitter_m if time_s < 6.0 else 0.001, 2)
+        return 9.0 * t - 0.75 * t * t + 0.5 * rolled * rolled + off[0], float(off[1])
+
+    states = states_of(along(place, 20.0, rate_hz=rate_hz))
+    return [state.speed_mps for state in states if state.stamp_ns > rolls_s * 1e9]
+
+
+def test_a_car_that_pulls_away_moves_at_once_however_rough_its_fixes_were_on_the_move() -> None:
+    speeds = pulling_away(jitter_m=0.3, rate_hz=4.0)
+    assert speeds[3] > 0.3, "a second later, 0.5 m on, at 1 m/s"
+
+
+def test_between_fixes_a_second_apart_one_step_shows_that_it_rolls() -> None:
+    first = pulling_away(jitter_m=0.0, rate_hz=1.0, rolls_s=11.45)[0]
+    assert first > 0.0
+
+
 def test_a_car_that_turns_is_followed() -> None:
     for state in states_of(along(circle, 20.0))[20:]:
         expected = 0.4 * state.stamp_ns * 1e-9

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
 
-from foretwin.telemetry.estimator.kinematic_filter import SPEED, KinematicFilter, X, Y
+from foretwin.contracts.drive import HeadingSample
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.kinematic_filter import CURVATURE, SPEED, KinematicFilter, X, Y
+from foretwin.telemetry.estimator.measured import MotionSamples
+from foretwin.telemetry.estimator.motion_track import MotionTrack
+from foretwin.telemetry.estimator.reported_state import moving_state
 from foretwin.telemetry.estimator.told_spreads import Stretched, ToldSpreads
+from tests.telemetry.position_track import FRAME, along, circle, info
 
+COVERS = ("foretwin.telemetry.estimator.reported_state",)
 RATE_HZ = 5.0
 RADIUS_M, SPEED_MPS = 40.0, 10.0
 
@@ -23,6 +32,8 @@ def driven(
     rate_hz: float = RATE_HZ,
     heading: bool = False,
     speed_mps: float = SPEED_MPS,
+    lever_m: tuple[float, float] = (0.0, 0.0),
+    backwards: bool = False,
 ) -> tuple[Stretched, float]:
     """A bend with states that are off by so much and tell 0.1 m/s, 0.02 rad and 0.05 m.
 
@@ -36,16 +47,18 @@ def driven(
         off_mps = random.normal(0.0, speed_off_mps)
         filter_ = KinematicFilter(
             xy_m=at + random.normal(0.0, place_off_m, 2),
-            yaw_rad=turned + random.normal(0.0, yaw_off_rad),
-            speed_mps=speed_mps + off_mps,
+            yaw_rad=turned + backwards * math.pi + random.normal(0.0, yaw_off_rad),
+            speed_mps=(speed_mps + off_mps) * (-1.0 if backwards else 1.0),
             yaw_std_rad=0.02,
         )
         filter_.covariance[SPEED, SPEED] = 0.1**2
         filter_.covariance[X, X] = filter_.covariance[Y, Y] = 0.05**2
         within.append(abs(off_mps) < 1.96 * 0.1 * told.stretched.speed)
+        filter_.mean[CURVATURE] = (-1.0 if backwards else 1.0) / RADIUS_M
+        at = filter_.sensor_xy(lever_m) if any(lever_m) else at
         fix = at + random.normal(0.0, noise_m or 0.0, 2)
         told.take(
-            k / rate_hz, fix, filter_, (0.0, 0.0),
+            k / rate_hz, fix, filter_, lever_m,
             noise_m=noise_m, overconfidence=1.0, heading=heading,
         )  # fmt: skip
     return told.stretched, float(np.mean(within[100:]))
@@ -79,6 +92,58 @@ def test_places_are_told_worse_and_never_better_for_what_all_fixes_err_alike_sho
 def test_fixes_that_cannot_show_it_change_nothing(changed: dict[str, float]) -> None:
     stretched, _ = driven(speed_off_mps=1.0, yaw_off_rad=0.2, **changed)
     assert (stretched.speed, stretched.yaw) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("changed", [{"lever_m": (4.0, 0.0)}, {"backwards": True}])
+def test_an_antenna_ahead_and_a_car_that_backs_go_as_they_face(changed: dict[str, Any]) -> None:
+    assert driven(**changed)[0].yaw < 0.7
+
+
+def test_states_tell_the_spreads_stretched() -> None:
+    measured = MotionSamples(steering_ratio=15.0, steering_offset_rad=0.0, skipped=Counter())
+    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=9.0, yaw_std_rad=0.02)
+    one, other = (
+        moving_state(
+            measured, "car", 0, FRAME.origin, filter_, convergence_rad=0.0, wheelbase_m=2.7,
+            standing=False, map_shift_m=None, stretched=stretched,
+        )
+        for stretched in (Stretched(1.0, 1.0, 1.0), Stretched(2.0, 3.0, 0.5))
+    )  # fmt: skip
+    for name, by in (("position_std_m", 2.0), ("speed_std_mps", 3.0), ("yaw_std_rad", 0.5)):
+        assert getattr(other, name) == pytest.approx(by * getattr(one, name))
+        assert getattr(one, name) > 0.0
+
+
+@pytest.mark.parametrize("heading", [False, True])
+def test_an_estimator_narrows_what_it_tells_of_the_heading_where_none_is_measured(
+    heading: bool,
+) -> None:
+    estimator = StateEstimator(info())
+    for channel, message in along(lambda time_s: (9.0 * time_s, 0.0), 40.0):
+        estimator.handle(channel, message)
+        if heading:
+            estimator.handle("heading", HeadingSample(stamp_ns=message.stamp_ns, yaw_rad=0.0))
+    stretched = estimator.consistency.stretched
+    assert (stretched.yaw == 1.0) if heading else (stretched.yaw < 0.8)
+
+
+def test_a_track_that_was_copied_and_went_on_leaves_the_first_as_it_was() -> None:
+    def bending(time_s: float) -> tuple[float, float]:
+        return circle(time_s) if time_s < 20.0 else circle(20.0)
+
+    samples = along(bending, 40.0)
+    first, undisturbed = MotionTrack(info()), MotionTrack(info())
+    for sample in samples[:60]:
+        first.take(*sample)
+        undisturbed.take(*sample)
+    other = first.copy()
+    for sample in samples[60:150]:
+        other.take(*sample)
+    assert first.consistency == undisturbed.consistency != other.consistency
+    for sample in samples[60:]:
+        first.take(*sample)
+        undisturbed.take(*sample)
+        assert first.state(sample[1].stamp_ns) == undisturbed.state(sample[1].stamp_ns)
 
 
 def test_slow_cars_show_no_course_and_standing_ones_no_speed() -> None:
