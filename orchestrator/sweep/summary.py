@@ -23,12 +23,15 @@ class _CaseCount:
         self.clearance_m: list[float] = []
         self.scores: list[float] = []
         self.reasons: collections.Counter[str] = collections.Counter()
+        self.not_placed: collections.Counter[str] = collections.Counter()
 
     def add(self, row: Row) -> None:
         self.cases += 1
         if row["failure"]:
             self.failed += 1
             self.reasons[row["failure"]] += 1
+        if row["left_out"]:
+            self.not_placed[row["left_out"]] += 1
         if row["left_out"] or row["trajectory_sha256"] is None:
             return
         self.placed += 1
@@ -66,6 +69,7 @@ class Summary:
                 "median_clearance_m": _rounded(group.clearance_m, statistics.median),
                 "mean_score": _rounded(group.scores, statistics.fmean) if self._scored else None,
                 "reasons": dict(group.reasons.most_common(3)),
+                "not_placed": dict(group.not_placed.most_common(3)),
             }
             for (scenario, planner), group in sorted(self._groups.items())
         ]
@@ -107,5 +111,9 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     for entry in summary["scenarios"]:
         for reason, count in entry["reasons"].items():
             say(plain(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}"))
+        for reason, count in entry["not_placed"].items():
+            say(
+                plain(f"not placed: {count} of {entry['scenario']} by {entry['planner']}: {reason}")
+            )
     say(f"sha256 of the rows: {summary['rows_sha256']}")
     say(summary["attribution"])

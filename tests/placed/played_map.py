@@ -63,7 +63,13 @@ class PlayedMap(NamedTuple):
 
 
 def played_map(
-    file: Path, raw: RawMap, *, most: int | None, seed: int = 7, kind: str | None = None
+    file: Path,
+    raw: RawMap,
+    *,
+    most: int | None,
+    seed: int = 7,
+    kind: str | None = None,
+    part: tuple[int, ...] = (1, 1),
 ) -> PlayedMap:
     """Place and play the catalogue on all junctions of a map, or of a kind, or `most` of them."""
     osm = read_map(file)
@@ -75,6 +81,7 @@ def played_map(
         junctions = [junction for junction in junctions if junction.summary.kind == kind]
     if most is not None and most < len(junctions):
         junctions = tuple(random.Random(seed).sample(list(junctions), most))
+    junctions = junctions[part[0] - 1 :: part[1]]
     rehearsal, played = rehearsal_stage(load_vehicle()), []
     for junction in junctions:
         world = build_world(osm, graph, junction, radius_m=RADIUS_M, index=index)

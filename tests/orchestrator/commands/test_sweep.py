@@ -32,7 +32,6 @@ COVERS = (
     "foretwin.orchestrator.sweep.folder",
     "foretwin.orchestrator.sweep.jobs",
     "foretwin.orchestrator.sweep.rows",
-    "foretwin.orchestrator.sweep.summary",
     "foretwin.orchestrator.sweep.workers",
 )
 

@@ -1,8 +1,4 @@
-"""The catalogue on real junctions: a sample of each extract here, every junction for judges.
-
-`foretwin scenarios place MAP` gives the figures of one map; those of all extracts together are
-printed by the judge (`pytest -m judge -s tests/sim_worker/scenarios/test_real_junctions.py`).
-"""
+"""The catalogue on a sample of real junctions; `tests.placed` judges whole maps."""
 
 from __future__ import annotations
 
@@ -33,12 +29,6 @@ SMALL = {
     "berlin-mitte": "osm-berlin-mitte/berlin-mitte.osm",
     "moritzplatz": "osm-berlin-moritzplatz/berlin-moritzplatz.osm",
     "kingsway": "osm-kingsway/kingsway_junction.osm",
-}
-MAPS = SMALL | {
-    "monaco": "osm-monaco/monaco.osm.gz",
-    "badhersfeld": "osm-badhersfeld/badhersfeld.osm.xml.gz",
-    "liechtenstein": "osm-liechtenstein/liechtenstein-latest.osm.pbf",
-    "testfeld": "osm-testfeld-nds/TestfeldNDS_main_roads.osm.xml.gz",
 }
 LEAST_SHARE = 0.95
 Counts = dict[str, collections.Counter[str]]
@@ -90,33 +80,3 @@ def test_the_catalogue_is_placed_on_a_sample_of_real_junctions(data_dir: Path) -
     assert sum(c["cast"] for c in counts.values()) >= 0.95 * sum(
         c["cases"] for c in counts.values()
     )
-
-
-@pytest.mark.judge
-@pytest.mark.timeout(5400)
-def test_the_catalogue_is_placed_wherever_it_applies(
-    data_dir: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    counts: Counts = collections.defaultdict(collections.Counter)
-    reasons: Counts = collections.defaultdict(collections.Counter)
-    junctions = 0
-    for file in MAPS.values():
-        for world in worlds_of(data_dir / file):
-            junctions += 1
-            count(world, counts, reasons, check=junctions % 5 == 0)
-    with capsys.disabled():
-        print(f"\n{junctions} junctions")
-        for id_, found in counts.items():
-            applies = found["placed"] + found["unplaced"]
-            share = 100.0 * found["placed"] / max(applies, 1)
-            print(
-                f"{id_:20} {found['placed']:5} of {applies:5} ({share:5.1f} %), "
-                f"{found['cast']} of {found['cases']} cases, elsewhere {found['elsewhere']}"
-            )
-            for reason, times in reasons[id_].most_common(4):
-                print(f"{'':20} {times:5}: {reason}")
-    for id_, found in counts.items():
-        applies = found["placed"] + found["unplaced"]
-        assert found["placed"] >= LEAST_SHARE * applies, (id_, reasons[id_].most_common(3))
-        # No extract holds a race track; drawn Worlds show that one is found.
-        assert applies >= 1 or id_ == "race_track_lap", id_
