@@ -93,6 +93,19 @@ def test_what_the_first_lacks_is_taken_on_its_clock() -> None:
     assert np.abs(speed - true).max() < 0.15
 
 
+def test_a_recording_that_began_earlier_is_laid_where_it_belongs() -> None:
+    whole = drive()
+    stamps = whole["imu"].stamps_ns
+    late = {"imu": Stream(stamps[1200:], {n: v[1200:] for n, v in whole["imu"].columns.items()})}
+    first = recording(late, "imu", source="A")
+    second = recording(whole, "imu", "speed", source="B", offset_s=3.0)
+    clock = clock_between(first, second)
+    assert clock.offset_s == pytest.approx(3.0, abs=0.03)
+    joined = together(first, second, stamp_ns=clock.first_from_second(first.info.start_stamp_ns))
+    speeds = [message.stamp_ns for name, message in joined.samples() if name == "speed"]  # type: ignore[attr-defined]
+    assert min(speeds) == pytest.approx(60e9, abs=60e6)
+
+
 @pytest.mark.parametrize(
     ("first", "second", "told"),
     [

@@ -13,6 +13,8 @@ from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.columns import Stream, table_log
 from foretwin.telemetry.logs.declare import propose
+from foretwin.telemetry.logs.declare.likeness import likeness
+from foretwin.telemetry.logs.declare.motion import GRID_S
 from foretwin.telemetry.logs.log import Log, LogError
 from foretwin.telemetry.logs.write_declaration import declaration_toml
 from foretwin.world_gen.countries.outlines import place_at
@@ -84,6 +86,60 @@ def test_a_late_sensor_is_put_right(tmp_path: Path, late_s: float) -> None:
     drive["speed"] = speed._replace(stamps_ns=speed.stamps_ns + round(late_s * 1e9))
     table = disguise(drive, tmp_path, seed=2, late=False)
     assert judged(table, country_of=country).late_s["speed"] == pytest.approx(late_s, abs=0.05)
+
+
+def one_table(folder: Path, **columns: np.ndarray) -> Path:
+    """Write the drawn drive's positions with more columns, each on their stamps."""
+    gnss = drawn_drive()["gnss"]
+    columns = {"t": gnss.stamps_ns / 1e9, "lat": gnss.columns["latitude"],
+               "lon": gnss.columns["longitude"]} | columns  # fmt: skip
+    path = folder / "one.csv"
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    path.write_text(
+        ",".join(columns) + "\n" + "".join(f"{','.join(map(repr, row))}\n" for row in rows)
+    )
+    return path
+
+
+def test_a_sensor_mounted_turned_is_turned_back(tmp_path: Path) -> None:
+    yaw = drawn_drive()["heading"].columns["yaw"]
+    path = one_table(
+        tmp_path, h=np.degrees(np.mod(0.5 * np.pi - yaw - np.radians(40.0), 2 * np.pi))
+    )
+    found = propose(path).declaration
+    assert found is not None
+    assert found.heading is not None
+    assert (found.heading.zero, found.heading.direction) == ("north", "clockwise")
+    assert found.heading.offset_deg == pytest.approx(40.0, abs=0.5)
+
+
+def test_a_gyro_that_is_upside_down_turns_nothing_else_round(tmp_path: Path) -> None:
+    drive = drawn_drive()
+    stamps = drive["gnss"].stamps_ns
+    imu, steering = drive["imu"], drive["steering"]
+    columns = {name: np.interp(stamps, imu.stamps_ns, imu.columns[name])
+               for name in ("accel_x", "accel_y", "rate_z")}  # fmt: skip
+    columns["rate_z"] = -columns["rate_z"]
+    wheel = np.interp(stamps, steering.stamps_ns, steering.columns["wheel"])
+    found = propose(one_table(tmp_path, **columns, wheel=wheel)).declaration
+    assert found is not None
+    assert found.imu is not None
+    assert found.steering is not None
+    assert found.imu.rate_z.negate
+    assert not found.imu.accel_x.negate
+    assert found.imu.accel_y is not None
+    assert not found.imu.accel_y.negate
+    assert found.steering.wheel is not None
+    assert not found.steering.wheel.negate
+
+
+def test_likeness_is_looked_for_where_a_column_is_late() -> None:
+    time_s = np.arange(0.0, 120.0, GRID_S)
+    signal = np.sin(time_s**1.2)
+    found = likeness(np.roll(signal, round(0.4 / GRID_S)) * 3.0, signal[:, None])
+    assert found is not None
+    assert found.late_s == pytest.approx(0.4)
+    assert found.sizes[0] == pytest.approx(3.0, rel=0.02)
 
 
 def test_names_that_lie_are_given_up_where_the_motion_says_otherwise(tmp_path: Path) -> None:
