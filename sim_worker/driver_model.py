@@ -20,6 +20,9 @@ COMFORT_DECEL_MPS2 = 2.0
 HEEDLESS_BRISKNESS = 1.6
 """By so much the accelerations of who heeds nobody exceed an ordinary driver's in bends. Chosen:
 4.0 m/s² across are half of what holds a car on a dry road."""
+BEND_DECEL_MPS2 = 0.9
+"""Before bends, of other drivers who take LATERAL_ACCEL_MPS2 in them. Fitted on Mcity, as what
+stands at OTHERS_TIME_GAP_S."""
 CURVE_TIME_S = 0.5
 """So far ahead a bend's speed counts: it is to be driven by then. Chosen."""
 MAX_DECEL_MPS2 = 8.0
@@ -37,8 +40,30 @@ STANDSTILL_GAP_M = 2.0
 CALM_TIME_GAP_S = 1.5
 """IDM's T of the car under test. Chosen: near the paper's 1.6 s."""
 BRISK_TIME_GAP_S = 1.2
-"""IDM's T of other road users, and of a lattice's candidates that follow. Chosen: dense town
-traffic keeps less than the paper's 1.6 s."""
+"""IDM's T of a lattice's candidates that follow. Chosen: dense town traffic keeps less than the
+paper's 1.6 s."""
+OTHERS_TIME_GAP_S = 0.5, 0.26
+"""IDM's T of other drivers: median, and standard deviation of its logarithm. Fitted on Mcity's cars
+with satellite receivers (MIT licence), `python -m tests.sim_worker.realism --fit mcity`, but not to
+less than half a second."""
+OTHERS_ACCEL_MPS2 = 0.75, 0.45
+"""IDM's a of other drivers of cars; of other kinds as their acceleration is to a car's. Fitted as
+above."""
+OTHERS_DECEL_MPS2 = 2.4, 0.13
+"""IDM's b of other drivers of cars; of other kinds as above. Fitted as above."""
+OTHERS_LATERAL_MPS2 = 2.3, 0.2
+"""What other drivers take in bends; they brake before and accelerate behind these in proportion.
+Fitted as above."""
+OTHERS_LIMIT_SHARE = 0.8, 0.13
+"""Of the speed limit, what other drivers want on a free road, or else the speed that they have.
+Fitted as above."""
+OTHERS_REACTION_S = 0.9, 0.4
+"""So late other drivers see what changes ahead of them. Chosen: Green (2000), How long does it take
+to stop?, Transportation Human Factors 2, has 0.7 s for who expects it and 1.25 s for who does not.
+Too few cars follow each other at Mcity to fit it."""
+OTHERS_LAG_S = 1.0, 0.3
+"""What other drivers leave of time between who was there first and themselves: median as LAG_S,
+spread chosen. Two crossings of two cars each were recorded: nothing to fit it on."""
 HASTE = (0.3, 2.0)
 """Least and most by which a driver's haste multiplies accelerations from a standstill. Chosen."""
 LINE_GAP_M = 1.0
@@ -68,7 +93,7 @@ LEAST_START_MPS = 2.0
 
 
 def dynamic_gap_m(
-    speed_mps: Array, lead_mps: Array, time_gap_s: float, accel_mps2: Numbers, decel_mps2: Numbers
+    speed_mps: Array, lead_mps: Array, time_gap_s: Numbers, accel_mps2: Numbers, decel_mps2: Numbers
 ) -> Array:
     """Return what IDM wants ahead beyond the gap at a standstill: v T + v Δv / (2 √(a b)), or 0.
 

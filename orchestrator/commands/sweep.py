@@ -40,6 +40,7 @@ from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.orchestrator.sweep.worlds import Building, all_there, choose_worlds, source_digest
+from foretwin.sim_worker.road_users.likeness import likenesses
 
 SOME_FAILED = 3
 
@@ -182,6 +183,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         **counted.totals(),
         "rows_sha256": digest.hexdigest(),
         "scenarios": counted.table(),
+        "road_users": [msgspec.to_builtins(row) for row in likenesses()],
         "unplaced": [one for one in unplaced if one.applies],
         "placed_nowhere": sorted({one.id for one in loaded.scenarios} - placed),
         "does_not_apply": sum(not one.applies for one in unplaced),

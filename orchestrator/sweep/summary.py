@@ -10,6 +10,7 @@ from typing import Any
 from foretwin.contracts.terminal import console, plain, say, words
 from foretwin.orchestrator.sweep.spec import SweepSpec
 from foretwin.sim_worker.futures.future_rows import Row
+from foretwin.sim_worker.road_users.likeness import likeness_words
 
 _SCORE = "metric_driving_score"
 COUNTS = ("cases", "placed", "collided", "failed")
@@ -104,6 +105,7 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
         f"{summary['jobs']} jobs played now in {summary['playing_s']:.1f} s; "
         f"{len(summary['unplaced'])} unplaced"
     )
+    say(likeness_words())
     if summary["placed_nowhere"]:
         say(f"placed nowhere: {', '.join(summary['placed_nowhere'])}")
     for place, reason in summary["failures"].items():

@@ -72,7 +72,8 @@ class Play:
         time_s = tick * self.stage.control_dt_s
         place = self._locate(now)
         if tick % self._decide_every == 0:
-            self._decide(self.scene.red_arcs_m(time_s), now, place)
+            every_s = self._decide_every * self.stage.control_dt_s
+            self._decide(self.scene.red_arcs_m(time_s), now, place, every_s)
         return self._view(tick, time_s, now, place, heading)
 
     def look_by_row(self, ticks: Indices, lights_s: Array, now: Array) -> PlannerView:
@@ -83,7 +84,8 @@ class Play:
         place = self._locate(now)
         times, which = np.unique(lights_s, return_inverse=True)
         red = np.stack([self.scene.red_arcs_m(float(time_s)) for time_s in times])
-        self._decide(red[which] if self.scene.rules.groups else red[0], now, place)
+        red_arcs_m = red[which] if self.scene.rules.groups else red[0]
+        self._decide(red_arcs_m, now, place, self.stage.control_dt_s)
         return self._view(ticks, np.nan, now, place)
 
     def act(self, time_s: float | Array, answer: PlannerOutput) -> None:
@@ -101,8 +103,8 @@ class Play:
         self.arc_m = place.arc_m
         return place
 
-    def _decide(self, red_arcs_m: Array, now: Array, place: FrenetPoint) -> None:
-        """Update the lights, and let law-abiding road users decide."""
+    def _decide(self, red_arcs_m: Array, now: Array, place: FrenetPoint, every_s: float) -> None:
+        """Update the lights, and let law-abiding road users decide, as they do `every_s`."""
         scene, self._red = self.scene, red_arcs_m
         if scene.traffic is None or not scene.traffic.reacts:
             return
@@ -117,7 +119,7 @@ class Play:
             length_m=vehicle.length_m.value,
             width_m=vehicle.width_m.value,
         )
-        scene.traffic.decide(ego, red_arcs_m)
+        scene.traffic.decide(ego, red_arcs_m, every_s=every_s)
 
     def _view(
         self,

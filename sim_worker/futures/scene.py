@@ -23,6 +23,7 @@ from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.road_users.cast import Player, casting
+from foretwin.sim_worker.road_users.manners import key_of
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
@@ -194,7 +195,8 @@ class SceneMaker:
             else:
                 cast = (*seen, *players)
             casts.append(cast)
-        crowd = casting(casts, ego_path=path, replayed=job.replayed)
+        keys = [key_of(job.seed, v.name, v.place or v.place_rank) for v in job.futures]
+        crowd = casting(casts, ego_path=path, replayed=job.replayed, keys=keys)
         # Where recorded road users go, no rule binds.
         taken = [self._rules.taken(one) for one in crowd.paths] + [()] * len(job.replayed)
         rules = self._rules.between(taken)

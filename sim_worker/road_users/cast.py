@@ -11,7 +11,9 @@ from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.futures import RecordedRoadUser
 from foretwin.contracts.scenario import Conduct
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd
+from foretwin.sim_worker.road_users.manners import SPREADS, Spreads, key_of, manners
 from foretwin.sim_worker.road_users.paces import Paces, briskness
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
@@ -62,10 +64,14 @@ def casting(
     *,
     ego_path: FrenetPath,
     replayed: Sequence[RecordedRoadUser] = (),
+    keys: Sequence[int] | None = None,
+    spreads: Spreads = SPREADS,
 ) -> RoadUserArrays:
     """Lay the road users of S futures out as arrays; places without one are not present.
 
-    Those `replayed` come first in each; their `path_of` counts on after the paths.
+    Those `replayed` come first in each; their `path_of` counts on after the paths. `keys` (S,) name
+    the futures: by them and by their own names the law-abiding have their manners,
+    drawn from `spreads`.
     """
     first = len(replayed)
     shape = (len(casts), first + max(map(len, casts), default=0))
@@ -86,8 +92,15 @@ def casting(
     for player in players:
         paths.setdefault(id(player.path), player.path)
     places = {path: place for place, path in enumerate(paths)}
-    paced = [p for p in players if p.speed_mps > 0.0 and p.conduct not in ("law_abiding", "parked")]
-    pace_of = {id(player): number for number, player in enumerate(paced)}
+    # Who drives alike on one path has one pace.
+    paced: dict[tuple[int, float, float], int] = {}
+    pace_of = {
+        id(p): paced.setdefault(
+            (places[id(p.path)], p.speed_mps, briskness(p.conduct, p.decel_mps2)), len(paced)
+        )
+        for p in players
+        if p.speed_mps > 0.0 and p.conduct not in ("law_abiding", "parked")
+    }
     rows = [
         _ABSENT,
         *(_player_row(p, places[id(p.path)], pace_of.get(id(p), _NO_PACE)) for p in players),
@@ -95,27 +108,48 @@ def casting(
     which[:, :first] = len(rows) + np.arange(first)
     rows += [_row(user.kind, user.size_m, len(paths) + k) for k, user in enumerate(replayed)]
     columns = np.moveaxis(np.array(rows)[which], -1, 0).copy()
-    present, lawful, walks, known = columns[:4] > 0.0
-    path_of, kinds, pace = columns[4:7].astype(np.intp)
-    crowd = Crowd._make(
-        [present, lawful, *columns[7:9], path_of, pace, *columns[9:], walks, kinds, known, hidden]
+    present, lawful, walks, known_already = columns[:4] > 0.0
+    path_of, kinds, pace, user_key = columns[4:8].astype(np.intp)
+    length, width, lateral, arc, speed, wants, limit, accel, decel, at, by = columns[8:]
+    own = manners(range(len(casts)) if keys is None else keys, user_key, spreads)
+    by_limit = np.where(np.isfinite(limit), np.maximum(speed, own.limit_share * limit), speed)
+    crowd = Crowd(
+        present=present,
+        lawful=lawful,
+        length_m=length,
+        width_m=width,
+        path_of=path_of,
+        pace_of=pace,
+        lateral_m=lateral,
+        start_arc_m=arc,
+        start_speed_mps=speed,
+        desired_mps=np.where(np.isnan(wants), by_limit, wants),
+        accel_mps2=own.accel_mps2 * accel,
+        decel_mps2=own.decel_mps2 * decel,
+        time_gap_s=own.time_gap_s,
+        briskness=own.lateral_mps2 / driver.LATERAL_ACCEL_MPS2 * np.minimum(accel, 1.0),
+        reaction_s=own.reaction_s,
+        lag_s=own.lag_s,
+        brakes_at_s=at,
+        brakes_by_mps2=by,
+        walks=walks,
+        kinds=kinds,
+        known=known_already,
+        hidden_by=hidden,
     )
-    paces = Paces(
-        tuple(paths.values()),
-        np.array([places[id(p.path)] for p in paced], dtype=np.intp),
-        np.array([p.speed_mps for p in paced]),
-        np.array([briskness(p.conduct, p.decel_mps2) for p in paced]),
-    )
+    motions = np.array(list(paced)).reshape(-1, 3).T
+    paces = Paces(tuple(paths.values()), motions[0].astype(np.intp), motions[1], motions[2])
     replay = Replay(replayed) if replayed else None
     return RoadUserArrays(crowd, tuple(paths.values()), paces, replay)
 
 
 _Row = tuple[float, ...]
-"""Of one player: 1 where present, lawful, walking, known; places of path, kind and pace; columns of
-`Crowd` from its length on, without path and pace."""
+"""Of one player: 1 where present, lawful, walking, known; places of path, kind and pace; its key;
+length, width, offset, place, speed; the speed that it wants, if given, and the limit; acceleration
+and deceleration as shares of a car's; when it brakes, and how."""
 _NO_PACE = -1
-_STILL: _Row = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
-_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_PACE, 1.0, 1.0, *_STILL)
+_STILL: _Row = (0.0, 0.0, 0.0, 0.0, np.inf, 1.0, 1.0, np.inf, 1.0)
+_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_PACE, 0.0, 1.0, 1.0, *_STILL)
 
 
 def _row(
@@ -126,27 +160,36 @@ def _row(
     lawful: bool = False,
     known: bool = True,
     pace: int = _NO_PACE,
+    key: int = 0,
     motion: _Row = _STILL,
 ) -> _Row:
     traits = KINDS[kind]
     size = size_m or (traits.length_m, traits.width_m)
     kind_place = KIND_NAMES.index(kind)
-    return (1.0, lawful, not traits.keeps_lane, known, path, kind_place, pace, *size, *motion)
+    flags = (1.0, lawful, not traits.keeps_lane, known)
+    return (*flags, path, kind_place, pace, key, *size, *motion)
 
 
 def _player_row(player: Player, path: int, pace: int) -> _Row:
-    traits = KINDS[player.kind]
+    traits, car, on = KINDS[player.kind], KINDS["car"], player.path
     motion = (
         player.lateral_m,
         player.start_arc_m,
         0.0 if player.conduct == "parked" else player.speed_mps,
-        player.speed_mps if player.desired_mps is None else player.desired_mps,
-        traits.accel_mps2,
-        traits.decel_mps2,
+        np.nan if player.desired_mps is None else player.desired_mps,
+        float(on.speed_limit_mps[on.place(np.array([player.start_arc_m])).node[0]]),
+        traits.accel_mps2 / car.accel_mps2,
+        traits.decel_mps2 / car.decel_mps2,
         player.acts_after_s if player.conduct == "stops" else np.inf,
         player.decel_mps2,
     )
-    lawful = player.conduct == "law_abiding"
-    known = player.known
-    size = player.size_m
-    return _row(player.kind, size, path, lawful=lawful, known=known, pace=pace, motion=motion)
+    return _row(
+        player.kind,
+        player.size_m,
+        path,
+        lawful=player.conduct == "law_abiding",
+        known=player.known,
+        pace=pace,
+        key=key_of(player.name),
+        motion=motion,
+    )

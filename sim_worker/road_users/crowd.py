@@ -10,12 +10,13 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 class Crowd(NamedTuple):
     """Who is on the road besides the ego; every field (S, R).
 
-    `path_of` is a place in the `PathTable`; `lateral_m` lies to its left. `desired_mps` is the
-    speed on a free road. From `brakes_at_s` on, infinite for most, it brakes by `brakes_by_mps2`.
-    `lawful` ones react to others, the rest move as `pace_of` in the `Paces` says, or, where it is
-    -1, not at all. `walks` is true of those who keep to
-    no lane, `kinds` are places in `KIND_NAMES`, `hidden_by` the column of who hides it, or -1.
-    `known` ones were perceived by the real car: no wall of the map hides them.
+    `path_of` is a place in the `PathTable`; `lateral_m` lies to its left. `lawful` ones react to
+    others, each with its own manners; `desired_mps` is their speed on a free road, and `briskness`
+    multiplies an ordinary driver's accelerations in bends. The rest move as `pace_of` in the
+    `Paces` says, or, where it is -1, not at all; from `brakes_at_s` on, infinite for most, they
+    brake by `brakes_by_mps2`. `walks` is true of those who keep to no lane, `kinds` are places in
+    `KIND_NAMES`, `hidden_by` the column of who hides it, or -1. `known` ones were perceived by the
+    real car: no wall of the map hides them.
     """
 
     present: Flags
@@ -30,6 +31,10 @@ class Crowd(NamedTuple):
     desired_mps: Array
     accel_mps2: Array
     decel_mps2: Array
+    time_gap_s: Array
+    briskness: Array
+    reaction_s: Array
+    lag_s: Array
     brakes_at_s: Array
     brakes_by_mps2: Array
     walks: Flags

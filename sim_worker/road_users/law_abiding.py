@@ -13,6 +13,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
+from foretwin.sim_worker.road_users.noticed import Noticed
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.right_of_way import PathRules
 
@@ -52,15 +53,17 @@ class LawAbiding:
         self._half = 0.5 * crowd.length_m[s, r]
         self._width = crowd.width_m[s, r]
         self._decel, self._most = crowd.decel_mps2[s, r], crowd.accel_mps2[s, r]
+        self._time_gap, self._lag = crowd.time_gap_s[s, r], crowd.lag_s[s, r]
+        self._brisk = crowd.briskness[s, r]
+        self.noticed = Noticed(crowd.reaction_s[s, r], s, r)
         self._desired = crowd.desired_mps[s, r]
-        self._hardest = np.minimum(2.0 * self._decel, driver.EMERGENCY_DECEL_MPS2)
         self._parts = [
             slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(s), _ROWS_AT_ONCE)
         ]
         self._pairs: tuple[int, _Pairs] | None = None
 
-    def accelerations(self, now: Now, ego: EgoBoxes, red_arcs_m: Array) -> Array:
-        """Return (K,) what they choose; `red_arcs_m` (P, K) of paths, or (S, P, K)."""
+    def accelerations(self, now: Now, ego: EgoBoxes, red_arcs_m: Array, *, every_s: float) -> Array:
+        """Return (K,) what they choose, `every_s`; `red_arcs_m` (P, K) of paths, or (S, P, K)."""
         s, r, decel, most = self.rows, self.columns, self._decel, self._most
         arc, speed = now.arc_m[s, r], now.speed_mps[s, r]
         bend = self._bend(arc)
@@ -68,19 +71,25 @@ class LawAbiding:
         red = red_arcs_m[self._path] if red_arcs_m.ndim == 2 else red_arcs_m[s, self._path]
         still = np.minimum(self._before(red, arc, speed), self._wait(now, ego, arc, speed))
         nearer = still < gap
-        gap, lead_speed = np.where(nearer, still, gap), np.where(nearer, 0.0, lead_speed)
-        wanted = driver.STANDSTILL_GAP_M * (~nearer) + driver.dynamic_gap_m(
-            speed, lead_speed, driver.BRISK_TIME_GAP_S, most, decel
+        ahead = np.stack(
+            [
+                arc + np.where(nearer, still, gap),
+                np.where(nearer, 0.0, lead_speed),
+                np.where(nearer, 0.0, driver.STANDSTILL_GAP_M),
+            ]
         )
+        end, lead_speed, least = self.noticed.after(ahead, every_s=every_s)
+        gap = end - arc
+        wanted = least + driver.dynamic_gap_m(speed, lead_speed, self._time_gap, most, decel)
         free = 1.0 - (speed / np.maximum(self._desired, 0.1)) ** driver.ACCEL_EXPONENT
         accel = most * (free - np.square(wanted / np.maximum(gap, 0.1)))
         accel = np.minimum(accel, self._for_bends(arc, speed))
-        return np.clip(accel, -self._hardest, most)
+        return np.asarray(np.clip(accel, -driver.EMERGENCY_DECEL_MPS2, most))
 
     def _for_bends(self, arc: Array, speed: Array) -> Array:
         """Return what brings a driver to the speed that bends allow where it decides next."""
         there = self._table.place(self._on, arc + speed * driver.DECIDE_EVERY_S)
-        allowed = np.sqrt(self._table.square_bound(there))
+        allowed = np.sqrt(self._brisk * self._table.square_bound(there))
         return np.asarray((allowed - speed) / driver.DECIDE_EVERY_S)
 
     def _bend(self, arc: Array) -> Array:
@@ -145,7 +154,7 @@ class LawAbiding:
         enter_s = np.maximum(ahead, 0.0) / pace
         clear_s = (leave - arc[k] + self._half[k]) / pace
         taken = (
-            (gone_s > 0.0) & (reach_s < clear_s + driver.LAG_S) & (gone_s > enter_s - driver.LEAD_S)
+            (gone_s > 0.0) & (reach_s < clear_s + self._lag[k]) & (gone_s > enter_s - driver.LEAD_S)
         )
         gap = np.full(len(self.rows), np.inf)
         np.minimum.at(gap, k[taken], ahead[taken] - driver.LINE_GAP_M)

@@ -32,12 +32,12 @@ class WayMade(NamedTuple):
     speed_mps: Array
 
 
-def square_bound(path: FrenetPath) -> Array:
+def square_bound(path: FrenetPath, *, decel_mps2: float) -> Array:
     """Return (M,) the square of the speed at a path's nodes that the accelerations of an ordinary
     driver allow, across and along; in (m/s)². It is proportional to these accelerations."""
     return path.bounded_squares(
         lateral_accel_mps2=driver.LATERAL_ACCEL_MPS2,
-        decel_mps2=driver.COMFORT_DECEL_MPS2,
+        decel_mps2=decel_mps2,
         accel_mps2=driver.MAX_ACCEL_MPS2,
     )
 
@@ -73,7 +73,8 @@ class Paces:
         begin = motions = 0
         for place in np.unique(path_of):
             rows, path = np.flatnonzero(path_of == place), paths[place]
-            allowed = briskness[rows, None] * square_bound(path)
+            bound = square_bound(path, decel_mps2=driver.COMFORT_DECEL_MPS2)
+            allowed = briskness[rows, None] * bound
             speed = np.sqrt(np.minimum(square[rows, None], allowed))
             speed = np.pad(speed, ((0, 0), (1, 1)), mode="edge")
             ends = path.arc_m[[0, -1]] + [-_BEYOND_M, _BEYOND_M]

@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
+from foretwin.sim_worker.driver_model import BEND_DECEL_MPS2
 from foretwin.sim_worker.road_users.paces import square_bound
 
 
@@ -81,13 +82,16 @@ class PathTable:
 
     @functools.cached_property
     def _square_bounds(self) -> Array:
-        bounds = [square_bound(path) for path in self.paths]
+        bounds = [square_bound(path, decel_mps2=BEND_DECEL_MPS2) for path in self.paths]
         return np.concatenate([*bounds, np.full(len(self._poses) - sum(map(len, bounds)), np.inf)])
 
     def square_bound(self, place: PathPlace) -> Array:
-        """Return (…) the square of the speed that bends let an ordinary driver have at places."""
+        """Return (…) the square of the speed that bends let a law-abiding driver have at places."""
         low, high = self._square_bounds.take(place.node), self._square_bounds.take(place.node + 1)
-        return np.asarray(low + np.minimum(np.maximum(place.share, 0.0), 1.0) * (high - low))
+        high -= low
+        high *= np.minimum(np.maximum(place.share, 0.0), 1.0)
+        high += low
+        return np.asarray(high)
 
     def along(self, path: FrenetPath) -> PathProjection:
         """Project every node on another path, so that road users can be found on it at once."""

@@ -7,15 +7,43 @@ their pace has them at the time, recorded ones where they were.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
+from foretwin.sim_worker.driver_model import DECIDE_EVERY_S
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.law_abiding import LawAbiding, Now
-from foretwin.sim_worker.road_users.paces import Paces
+from foretwin.sim_worker.road_users.paces import Paces, WayMade
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.road_users.right_of_way import PathRules
+
+_FORESEEN = 32
+"""Ticks."""
+
+
+class _Foreseen(NamedTuple):
+    """Where those who heed nobody are at `_FORESEEN` ticks from `from_s` on, each (T, K)."""
+
+    from_s: float
+    tick_s: float
+    made: WayMade
+
+    def _tick(self, now_s: float) -> int:
+        return round((now_s - self.from_s) / self.tick_s)
+
+    def holds(self, now_s: float, tick_s: float) -> bool:
+        """Return whether it says where they are then."""
+        tick = self._tick(now_s)
+        known = tick_s == self.tick_s and 0 <= tick < _FORESEEN
+        return known and abs(self.from_s + tick * tick_s - now_s) < 1e-9
+
+    def at(self, now_s: float) -> WayMade:
+        """Return where they are (K,) then."""
+        tick = self._tick(now_s)
+        return WayMade(self.made.arc_m[tick], self.made.speed_mps[tick])
 
 
 class Traffic:
@@ -44,7 +72,8 @@ class Traffic:
         # Their own clocks as the future begins.
         self._clock_s = paces.time_at(self._motion, self.arc_m[self._paced])
         self._brakes_at_s = self._clock_s + crowd.brakes_at_s[self._paced]
-        self._pace()
+        self._foreseen: _Foreseen | None = None
+        self._pace(0.0)
         self._put()
         self._accel = np.zeros_like(self.arc_m)
         self._lawful = LawAbiding(crowd, table, rules)
@@ -82,6 +111,7 @@ class Traffic:
             (self._accel, before._accel),
         ):
             mine[futures] = theirs[futures]
+        self._lawful.noticed.carry_on(before._lawful.noticed, futures)
         self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
         self._put()
 
@@ -92,22 +122,34 @@ class Traffic:
             after = np.maximum(self.speed_mps + self._accel * dt_s, 0.0)
             self.arc_m += 0.5 * (self.speed_mps + after) * dt_s
             self.speed_mps = after
-        self._pace()
+        self._pace(dt_s)
         if self.replay is not None:
             self.arc_m[:, : len(self.replay)] = 0.0
         self._put()
 
-    def _pace(self) -> None:
+    def _pace(self, dt_s: float) -> None:
         """Put those who heed nobody where they are now."""
-        now_s = np.broadcast_to(self._now_s, self.arc_m.shape)[self._paced] + self._clock_s
-        brakes_by = self.crowd.brakes_by_mps2[self._paced]
-        now = self._paces.braked(self._motion, now_s, self._brakes_at_s, brakes_by)
+        if not len(self._motion):
+            return
+        if isinstance(self._now_s, float) and dt_s > 0.0:
+            # Their motion is known for good: that of many ticks costs little more than of one.
+            if self._foreseen is None or not self._foreseen.holds(self._now_s, dt_s):
+                times: Array = self._now_s + dt_s * np.arange(float(_FORESEEN))[:, None]
+                self._foreseen = _Foreseen(self._now_s, dt_s, self._motion_at(times))
+            now = self._foreseen.at(self._now_s)
+        else:
+            now = self._motion_at(np.broadcast_to(self._now_s, self.arc_m.shape)[self._paced])
         self.arc_m[self._paced], self.speed_mps[self._paced] = now
 
-    def decide(self, ego: EgoBoxes, red_arcs_m: Array) -> None:
-        """Let law-abiding road users choose their accelerations; `red_arcs_m` (P, K) of paths, or
-        (S, P, K)."""
+    def _motion_at(self, now_s: Array) -> WayMade:
+        brakes_by = self.crowd.brakes_by_mps2[self._paced]
+        clock_s = self._clock_s + now_s
+        return self._paces.braked(self._motion, clock_s, self._brakes_at_s, brakes_by)
+
+    def decide(self, ego: EgoBoxes, red_arcs_m: Array, *, every_s: float = DECIDE_EVERY_S) -> None:
+        """Let law-abiding road users choose their accelerations, as they do `every_s`; `red_arcs_m`
+        (P, K) of paths, or (S, P, K)."""
         if self.reacts:
             now = Now(self.poses, self.speed_mps, self.arc_m)
-            chosen = self._lawful.accelerations(now, ego, red_arcs_m)
+            chosen = self._lawful.accelerations(now, ego, red_arcs_m, every_s=every_s)
             self._accel[self._lawful.rows, self._lawful.columns] = chosen

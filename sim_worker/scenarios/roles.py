@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -87,14 +88,17 @@ class StagedCase(NamedTuple):
     """How far beyond the World's lanes the ego or an actor starts, on a road prolonged."""
 
 
+@functools.lru_cache(maxsize=64)
+def _pace(path: FrenetPath, speed_mps: float, brisk: float) -> Paces:
+    return Paces([path], np.zeros(1, np.intp), np.array([speed_mps]), np.array([brisk]))
+
+
 def moving_box(
     kind: RoadUserKind, path: FrenetPath, speed_mps: float, *, brisk: float = HEEDLESS_BRISKNESS
 ) -> MovingBox:
     """Return the box of a road user that drives along a path as it does on its own."""
     size, path = KINDS[kind], path.eased
-    paces = None
-    if speed_mps > 0.0:
-        paces = Paces([path], np.zeros(1, np.intp), np.array([speed_mps]), np.array([brisk]))
+    paces = _pace(path, speed_mps, brisk) if speed_mps > 0.0 else None
     return MovingBox(path, speed_mps, size.length_m, size.width_m, paces=paces)
 
 

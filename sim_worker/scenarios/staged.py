@@ -7,6 +7,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import BEND_DECEL_MPS2
 from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.road_users.paces import square_bound
 from foretwin.sim_worker.scenarios.roles import StagedActor, StagedCase
@@ -29,7 +30,7 @@ def player_on(actor: StagedActor, path: FrenetPath, start_arc_m: float) -> Playe
     speed = actor.speed_mps
     if lawful:
         node = int(np.argmin(np.abs(path.arc_m - start_arc_m)))
-        speed = min(speed, float(np.sqrt(square_bound(path)[node])))
+        speed = min(speed, float(np.sqrt(square_bound(path, decel_mps2=BEND_DECEL_MPS2)[node])))
     return Player(
         name=actor.name,
         kind=actor.kind,

@@ -67,6 +67,7 @@ def traffic(
     lawful: list[bool],
     brakes_at_s: float = np.inf,
     present: list[bool] | None = None,
+    reaction_s: float = 0.0,
 ) -> Traffic:
     """One future in which each path has one car, so many metres before the junction's centre."""
     rules = JunctionRules(world)
@@ -86,6 +87,10 @@ def traffic(
         desired_mps=np.maximum(speed, 8.0),
         accel_mps2=2.0 * row,
         decel_mps2=3.0 * row,
+        time_gap_s=1.2 * row,
+        briskness=row,
+        reaction_s=reaction_s * row,
+        lag_s=row,
         brakes_at_s=brakes_at_s * row,
         brakes_by_mps2=4.0 * row,
         walks=row < 0,

@@ -29,11 +29,11 @@ def test_a_hook_is_slowed_down_for_and_left_with_the_old_speed(
 ) -> None:
     path = hook(radius_m, math.radians(90.0)).eased
     moving = traffic(crossroads(tmp_path), [path], before_m=[0.0], speed_mps=[13.0], lawful=[True])
-    moving.arc_m[:] = 5.0
+    moving.arc_m[:] = -19.0
     seen = run(moving, seconds=25.0)[:, 0]
     accel = np.diff(seen[:, 1]) / 0.05
     assert np.abs(across_mps2(path, seen)).max() <= 1.1 * driver.LATERAL_ACCEL_MPS2
-    assert accel.min() >= -1.5 * driver.COMFORT_DECEL_MPS2
+    assert accel.min() >= -1.5 * driver.BEND_DECEL_MPS2
     assert seen[-1, 1] > 12.0
 
 
@@ -58,4 +58,4 @@ def test_nobody_brakes_harder_than_tyres_do_however_late_it_sees_who_stands(tmp_
     )
     seen = run(moving, seconds=4.0)[:, 1]
     hardest = np.diff(seen[:, 1]).min() / 0.05
-    assert hardest == pytest.approx(-6.0, abs=1e-6), "twice what it takes for ordinary"
+    assert hardest == pytest.approx(-driver.EMERGENCY_DECEL_MPS2, abs=1e-6)

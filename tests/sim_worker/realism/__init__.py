@@ -1,0 +1,1 @@
+"""How alike simulated road users and recorded ones are, in distributions with units."""
