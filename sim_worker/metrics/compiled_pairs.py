@@ -12,62 +12,8 @@ from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.compiled import REAL, WHOLE, given, kernel, types
 
 _ALL, _ROWS, _LINE = given(3, "C"), given(2), given(1)
-_SIZES, _HALF = types.UniTuple(given(3), 2), types.UniTuple(REAL, 2)
+_SIZES = types.UniTuple(given(3), 2)
 _PICKED, _OUT_ROWS = types.Array(WHOLE, 1, "A", readonly=True), REAL[:, ::1]
-NEVER_ZERO = 1e-300
-"""Added to speeds before division: standing still becomes a very long time."""
-
-
-@kernel(types.void, types.UniTuple(_ALL, 6), _SIZES, _HALF, _OUT_ROWS)
-def least_until_touch(
-    relative: tuple[Array, ...],
-    other_half_m: tuple[Array, Array],
-    half_m: tuple[float, float],
-    least_s: Array,
-) -> None:
-    """Lower `least_s` (S, N) to the seconds until any is touched, by the formulas of `meeting`.
-
-    `relative` holds (S, N, R) each: ahead, left, cos, sin, and the speeds ahead and left. Half
-    sizes (S, 1, R) are the road users'; `length` and `width` are half of the ego's.
-    """
-    ahead_m, left_m, cos, sin, ahead_mps, left_mps = relative
-    futures, instants, users = ahead_m.shape
-    (length, width), (half_length_m, half_width_m) = half_m, other_half_m
-    own_reach = math.hypot(length, width)
-    for future in range(futures):
-        for user in range(users):
-            other_length = half_length_m[future, 0, user]
-            other_width = half_width_m[future, 0, user]
-            reach = math.hypot(other_length, other_width) + own_reach
-            square = reach * reach
-            for instant in range(instants):
-                x, y = ahead_m[future, instant, user], left_m[future, instant, user]
-                vx, vy = ahead_mps[future, instant, user], left_mps[future, instant, user]
-                # Circles around the boxes touch now or, with these velocities, later.
-                past = x * vy - y * vx
-                closing = x * vx + y * vy < 0.0 and past * past <= (vx * vx + vy * vy) * square
-                if not closing and not x * x + y * y <= square:
-                    continue
-                c, s = cos[future, instant, user], sin[future, instant, user]
-                along, across = abs(c), abs(s)
-                first, last = -math.inf, math.inf
-                for away, speed, both in (
-                    (x, vx, along * other_length + across * other_width + length),
-                    (y, vy, across * other_length + along * other_width + width),
-                    (
-                        c * x + s * y,
-                        c * vx + s * vy,
-                        along * length + across * width + other_length,
-                    ),
-                    (c * y - s * x, c * vy - s * vx, across * length + along * width + other_width),
-                ):
-                    per_speed = 1.0 / (speed + NEVER_ZERO)
-                    half = abs(per_speed) * both
-                    first = max(first, -(per_speed * away) - half)
-                    last = min(last, half - per_speed * away)
-                until = max(first, 0.0)
-                if until <= last and until < least_s[future, instant]:
-                    least_s[future, instant] = until
 
 
 @kernel(

@@ -1,4 +1,5 @@
-"""Post-encroachment time: how narrowly two road users miss each other where their ways cross."""
+"""Encroachment: how narrowly two road users miss each other where their ways cross, and how long
+and from how far the ego gets in the way."""
 
 from __future__ import annotations
 
@@ -16,6 +17,8 @@ _CHUNK = 8
 _PARALLEL_SIN = 0.17
 """Ways that never differ by 10° follow or meet each other; they do not cross."""
 _HALF_STEP = 0.5 + 1e-9
+STOPPING_DECEL_MPS2 = 3.4
+"""Deceleration that most drivers accept: AASHTO (2018), A Policy on Geometric Design, 3.2.2."""
 
 
 class Crossings(NamedTuple):
@@ -34,14 +37,72 @@ class Crossings(NamedTuple):
     user_way: Array
 
 
+class Stays(NamedTuple):
+    """When each is on the other's strip at K crossings (K,): from when until when.
+
+    Who is on it at the first instant came then, who is at the last leaves never. A strip is as
+    wide as the road user, straight around the crossing; the oriented outlines say who is on it.
+    """
+
+    ego_from_s: Array
+    ego_until_s: Array
+    user_from_s: Array
+    user_until_s: Array
+
+
 def post_encroachment_time(view: RolloutView) -> Measure:
     """Least post-encroachment time (S,); infinite where no tracks cross, 0 where both meet there.
 
     From the moment the first leaves the other's path until that other reaches the first one's:
-    Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. A path is the
-    strip as wide as the road user, straight around the crossing; the oriented outlines
-    say when it is on it. Both must pass within the rollout.
+    Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. A path is the strip
+    of `Stays`. Both must pass within the rollout.
     """
+    at = view.keep(stays)
+    between = np.maximum(at.user_from_s - at.ego_until_s, at.ego_from_s - at.user_until_s)
+    least = np.full(len(view.valid), np.inf)
+    np.minimum.at(least, view.keep(crossings).future, np.maximum(between, 0.0))
+    least[_met(view)] = 0.0
+    return view.measure(least)
+
+
+def encroachment_time(view: RolloutView) -> Measure:
+    """Longest time (S,) for which the ego is on the path of a road user whose track it crosses.
+
+    Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. Invalid where it
+    crosses none, or does not leave all of those paths within the rollout.
+    """
+    at = view.keep(stays)
+    longest = np.full(len(view.valid), -np.inf)
+    np.maximum.at(longest, view.keep(crossings).future, at.ego_until_s - at.ego_from_s)
+    return view.measure(longest, np.isfinite(longest))
+
+
+def proportion_of_stopping_distance(view: RolloutView) -> Measure:
+    """Least way that is left at the first instant to a path that it will cross (S,), infinite
+    without one, as a multiple of the way in which the ego can stop.
+
+    Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. Below 1 the ego
+    cannot stop before it without braking harder than `STOPPING_DECEL_MPS2`. Of later instants it
+    tells nothing: who drives onto a path has no way left to it at last.
+    """
+    moved = np.diff(view.centre_m, axis=1)
+    gone_m = np.zeros(view.states.shape[:2])
+    np.cumsum(np.hypot(moved[..., 0], moved[..., 1]), axis=1, out=gone_m[:, 1:])
+    future, at_s = view.keep(crossings).future, view.keep(stays).ego_from_s
+    after = np.clip(np.searchsorted(view.time_s, at_s), 1, len(view.time_s) - 1)
+    begin_s, end_s = view.time_s[after - 1], view.time_s[after]
+    share = (at_s - begin_s) / (end_s - begin_s)
+    left_m = gone_m[future, after - 1] * (1.0 - share) + gone_m[future, after] * share
+    stop_m = np.square(view.speed_mps[future, 0]) / (2.0 * STOPPING_DECEL_MPS2)
+    least = np.full(len(view.valid), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(left_m > 0.0, left_m / stop_m, 0.0)
+    np.minimum.at(least, future, ratio)
+    return view.measure(least)
+
+
+def stays(view: RolloutView) -> Stays:
+    """Return when both are on each other's strips, at each of `crossings`."""
     found = view.keep(crossings)
     future, user = found.future, found.user
     half_m = tuple(half[future, 0, user] for half in view.user_half_m)
@@ -49,20 +110,15 @@ def post_encroachment_time(view: RolloutView) -> Measure:
     x, y, yaw = (v[..., None] for v in (*np.moveaxis(view.centre_m, 2, 0), view.states[..., 2]))
     own_picked = (future, np.zeros_like(user), found.ego_step)
     picked = (future, user, found.user_step)
-    stays = np.empty((4, len(future)))
+    stay_s = np.empty((4, len(future)))
     for poses, half, which, way, strip_half, stay in (
-        ((x, y, yaw), own_half_m, own_picked, found.user_way, half_m[1], stays[:2]),
-        (view.users[:3], half_m, picked, found.ego_way, own_half_m[1], stays[2:]),
+        ((x, y, yaw), own_half_m, own_picked, found.user_way, half_m[1], stay_s[:2]),
+        (view.users[:3], half_m, picked, found.ego_way, own_half_m[1], stay_s[2:]),
     ):
         compiled_pairs.stays_on_strips(
             poses, half, which, found.point_m, way, strip_half, view.time_s, stay
         )
-    ego_from, ego_until, other_from, other_until = stays
-    between = np.maximum(np.maximum(other_from - ego_until, ego_from - other_until), 0.0)
-    least = np.full(len(view.valid), np.inf)
-    np.minimum.at(least, future, between)
-    least[_met(view)] = 0.0
-    return view.measure(least)
+    return Stays(*stay_s)
 
 
 def _met(view: RolloutView) -> Indices:

@@ -50,7 +50,7 @@ def time_headway(view: RolloutView) -> Measure:
     ahead = view.keep(leaders)
     moving = ahead.ego_mps > _MOVES_MPS
     headway = np.where(moving, ahead.gap_m, np.inf) / np.where(moving, ahead.ego_mps, 1.0)
-    return _extreme(view, ahead, headway, np.minimum, np.inf)
+    return extreme(view, ahead, headway, np.minimum, np.inf)
 
 
 def drac(view: RolloutView) -> Measure:
@@ -60,7 +60,7 @@ def drac(view: RolloutView) -> Measure:
     Archer (2005), Indicators for traffic safety assessment and prediction, equation 4.
     """
     ahead = view.keep(leaders)
-    return _extreme(view, ahead, _drac(ahead), np.maximum, 0.0)
+    return extreme(view, ahead, _drac(ahead), np.maximum, 0.0)
 
 
 def required_deceleration(view: RolloutView) -> Measure:
@@ -70,7 +70,7 @@ def required_deceleration(view: RolloutView) -> Measure:
     0 where none is approached. Positive here, negative in the source.
     """
     ahead = view.keep(leaders)
-    return _extreme(view, ahead, _longitudinal(ahead), np.maximum, 0.0)
+    return extreme(view, ahead, _longitudinal(ahead), np.maximum, 0.0)
 
 
 def required_lateral_acceleration(view: RolloutView) -> Measure:
@@ -79,7 +79,7 @@ def required_lateral_acceleration(view: RolloutView) -> Measure:
     Jansson (2005), Collision Avoidance Theory, section 5.3.8, to the easier side.
     """
     ahead = view.keep(leaders)
-    return _extreme(view, ahead, _lateral(ahead), np.maximum, 0.0)
+    return extreme(view, ahead, _lateral(ahead), np.maximum, 0.0)
 
 
 def required_acceleration(view: RolloutView) -> Measure:
@@ -88,7 +88,7 @@ def required_acceleration(view: RolloutView) -> Measure:
     Jansson (2005), Collision Avoidance Theory, section 5.3.10.
     """
     ahead = view.keep(leaders)
-    return _extreme(view, ahead, np.hypot(_longitudinal(ahead), _lateral(ahead)), np.maximum, 0.0)
+    return extreme(view, ahead, np.hypot(_longitudinal(ahead), _lateral(ahead)), np.maximum, 0.0)
 
 
 def leaders(view: RolloutView) -> Leaders:
@@ -134,12 +134,19 @@ def _user_acceleration(view: RolloutView, row: Indices, user: Indices) -> Array:
     return np.asarray(np.nan_to_num(gain / (view.time_s[after] - view.time_s[before])))
 
 
-def _closing(ahead: Leaders) -> Array:
+def closing_mps(ahead: Leaders) -> Array:
+    """Return how fast the ego nears each leader (K,) along the course, 0 where it does not."""
     return np.maximum(ahead.ego_mps - ahead.other_mps, 0.0)
 
 
+def aside_to_pass(ahead: Leaders, until_s: Array) -> Array:
+    """Return how far to the easier side (K,) the ego has to get to pass leaders `until_s` later."""
+    then_left = ahead.left_m + ahead.other_left_mps * until_s
+    return np.asarray(np.maximum(ahead.reach_m - np.abs(then_left), 0.0))
+
+
 def _drac(ahead: Leaders) -> Array:
-    closing = _closing(ahead)
+    closing = closing_mps(ahead)
     touching = ahead.gap_m <= 0.0
     rate = closing * closing / (2.0 * np.where(touching, 1.0, ahead.gap_m))
     return np.where(touching & (closing > 0.0), np.inf, rate)
@@ -147,26 +154,25 @@ def _drac(ahead: Leaders) -> Array:
 
 def _longitudinal(ahead: Leaders) -> Array:
     needed = _drac(ahead) - ahead.accel_mps2
-    return np.where(_closing(ahead) > 0.0, np.maximum(needed, 0.0), 0.0)
+    return np.where(closing_mps(ahead) > 0.0, np.maximum(needed, 0.0), 0.0)
 
 
 def _lateral(ahead: Leaders) -> Array:
-    closing = _closing(ahead)
+    closing = closing_mps(ahead)
     approaching = closing > 1e-9
     until = np.where(approaching, ahead.gap_m, 1.0) / np.where(approaching, closing, 1.0)
-    then_left = ahead.left_m + ahead.other_left_mps * until
-    way = np.maximum(ahead.reach_m - np.abs(then_left), 0.0)
+    way = aside_to_pass(ahead, until)
     touching = until <= 0.0
     needed = 2.0 * way / np.square(np.where(touching, 1.0, until))
     needed = np.where(touching & (way > 0.0), np.inf, needed)
     return np.where(approaching, needed, 0.0)
 
 
-def _extreme(
-    view: RolloutView, ahead: Leaders, values: Array, extreme: np.ufunc, without: float
+def extreme(
+    view: RolloutView, ahead: Leaders, values: Array, of: np.ufunc, without: float
 ) -> Measure:
-    """Return the smallest or greatest of `values` (K,) for each future (S,)."""
+    """Return the smallest or greatest of `values` (K,) of each future, else `without`."""
     futures, instants = view.states.shape[:2]
     found = np.full(futures, without)
-    extreme.at(found, ahead.row // instants, values)
+    of.at(found, ahead.row // instants, values)
     return view.measure(found)

@@ -14,8 +14,10 @@ from foretwin.sim_worker.metrics import (
     impact,
     progress,
     score,
+    threat,
     time_to_collision,
     violations,
+    worst_case,
 )
 from foretwin.sim_worker.metrics.rollout import Context, Measure, Rollout, RolloutView
 
@@ -52,7 +54,10 @@ METRICS = MappingProxyType(
         "ttc_series": Metric(time_to_collision.ttc_series, "s", "higher", series=True),
         "time_exposed": Metric(time_to_collision.time_exposed, "s", "lower"),
         "time_integrated": Metric(time_to_collision.time_integrated, "s²", "lower"),
+        "wttc": Metric(worst_case.worst_time_to_collision, "s", "higher"),
         "pet": Metric(encroachment.post_encroachment_time, "s", "higher"),
+        "et": Metric(encroachment.encroachment_time, "s", "lower"),
+        "psd": Metric(encroachment.proportion_of_stopping_distance, "1", "higher"),
         "thw": Metric(following.time_headway, "s", "higher"),
         "drac": Metric(following.drac, "m/s²", "lower"),
         "required_deceleration": Metric(following.required_deceleration, "m/s²", "lower"),
@@ -60,6 +65,13 @@ METRICS = MappingProxyType(
             following.required_lateral_acceleration, "m/s²", "lower"
         ),
         "required_acceleration": Metric(following.required_acceleration, "m/s²", "lower"),
+        "btn": Metric(threat.brake_threat_number, "1", "lower"),
+        "stn": Metric(threat.steer_threat_number, "1", "lower"),
+        "ttb": Metric(threat.time_to_brake, "s", "higher"),
+        "tts": Metric(threat.time_to_steer, "s", "higher"),
+        "ttr": Metric(threat.time_to_react, "s", "higher"),
+        "rss_distance": Metric(threat.rss_distance, "m", "lower"),
+        "rss_margin": Metric(threat.rss_margin, "m", "higher"),
         "min_clearance": Metric(impact.minimum_clearance, "m", "higher"),
         "collided": Metric(impact.collided, "1", "lower"),
         "at_fault_collision": Metric(impact.at_fault_collision, "1", "lower"),

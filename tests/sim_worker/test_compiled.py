@@ -20,7 +20,7 @@ from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.batch import compiled as compiled_nearness
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
-from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics import compiled_pairs, compiled_touch
 from foretwin.sim_worker.metrics.displacement import cheapest_walks
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled as compiled_pursuit
@@ -42,7 +42,14 @@ COVERS = (
 
 KERNELS: dict[str, Any] = {
     name: kernel
-    for module in (compiled_geometry, compiled, compiled_pursuit, compiled_pairs, compiled_nearness)
+    for module in (
+        compiled_geometry,
+        compiled,
+        compiled_pursuit,
+        compiled_pairs,
+        compiled_touch,
+        compiled_nearness,
+    )
     for name, kernel in vars(module).items()
     if hasattr(kernel, "signatures")
 }
@@ -79,6 +86,7 @@ def test_all_is_compiled_once_it_is_imported_and_nothing_later() -> None:
     assert set(KERNELS) == {
         "locate", "curve", "free_road", "forces", "ramp", "read_base", "all_sane", "cheapest_walks",
         "least_until_touch", "find_leaders", "stays_on_strips", "come_near", "least_m", "may_touch",
+        "least_worst_case", "until_turning_touch", "_apart", "_arc", "_relative_at",
     }  # fmt: skip
     assert {name: len(found) for name, found in signatures().items()} == dict.fromkeys(KERNELS, 1)
     with pytest.raises(TypeError, match="No matching definition"):

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.metrics.encroachment import STOPPING_DECEL_MPS2
 from foretwin.sim_worker.metrics.rollout import Rollout
 from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
@@ -191,6 +192,40 @@ def frozen_rollout(scene: dict[str, object], time_s: Array) -> Rollout:
     driven.states[0, :, 0] += moved * math.cos(yaw)
     driven.states[0, :, 1] += moved * math.sin(yaw)
     return driven._replace(vehicle=vehicle)
+
+
+@settings(max_examples=60)
+@given(speeds, speeds, st.floats(0.4, 2.7), sizes, st.floats(15.0, 40.0))
+def test_encroachment_at_any_angle(
+    speed: float, other_mps: float, angle: float, size: tuple[float, float], away: float
+) -> None:
+    """A box is on a strip while its middle is no farther off than half of what both are across."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    other = Mover(-20.0 * cos, -20.0 * sin, angle, other_mps, *size)
+    time_s = times(60.0, 0.25)
+    reach = LENGTH_M / 2 * abs(sin) + WIDTH_M / 2 * abs(cos) + size[1] / 2
+    stays, begins = 2.0 * reach / (speed * abs(sin)), away - reach / abs(sin)
+    assume(stays > 0.25 and begins > 0.0)
+    assume(begins / speed + stays < time_s[-1] and 20.0 / other_mps < time_s[-1])
+
+    found = evaluate(rollout(Mover(-away, 0, 0, speed), other, time_s=time_s), ("et", "psd"))
+
+    assert found["et"].values == pytest.approx([stays], abs=1e-6)
+    stop_m = speed**2 / (2.0 * STOPPING_DECEL_MPS2)
+    assert found["psd"].values == pytest.approx([begins / stop_m], rel=1e-6)
+
+
+def test_encroachment_that_does_not_end_has_no_time_and_no_way_left_is_no_share() -> None:
+    stays = rollout(Mover(-12, 0, 0, 6), Mover(0, -9, math.pi / 2, 9), time_s=times(2.0))
+    on_it = rollout(Mover(0, 0, 0, 6), Mover(0.5, -30, math.pi / 2, 9))
+    apart = rollout(Mover(0, 0, 0, 10), Mover(10, 3, 0, 8))
+    found = {k: evaluate(one, ("et", "psd")) for k, one in enumerate((stays, on_it, apart))}
+
+    assert not found[0]["et"].valid[0]
+    assert found[1]["et"].valid[0]
+    assert found[1]["psd"].values[0] == 0.0
+    assert not found[2]["et"].valid[0]
+    assert found[2]["psd"].values[0] == math.inf
 
 
 def test_who_comes_towards_or_crosses_is_no_leader() -> None:
