@@ -71,6 +71,7 @@ def measure(
         path=scene.path,
         ground=scenes.drivable if "ground" in needs else None,
         rules=RouteRules(scene.lights.world, scene.path) if "rules" in needs else None,
+        lanes=scenes.lanes if "lanes" in needs else None,
         user_mass_kg=_masses(scene) if "user_mass_kg" in needs else None,
         start_s=job.drive_time_s,
         live=scene.lights.live,

@@ -20,6 +20,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.futures.lights import Lights, lights_of
 from foretwin.sim_worker.futures.number_columns import NumberColumns, number_columns
 from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.lane_areas import LaneAreas
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.road_users.cast import Player, casting
@@ -126,6 +127,11 @@ class SceneMaker:
     def drivable(self) -> DrivableGround:
         """Where this World may be driven on; what one job looked up, the next ones know."""
         return DrivableGround(self.world)
+
+    @functools.cached_property
+    def lanes(self) -> LaneAreas:
+        """The lanes of this World as areas."""
+        return LaneAreas(self.world)
 
     @functools.cached_property
     def _walls(self) -> OpaqueGrid | None:

@@ -12,8 +12,9 @@ from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.compiled import REAL, WHOLE, given, kernel, types
 
 _ALL, _ROWS, _LINE = given(3, "C"), given(2), given(1)
-_SIZES = types.UniTuple(given(3), 2)
-_PICKED, _OUT_ROWS = types.Array(WHOLE, 1, "A", readonly=True), REAL[:, ::1]
+_SIZES, _HALF = types.UniTuple(given(3), 2), types.UniTuple(REAL, 2)
+_PICKED, _STEPS = (types.Array(WHOLE, 1, kind, readonly=True) for kind in "AC")
+_OUT_ROWS = REAL[:, ::1]
 
 
 @kernel(
@@ -129,3 +130,67 @@ def stays_on_strips(
                     break
                 inside_aside, inside_reach = aside, reach
                 at += outward
+
+
+@kernel(
+    WHOLE,
+    types.UniTuple(_ROWS, 4),
+    types.UniTuple(given(3), 3),
+    *(_SIZES, _HALF, _STEPS, REAL, REAL, WHOLE[:, ::1]),
+)
+def find_overlaps(
+    ego: tuple[Array, ...],
+    others: tuple[Array, ...],
+    other_half_m: tuple[Array, Array],
+    half_m: tuple[float, float],
+    later: Indices,
+    step_s: float,
+    moves_mps: float,
+    found: Indices,
+) -> int:
+    """Return of how many pairs (K) of a future and a road user the boxes overlap at all.
+
+    `ego` is x, y, yaw and speed (S, N) of its box, which goes straight on from each instant for
+    `later` (L,) steps; who is slower than `moves_mps` is left out. `others` are x, y, yaw
+    (S, N, R), where they come to be. The first K columns of `found` (4, S R) are future, instant,
+    road user and steps of each pair's first overlap.
+    """
+    x, y, yaw, speed = ego
+    other_x, other_y, other_yaw = others
+    (length, width), (half_length_m, half_width_m) = half_m, other_half_m
+    futures, instants, users = other_x.shape
+    own_reach, count = math.hypot(length, width), 0
+    for future in range(futures):
+        for user in range(users):
+            a, b = half_length_m[future, 0, user], half_width_m[future, 0, user]
+            reach = own_reach + math.hypot(a, b)
+            met = False
+            for instant in range(instants - later[-1]):
+                if met or abs(speed[future, instant]) < moves_mps:
+                    continue
+                for k in range(len(later)):
+                    at = instant + later[k]
+                    way = speed[future, instant] * (later[k] * step_s)
+                    dx = other_x[future, at, user] - x[future, instant]
+                    dy = other_y[future, at, user] - y[future, instant]
+                    if abs(dx) + abs(dy) > 1.5 * (reach + abs(way)):
+                        continue
+                    c, s = math.cos(yaw[future, instant]), math.sin(yaw[future, instant])
+                    ahead, left = c * dx + s * dy - way, c * dy - s * dx
+                    if ahead * ahead + left * left > reach * reach:
+                        continue
+                    turned = other_yaw[future, at, user] - yaw[future, instant]
+                    c, s = math.cos(turned), math.sin(turned)
+                    along, across = abs(c), abs(s)
+                    apart = max(
+                        abs(ahead) - (along * a + across * b + length),
+                        abs(left) - (across * a + along * b + width),
+                        abs(c * ahead + s * left) - (along * length + across * width + a),
+                        abs(c * left - s * ahead) - (across * length + along * width + b),
+                    )
+                    if apart <= 0.0:
+                        found[0, count], found[1, count] = future, instant
+                        found[2, count], found[3, count] = user, later[k]
+                        count, met = count + 1, True
+                        break
+    return count

@@ -95,14 +95,14 @@ def until_turning_touch(
     own_m, other_m = math.hypot(half_m[0], half_m[1]), math.hypot(other_half_m[0], other_half_m[1])
     reach = own_m + other_m
     spin = abs(rate) * own_m + abs(other_rate) * other_m
-    bend = abs(rate) * math.hypot(speed, slide) + abs(other_rate) * abs(other_speed)
+    bend = abs(rate) * math.sqrt(speed * speed + slide * slide) + abs(other_rate * other_speed)
     whirl = bend + rate * rate * own_m + other_rate * other_rate * other_m
     ahead, left, cos, sin = pair[0], pair[1], pair[2], pair[3]
     now = (ahead, left, cos, sin, other_speed * cos - speed, other_speed * sin - slide)
     before = t = gap = 0.0
     while t <= within_s:
         at = _relative_at(pair, t) if t > 0.0 else now
-        away = math.hypot(at[0], at[1])
+        away = math.sqrt(at[0] * at[0] + at[1] * at[1])
         if away > reach:
             gap, change = away - reach, bend
             closing = -(at[0] * at[4] + at[1] * at[5]) / away
@@ -110,7 +110,7 @@ def until_turning_touch(
             gap, change = _apart(at, half_m, other_half_m), whirl
             if gap <= 0.0:
                 break
-            closing = math.hypot(at[4], at[5]) + spin
+            closing = math.sqrt(at[4] * at[4] + at[5] * at[5]) + spin
         root = math.sqrt(closing * closing + 2.0 * change * gap)
         if closing > 0.0:
             step = 2.0 * gap / (closing + root)
@@ -200,11 +200,14 @@ def least_until_touch(
                     within = min(least_s[future, instant], TURNS_FOR_S, TURNS_BY_RAD / fastest)
                     vx, vy = other_speed * c - speed, other_speed * s - slide
                     # By how much nobody can come nearer than straight on: most end here.
-                    bend = abs(rate) * math.hypot(speed, slide) + abs(other_rate * other_speed)
+                    bend = abs(rate) * math.sqrt(speed * speed + slide * slide) + abs(
+                        other_rate * other_speed
+                    )
                     near = reach + 0.5 * bend * within * within
                     nearest = -(x * vx + y * vy) / (vx * vx + vy * vy + NEVER_ZERO)
                     nearest = min(max(nearest, 0.0), within)
-                    if math.hypot(x + nearest * vx, y + nearest * vy) > near:
+                    beside_x, beside_y = x + nearest * vx, y + nearest * vy
+                    if beside_x * beside_x + beside_y * beside_y > near * near:
                         continue
                     until = until_turning_touch(
                         (x, y, c, s, speed, slide, rate, other_speed, other_rate),
@@ -267,12 +270,13 @@ def least_worst_case(
                 vx, vy = ahead_mps[future, instant, user], left_mps[future, instant, user]
                 until, least = 0.0, least_s[future]
                 if least < math.inf:
-                    away = math.hypot(x + vx * least, y + vy * least)
+                    px, py = x + vx * least, y + vy * least
+                    away = math.sqrt(px * px + py * py)
                     if away > reach + 0.5 * accel_mps2 * least * least:
                         continue
                 for _ in range(_MOST_STEPS):
                     px, py = x + vx * until, y + vy * until
-                    away = math.hypot(px, py)
+                    away = math.sqrt(px * px + py * py)
                     gap = away - reach - 0.5 * accel_mps2 * until * until
                     if gap <= _CLOSE_M or until > least:
                         break

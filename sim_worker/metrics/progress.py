@@ -48,7 +48,7 @@ def off_road_share(view: RolloutView) -> Measure:
 
     The ground is 0.3 m wider than drawn: nuPlan, drivable_area_compliance.
     """
-    off = view.keep(_off_road)
+    off = view.keep(off_road)
     share: Array = np.empty(len(off))
     np.mean(off, axis=1, out=share)
     return view.measure(share)
@@ -56,10 +56,14 @@ def off_road_share(view: RolloutView) -> Measure:
 
 def on_road(view: RolloutView) -> Measure:
     """Whether all corners stay on drivable ground at all instants (S,): 1 or 0."""
-    return view.measure((~np.asarray(view.keep(_off_road).any(axis=1))).astype(np.float64))
+    return view.measure((~np.asarray(view.keep(off_road).any(axis=1))).astype(np.float64))
 
 
-def _off_road(view: RolloutView) -> Flags:
+def off_road(view: RolloutView) -> Flags:
+    """Return at which instants (S, N) a corner of the ego is off the drivable ground.
+
+    Raises ValueError where there is no World.
+    """
     ground = view.context.ground
     if ground is None:
         raise ValueError("drivable area: no World given")

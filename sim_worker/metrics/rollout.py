@@ -17,6 +17,7 @@ from foretwin.contracts.futures import STATE_COLUMNS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.lane_areas import LaneAreas
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.rules.signal_state import HeardCycle, LiveColour
@@ -66,6 +67,7 @@ class Context(NamedTuple):
     path: FrenetPath | None = None
     ground: DrivableGround | None = None
     rules: RouteRules | None = None
+    lanes: LaneAreas | None = None
     reference: Array | None = None
     user_mass_kg: Array | None = None
     start_s: float = 0.0

@@ -105,7 +105,7 @@ def _priority(world: World, conflict: Conflict, by_id: dict[str, Connection]) ->
     entry = next(lane.centerline for lane in world.lanes if lane.id == other.from_lane_id)
     way = FrenetPath(np.concatenate([_last(np.asarray(entry), _APPROACH_M), other.centerline]))
     point = np.asarray(conflict.point)
-    own_way = _direction(np.asarray(own.centerline), point)
+    own_way = direction_near(np.asarray(own.centerline), point)
     along = (np.asarray(conflict.area) - point) @ own_way
     arcs = way.locate(np.vstack([point, conflict.area])).arc_m
     merging = conflict.kind == "merging"
@@ -123,7 +123,7 @@ def _priority(world: World, conflict: Conflict, by_id: dict[str, Connection]) ->
     )
 
 
-def _direction(line: Array, point: Array) -> Array:
+def direction_near(line: Array, point: Array) -> Array:
     """Return the unit direction (2,) of a line (N, 2) where it comes nearest to `point`."""
     steps = np.diff(line, axis=0)
     middle = line[:-1] + steps / 2.0

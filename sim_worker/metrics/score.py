@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics.comfort import comfortable
 from foretwin.sim_worker.metrics.impact import at_fault_collision
 from foretwin.sim_worker.metrics.progress import backwards, on_road, progress
@@ -32,11 +33,18 @@ def driving_score(view: RolloutView) -> Measure:
     gates = gates * on_road(view).values
     back = backwards(view).values
     gates = gates * np.where(back <= _BACK_M[0], 1.0, np.where(back <= _BACK_M[1], 0.5, 0.0))
-    way = np.maximum(progress(view).values, 0.0)
-    farthest = float(np.max(way[view.valid & (gates > 0.0)], initial=0.0))
-    ratio = np.minimum(way / farthest, 1.0) if farthest > _LEAST_PROGRESS_M else np.ones_like(way)
+    ratio = relative_progress(view, np.where(gates > 0.0, 1.0, 0.0))
     in_time = (ttc(view).values >= TTC_BOUND_S).astype(np.float64)
     mean = (
         TTC_WEIGHT * in_time + PROGRESS_WEIGHT * ratio + COMFORT_WEIGHT * comfortable(view).values
     ) / (TTC_WEIGHT + PROGRESS_WEIGHT + COMFORT_WEIGHT)
     return view.measure(gates * mean)
+
+
+def relative_progress(view: RolloutView, gates: Array) -> Array:
+    """Return progress (S,) as a share of the most that is made, times `gates` (S,), by any."""
+    way = np.maximum(progress(view).values, 0.0)
+    farthest = float(np.max((way * gates)[view.valid], initial=0.0))
+    if farthest <= _LEAST_PROGRESS_M:
+        return np.ones_like(way)
+    return np.asarray(np.minimum(way / farthest, 1.0))

@@ -10,6 +10,7 @@ from foretwin.sim_worker.metrics import (
     comfort,
     displacement,
     encroachment,
+    extended_score,
     following,
     impact,
     progress,
@@ -21,7 +22,7 @@ from foretwin.sim_worker.metrics import (
 )
 from foretwin.sim_worker.metrics.rollout import Context, Measure, Rollout, RolloutView
 
-Need = Literal["path", "ground", "rules", "reference", "user_mass_kg"]
+Need = Literal["path", "ground", "rules", "lanes", "reference", "user_mass_kg"]
 """Fields of `Context` without which a metric cannot be computed."""
 Better = Literal["lower", "higher", "neither"]
 
@@ -38,6 +39,7 @@ class Metric(NamedTuple):
 
 
 _DRIVEN: tuple[Need, ...] = ("path", "ground")
+_ROUTED: tuple[Need, ...] = ("path", "ground", "rules", "lanes")
 
 METRICS = MappingProxyType(
     {
@@ -96,6 +98,16 @@ METRICS = MappingProxyType(
             violations.right_of_way_violations, "1", "lower", ("rules",)
         ),
         "driving_score": Metric(score.driving_score, "1", "higher", _DRIVEN),
+        "epdms": Metric(extended_score.extended_score, "1", "higher", _ROUTED),
+        "epdms_no_fault": Metric(extended_score.no_at_fault, "1", "higher", ("ground", "lanes")),
+        "epdms_direction": Metric(
+            extended_score.driving_direction, "1", "higher", ("path", "lanes")
+        ),
+        "epdms_lights": Metric(extended_score.traffic_lights, "1", "higher", ("rules",)),
+        "epdms_ttc": Metric(
+            extended_score.time_to_collision_kept, "1", "higher", ("ground", "lanes")
+        ),
+        "epdms_lane": Metric(extended_score.lane_keeping, "1", "higher", ("path", "lanes")),
     }
 )
 

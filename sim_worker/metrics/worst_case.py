@@ -19,8 +19,11 @@ def worst_time_to_collision(view: RolloutView) -> Measure:
     least = np.full(len(view.valid), np.inf)
     if view.there.any():
         reach_m = float(np.hypot(view.half_length_m, view.half_width_m))
+        seen = view.relative
+        # The middle of a car that turns goes aside of base_link.
+        aside_mps = seen.left_mps - (view.centre_ahead_m * view.states[..., 5])[..., None]
         compiled_touch.least_worst_case(
-            tuple(view.relative[:6]), view.user_half_m, reach_m, 2.0 * MAX_DECEL_MPS2, least
+            (*seen[:5], aside_mps), view.user_half_m, reach_m, 2.0 * MAX_DECEL_MPS2, least
         )
         least[~view.there.any(axis=(1, 2))] = np.inf
     return view.measure(least)

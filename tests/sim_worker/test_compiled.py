@@ -86,7 +86,8 @@ def test_all_is_compiled_once_it_is_imported_and_nothing_later() -> None:
     assert set(KERNELS) == {
         "locate", "curve", "free_road", "forces", "ramp", "read_base", "all_sane", "cheapest_walks",
         "least_until_touch", "find_leaders", "stays_on_strips", "come_near", "least_m", "may_touch",
-        "least_worst_case", "until_turning_touch", "_apart", "_arc", "_relative_at",
+        "find_overlaps", "least_worst_case", "until_turning_touch", "_apart", "_arc",
+        "_relative_at",
     }  # fmt: skip
     assert {name: len(found) for name, found in signatures().items()} == dict.fromkeys(KERNELS, 1)
     with pytest.raises(TypeError, match="No matching definition"):

@@ -14,6 +14,7 @@ from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.world import Arm, Conflict, StopLine, World, WorldJunction
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.lane_areas import LaneAreas
 from foretwin.sim_worker.metrics.rollout import Context
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from tests.sim_worker.places import crossroads, straight_path
@@ -87,5 +88,9 @@ def context(
     world = junction(lights=lights)
     way = FrenetPath(straight_path().xy_m) if path is None else path
     return Context(
-        path=way, ground=DrivableGround(world), rules=RouteRules(world, way), start_s=start_s
+        path=way,
+        ground=DrivableGround(world),
+        rules=RouteRules(world, way),
+        lanes=LaneAreas(world),
+        start_s=start_s,
     )

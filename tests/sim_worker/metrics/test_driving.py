@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -285,3 +287,13 @@ def test_the_table_says_what_is_computable() -> None:
     for name, measure in evaluate(driven, context=given).items():
         shape = (1, 81) if METRICS[name].series else (1,)
         assert measure.values.shape == measure.valid.shape == shape, name
+
+
+def test_the_documentation_names_every_metric_in_its_order_with_its_unit() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "metrics.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:3] for line in text.splitlines() if line.startswith("| `")]
+    told = [(name, unit) for names, unit in rows[1:] for name in re.findall(r"`(\w+)`", names)]
+
+    assert sorted(name for name, _ in told) == sorted(METRICS)
+    for name, unit in told:
+        assert METRICS[name].unit in unit.strip().split(", "), name

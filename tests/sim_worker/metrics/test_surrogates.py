@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from foretwin.contracts.arrays import Array
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.metrics.encroachment import STOPPING_DECEL_MPS2
 from foretwin.sim_worker.metrics.rollout import Rollout
@@ -26,7 +22,6 @@ COVERS = (
     "foretwin.sim_worker.metrics.time_to_collision",
 )
 
-FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/crime.json").read_text())
 HALF_M = LENGTH_M / 2
 speeds = st.floats(2.0, 25.0)
 sizes = st.tuples(st.floats(0.5, 12.0), st.floats(0.4, 2.5))
@@ -141,57 +136,6 @@ def test_time_to_collision_is_when_outlines_come_to_touch(
         assert apart(ttc - 1e-3) > 0.0
     else:
         assert min(apart(t) for t in np.linspace(0.0, 60.0 / speed, 300)) > 0.0
-
-
-@pytest.mark.parametrize(("name", "scene"), FROZEN["scenes"].items())
-def test_ten_scenes_are_what_commonroad_crime_finds(name: str, scene: dict[str, object]) -> None:
-    """It works with whole steps and rounds to 0.01."""
-    step_s, found = FROZEN["step_s"], scene["found"]
-    expected = {
-        key: math.inf if value is None else abs(value)
-        for key, value in found.items()  # type: ignore[attr-defined]
-    }
-    if "PET" in expected:
-        driven = frozen_rollout(scene, times(FROZEN["until_s"], step_s))
-        assert value(driven, "pet") == pytest.approx(expected["PET"], abs=2 * step_s)
-        return
-    driven = frozen_rollout(scene, np.array([0.0, 1e-6]))
-    # Theirs follows the leader's rear of now with the ego's later states, in whole steps.
-    assert value(driven, "thw") == pytest.approx(expected["THW"], abs=step_s + 0.005)
-    if name == "faster_leader":
-        # Theirs squares the speed at which the gap grows.
-        assert value(driven, "required_acceleration") == 0.0
-        return
-    assert value(driven, "required_deceleration") == pytest.approx(expected["ALongReq"], abs=0.0051)
-    if name != "accelerating_leader":
-        # There theirs is the time with constant accelerations. Below it enters rounded.
-        assert value(driven, "ttc") == pytest.approx(expected["TTC"], abs=0.0051)
-        for ours, theirs in (
-            ("required_lateral_acceleration", "ALatReq"),
-            ("required_acceleration", "AReq"),
-        ):
-            assert value(driven, ours) == pytest.approx(expected[theirs], abs=0.0071)
-
-
-def frozen_rollout(scene: dict[str, object], time_s: Array) -> Rollout:
-    x, y, yaw, speed, _ = scene["ego"]  # type: ignore[misc]
-    ox, oy, other_yaw, other_mps, accel, length, width = scene["other"]  # type: ignore[misc]
-    other = Mover(ox, oy, other_yaw, other_mps, length, width)
-    driven = rollout(Mover(x, y, yaw, speed), other, time_s=time_s)
-    way = accel * time_s**2 / 2
-    driven.users[0, :, 0, 0] += way * math.cos(other_yaw)
-    driven.users[0, :, 0, 1] += way * math.sin(other_yaw)
-    driven.user_speed_mps[0, :, 0] += accel * time_s
-    size = scene["ego_size_m"]
-    changed = {
-        "length_m": msgspec.structs.replace(VEHICLE.length_m, value=size[0]),  # type: ignore[index]
-        "width_m": msgspec.structs.replace(VEHICLE.width_m, value=size[1]),  # type: ignore[index]
-    }
-    vehicle = msgspec.structs.replace(VEHICLE, **changed)
-    moved = VEHICLE.length_m.value / 2 - size[0] / 2  # type: ignore[index]
-    driven.states[0, :, 0] += moved * math.cos(yaw)
-    driven.states[0, :, 1] += moved * math.sin(yaw)
-    return driven._replace(vehicle=vehicle)
 
 
 @settings(max_examples=60)
