@@ -39,16 +39,17 @@ class Sighting(NamedTuple):
 class StepFacts(NamedTuple):
     """What happened to S cars in one step, each (S,): a reward is a function of these.
 
-    `progress_m` along the path, `speed_mps` after the step, `target_speed_mps`, `accel_mps2`,
-    `lateral_accel_mps2` and `jerk_mps3`. `collided` with a road user, building or island;
-    `off_road` with the middle of the car, or far beside the path; `arrived` at the path's end;
-    `ran_red` over a stop line, `did_not_wait` where others have priority and need the ground;
-    `failed` where the physics diverged.
+    `progress_m` along the path, `speed_mps` after the step and `speed_gain_mps` in it,
+    `target_speed_mps`, `accel_mps2`, `lateral_accel_mps2` and `jerk_mps3`. `collided` with a road
+    user, building or island; `off_road` with the middle of the car, or far beside the path;
+    `arrived` at the path's end; `ran_red` over a stop line, `did_not_wait` where others have
+    priority and need the ground; `failed` where the physics diverged.
     """
 
     dt_s: float
     progress_m: Array
     speed_mps: Array
+    speed_gain_mps: Array
     target_speed_mps: Array
     accel_mps2: Array
     lateral_accel_mps2: Array
@@ -152,6 +153,7 @@ class EpisodeRows:
             dt_s=dt_s,
             progress_m=place.arc_m - seen.view.arc_m,
             speed_mps=after[:, 3].copy(),
+            speed_gain_mps=after[:, 3] - before[:, 3],
             target_speed_mps=np.array(seen.view.target_speed_mps),
             accel_mps2=accel.copy(),
             lateral_accel_mps2=after[:, 3] * after[:, 5],
