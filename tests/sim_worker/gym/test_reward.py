@@ -53,6 +53,8 @@ def test_discomfort_takes_a_share_of_the_metres_and_nothing_of_who_stands() -> N
 def test_events_settle_once_each() -> None:
     assert worth(collided=True) == pytest.approx(QUIET + COLLISION)
     assert worth(off_road=True, failed=True) == pytest.approx(QUIET + OFF_ROAD)
+    # What the crash takes off the speed is no loss of potential on top.
+    assert worth(collided=True, speed_gain_mps=-6.0) == pytest.approx(QUIET + COLLISION)
     assert worth(arrived=True) == pytest.approx(QUIET + ARRIVED)
     assert worth(ran_red=True) == pytest.approx(QUIET + RAN_RED)
     assert worth(did_not_wait=True) == pytest.approx(QUIET + DID_NOT_WAIT)

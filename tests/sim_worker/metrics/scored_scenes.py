@@ -1,4 +1,4 @@
-"""Fourteen scenes at the drawn crossroads for the parts of the extended score.
+"""Seventeen scenes at the drawn crossroads for the parts of the extended score.
 
 In each the ego drives 4 s by itself in the first future, and steadily along its lane in the second.
 """
@@ -87,6 +87,11 @@ SCENES = {
         along(-50, 4, y=1.5), parts={"ddc": 0.5, "lk": 0.0}
     ),
     "beside_the_middle": Scored(along(-50, 7, y=-0.9), parts={"lk": 0.0}),
+    "slowly_on_the_wrong_side": Scored(along(-50, 1.9, y=1.5), parts={"ddc": 0.5, "lk": 0.0}),
+    "beside_the_middle_before_and_behind": Scored(along(-14, 7, y=-0.9), parts={"lk": 0.0}),
+    "backwards_into_who_stands": Scored(
+        along(-50, -3), (Mover(-58, -1.5, 0, 0),), parts={"nc": 0.0}
+    ),
     "off_the_road": Scored(
         swerving(-50, 8, -4.2), parts={"dac": 0.0, "ddc": 0.0, "lk": 0.0}
     ),

@@ -104,7 +104,7 @@ def test_outlines_on_arcs_come_to_touch_then_and_not_before(seed: int) -> None:
     random = np.random.default_rng(seed)
     yaw, bearing = random.uniform(-math.pi, math.pi, 2)
     ahead, left = random.uniform(4.0, 30.0) * np.array([math.cos(bearing), math.sin(bearing)])
-    speed, slide, other_mps = random.uniform([-2.0, -0.5, -3.0], [14.0, 0.5, 14.0])
+    speed, slide, other_mps = random.uniform([-2.0, -6.0, -3.0], [14.0, 6.0, 14.0])
     rate, other_rate = random.uniform(-0.8, 0.8, 2)
     half_m, other_half_m = tuple(random.uniform(0.4, 3.0, 2)), tuple(random.uniform(0.2, 6.0, 2))
     pair = ahead, left, math.cos(yaw), math.sin(yaw), speed, slide, rate, other_mps, other_rate
