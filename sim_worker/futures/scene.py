@@ -42,7 +42,6 @@ _MAX_OFFSET_M = 8.0
 _CAR_WITHIN_M = 60.0
 """The car is looked for on this much of the path's beginning."""
 
-
 _PERCEPTION: tuple[Quantity, ...] = (
     "perception.delay_s",
     "perception.lost_from_s",
