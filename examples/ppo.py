@@ -27,7 +27,7 @@ CARS, HELD_OUT, STEPS = 8, 128, 500_000
 ENDS = "collided", "off_road", "arrived"
 
 
-class SideBySide(VecEnv):
+class CarsForLearner(VecEnv):
     """A `JunctionVectorEnv` as stable-baselines3 wants it: what is over begins anew at once."""
 
     def __init__(self, envs: JunctionVectorEnv) -> None:
@@ -93,7 +93,7 @@ def learn(world: Any, *, seed: int, steps: int, **settings: Any) -> list[dict[st
     """Return the scores on cases never seen before learning and after it."""
     envs = JunctionVectorEnv(CARS, world, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
     held_out = JunctionVectorEnv(HELD_OUT, world, cases=HELD_OUT, cases_seed=1, **settings)
-    model = PPO("MlpPolicy", SideBySide(envs), seed=seed, device="cpu")
+    model = PPO("MlpPolicy", CarsForLearner(envs), seed=seed, device="cpu")
     before = score(model, held_out)
     model.learn(steps)
     return [before, score(model, held_out)]
