@@ -43,10 +43,8 @@ _CAR_WITHIN_M = 60.0
 """The car is looked for on this much of the path's beginning."""
 
 _PERCEPTION: tuple[Quantity, ...] = (
-    "perception.delay_s",
-    "perception.lost_from_s",
-    "perception.lost_for_s",
-)
+    "perception.delay_s", "perception.lost_from_s", "perception.lost_for_s",
+)  # fmt: skip
 """In the order of `PerceptionFaults`."""
 
 
