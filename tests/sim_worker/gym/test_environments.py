@@ -168,7 +168,7 @@ def test_leaving_the_road_ends_an_episode_at_a_cost() -> None:
 
     assert terminated
     assert info["off_road"]
-    assert reward < -15.0
+    assert reward < -0.5
 
 
 def test_a_reward_can_be_given() -> None:
