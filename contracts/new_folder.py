@@ -68,7 +68,7 @@ def trouble_with_folder(path: Path) -> str | None:
     try:
         if not there.is_dir():
             return "is no folder" if there == path else f"{there} is no folder"
-        _try(path)
+        _try(there, path)
     except OSError as error:
         # What the system says of its own folders is no such file.
         why = "" if error.errno in _PLAIN else f": {(error.strerror or str(error)).lower()}"
@@ -76,12 +76,11 @@ def trouble_with_folder(path: Path) -> str | None:
     return None
 
 
-def _try(path: Path) -> None:
-    with contextlib.suppress(_TriedError), new_folder(path):
-        with tempfile.TemporaryFile(dir=path):
-            pass
-        raise _TriedError
-
-
-class _TriedError(Exception):
-    """Nothing is wrong: what was made goes again."""
+def _try(there: Path, path: Path) -> None:
+    with contextlib.ExitStack() as tried:
+        if there != path:
+            # Under a name of its own: others may ask the same at once, and find nothing half made.
+            own = Path(tried.enter_context(tempfile.TemporaryDirectory(dir=there)))
+            path = own / path.relative_to(there)
+            path.mkdir(parents=True)
+        tried.enter_context(tempfile.TemporaryFile(dir=path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,14 @@ def test_it_is_tried_and_leaves_nothing(tmp_path: Path) -> None:
     for folder in (tmp_path / "there", tmp_path / "a" / "b"):
         assert trouble_with_folder(folder) is None
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+
+
+def test_many_may_try_the_same_folder_at_once(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with ThreadPoolExecutor(4) as threads:
+        told = set(threads.map(trouble_with_folder, [folder] * 400))
+    assert told == {None}
+    assert not folder.exists()
 
 
 def test_folders_of_the_system_take_nothing(tmp_path: Path) -> None:
