@@ -70,16 +70,24 @@ def clocks_of(table: LooseTable) -> list[ClockColumn]:
             first_s = numbers[0] * scale
             utc = _UTC_S[0] < first_s < _UTC_S[1]
             base: TimeBase = "utc" if utc else "log" if abs(first_s) < 1.0 else "boot"
-            said = {
-                "utc": f"seconds since 1970 from {_day(round(first_s * 1e9))}"
-                " (GPS time would lie 10 years on: no table tells it from UTC)",
-                "log": "from zero",
-                "boot": f"from {first_s:.3f} s: since some start, as data tell",
-            }[base]
+            said = _said(base, first_s)
             # A clock that stands for rows is another's, repeated; one by one it may be a counter.
             rank = (0.0 if utc else 1.0) + 2.0 * counts + 2.0 * (rises < _RISES)
             found.append((rank, ClockColumn(name, unit, base, time_s, counts, said)))
     return [clock for _, clock in sorted(found, key=lambda one: one[0])]
+
+
+def _said(base: TimeBase, first_s: float) -> str:
+    """Return in words where a clock's zero lies."""
+    if base == "utc":
+        day = _day(round(first_s * 1e9))
+        return (
+            f"seconds since 1970 from {day}"
+            " (GPS time would lie 10 years on: no table tells it from UTC)"
+        )
+    if base == "log":
+        return "from zero"
+    return f"from {first_s:.3f} s: since some start, as data tell"
 
 
 def _rises(values: Array) -> float:

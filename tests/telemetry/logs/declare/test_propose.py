@@ -24,7 +24,6 @@ from tests.telemetry.logs.declare.judged import judged
 COVERS = (
     "foretwin.telemetry.logs.declare",
     "foretwin.telemetry.logs.declare.choice",
-    "foretwin.telemetry.logs.declare.clock",
     "foretwin.telemetry.logs.declare.likeness",
     "foretwin.telemetry.logs.declare.loose_table",
     "foretwin.telemetry.logs.declare.motion",
