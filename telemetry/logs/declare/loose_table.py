@@ -55,8 +55,11 @@ def read_loose_table(path: Path) -> LooseTable:
             raise LogError(f"{path}: no Parquet table that can be read: {error}") from error
     else:
         text = path.read_bytes().decode("utf-8-sig", errors="replace")
-        shape = _shape(path, text)
-        table = _parsed(path, text, *shape)
+        try:
+            shape = _shape(path, text)
+            table = _parsed(path, text, *shape)
+        except csv.Error as error:
+            raise LogError(f"{path}: no table of text: {error}") from error
     columns: dict[str, Array] = {}
     times: dict[str, Stamps] = {}
     texts = []

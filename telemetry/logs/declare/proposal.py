@@ -47,13 +47,14 @@ class Proposal:
     question: OpenQuestion | None = None
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def propose(
     path: Path, *, answers: dict[str, str] | None = None, country_of: CountryOf | None = None
 ) -> Proposal:
     """Propose the declaration of a table.
 
     Raises LogError where the file is no table, has no time or no positions of a drive, or an answer
-    does not fit.
+    does not fit. Numbers of a damaged file that are too large to reckon with are like no others.
     """
     answers = answers or {}
     for key in answers:

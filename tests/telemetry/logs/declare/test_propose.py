@@ -25,7 +25,6 @@ COVERS = (
     "foretwin.telemetry.logs.declare",
     "foretwin.telemetry.logs.declare.choice",
     "foretwin.telemetry.logs.declare.likeness",
-    "foretwin.telemetry.logs.declare.loose_table",
     "foretwin.telemetry.logs.declare.motion",
     "foretwin.telemetry.logs.declare.names",
     "foretwin.telemetry.logs.declare.places",
