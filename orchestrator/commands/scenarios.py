@@ -167,7 +167,7 @@ def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:
         cases = sorted(row.not_playable.items(), key=lambda item: -item[1])
         lines += [f"{count} cases: {reason}" for reason, count in cases]
         played = f"{row.playable} of {row.cases}"
-        rows.append((row.id, row.placed, row.applies, row.looked_at, played, "\n".join(lines)))
+        rows.append((row.id, row.placed, row.applies, row.looked_at, played, "; ".join(lines)))
     columns = (
         Column("id", no_wrap=True),
         "placed",

@@ -113,9 +113,13 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     for entry in summary["scenarios"]:
         for reason, count in entry["reasons"].items():
             say(plain(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}"))
-        for reason, count in entry["not_placed"].items():
-            say(
-                plain(f"not placed: {count} of {entry['scenario']} by {entry['planner']}: {reason}")
-            )
+    # Where a case can be played is the same for all planners.
+    not_placed = {
+        (entry["scenario"], reason): f"not placed: {count} of {entry['scenario']}: {reason}"
+        for entry in summary["scenarios"]
+        for reason, count in entry["not_placed"].items()
+    }
+    for line in not_placed.values():
+        say(plain(line))
     say(f"sha256 of the rows: {summary['rows_sha256']}")
     say(summary["attribution"])
