@@ -21,7 +21,7 @@ HEEDLESS_BRISKNESS = 1.6
 """By so much the accelerations of who heeds nobody exceed an ordinary driver's in bends. Chosen:
 4.0 m/s² across are half of what holds a car on a dry road."""
 BEND_DECEL_MPS2 = 0.9
-"""Before bends, of other drivers who take LATERAL_ACCEL_MPS2 in them. Fitted on Mcity, as what
+"""Before bends, of other drivers who take LATERAL_ACCEL_MPS2 in them. Chosen by hand, with what
 stands at OTHERS_TIME_GAP_S."""
 CURVE_TIME_S = 0.5
 """So far ahead a bend's speed counts: it is to be driven by then. Chosen."""
@@ -44,8 +44,8 @@ BRISK_TIME_GAP_S = 1.2
 paper's 1.6 s."""
 OTHERS_TIME_GAP_S = 0.5, 0.26
 """IDM's T of other drivers: median, and standard deviation of its logarithm. Fitted on Mcity's cars
-with satellite receivers (MIT licence), `python -m tests.sim_worker.realism --fit mcity`, but not to
-less than half a second."""
+with satellite receivers (MIT licence): begun by `python -m tests.sim_worker.realism --fit mcity`,
+ended by choosing the nearest of nine tried by hand, none with less than half a second."""
 OTHERS_ACCEL_MPS2 = 0.75, 0.45
 """IDM's a of other drivers of cars; of other kinds as their acceleration is to a car's. Fitted as
 above."""
