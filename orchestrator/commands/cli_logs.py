@@ -7,6 +7,12 @@ from typing import Annotated
 
 import typer
 
+from foretwin.orchestrator.commands.cli_options import (
+    DeclarationOption,
+    FirstDeclarationOption,
+    OtherDeclarationOption,
+)
+
 
 def convert(
     source: Annotated[Path, typer.Argument(help="recorded drive")],
@@ -51,14 +57,8 @@ def merge(
         Path, typer.Argument(metavar="LOG_B", help="another recording of the same drive")
     ],
     target: Annotated[Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder")],
-    declaration: Annotated[
-        Path | None,
-        typer.Option("--declaration", help="TOML that declares LOG_A; else LOG_A.toml"),
-    ] = None,
-    other_declaration: Annotated[
-        Path | None,
-        typer.Option("--other-declaration", help="TOML that declares LOG_B; else LOG_B.toml"),
-    ] = None,
+    declaration: FirstDeclarationOption = None,
+    other_declaration: OtherDeclarationOption = None,
 ) -> None:
     """Put two recordings of one drive on one clock, by how the car moved, and write them as one."""
     asked = locals()
@@ -76,10 +76,7 @@ def identify(
     out: Annotated[
         Path | None, typer.Option(help="folder for plots and a vehicle file with what was taken")
     ] = None,
-    declaration: Annotated[
-        Path | None,
-        typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml"),
-    ] = None,
+    declaration: DeclarationOption = None,
 ) -> None:
     """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
     from foretwin.orchestrator.commands.identify import identify_log
@@ -141,10 +138,7 @@ def gap(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
-    declaration: Annotated[
-        Path | None,
-        typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml"),
-    ] = None,
+    declaration: DeclarationOption = None,
     against: Annotated[
         Path | None, typer.Option(help="another drive of this road: how far people differ on it")
     ] = None,
@@ -163,14 +157,8 @@ def compare(
     ],
     as_json: Annotated[bool, typer.Option("--json", help="all of it as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="folder for a picture")] = None,
-    declaration: Annotated[
-        Path | None,
-        typer.Option("--declaration", help="TOML that declares LOG_A; else LOG_A.toml"),
-    ] = None,
-    other_declaration: Annotated[
-        Path | None,
-        typer.Option("--other-declaration", help="TOML that declares LOG_B; else LOG_B.toml"),
-    ] = None,
+    declaration: FirstDeclarationOption = None,
+    other_declaration: OtherDeclarationOption = None,
 ) -> None:
     """Compare two drives of one road: how far people differ where nothing is wrong."""
     asked = locals()

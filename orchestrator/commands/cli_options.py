@@ -30,6 +30,16 @@ TracksOption = Annotated[
         "--tracks", help="lanes lie where you drove: own, or a store's folder [default: none]"
     ),
 ]
+DeclarationOption = Annotated[
+    Path | None, typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml")
+]
+FirstDeclarationOption = Annotated[
+    Path | None, typer.Option("--declaration", help="TOML that declares LOG_A; else LOG_A.toml")
+]
+OtherDeclarationOption = Annotated[
+    Path | None,
+    typer.Option("--other-declaration", help="TOML that declares LOG_B; else LOG_B.toml"),
+]
 LeastFuturesOption = Annotated[
     int | None,
     typer.Option(

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from foretwin.orchestrator.commands.cli_options import DeclarationOption
+
 tracks = typer.Typer(
     help="Where your car drove, to correct lanes by (docs/tracks.md): yours to list and delete.",
     no_args_is_help=True,
@@ -38,9 +40,7 @@ def add(
             "log does not tell: a phone in a town 3, RTK 0.02",
         ),
     ] = None,
-    declaration: Annotated[
-        Path | None, typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml")
-    ] = None,
+    declaration: DeclarationOption = None,
 ) -> None:
     """Keep where a recorded drive went."""
     from foretwin.orchestrator.commands.tracks import add_track
