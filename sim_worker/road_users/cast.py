@@ -25,7 +25,7 @@ class Player(NamedTuple):
     """One road user of one future; arc lengths are those of its box centre on its own path.
 
     `speed_mps` is what it drives where no bend asks for less, of the law-abiding the one to begin
-    with.     `size_m` is length and width where measured, else that of its kind. Who stops does so
+    with. `size_m` is length and width where measured, else that of its kind. Who stops does so
     `acts_after_s` after the start; `hidden_by` names another actor of the future; `known` is who
     the real car perceives, whatever the map says.
     """
@@ -49,8 +49,8 @@ class RoadUserArrays(NamedTuple):
     """The crowd of a job, and the paths that it moves on.
 
     `paths` are all that are driven on, the ego's first; `paces` how those get on along them who
-    react to nobody; `replay` has where those are who come
-    first in every future, if they were recorded.
+    react to nobody; `replay` has where those are who come first in every future, if they were
+    recorded.
     """
 
     crowd: Crowd
@@ -70,8 +70,8 @@ def casting(
     """Lay the road users of S futures out as arrays; places without one are not present.
 
     Those `replayed` come first in each; their `path_of` counts on after the paths. `keys` (S,) name
-    the futures: by them and by their own names the law-abiding have their manners,
-    drawn from `spreads`.
+    the futures: by them and by their own names the law-abiding have their manners, drawn from
+    `spreads`.
     """
     first = len(replayed)
     shape = (len(casts), first + max(map(len, casts), default=0))

@@ -24,7 +24,9 @@ _CROSS_RAD, _SQUARE_RAD = math.radians(20.0), math.radians(50.0)
 do those that meet within so much of the same or the opposite heading. Chosen."""
 _ASIDE_M, _BEYOND_M = 1.5, 5.0
 """So far on either side of the ego's way is who crosses it, so far from the junction."""
-_OFF_LANES_M = 1.0
+_APPROACH_M, _OFF_LANES_M = 40.0, 1.0
+_NO_WALKING = frozenset(("motorway", "motorway_link"))
+_SLOW = frozenset(("pedestrian", "bicycle"))
 _QUARTERS = {"straight": 0, "across": 1, "near": -1}
 _FROM = {"from_near": 1, "oncoming": 2, "from_across": -1}
 """Quarters of a turn to the left, where traffic keeps right: turns, and where others come from."""
@@ -57,11 +59,6 @@ def _limit_mps(way: Way, from_m: float | None = None) -> float:
     nodes = (way.path.arc_m >= from_m) & (way.path.arc_m <= max(way.entry_m - 1.0, from_m))
     at_entry = np.interp(from_m, way.path.arc_m, way.path.speed_limit_mps)
     return float(way.path.speed_limit_mps[nodes].min(initial=float(at_entry)))
-
-
-_APPROACH_M = 40.0
-_NO_WALKING = frozenset(("motorway", "motorway_link"))
-_SLOW = frozenset(("pedestrian", "bicycle"))
 
 
 def _too_fast(who: str, speed_mps: float, limit_mps: float) -> str:

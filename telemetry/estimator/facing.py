@@ -65,21 +65,20 @@ class Facing:
             if speed_mps > 0.5 * CREEPING_MPS:
                 filter_.may_reverse = False
             elif speed_mps < -_FASTEST_REVERSE_MPS or self._reversed_m > _LONGEST_REVERSE_M:
-                return self._gate.course(1.0 + 5.0 * std_m, within_s=_WITHIN_S)
+                return self._long_course(std_m)
             return None
         known = filter_.covariance.item(YAW, YAW) < _KNOWN_YAW_STD**2
-        course = (
-            self.backed_course(std_m)
-            if known
-            else self._gate.course(1.0 + 5.0 * std_m, within_s=_WITHIN_S)
-        )
-        if course is None:
+        backed = self.backed_course(std_m) if known else None
+        if known and backed is None:
             return None
-        turned = abs(math.remainder(course - yaw_before, math.tau))
-        if known and turned > _BACKWARDS_RAD and speed_mps < BACKING_MPS:
+        if (
+            backed is not None
+            and speed_mps < BACKING_MPS
+            and abs(math.remainder(backed - yaw_before, math.tau)) > _BACKWARDS_RAD
+        ):
             self.reverse(filter_, -self._gate.speed_mps())
             return None
-        course = self._gate.course(1.0 + 5.0 * std_m, within_s=_WITHIN_S)
+        course = self._long_course(std_m)
         if course is None or abs(math.remainder(course - yaw_before, math.tau)) <= _TURNED_RAD:
             return None
         return course
@@ -87,3 +86,6 @@ class Facing:
     def backed_course(self, std_m: float) -> float | None:
         """Return the course of the shortest way that fixes good to `std_m` show."""
         return self._gate.course(_BACKED_M + 5.0 * std_m, within_s=_WITHIN_S)
+
+    def _long_course(self, std_m: float) -> float | None:
+        return self._gate.course(1.0 + 5.0 * std_m, within_s=_WITHIN_S)

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import fftconvolve
 
 from foretwin.contracts import drive
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.geometry.shifted_fit import shifted_fit
 from foretwin.telemetry.logs.declare.motion import GRID_S, motion_of, smoothed
 from foretwin.telemetry.logs.log import Log, LogError
@@ -30,6 +30,8 @@ _LEAST_UNLIKE = 0.02
 _MOST_STD_S = 0.1
 _STRETCH_S, _LEAST_STRETCHES = 90.0, 4
 _SURE = 3.0
+_HALF = round(0.5 / GRID_S)
+"""Ticks on either side over which a sensor is smoothed."""
 _LEVER_S = 0.15
 """What a metre between receiver and rear axle looks like at 7 m/s, where turning is that of
 positions."""
@@ -100,7 +102,8 @@ def clock_between(first: Log, second: Log) -> ClockBetween:
     )
     found = []
     for name in common:
-        y, x = _overlaid(theirs[name].values, ours[name].values, late)
+        x = ours[name].values
+        y = _at_ticks_of(x, theirs[name].values, late)
         fit = _fitted(y, x)
         if fit is not None:
             roughly = (
@@ -156,7 +159,7 @@ def signals_of(log: Log) -> dict[str, MotionSignal]:
             found[name] = MotionSignal(smoothed(time_s, values, grid, half=_HALF), by)
     if len(places) > 20 and len(found) < 2:
         time_s, lat, lon = np.array(places).T
-        frame = LocalFrame(_point(lat, lon))
+        frame = LocalFrame(GeoPoint(float(np.median(lat)), float(np.median(lon))))
         motion = motion_of(time_s, local_from_geo(frame, lat, lon), whole=True)
         if motion is not None:
             for name, values in (("turning", motion.turn_radps), ("speed", motion.speed_mps)):
@@ -165,15 +168,6 @@ def signals_of(log: Log) -> dict[str, MotionSignal]:
                     known = np.interp(grid, motion.time_s, np.isfinite(values).astype(float)) > 0.99
                     found[name] = MotionSignal(np.where(known, level, np.nan), "positions")
     return found
-
-
-_HALF = round(0.5 / GRID_S)
-
-
-def _point(lat: Array, lon: Array) -> Any:
-    from foretwin.contracts.frames import GeoPoint
-
-    return GeoPoint(float(np.median(lat)), float(np.median(lon)))
 
 
 def _coarse(first: Log, second: Log, pairs: list[tuple[Array, Array]]) -> tuple[int, float, float]:
@@ -227,13 +221,13 @@ def _likeness(x: Array, y: Array) -> tuple[Array, Array]:
     return np.where(varies, np.clip(like, -1.0, 1.0), -1.0), count
 
 
-def _overlaid(y: Array, x: Array, late: int) -> tuple[Array, Array]:
+def _at_ticks_of(x: Array, y: Array, late: int) -> Array:
     """Return y on x's ticks if y's ticks come `late` after the same of x."""
     out = np.full(len(x), np.nan)
     at = np.arange(len(x)) + late
     inside = (at >= 0) & (at < len(y))
     out[inside] = y[at[inside]]
-    return out, x
+    return out
 
 
 def _fitted(y: Array, x: Array) -> tuple[float, float] | None:

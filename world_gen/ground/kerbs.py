@@ -77,28 +77,30 @@ def _place_borders(paved: Paved, tree: shapely.STRtree, layer: Array) -> list[sh
     if not len(paved.places):
         return []
     rings, owner = shapely.get_rings(paved.places, return_index=True)
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    of = len(paved.roads) + owner
-    inside = ring[1:] == ring[:-1]
-    a, b, mine = points[:-1][inside], points[1:][inside], of[ring[1:][inside]]
-    covered = _covered(points, of[ring], tree, layer)
-    ends = covered[:-1][inside] + 0 + covered[1:][inside]
-    middle = _covered((a + b) / 2, mine, tree, layer)
-    partly = (ends + middle > 0) & (ends + middle < 3)
-    segments = shapely.linestrings(np.stack([a, b], axis=1))
-    kerb, of_kerb = segments[ends + middle == 0], mine[ends + middle == 0]
-    pieces, row = shapely.get_coordinates(
-        shapely.segmentize(segments[partly], SHORTEST_M), return_index=True
+    ends, ring = _segments(rings)
+    mine = len(paved.roads) + owner[ring]
+    places = ends[:, 0], ends.mean(axis=1), ends[:, 1]
+    covered = sum(_covered(at, mine, tree, layer).astype(np.intp) for at in places)
+    free, partly = covered == 0, (covered > 0) & (covered < len(places))
+    split, row = _segments(
+        shapely.segmentize(shapely.linestrings(ends[partly]), max_segment_length=SHORTEST_M)
     )
-    same = row[1:] == row[:-1]
-    pairs, of_pair = np.stack([pieces[:-1], pieces[1:]], axis=1)[same], mine[partly][row[1:][same]]
-    free = ~_covered(pairs.mean(axis=1), of_pair, tree, layer)
-    segments = np.concatenate([kerb, shapely.linestrings(pairs[free])])
-    used, indices = np.unique(np.concatenate([of_kerb, of_pair[free]]), return_inverse=True)
-    order = np.argsort(indices, kind="stable")
+    of_split = mine[partly][row]
+    kept = ~_covered(split.mean(axis=1), of_split, tree, layer)
+    kerbs = np.concatenate([ends[free], split[kept]])
+    used, of_kerb = np.unique(np.concatenate([mine[free], of_split[kept]]), return_inverse=True)
     if not len(used):
         return []
-    return list(shapely.multilinestrings(segments[order], indices=indices[order]))
+    order = np.argsort(of_kerb, kind="stable")
+    lines = shapely.linestrings(kerbs[order])
+    return list(shapely.multilinestrings(lines, indices=of_kerb[order]))
+
+
+def _segments(lines: np.ndarray) -> tuple[Array, Indices]:
+    """Return the ends (K, 2, 2) of all segments of lines, and which line each is of, (K,)."""
+    points, row = shapely.get_coordinates(lines, return_index=True)
+    same = row[1:] == row[:-1]
+    return np.stack([points[:-1], points[1:]], axis=1)[same], row[1:][same]
 
 
 def _covered(points: Array, mine: Indices, tree: shapely.STRtree, layer: Array) -> Flags:
