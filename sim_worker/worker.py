@@ -34,7 +34,7 @@ from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.world_places import places_in
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
-from foretwin.sim_worker.world_file import load_world
+from foretwin.sim_worker.world_file import WorldFolder, WorldSource
 
 _IDLE_S = 0.2
 
@@ -47,14 +47,16 @@ class _Prepared(NamedTuple):
 
 
 class SimulationCache:
-    """Compiled stages of the Worlds used last; loads a World's file on first use."""
+    """Compiled stages of the Worlds used last; fetches a World on first use."""
 
-    def __init__(self, setup: WorkerSetup, vehicle: VehicleParameters) -> None:
-        self._setup, self._vehicle = setup, vehicle
+    def __init__(
+        self, setup: WorkerSetup, vehicle: VehicleParameters, *, worlds: WorldSource
+    ) -> None:
+        self._setup, self._vehicle, self._worlds = setup, vehicle, worlds
         self._stages: OrderedDict[str, _Prepared] = OrderedDict()
 
     def get(self, world_id: str) -> _Prepared:
-        """Return the stage of a World; raises FileNotFoundError where its file is missing."""
+        """Return the stage of a World; raises as its source does where that has it not."""
         if world_id in self._stages:
             self._stages.move_to_end(world_id)
             return self._stages[world_id]
@@ -66,7 +68,7 @@ class SimulationCache:
         return prepared
 
     def _compiled(self, world_id: str) -> _Prepared:
-        setup, world = self._setup, load_world(Path(self._setup.worlds_dir), world_id)
+        setup, world = self._setup, self._worlds.world(world_id)
         stage = BatchSimulation(
             world,
             self._vehicle,
@@ -89,15 +91,24 @@ class SimulationCache:
 
 
 class FuturesWorker:
-    """Answers `prepare`, `use_vehicle`, `job`, `place`: in a process of its own, or in any."""
+    """Answers `prepare`, `use_vehicle`, `job`, `place`: in a process of its own, or in any.
 
-    def __init__(self, setup: WorkerSetup, *, refusals: Refusals | None = None) -> None:
+    Its Worlds come from `worlds`; without, from the folder that the setup names.
+    """
+
+    def __init__(
+        self,
+        setup: WorkerSetup,
+        *,
+        worlds: WorldSource | None = None,
+        refusals: Refusals | None = None,
+    ) -> None:
         self._id = setup.process_id
         self._refusals = Refusals() if refusals is None else refusals
-        self._worlds_dir = Path(setup.worlds_dir)
-        self._stages = SimulationCache(setup, setup.vehicle)
+        self._worlds = WorldFolder(Path(setup.worlds_dir)) if worlds is None else worlds
+        self._stages = self._cache(setup, setup.vehicle)
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
-        self._swept = {name: SimulationCache(setup, v) for name, v in self._vehicles.items()}
+        self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
@@ -105,6 +116,9 @@ class FuturesWorker:
             "job": self._job,
             "place": self._place,
         }
+
+    def _cache(self, setup: WorkerSetup, vehicle: VehicleParameters) -> SimulationCache:
+        return SimulationCache(setup, vehicle, worlds=self._worlds)
 
     def handle(self, request: Request) -> None:
         """Answer one question; never raises: what cannot be answered is refused in one line."""
@@ -166,7 +180,7 @@ class FuturesWorker:
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:
         assert isinstance(question, PlaceRequest)
-        world = load_world(self._worlds_dir, question.world_id)
+        world = self._worlds.world(question.world_id)
         return places_in(world, question, self._vehicles[question.vehicle])
 
 

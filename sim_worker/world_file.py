@@ -1,11 +1,30 @@
-"""A run's Worlds by their ids, as the orchestrator leaves them for the workers."""
+"""Where a worker gets the Worlds of its jobs from, by their ids."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple, Protocol
 
 from foretwin.contracts.codec import read_message
 from foretwin.contracts.world import World
+
+
+class WorldSource(Protocol):
+    """Has Worlds by their ids: a folder, or whatever brings them to this machine."""
+
+    def world(self, world_id: str) -> World:
+        """Return a World; raises OSError where it is not there, SchemaMismatch where what is there
+        is not it, each naming where."""
+
+
+class WorldFolder(NamedTuple):
+    """The folder in which the orchestrator leaves the Worlds of a run."""
+
+    folder: Path
+
+    def world(self, world_id: str) -> World:
+        """Read a World's file; see WorldSource."""
+        return load_world(self.folder, world_id)
 
 
 def load_world(worlds_dir: Path, world_id: str) -> World:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
-from foretwin.contracts.codec import content_parts
 from foretwin.contracts.elevation import Elevation
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
@@ -20,6 +18,7 @@ from foretwin.contracts.world import (
     World,
     WorldJunction,
 )
+from foretwin.contracts.world_identity import with_id
 from foretwin.world_gen.connections.connection_paths import draw_paths
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft, connect
 from foretwin.world_gen.connections.movements import movements
@@ -234,15 +233,6 @@ def _elevation(
     found = world_elevation(around, index.profiles, edge_of, lanes.roads, finished, joined)
     notes.extend(found.notes)
     return found.elevation
-
-
-def with_id(world: World) -> World:
-    """Return the World with the id that its content has: 16 hex digits of a SHA-256."""
-    nameless = msgspec.structs.replace(world, id="")
-    digest = hashlib.sha256()
-    for part in content_parts(nameless):
-        digest.update(part)
-    return msgspec.structs.replace(nameless, id=digest.hexdigest()[:16])
 
 
 def _connections(

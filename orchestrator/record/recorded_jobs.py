@@ -18,6 +18,7 @@ from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import future_id, job_from_bytes, vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.contracts.world_identity import with_id
 from foretwin.orchestrator.record.job_tables import (
     RESULT_SCHEMA_VERSION,
     VEHICLES,
@@ -28,7 +29,6 @@ from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.record.versions import versions
 from foretwin.sim_worker.world_file import load_world
-from foretwin.world_gen.build import with_id
 
 _DECIDE = ("python", "foretwin", "mujoco", "numpy", "scipy", "numba")
 """Versions without which a job may come to other bits."""

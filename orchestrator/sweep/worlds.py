@@ -12,13 +12,13 @@ import numpy as np
 
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.world_identity import with_id
 from foretwin.orchestrator.record.recorded_jobs import kept_world
 from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
 from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import NodeClip, open_map
 from foretwin.sim_worker.world_file import load_world
-from foretwin.world_gen.build import with_id
 from foretwin.world_gen.elevation.read_dem import dem_digest
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import index_map

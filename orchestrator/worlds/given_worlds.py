@@ -8,7 +8,7 @@ from pathlib import Path
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
-from foretwin.world_gen.build import with_id
+from foretwin.contracts.world_identity import with_id
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import OsmMap
 

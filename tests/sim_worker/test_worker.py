@@ -22,16 +22,23 @@ from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.runner import Wanted, job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
-from foretwin.contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
+from foretwin.contracts.simulation import (
+    ActiveWorld,
+    MirrorSample,
+    PrepareReply,
+    PrepareRequest,
+    RunEnd,
+)
 from foretwin.contracts.tuning import UseVehicle
+from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_rows import future_rows, rows_from_bytes
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.worker import SimulationCache, serve_futures
-from foretwin.sim_worker.world_file import load_world
+from foretwin.sim_worker.worker import FuturesWorker, SimulationCache, serve_futures
+from foretwin.sim_worker.world_file import WorldFolder, load_world
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
@@ -140,12 +147,23 @@ def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:
         world = msgspec.structs.replace(crossroads(), id=name)
         write_message(world, folder / f"{name}.world")
     setup = msgspec.structs.replace(_setup(folder), simulations=2, kept_worlds=2)
-    cache = SimulationCache(setup, CAR)
+    cache = SimulationCache(setup, CAR, worlds=WorldFolder(folder))
     first = cache.get("a")
     cache.get("b")
     assert cache.get("a") is first
     cache.get("c")
     assert cache.world_ids == ("a", "c")
+
+
+def test_a_worker_takes_its_worlds_from_wherever_it_is_told(tmp_path: Path) -> None:
+    class Elsewhere:
+        def world(self, world_id: str) -> World:
+            return msgspec.structs.replace(crossroads(), id=world_id)
+
+    worker = FuturesWorker(_setup(tmp_path), worlds=Elsewhere())
+    answer = worker.answer("prepare", PrepareRequest(world_id="from afar"))
+    assert isinstance(answer, PrepareReply)
+    assert answer.world_id == "from afar"
 
 
 @pytest.mark.parametrize("world_id", ["", "../secret", "a\\\\b", ".hidden"])

@@ -12,12 +12,12 @@ import pytest
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.simulation import BuildReply, BuildRequest
 from foretwin.contracts.world import World
+from foretwin.contracts.world_identity import with_id
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.orchestrator.drive.processes import PROCESSES
 from foretwin.orchestrator.worlds.builder_process import serve_builds
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds, read_given_worlds
-from foretwin.world_gen.build import with_id
 from foretwin.world_gen.world_store import WorldStore
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town, town_plan, town_world
