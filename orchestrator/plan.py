@@ -13,6 +13,7 @@ from foretwin.contracts.campaign import role_files
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.elevation import RoadSlopes
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.local_bus import LocalBus
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
@@ -25,7 +26,6 @@ from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import StandinPath
-from foretwin.orchestrator.runner.local_bus import LocalBus
 from foretwin.orchestrator.worlds.opening import Clip
 from foretwin.telemetry.ros2.mapping import MappingFile
 from foretwin.world_gen.junctions.intersections import Junction

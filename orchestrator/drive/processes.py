@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.keys import BusRole
+from foretwin.contracts.local_bus import OUTSIDERS, member_of
 from foretwin.contracts.process_setup import RouterSetup
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
@@ -22,7 +23,6 @@ from foretwin.contracts.setup import (
 )
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
-from foretwin.orchestrator.runner.local_bus import OUTSIDERS, member_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR, SUPERVISOR = "orchestrator", "supervisor"

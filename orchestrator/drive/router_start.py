@@ -10,11 +10,11 @@ from dataclasses import replace
 
 from foretwin.contracts.bus import BusUnreachable, ZenohBus
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.local_bus import make_local_bus
 from foretwin.contracts.router import LISTENS
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, ROUTER, members, row_of
 from foretwin.orchestrator.plan import DrivePlan
-from foretwin.orchestrator.runner.local_bus import make_local_bus
 from foretwin.orchestrator.runner.supervisor import Supervisor
 
 log = logging.getLogger(ORCHESTRATOR)

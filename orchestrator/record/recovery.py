@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 
 from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.local_bus import BUS
 from foretwin.contracts.process import is_held
 from foretwin.contracts.segments import segments_of
 from foretwin.orchestrator.record.derive import derive, streams_in
@@ -35,7 +36,6 @@ from foretwin.orchestrator.record.run_state import (
 from foretwin.orchestrator.record.so_far import forget_so_far
 from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.record.table_stream import SUFFIX, TableStream, record_bytes
-from foretwin.orchestrator.runner.local_bus import BUS
 from foretwin.orchestrator.runner.supervisor import fold_stderr
 from foretwin.telemetry.logs.mend_mcap import look_through, mend
 

@@ -13,15 +13,15 @@ import msgspec
 
 from foretwin.contracts.bus import Alive, Mailbox, Reply, ZenohBus
 from foretwin.contracts.keys import alive_key, process_of_alive_key
-from foretwin.contracts.runner import Answer, Task, TaskCount
-from foretwin.contracts.setup import WorkerSetup
-from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
-from foretwin.orchestrator.runner.local_bus import (
+from foretwin.contracts.local_bus import (
     LocalBus,
     make_local_bus,
     member_of,
     private_files,
 )
+from foretwin.contracts.runner import Answer, Task, TaskCount
+from foretwin.contracts.setup import WorkerSetup
+from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
 from foretwin.orchestrator.runner.supervisor import (
     Death,
     FreshInterpreter,

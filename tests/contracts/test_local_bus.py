@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.bus import ZenohBus
-from foretwin.orchestrator.runner.local_bus import make_local_bus, member_of, private_files
+from foretwin.contracts.local_bus import make_local_bus, member_of, private_files
 
 MEMBERS = (member_of("worker", "w0"), member_of("orchestrator", "orchestrator"))
 
