@@ -175,8 +175,9 @@ class FuturesWorker:
         result = run_job(job, prepared.stage, worker_id=self._id, scenes=prepared.scenes)
         if question.wanted == "result":
             return JobAnswer(result=result)
-        rows = future_rows(job, result, job_sha256=question.sha256)
-        return JobAnswer(rows=rows_as_bytes(rows))
+        with span("rows"):
+            rows = future_rows(job, result, job_sha256=question.sha256)
+            return JobAnswer(rows=rows_as_bytes(rows))
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:
         assert isinstance(question, PlaceRequest)
