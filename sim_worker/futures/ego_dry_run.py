@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
@@ -72,11 +73,24 @@ def rehearsal_stage(
 def rehearsed_cases(
     job: Job, vehicle: VehicleParameters, maker: SceneMaker
 ) -> dict[int, StagedCase | Unplaced]:
-    """Return `staged_cases` on a stage made for a job, if any of its rows names a place."""
-    count = sum(bool(future.place) for future in job.futures)
-    if not count:
+    """Return `staged_cases` on a stage made for a job, if any of its rows names a place.
+
+    Rows that differ in numbers and planner alone are one case, and rehearsed once.
+    """
+    same: dict[tuple[object, ...], list[int]] = {}
+    for row, future in enumerate(job.futures):
+        if future.place:
+            case = future.scenario_id, future.place, *sorted(future.values.items())
+            same.setdefault(case, []).append(row)
+    if not same:
         return {}
-    return staged_cases(job, rehearsal_stage(vehicle, nsim=count, control_hz=job.control_hz), maker)
+    first = [rows[0] for rows in same.values()]
+    starts = None if job.starts is None else job.starts[first]
+    futures = tuple(job.futures[row] for row in first)
+    distinct = msgspec.structs.replace(job, futures=futures, starts=starts)
+    stage = rehearsal_stage(vehicle, nsim=len(first), control_hz=job.control_hz)
+    found = staged_cases(distinct, stage, maker)
+    return {row: found[n] for n, rows in enumerate(same.values()) if n in found for row in rows}
 
 
 def staged_cases(

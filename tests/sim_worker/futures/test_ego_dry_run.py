@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -16,7 +16,11 @@ from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.driven_line import driven_lines, time_at
-from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.ego_dry_run import (
+    rehearsal_stage,
+    rehearsed_cases,
+    staged_cases,
+)
 from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.playable import job_at, places
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
@@ -200,6 +204,39 @@ def test_another_maker_of_scenes_gives_the_same_bits() -> None:
     assert played is not None
     other = BatchSimulation(cross(), CAR, nsim=8)
     assert result_digest(run_job(played.job, other)) == result_digest(played.result)
+
+
+def test_a_case_is_rehearsed_once_however_many_numbers_it_is_played_with(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    played = play(cross(), "ccftap")
+    assert played is not None
+    stage, maker = _stage(cross().id)
+    seen: list[int] = []
+
+    def counted(job: Job, *given: Any) -> Any:
+        seen.append(len(job.futures))
+        return staged_cases(job, *given)
+
+    monkeypatch.setattr("foretwin.sim_worker.futures.ego_dry_run.staged_cases", counted)
+    futures = tuple(
+        msgspec.structs.replace(one, index=3 * k + n, numbers={"friction_factor": friction})
+        for k, friction in enumerate((1.0, 0.4))
+        for n, one in enumerate(played.job.futures)
+    )
+    job = msgspec.structs.replace(played.job, futures=futures)
+    rehearsed = rehearsed_cases(job, CAR, maker)
+    assert seen == [len(played.cases)] == [3]
+    assert sorted(rehearsed) == list(range(6))
+    each = staged_cases(job, rehearsal_stage(CAR, nsim=6), maker)
+    for row, case in rehearsed.items():
+        alone = each[row]
+        assert isinstance(case, StagedCase)
+        assert isinstance(alone, StagedCase)
+        assert case.values == alone.values == job.futures[row].values
+        assert (case.ego_arc_m, case.impact_time_s) == (alone.ego_arc_m, alone.impact_time_s)
+    result = run_job(job, stage, scenes=maker)
+    assert result.future_indices == tuple(range(6))
 
 
 @pytest.mark.real_data
