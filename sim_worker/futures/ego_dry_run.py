@@ -19,6 +19,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import EGO, FAULTS
+from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.slopes import slopes_of
@@ -70,6 +71,7 @@ def rehearsal_stage(
     return BatchSimulation(None, vehicle, nsim=nsim, control_hz=control_hz)
 
 
+@traced("rehearse")
 def rehearsed_cases(
     job: Job, vehicle: VehicleParameters, maker: SceneMaker
 ) -> dict[int, StagedCase | Unplaced]:

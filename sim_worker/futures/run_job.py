@@ -78,9 +78,7 @@ def run_job(
     check_job(job, stage)
     ticks, every = _ticks(job, stage)
     maker = SceneMaker(world) if scenes is None else scenes
-    with span("rehearse"):
-        rehearsed = rehearsed_cases(job, stage.vehicle, maker)
-    job, staged, unplaced = _placed(job, rehearsed)
+    job, staged, unplaced = _placed(job, rehearsed_cases(job, stage.vehicle, maker))
     time_s = np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s
     if job.futures:
         played = _play(job, staged, stage, maker, ticks=ticks, every=every)
