@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from foretwin.checks import path_of
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.record.job_tables import table_at
+from foretwin.orchestrator.record.run_folder import table_at
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.record.table_parts import read_parts
 

@@ -33,10 +33,10 @@ from foretwin.contracts.numbers import MAX_HORIZON_S, MAX_SEED, out_of_range
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.orchestrator.record.job_tables import as_table
 from foretwin.sim_worker.driver_model import UNKNOWN_LIMIT_MPS
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_rows import future_rows
+from foretwin.sim_worker.futures.job_tables import as_table
 from foretwin.sim_worker.futures.run_job import run_alone
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.planners.registry import check_planner

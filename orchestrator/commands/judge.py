@@ -14,6 +14,7 @@ from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.segments import first_left
 from foretwin.contracts.terminal import say
+from foretwin.contracts.versions import versions
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
 from foretwin.orchestrator.config import DriveConfig
@@ -23,7 +24,6 @@ from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.orchestrator.processors import most_workers
 from foretwin.orchestrator.record.recovery import RECOVERED
 from foretwin.orchestrator.record.run_state import RECORD, check_finished
-from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 
 DRIVE = "drive.mcap"

@@ -11,8 +11,8 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.record.job_tables import REPEATED
 from foretwin.orchestrator.record.recorded_jobs import RecordedFuture, recorded_future
+from foretwin.orchestrator.record.run_folder import REPEATED
 from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.run_job import run_alone
 from foretwin.sim_worker.planners.registry import in_another_process

@@ -23,8 +23,8 @@ from foretwin.contracts.runner import Runner, Task, answers, job_task, place_tas
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.processors import trouble_with_workers
-from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.record.ledger import jobs_ledger
+from foretwin.orchestrator.record.run_folder import keep_vehicles
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
     SUMMARY,

@@ -15,6 +15,7 @@ from foretwin.contracts.new_folder import named_in_errors, new_folder
 from foretwin.contracts.process import log_to_file
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.contracts.signing import OrderSigner
+from foretwin.contracts.versions import versions
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.foreground import Foreground, start_all
@@ -27,7 +28,6 @@ from foretwin.orchestrator.drive.supervision import CRASHED, DriveError, Life, O
 from foretwin.orchestrator.drive.supervisor_link import SupervisorLink
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.run_state import LOG, RECORD, run_lock
-from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor
 from foretwin.orchestrator.runner.warm_fork import trouble_with_forking

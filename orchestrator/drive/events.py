@@ -10,8 +10,8 @@ from foretwin.contracts.bus import Bus
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR
 from foretwin.orchestrator.instructions import Notice
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import ResultTables
+from foretwin.sim_worker.futures.columns import row_of
 
 log = logging.getLogger(ORCHESTRATOR)
 

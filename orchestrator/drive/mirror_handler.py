@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from foretwin.contracts.gap import limits_after
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.orchestrator.instructions import Notice
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import MIRROR, MIRRORED, ResultTables
+from foretwin.sim_worker.futures.columns import row_of
 
 _APART_NS = 2_000_000_000
 """Who touches again sooner is not told of again."""

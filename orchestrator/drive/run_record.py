@@ -11,6 +11,7 @@ import msgspec
 
 from foretwin.contracts.cpu_use import cpu_uses
 from foretwin.contracts.tally import read_tally, tally_file
+from foretwin.contracts.versions import versions
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
@@ -19,7 +20,6 @@ from foretwin.orchestrator.record.kept_parts import kept_record
 from foretwin.orchestrator.record.ledger import Ledger, jobs_ledger, lost_rounds_line
 from foretwin.orchestrator.record.run_state import RUNNING
 from foretwin.orchestrator.record.telemetry_ledger import lost_telemetry_line, telemetry_ledger
-from foretwin.orchestrator.record.versions import versions
 
 RESERVED_BYTES = 65536
 

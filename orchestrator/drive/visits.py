@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.running import MOST_LISTED, FirstOf
 from foretwin.contracts.world import World
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.visited import RoundsOf, Visited
+from foretwin.sim_worker.futures.columns import row_of
 from foretwin.world_gen.junctions.intersections import Junction
 
 MOST_JUNCTIONS, SEEN_LATELY_S = 64, 120.0

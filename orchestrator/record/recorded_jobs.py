@@ -17,17 +17,13 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import future_id, job_from_bytes, vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.versions import processor, versions
 from foretwin.contracts.world import World
 from foretwin.contracts.world_identity import with_id
-from foretwin.orchestrator.record.job_tables import (
-    RESULT_SCHEMA_VERSION,
-    VEHICLES,
-    processor,
-    table_at,
-)
+from foretwin.orchestrator.record.run_folder import VEHICLES, table_at
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.record.table_parts import parts_of_table
-from foretwin.orchestrator.record.versions import versions
+from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
 from foretwin.sim_worker.world_file import load_world
 
 _DECIDE = ("python", "foretwin", "mujoco", "numpy", "scipy", "numba")

@@ -9,9 +9,9 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.simulation import PlanComparison
 from foretwin.contracts.trace import traced
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import PLAN
 from foretwin.orchestrator.runner.open_rounds import RoundDone
+from foretwin.sim_worker.futures.columns import row_of
 from foretwin.sim_worker.futures.future_rows import Row, future_rows
 from foretwin.sim_worker.metrics.displacement import distinct_count
 

@@ -27,14 +27,14 @@ from foretwin.contracts.simulation import (
 from foretwin.contracts.trace import span, traced
 from foretwin.contracts.tuning import ParameterChange, ParameterEstimate
 from foretwin.orchestrator.keep import Keep
-from foretwin.orchestrator.record.columns import columns, columns_of, schema
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import sync_folder
-from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, played_with
 from foretwin.orchestrator.record.kept_parts import KeptParts
 from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.run_streams import Rows, RunStreams
 from foretwin.orchestrator.record.so_far import write_so_far
+from foretwin.sim_worker.futures.columns import columns, columns_of, schema
+from foretwin.sim_worker.futures.job_tables import JOB_TABLES, metric_rows, played_with
 
 log = logging.getLogger("results")
 

@@ -21,11 +21,10 @@ from foretwin.orchestrator.agreement.windows import OpenWindows
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports, LatestState, Notice, RoundIntent
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.forecast_count import ForecastCount
-from foretwin.orchestrator.record.job_tables import VehicleKeeper, job_row, road_user_rows
 from foretwin.orchestrator.record.ledger import RoundTally
 from foretwin.orchestrator.record.result_rows import plan_row, round_futures, round_row
+from foretwin.orchestrator.record.run_folder import VehicleKeeper
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons, plan_compared
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.rounds.news import RoundNews
@@ -34,6 +33,8 @@ from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
 from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
+from foretwin.sim_worker.futures.columns import row_of
+from foretwin.sim_worker.futures.job_tables import job_row, road_user_rows
 
 log = logging.getLogger("orchestrator")
 

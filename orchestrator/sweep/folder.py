@@ -13,18 +13,13 @@ import msgspec
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.placement import WorldPlaces
-from foretwin.orchestrator.record.job_tables import (
-    METRICS_FILE,
-    REPEATED,
-    RESULT_SCHEMA_VERSION,
-    SWEPT_TABLES,
-    VEHICLES,
-)
-from foretwin.orchestrator.record.versions import versions
+from foretwin.contracts.versions import versions
+from foretwin.orchestrator.record.run_folder import METRICS_FILE, REPEATED, SWEPT_TABLES, VEHICLES
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec
+from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
 from foretwin.sim_worker.planners.registry import planner_origin
 from foretwin.world_gen.build import GENERATOR_VERSION
 

@@ -11,10 +11,10 @@ from foretwin.contracts.futures import RESULT_STEP_S, Future, Job
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
 from foretwin.contracts.runner import Answer
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob
 from foretwin.orchestrator.sweep.road_users import NO_OTHERS, others_at
 from foretwin.orchestrator.sweep.spec import Loaded
+from foretwin.sim_worker.futures.columns import row_of
 from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_bytes
 
 

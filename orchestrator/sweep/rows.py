@@ -11,19 +11,18 @@ import pyarrow.parquet as pq
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
-from foretwin.orchestrator.record.job_tables import (
+from foretwin.orchestrator.record.recorded_jobs import opened
+from foretwin.orchestrator.record.run_folder import METRICS_FILE, SWEPT_TABLES
+from foretwin.orchestrator.sweep.plan import SweepJob
+from foretwin.sim_worker.futures.future_rows import Row
+from foretwin.sim_worker.futures.job_tables import (
     JOB_TABLES,
-    METRICS_FILE,
-    SWEPT_TABLES,
     as_table,
     job_row,
     metric_rows,
     played_with,
     road_user_rows,
 )
-from foretwin.orchestrator.record.recorded_jobs import opened
-from foretwin.orchestrator.sweep.plan import SweepJob
-from foretwin.sim_worker.futures.future_rows import Row
 
 
 class Parts:

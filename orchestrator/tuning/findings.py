@@ -15,11 +15,11 @@ from foretwin.contracts.running import MOST_LISTED, FirstOf, RunningMeans
 from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Notice
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import GAP, ResultTables
 from foretwin.orchestrator.tuning.parameter_versions import departs
 from foretwin.orchestrator.tuning.words import alarm_text, found_text, verdict_text
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable, is_left_open
+from foretwin.sim_worker.futures.columns import row_of
 
 _SQUARES = ("along_m", "across_m", "yaw_rad", "speed_mps")
 

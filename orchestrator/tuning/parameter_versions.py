@@ -18,10 +18,10 @@ from foretwin.contracts.tuning import (
     UseVehicle,
 )
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.results import PARAMETER
 from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable
 from foretwin.sim_worker.analysis.identify.parameters_in_force import ParametersInForce
+from foretwin.sim_worker.futures.columns import row_of
 
 _BY_HAND = ("set", "rolled_back")
 

@@ -15,12 +15,12 @@ import pytest
 from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
 from foretwin.contracts.provenance import Choice
+from foretwin.contracts.versions import versions
 from foretwin.contracts.world import StopLine, World
 from foretwin.orchestrator.commands import judge
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.embedded import MAP_FILE
-from foretwin.orchestrator.record.versions import versions
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.write_mcap import create
 from foretwin.world_gen.world_store import WorldStore

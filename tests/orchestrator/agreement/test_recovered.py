@@ -11,9 +11,9 @@ from foretwin.contracts.codec import write_message
 from foretwin.orchestrator.agreement.known_windows import into_table
 from foretwin.orchestrator.agreement.recovered import recovered_agreement
 from foretwin.orchestrator.record import recovery
-from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.record.recovery import recover
 from foretwin.orchestrator.record.results import TABLES
+from foretwin.orchestrator.record.run_folder import keep_vehicles
 from foretwin.orchestrator.record.run_streams import RunStreams
 from tests.orchestrator.agreement.test_windows import VEHICLE, WORLD, driven
 from tests.orchestrator.record.ended_badly import killed_run, round_row

@@ -14,16 +14,18 @@ import pytest
 from foretwin.contracts.codec import write_message
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep
-from foretwin.orchestrator.record.job_tables import JOB_TABLES, REPEATED
+from foretwin.orchestrator.record.run_folder import REPEATED
 from foretwin.orchestrator.sweep.spec import load_spec
+from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 from tests.sim_worker.scenarios.worlds import cross
 
 COVERS = (
-    "foretwin.orchestrator.record.job_tables",
+    "foretwin.orchestrator.record.run_folder",
+    "foretwin.sim_worker.futures.job_tables",
     "foretwin.orchestrator.record.recorded_jobs",
-    "foretwin.orchestrator.record.versions",
+    "foretwin.contracts.versions",
 )
 
 

@@ -21,9 +21,9 @@ from foretwin.contracts.world import ATTRIBUTION
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep, workers_for
 from foretwin.orchestrator.embedded import MAP_FILE
-from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.runner import worker_processes
 from foretwin.orchestrator.sweep.spec import load_spec
+from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 from tests.sim_worker.planners.installed import install
 from tests.starvation import kept_waiting

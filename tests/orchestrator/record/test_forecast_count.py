@@ -6,8 +6,8 @@ import msgspec
 import pytest
 
 from foretwin.contracts.forecast import ForecastOutcome
-from foretwin.orchestrator.record.columns import row_of
 from foretwin.orchestrator.record.forecast_count import ForecastCount
+from foretwin.sim_worker.futures.columns import row_of
 
 
 def outcome(share: float, *, horizon_s: float = 1.0, crps_m: float = 0.5) -> ForecastOutcome:

@@ -9,7 +9,6 @@ import pytest
 
 from foretwin.contracts.gap import Verdict
 from foretwin.contracts.simulation import MirroredVehicle, PlaneState, TwinCorrection
-from foretwin.orchestrator.record.columns import columns, columns_of, row_of
 from foretwin.orchestrator.record.result_rows import (
     plan_row,
     round_futures,
@@ -17,13 +16,14 @@ from foretwin.orchestrator.record.result_rows import (
 )
 from foretwin.orchestrator.record.results import MIRROR, MIRRORED, TABLES
 from foretwin.orchestrator.rounds.views import round_view
+from foretwin.sim_worker.futures.columns import columns, columns_of, row_of
 from foretwin.sim_worker.futures.likelihood import NEAR_MISS
 from tests.contracts.mirror_samples import mirror_sample
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, town_world
 from tests.viewer.scene import drive
 
-COVERS = ("foretwin.orchestrator.record.columns",)
+COVERS = ("foretwin.sim_worker.futures.columns",)
 FRAME = town_world("n4").frame
 
 

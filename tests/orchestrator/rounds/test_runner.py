@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.simulation import Event
-from foretwin.orchestrator.record import job_tables
+from foretwin.orchestrator.record import run_folder
 from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
@@ -28,7 +28,7 @@ def test_parameters_that_a_full_disk_does_not_take_are_written_with_the_next_rou
     vehicles = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.vehicle")}
     assert len(vehicles) == 1
     with monkeypatch.context() as patched:
-        patched.setattr(job_tables, "keep_vehicles", full)
+        patched.setattr(run_folder, "keep_vehicles", full)
         rounds.use_vehicle(other, 1)
         assert house.conductor.start_round()
     house.workers[0].answer()

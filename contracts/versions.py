@@ -1,10 +1,11 @@
-"""The versions of what decides results, for records."""
+"""What decides results, for records: the versions of libraries, and the processor."""
 
 from __future__ import annotations
 
 import functools
 import importlib.metadata
 import platform
+from pathlib import Path
 
 _ARITHMETIC = "numpy", "scipy", "shapely", "numba"
 _PACKAGES = ("foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", *_ARITHMETIC)
@@ -25,3 +26,13 @@ def _found() -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             found[name] = "not installed as a package"
     return found
+
+
+def processor() -> str:
+    """Return what this machine computes with, in words."""
+    try:
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        told = ""
+    models = (line.split(":", 1)[1] for line in told.splitlines() if line.startswith("model name"))
+    return f"{platform.machine()} {next(models, platform.processor()).strip()}".strip()
