@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 
 from foretwin.contracts.codec import decode_content
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes
+from foretwin.contracts.parts import FinishedPart, JobCells
 from foretwin.contracts.placement import PlaceRequest
 
-Wanted = Literal["result", "rows"]
 AHEAD = 256
 """Tasks that a runner holds at once: enough for any machine's workers, and their jobs fit in
 memory."""
+TRIES = 3
+"""A task whose answers were wrong so often is given up."""
 
 
 class JobRequest(msgspec.Struct, frozen=True, kw_only=True):
@@ -26,7 +29,8 @@ class JobRequest(msgspec.Struct, frozen=True, kw_only=True):
     job: msgspec.Raw
     """The bytes of `job_bytes`, as they are recorded."""
     sha256: str
-    wanted: Wanted = "result"
+    cells: JobCells | None = None
+    """With them the job is answered by its finished part."""
 
     def decoded(self) -> Job:
         """Return the job; raises SchemaMismatch for bytes that are none."""
@@ -34,10 +38,10 @@ class JobRequest(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class JobAnswer(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of a job, or the rows of its futures alone, as msgpack."""
+    """The result of a job, or its finished part."""
 
     result: FuturesResult | None = None
-    rows: bytes = b""
+    part: FinishedPart | None = None
 
 
 class Task(NamedTuple):
@@ -99,9 +103,9 @@ class Runner(Protocol):
         """Return one answer, or None where there is none in time (None waits for ever)."""
 
 
-def job_task(job: Job, named: JobBytes, *, wanted: Wanted = "result") -> Task:
-    """Return the task of playing a job."""
-    request = JobRequest(job=msgspec.Raw(named.data), sha256=named.sha256, wanted=wanted)
+def job_task(job: Job, named: JobBytes, *, cells: JobCells | None = None) -> Task:
+    """Return the task of playing a job: for its result, or as a sweep's finished part."""
+    request = JobRequest(job=msgspec.Raw(named.data), sha256=named.sha256, cells=cells)
     return Task(named.sha256, "job", job.world_id, request)
 
 
@@ -110,12 +114,24 @@ def place_task(request: PlaceRequest) -> Task:
     return Task(f"places in {request.world_id}", "place", request.world_id, request)
 
 
-def answers(runner: Runner, tasks: Iterable[Task], *, ahead: int = AHEAD) -> Iterator[Answer]:
+def _never(_: Answer) -> str:
+    return ""
+
+
+def answers(
+    runner: Runner,
+    tasks: Iterable[Task],
+    *,
+    ahead: int = AHEAD,
+    fault_in: Callable[[Answer], str] = _never,
+) -> Iterator[Answer]:
     """Have tasks answered by a runner that has no others, and yield the answers as they come.
 
-    Tasks are taken as they are needed: the runner holds at most `ahead`.
+    Tasks are taken as they are needed: the runner holds at most `ahead`. An answer in which
+    `fault_in` finds a fault does not count: its task is asked again, up to `TRIES` times in all.
     """
     left, held = iter(tasks), 0
+    wrong: Counter[str] = Counter()
     while True:
         for task in itertools.islice(left, ahead - held):
             runner.submit(task)
@@ -124,5 +140,12 @@ def answers(runner: Runner, tasks: Iterable[Task], *, ahead: int = AHEAD) -> Ite
             return
         answer = runner.take(None)
         assert answer is not None
+        if answer.message is not None and (fault := fault_in(answer)):
+            wrong[answer.task.key] += 1
+            if wrong[answer.task.key] < TRIES:
+                runner.submit(answer.task)
+                continue
+            answer = Answer(answer.task, None, fault, answer.worker_id)
+        wrong.pop(answer.task.key, None)
         held -= 1
         yield answer

@@ -28,6 +28,7 @@ def _found() -> dict[str, str]:
     return found
 
 
+@functools.cache
 def processor() -> str:
     """Return what this machine computes with, in words."""
     try:

@@ -17,7 +17,7 @@ from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.guard import Refused
-from foretwin.contracts.job_identity import vehicle_digest
+from foretwin.contracts.job_identity import JobBytes, vehicle_digest
 from foretwin.contracts.placement import PlaceRequest, WorldPlaces
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.refusals import Refusals
@@ -28,7 +28,6 @@ from foretwin.contracts.trace import came, since, span
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
-from foretwin.sim_worker.futures.future_rows import future_rows, rows_as_bytes
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.world_places import places_in
@@ -173,11 +172,14 @@ class FuturesWorker:
             )
         prepared = self._swept.get(job.vehicle, self._stages).get(job.world_id)
         result = run_job(job, prepared.stage, worker_id=self._id, scenes=prepared.scenes)
-        if question.wanted == "result":
+        if question.cells is None:
             return JobAnswer(result=result)
+        # Parquet takes 40 MB and 0.2 s to import, and a drive's workers write none.
+        from foretwin.sim_worker.futures.finished_part import finished_part
+
+        recorded = JobBytes(bytes(question.job), question.sha256)
         with span("rows"):
-            rows = future_rows(job, result, job_sha256=question.sha256)
-            return JobAnswer(rows=rows_as_bytes(rows))
+            return JobAnswer(part=finished_part(job, recorded, result, question.cells))
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:
         assert isinstance(question, PlaceRequest)

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -19,7 +19,8 @@ from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.owned_folder import temporary_folder
-from foretwin.contracts.runner import Runner, Task, answers, job_task, place_task
+from foretwin.contracts.parts import JobCells
+from foretwin.contracts.runner import Answer, Runner, Task, answers, job_task, place_task
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.processors import trouble_with_workers
@@ -33,13 +34,14 @@ from foretwin.orchestrator.sweep.folder import (
     fingerprint_of,
     planner_origins,
 )
-from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
+from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of, place_request
 from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, plan_sweep
-from foretwin.orchestrator.sweep.rows import Parts
+from foretwin.orchestrator.sweep.rows import Parts, fault_in
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.orchestrator.sweep.worlds import Building, all_there, choose_worlds, source_digest
+from foretwin.sim_worker.futures.finished_part import finished_part
 from foretwin.sim_worker.road_users.likeness import likenesses
 
 SOME_FAILED = 3
@@ -105,16 +107,21 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         places = _find_places(loaded, folder, runner, chosen)
         plan = plan_sweep(loaded, places.worlds)
         keep_vehicles(folder.path, loaded.vehicles.values())
-        parts = Parts(folder.path, attribution=plan.attribution)
         maker = JobMaker(loaded, plan.worlds)
-        parts.keep_first(len(plan.jobs))
-        left = [one for one in plan.jobs if not parts.hold(maker.job(one))]
-        started_s, before = time.monotonic(), jobs_ledger(runner.count)
-        _play(left, maker, parts, runner)
-        playing_s = round(time.monotonic() - started_s, 3)
-        ledger = {"jobs": jobs_ledger(runner.count).since(before)}
-        now = {"jobs_played": len(left), "playing_s": playing_s, "ledger": ledger}
-        return folder.summarise(_summary(loaded, plan, places, parts) | now)
+        with Parts(folder.path, attribution=plan.attribution) as parts:
+            parts.keep_first(len(plan.jobs))
+            left = [
+                one
+                for one in plan.jobs
+                if one.number >= parts.listed
+                or not parts.hold(one.number, job_bytes(maker.job(one)).sha256)
+            ]
+            started_s, before = time.monotonic(), jobs_ledger(runner.count)
+            _play(left, maker, parts, runner, plan.attribution)
+            playing_s = round(time.monotonic() - started_s, 3)
+            ledger = {"jobs": jobs_ledger(runner.count).since(before)}
+            now = {"jobs_played": len(left), "playing_s": playing_s, "ledger": ledger}
+            return folder.summarise(_summary(loaded, plan, places, parts) | now)
 
 
 def _find_places(
@@ -146,32 +153,53 @@ def _find_places(
     return folder.save_places(tuple(found[one] for one in worlds.ids if one in found), failures)
 
 
-def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner) -> None:
-    """Play jobs and write their rows as they come."""
-    at_work: dict[str, tuple[SweepJob, Job, JobBytes]] = {}
+class _AtWork(NamedTuple):
+    planned: SweepJob
+    job: Job
+    named: JobBytes
+    cells: JobCells
+
+
+def _play(
+    left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner, attribution: str
+) -> None:
+    """Play jobs, and keep the parts that come back of them."""
+    at_work: dict[str, _AtWork] = {}
 
     def tasks() -> Iterator[Task]:
         for one in left:
             job = maker.job(one)
-            named = job_bytes(job)
-            at_work[named.sha256] = one, job, named
-            yield job_task(job, named, wanted="rows")
+            at = _AtWork(one, job, job_bytes(job), cells_of(one, attribution))
+            at_work[at.named.sha256] = at
+            yield job_task(job, at.named, cells=at.cells)
 
     with progress_bar(sum(len(one.cells) for one in left), "futures") as (advance, say):
-        for answer in answers(runner, tasks()):
-            one, job, named = at_work.pop(answer.task.key)
+
+        def fault(answer: Answer) -> str:
+            at = at_work[answer.task.key]
+            found = fault_in(answer.message.part, at.job, at.named.sha256, at.cells)
+            if found:
+                say(f"job {at.planned.number}: worker {answer.worker_id} gave no part: {found}")
+            return found
+
+        for answer in answers(runner, tasks(), fault_in=fault):
+            one, job, named, cells = at_work.pop(answer.task.key)
             if answer.message is None:
                 say(f"failed: job {one.number}: {answer.failure}")
-            parts.write(cell_rows(one, job, answer), job, named)
+                part = finished_part(job, named, None, cells, failure=answer.failure)
+            else:
+                part = answer.message.part
+            parts.write(one.number, part)
             for _ in one.cells:
-                advance(f"{one.cells[0].junction_id} {one.planner}")
+                advance(f"{cells.junction_id} {one.planner}")
 
 
 def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:
     digest, counted = hashlib.sha256(), Summary(loaded.spec)
-    for row in parts.rows(plan.jobs):
-        digest.update(msgspec.msgpack.encode(row))
-        counted.add(row)
+    for entry in parts.entries(len(plan.jobs)):
+        digest.update(bytes.fromhex(entry.rows_sha256))
+        for count in entry.counts:
+            counted.add(count)
     unplaced = [one for world in places.worlds for one in world.unplaced]
     placed = {one.scenario_id for world in places.worlds for one in world.placed}
     return {

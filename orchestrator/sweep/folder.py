@@ -16,6 +16,7 @@ from foretwin.contracts.placement import WorldPlaces
 from foretwin.contracts.versions import versions
 from foretwin.orchestrator.record.run_folder import METRICS_FILE, REPEATED, SWEPT_TABLES, VEHICLES
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
+from foretwin.orchestrator.sweep.manifest import MANIFEST
 from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec
@@ -165,7 +166,7 @@ def _clear(path: Path) -> None:
     """Remove what an earlier sweep left in its folder, and nothing else."""
     if not (path / SUMMARY).is_file():
         return
-    for name in (SUMMARY, PLAN, LOG, METRICS_FILE):
+    for name in (SUMMARY, PLAN, LOG, METRICS_FILE, MANIFEST):
         (path / name).unlink(missing_ok=True)
     for name in (*SWEPT_TABLES.values(), VEHICLES, WORLDS, REPEATED):
         shutil.rmtree(path / name, ignore_errors=True)

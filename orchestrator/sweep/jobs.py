@@ -1,4 +1,4 @@
-"""The jobs of a sweep, as a live round makes them, and what rows say of their cells."""
+"""The jobs of a sweep, as a live round makes them, and what their rows say of its cells."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ import msgspec
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.futures import RESULT_STEP_S, Future, Job
 from foretwin.contracts.job_identity import vehicle_digest
+from foretwin.contracts.parts import JobCells
 from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
-from foretwin.contracts.runner import Answer
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob
 from foretwin.orchestrator.sweep.road_users import NO_OTHERS, others_at
 from foretwin.orchestrator.sweep.spec import Loaded
-from foretwin.sim_worker.futures.columns import row_of
-from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_bytes
 
 
 def place_request(loaded: Loaded, world_id: str) -> PlaceRequest:
@@ -114,16 +112,15 @@ def _future(index: int, cell: Cell, planner: str) -> Future:
     )
 
 
-def cell_rows(planned: SweepJob, job: Job, answer: Answer) -> list[Row]:
-    """Return the rows of a job's cells; where it was given up, all say why."""
-    if answer.message is None:
-        rows = future_rows(job, None, job_sha256=answer.task.key)
-    else:
-        rows = rows_from_bytes(answer.message.rows, job)
-    for row, cell in zip(rows, planned.cells, strict=True):
-        row |= row_of(cell, "case junction_id place")
-        row |= {"cell": cell.number, "scenario": cell.scenario_id}
-        row |= {"vehicle": planned.vehicle, "worker_id": None}
-        if answer.failure:
-            row["failure"] = answer.failure
-    return rows
+def cells_of(planned: SweepJob, attribution: str) -> JobCells:
+    """Return what the rows of a job's cells say beside what the job says."""
+    cells = planned.cells
+    return JobCells(
+        first=cells[0].number,
+        junction_id=cells[0].junction_id,
+        vehicle=planned.vehicle,
+        scenarios=tuple(cell.scenario_id for cell in cells),
+        cases=tuple(cell.case for cell in cells),
+        places=tuple(cell.place for cell in cells),
+        attribution=attribution,
+    )

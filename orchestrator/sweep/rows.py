@@ -1,96 +1,154 @@
-"""The rows of a sweep: their Parquet parts, and which of them are there."""
+"""The rows of a sweep: the Parquet parts that who played them finished, and which are there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import functools
+import hashlib
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Self
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
-from foretwin.contracts.job_identity import JobBytes, job_bytes
-from foretwin.orchestrator.record.recorded_jobs import opened
+from foretwin.contracts.partial_file import partial_file
+from foretwin.contracts.parts import FinishedPart, JobCells
+from foretwin.orchestrator.record.durable import WRITING
 from foretwin.orchestrator.record.run_folder import METRICS_FILE, SWEPT_TABLES
-from foretwin.orchestrator.sweep.plan import SweepJob
-from foretwin.sim_worker.futures.future_rows import Row
-from foretwin.sim_worker.futures.job_tables import (
-    JOB_TABLES,
-    as_table,
-    job_row,
-    metric_rows,
-    played_with,
-    road_user_rows,
-)
+from foretwin.orchestrator.sweep.manifest import Manifest, PartEntry
+from foretwin.sim_worker.futures.finished_part import parquet_bytes
+from foretwin.sim_worker.futures.job_tables import JOB_TABLES, as_table, metric_rows, played_with
+
+_HASH = re.compile("[0-9a-f]{64}")
 
 
 class Parts:
-    """The tables of a sweep in its folder: Parquet files for each job that is done, each of which
-    is whole or not there."""
+    """The tables of a sweep in its folder: Parquet files of each job that is done, whole or not
+    there, and listed once they are. No row is read here. Use it as a context."""
 
     def __init__(self, folder: Path, *, attribution: str) -> None:
-        self._folder = folder
-        self._metadata = {"attribution": attribution, **played_with()}
-        for name in SWEPT_TABLES.values():
-            (folder / name).mkdir(parents=True, exist_ok=True)
-            for left in (folder / name).glob("*.writing"):
-                left.unlink()
-        self._write("metrics", folder / METRICS_FILE, metric_rows())
+        self._folder, self._attribution = folder, attribution
+        self._held = ExitStack()
 
-    def write(self, rows: list[Row], job: Job, recorded: JobBytes) -> None:
-        """Write a job, the road users in it, and the rows of its futures."""
-        tables = _given(job, recorded) | {"futures": rows}
-        for table in SWEPT_TABLES:
-            self._write(table, self._part(table, job.job_index), tables[table])
+    def __enter__(self) -> Self:
+        for name in SWEPT_TABLES.values():
+            (self._folder / name).mkdir(parents=True, exist_ok=True)
+            for left in (self._folder / name).glob(f"*{WRITING}"):
+                left.unlink()
+        metadata = {"attribution": self._attribution, **played_with()}
+        metrics = as_table("metrics", metric_rows(), metadata)
+        _write(self._folder / METRICS_FILE, parquet_bytes(metrics))
+        with ExitStack() as held:
+            self._manifest = held.enter_context(Manifest(self._folder))
+            self._held = held.pop_all()
+        return self
+
+    def __exit__(self, *what: object) -> None:
+        self._held.close()
+
+    def write(self, number: int, part: FinishedPart) -> None:
+        """Keep the part of the job of a number; raises OSError, and then it is not listed."""
+        for table, data in part.tables.items():
+            _write(self._part(table, number), data)
+        self._manifest.add(
+            PartEntry(
+                job=number,
+                job_sha256=part.job_sha256,
+                rows=sum(count.cases for count in part.counts),
+                rows_sha256=part.rows_sha256,
+                tables={table: _sha256(data) for table, data in part.tables.items()},
+                counts=part.counts,
+                given_up=part.given_up,
+            )
+        )
 
     def _part(self, table: str, job: int) -> Path:
         return self._folder / SWEPT_TABLES[table] / f"job-{job:06d}.parquet"
 
-    def _write(self, table: str, path: Path, rows: list[Row]) -> None:
-        partial = path.with_suffix(".writing")
-        pq.write_table(as_table(table, rows, self._metadata), partial, compression="zstd")
-        partial.replace(path)
-
     def keep_first(self, count: int) -> None:
         """Remove parts of jobs that are not among the first so many: of another plan."""
         for name in SWEPT_TABLES.values():
-            for path in sorted((self._folder / name).glob("job-*.parquet"))[::-1]:
-                if int(path.stem.removeprefix("job-")) < count:
-                    break
-                path.unlink()
+            for path in (self._folder / name).glob("job-*.parquet"):
+                if int(path.stem.removeprefix("job-")) >= count:
+                    path.unlink()
 
-    def hold(self, job: Job) -> bool:
-        """Return whether a job is done: all its parts are there, readable and its own, and none of
+    @property
+    def listed(self) -> int:
+        """Return one more than the greatest number of a job that may be there."""
+        return len(self._manifest)
+
+    def hold(self, number: int, job_sha256: str) -> bool:
+        """Return whether a job is done: all its files are there as they were written, and none of
         its futures was given up with the job."""
-        try:
-            there = {table: self._read(table, job.job_index) for table in SWEPT_TABLES}
-        except (UserError, FileNotFoundError):
+        entry = self._manifest.entry(number)
+        if entry is None or entry.job_sha256 != job_sha256 or entry.given_up:
             return False
-        recorded = job_bytes(job)
-        given = {name: len(rows) for name, rows in _given(job, recorded).items()}
-        for table, count in (given | {"futures": len(job.futures)}).items():
-            if there[table]["job_sha256"].to_pylist() != count * [recorded.sha256]:
-                return False
-        rows = there["futures"].select(["valid", "left_out"]).to_pylist()
-        return all(row["valid"] is not None or row["left_out"] for row in rows)
+        try:
+            found = {name: _sha256(self._part(name, number).read_bytes()) for name in SWEPT_TABLES}
+        except OSError:
+            return False
+        return found == entry.tables
 
-    def _read(self, table: str, job: int) -> pa.Table:
-        """Return a part; UserError where it is damaged, FileNotFoundError where it is lost."""
-        with opened(self._part(table, job)) as file:
-            part = file.read()
-            part.validate(full=True)
-            if part.schema != JOB_TABLES[table]:
-                raise UserError(f"{self._part(table, job)}: has other columns")
-        return part
-
-    def rows(self, jobs: Sequence[SweepJob]) -> Iterator[Row]:
-        """Yield all rows in the order of the plan."""
-        for job in jobs:
-            yield from self._read("futures", job.number).to_pylist()
+    def entries(self, jobs: int) -> Iterator[PartEntry]:
+        """Yield what is listed of the first so many jobs, in the order of the plan."""
+        return self._manifest.entries(jobs)
 
 
-def _given(job: Job, recorded: JobBytes) -> dict[str, list[Row]]:
-    """Return the rows that are known before a job is played, by table."""
-    users = road_user_rows(job, recorded.sha256)
-    return {"road_users": users, "jobs": [job_row(job, recorded)]}
+def fault_in(part: FinishedPart | None, job: Job, job_sha256: str, cells: JobCells) -> str:
+    """Return why something is not the finished part of a job, "" where it is one.
+
+    Of its files what stands at their ends is read: columns, how many rows, of which job and cells.
+    """
+    if part is None or part.job_sha256 != job_sha256:
+        return "no part of this job"
+    count = len(job.futures)
+    rows = {"futures": count, "jobs": 1, "road_users": len(job.replayed) + len(job.road_users)}
+    if part.tables.keys() != rows.keys():
+        return f"holds tables {', '.join(sorted(part.tables)) or 'none'}"
+    try:
+        ends = {name: pq.read_metadata(pa.BufferReader(part.tables[name])) for name in rows}
+    except (pa.ArrowException, OSError) as error:
+        return f"no Parquet: {' '.join(str(error).split())}"
+    for name, end in ends.items():
+        if not end.schema.equals(_parquet_schema(name)):
+            return f"{name} have other columns"
+        if end.num_rows != rows[name]:
+            return f"{end.num_rows} rows of {name}; {rows[name]} are due"
+    spans = {"job_sha256": (job_sha256, job_sha256), "cell": (cells.first, cells.first + count - 1)}
+    for column, span in spans.items():
+        if _span(ends["futures"], column) != span:
+            return f"futures of another {column}"
+    who = {(scenario, job.futures[0].planner) for scenario in cells.scenarios}
+    counted = {(one.scenario, one.planner): one.cases for one in part.counts}
+    if counted.keys() != who or sum(counted.values()) != count:
+        return "counts other rows than it holds"
+    if _HASH.fullmatch(part.rows_sha256) is None:
+        return "no hash of its rows"
+    return ""
+
+
+@functools.cache
+def _parquet_schema(table: str) -> pq.ParquetSchema:
+    empty = parquet_bytes(JOB_TABLES[table].empty_table())
+    return pq.read_metadata(pa.BufferReader(empty)).schema
+
+
+def _span(end: pq.FileMetaData, column: str) -> tuple[object, object]:
+    """Return the least and the greatest value of a column, as the end of its file tells."""
+    place = JOB_TABLES["futures"].names.index(column)
+    told = [end.row_group(n).column(place).statistics for n in range(end.num_row_groups)]
+    if not all(one is not None and one.has_min_max for one in told):
+        return None, None
+    return min(one.min for one in told), max(one.max for one in told)
+
+
+def _write(path: Path, data: bytes) -> None:
+    with partial_file(path, ending=WRITING) as partial:
+        partial.write_bytes(data)
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

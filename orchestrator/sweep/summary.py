@@ -3,56 +3,54 @@
 from __future__ import annotations
 
 import collections
-import statistics
+import math
 from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.parts import CaseCount
+from foretwin.contracts.running import RunningQuantiles
 from foretwin.contracts.terminal import console, plain, say, words
 from foretwin.orchestrator.sweep.spec import SweepSpec
-from foretwin.sim_worker.futures.future_rows import Row
 from foretwin.sim_worker.road_users.likeness import likeness_words
 
-_SCORE = "metric_driving_score"
+_SCORE = "driving_score"
 COUNTS = ("cases", "placed", "collided", "failed")
 """What is counted of each scenario and planner."""
+_REASONS = 1000
+"""So many different ones are counted of each."""
 _PLAIN_WIDTH = 120
 
 
-class _CaseCount:
+class _CaseSums:
     def __init__(self) -> None:
         self.cases = self.placed = self.collided = self.failed = 0
-        self.clearance_m: list[float] = []
-        self.scores: list[float] = []
+        self.clearance_m = RunningQuantiles()
+        self.scores, self.scored = 0.0, 0
         self.reasons: collections.Counter[str] = collections.Counter()
         self.not_placed: collections.Counter[str] = collections.Counter()
 
-    def add(self, row: Row) -> None:
-        self.cases += 1
-        if row["failure"]:
-            self.failed += 1
-            self.reasons[row["failure"]] += 1
-        if row["left_out"]:
-            self.not_placed[row["left_out"]] += 1
-        if row["left_out"] or row["trajectory_sha256"] is None:
-            return
-        self.placed += 1
-        self.collided += bool(row["collided"])
-        if row["min_clearance_m"] is not None:
-            self.clearance_m.append(row["min_clearance_m"])
-        if row.get(_SCORE) is not None:
-            self.scores.append(row[_SCORE])
+    def add(self, count: CaseCount) -> None:
+        for name in COUNTS:
+            setattr(self, name, getattr(self, name) + getattr(count, name))
+        for clearance_m in count.clearance_m:
+            self.clearance_m.take(clearance_m)
+        self.scores = math.fsum((self.scores, *count.scores))
+        self.scored += len(count.scores)
+        for mine, theirs in ((self.reasons, count.reasons), (self.not_placed, count.not_placed)):
+            known = {why: n for why, n in theirs.items() if why in mine or len(mine) < _REASONS}
+            mine.update(known)
 
 
 class Summary:
-    """Counts rows; a case that cannot be played at its place is not placed."""
+    """Adds up what came of parts, in memory that does not grow with them."""
 
     def __init__(self, spec: SweepSpec) -> None:
-        self._scored = _SCORE.removeprefix("metric_") in spec.metrics
-        self._groups: dict[tuple[str, str], _CaseCount] = collections.defaultdict(_CaseCount)
+        self._scored = _SCORE in spec.metrics
+        self._groups: dict[tuple[str, str], _CaseSums] = collections.defaultdict(_CaseSums)
 
-    def add(self, row: Row) -> None:
-        """Count one more row."""
-        self._groups[row["scenario"], row["planner"]].add(row)
+    def add(self, count: CaseCount) -> None:
+        """Count what came of more cases."""
+        self._groups[count.scenario, count.planner].add(count)
 
     def totals(self) -> dict[str, int]:
         """Return the counts of all rows."""
@@ -67,17 +65,24 @@ class Summary:
                 "scenario": scenario,
                 "planner": planner,
                 **{name: getattr(group, name) for name in COUNTS},
-                "median_clearance_m": _rounded(group.clearance_m, statistics.median),
-                "mean_score": _rounded(group.scores, statistics.fmean) if self._scored else None,
-                "reasons": dict(group.reasons.most_common(3)),
-                "not_placed": dict(group.not_placed.most_common(3)),
+                "median_clearance_m": _rounded(group.clearance_m.percentile(50.0)),
+                "mean_score": _rounded(
+                    group.scores / group.scored if self._scored and group.scored else None
+                ),
+                "reasons": _most(group.reasons),
+                "not_placed": _most(group.not_placed),
             }
             for (scenario, planner), group in sorted(self._groups.items())
         ]
 
 
-def _rounded(values: list[float], reduce: Any) -> float | None:
-    return round(float(reduce(values)), 4) if values else None
+def _most(reasons: collections.Counter[str]) -> dict[str, int]:
+    """Return the three most frequent, whoever counted them first."""
+    return dict(sorted(reasons.items(), key=lambda one: (-one[1], one[0]))[:3])
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)
 
 
 def print_summary(out: Path, summary: dict[str, Any]) -> None:

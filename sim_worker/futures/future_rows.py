@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from foretwin.contracts.future_numbers import numbers_of
@@ -87,19 +86,6 @@ def future_rows(job: Job, result: FuturesResult | None, *, job_sha256: str) -> l
         elif result is not None:
             row["left_out"] = unplaced[future.index]
         rows.append(row)
-    return rows
-
-
-def rows_as_bytes(rows: list[Row]) -> bytes:
-    """Return rows as they travel."""
-    return msgspec.msgpack.encode(rows)
-
-
-def rows_from_bytes(data: bytes, job: Job) -> list[Row]:
-    """Return the rows of a job from `rows_as_bytes`; raises msgspec.DecodeError for other bytes."""
-    rows: list[Row] = msgspec.msgpack.decode(data, type=list[Row])
-    for row, future in zip(rows, job.futures, strict=True):
-        row["values"] = list(future.values.items())  # Jobs travel with their names sorted.
     return rows
 
 

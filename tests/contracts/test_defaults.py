@@ -16,6 +16,7 @@ from foretwin.contracts import (
     gap,
     guard,
     numbering,
+    parts,
     placement,
     process_setup,
     roles,
@@ -33,6 +34,7 @@ from foretwin.contracts import (
 
 COVERS = (
     "foretwin.contracts.drive",
+    "foretwin.contracts.parts",
     "foretwin.contracts.process_setup",
     "foretwin.contracts.simulation",
     "foretwin.contracts.towards_vehicle",
@@ -56,7 +58,6 @@ LISTED: dict[str, dict[str, Any]] = {
     "Future": {"planner": "pure_pursuit_idm"},
     "GapAlarm": {"over": True},
     "Job": {"accident_motion": True, "control_hz": 20.0, "engine": "mujoco", "schema_version": 1},
-    "JobRequest": {"wanted": "result"},
     "Lane": {
         "turns_source": "inferred", "direction_source": "inferred", "change": "both",
         "change_source": "default",
@@ -85,8 +86,8 @@ LISTED: dict[str, dict[str, Any]] = {
 """Of faults those that are neutral are listed in the table of numbers."""
 FILES = (campaign, credentials, process_setup, roles, scenario, segments, setup, vehicle)
 MESSAGES = (
-    drive, futures, gap, numbering, placement, runner, simulation, tally, towards_vehicle, tuning,
-    world,
+    drive, futures, gap, numbering, parts, placement, runner, simulation, tally, towards_vehicle,
+    tuning, world,
 )  # fmt: skip
 KINDS = sorted(
     {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
 
 import msgspec
@@ -10,9 +10,11 @@ import pytest
 
 from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.job_identity import job_bytes
+from foretwin.contracts.parts import JobCells
 from foretwin.contracts.placement import PlaceRequest
 from foretwin.contracts.runner import (
     AHEAD,
+    TRIES,
     Answer,
     JobRequest,
     Task,
@@ -67,20 +69,54 @@ def test_tasks_are_made_as_they_are_needed_and_each_is_answered(count: int, ahea
     assert runner.most == min(count, ahead)
 
 
+class Odd(Newest):
+    """Answers with how often it was asked for a task."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked: Counter[str] = Counter()
+
+    def take(self, timeout_s: float | None = 0.0) -> Answer | None:
+        if not self.held:
+            return None
+        one = self.held.pop()
+        self.asked[one.key] += 1
+        return Answer(one, self.asked[one.key], worker_id="odd")
+
+
+def test_a_wrong_answer_does_not_count_and_its_task_is_asked_again() -> None:
+    runner = Odd()
+
+    def fault_in(answer: Answer) -> str:
+        never, soon = answer.task.key == "1", answer.task.key == "2" and answer.message < TRIES
+        return "garbage" if never or soon else ""
+
+    said = {
+        answer.task.key: (answer.message, answer.failure)
+        for answer in answers(runner, map(task, range(4)), ahead=2, fault_in=fault_in)
+    }
+    assert said == {"0": (1, ""), "1": (None, "garbage"), "2": (TRIES, ""), "3": (1, "")}
+    assert runner.asked == {"0": 1, "1": TRIES, "2": TRIES, "3": 1}
+    assert runner.most == 2
+
+
 def test_a_job_goes_out_as_it_is_recorded() -> None:
     """What is sent is to the byte the message that holds the job itself."""
 
     class Whole(msgspec.Struct, frozen=True, kw_only=True):
         job: object
         sha256: str
-        wanted: str
+        cells: JobCells | None
 
     one = job((), horizon_s=1.0)
     named = job_bytes(one)
-    asked = job_task(one, named, wanted="rows")
+    cells = JobCells(
+        first=3, junction_id="n1", vehicle="car", scenarios=(), cases=(), places=(), attribution=""
+    )
+    asked = job_task(one, named, cells=cells)
     assert isinstance(asked.question, JobRequest)
     assert (asked.key, asked.channel, asked.world_id) == (named.sha256, "job", one.world_id)
-    whole = Whole(job=one, sha256=named.sha256, wanted="rows")
+    whole = Whole(job=one, sha256=named.sha256, cells=cells)
     assert content_bytes(asked.question) == content_bytes(whole)
     assert job_bytes(asked.question.decoded()) == named
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.placement import WorldPlaces
 from foretwin.contracts.runner import Runner, answers, job_task, place_task
-from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
+from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of, place_request
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import Loaded, worlds_folder
 from foretwin.orchestrator.sweep.workers import worker_setup
@@ -58,6 +60,8 @@ def rows_of(runner: Runner, plan: SweepPlan, loaded: Loaded, *, step: int = 1) -
     maker, rows = JobMaker(loaded, plan.worlds), []
     for planned in plan.jobs[::step]:
         job = maker.job(planned)
-        (answer,) = answers(runner, [job_task(job, job_bytes(job), wanted="rows")])
-        rows += cell_rows(planned, job, answer)
+        cells = cells_of(planned, plan.attribution)
+        (answer,) = answers(runner, [job_task(job, job_bytes(job), cells=cells)])
+        part = pa.BufferReader(answer.message.part.tables["futures"])
+        rows += pq.read_table(part).to_pylist()
     return rows

@@ -18,9 +18,10 @@ from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.parts import JobCells
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife
-from foretwin.contracts.runner import Wanted, job_task
+from foretwin.contracts.runner import job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import (
     ActiveWorld,
@@ -32,8 +33,8 @@ from foretwin.contracts.simulation import (
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures.finished_part import finished_part
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.future_rows import future_rows, rows_from_bytes
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -42,6 +43,7 @@ from foretwin.sim_worker.world_file import WorldFolder, load_world
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
+from tests.sim_worker.futures.cells import cells_for
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 from tests.starvation import unhindered_wait_s
 
@@ -85,8 +87,8 @@ def served(folder: Path) -> Iterator[MemoryBus]:
     assert not thread.is_alive()
 
 
-def request(question: Job, wanted: Wanted = "result") -> msgspec.Struct:
-    return job_task(question, job_bytes(question), wanted=wanted).question
+def request(question: Job, cells: JobCells | None = None) -> msgspec.Struct:
+    return job_task(question, job_bytes(question), cells=cells).question
 
 
 def asked(bus: MemoryBus, channel: str, question: msgspec.Struct) -> Any:
@@ -103,13 +105,13 @@ def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
     assert result_digest(result) == result_digest(here)
 
 
-def test_rows_are_what_the_result_comes_to_and_the_job_is_the_same(served: MemoryBus) -> None:
+def test_a_part_is_what_the_result_comes_to_and_the_job_is_the_same(served: MemoryBus) -> None:
     question = job(plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
-    answer = asked(served, "job", request(question, "rows"))
+    cells = cells_for(question)
+    answer = asked(served, "job", request(question, cells))
     assert answer.result is None
     result = asked(served, "job", request(question)).result
-    rows = future_rows(question, result, job_sha256=job_bytes(question).sha256)
-    assert rows_from_bytes(answer.rows, question) == rows
+    assert answer.part == finished_part(question, job_bytes(question), result, cells)
 
 
 def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(

@@ -31,7 +31,6 @@ from tests.starvation import kept_waiting
 COVERS = (
     "foretwin.orchestrator.sweep.folder",
     "foretwin.orchestrator.sweep.jobs",
-    "foretwin.orchestrator.sweep.rows",
     "foretwin.orchestrator.sweep.workers",
 )
 

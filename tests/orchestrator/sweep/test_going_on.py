@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pyarrow.parquet as pq
 import pytest
 
-from foretwin.contracts.runner import Answer
+from foretwin.contracts.runner import Answer, JobAnswer
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.record.ledger import JobsLedger
@@ -21,7 +23,7 @@ from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.sweeps import small_sweep
 from tests.sim_worker.scenarios.worlds import tee
 
-COVERS = ("foretwin.orchestrator.sweep.folder", "foretwin.orchestrator.sweep.rows")
+COVERS = ("foretwin.orchestrator.sweep.folder",)
 
 
 class Leaving(InProcessRunner):
@@ -92,6 +94,88 @@ def test_a_job_is_done_where_all_its_parts_are_there_and_its_own(
     assert again["jobs_played"] == (table != "road_users" or harm is not swapped)
     assert part.read_bytes() == before
     assert again["rows_sha256"] == summary["rows_sha256"]
+
+
+def test_a_job_that_is_not_listed_is_played_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    loaded, out, summary = two_worlds
+    out = Path(shutil.copytree(out, tmp_path / "out"))
+    cut(out / "manifest.jsonl")
+    again = played(loaded, out)
+    assert (again["jobs_played"], again["rows_sha256"]) == (1, summary["rows_sha256"])
+    (out / "manifest.jsonl").unlink()
+    again = played(loaded, out)
+    assert (again["jobs_played"], again["rows_sha256"]) == (again["jobs"], summary["rows_sha256"])
+
+
+class Garbage(InProcessRunner):
+    """Gives something else than what a job comes to, at first or always."""
+
+    always = False
+
+    def __init__(self, setup: WorkerSetup) -> None:
+        super().__init__(setup)
+        self._given: set[str] = set()
+
+    def take(self, timeout_s: float | None = 0.0) -> Answer | None:
+        answer = super().take(timeout_s)
+        if answer is None or answer.task.channel != "job":
+            return answer
+        if answer.task.key in self._given and not self.always:
+            return answer
+        self._given.add(answer.task.key)
+        cut = {name: data[:-9] for name, data in answer.message.part.tables.items()}
+        part = msgspec.structs.replace(answer.message.part, tables=cut)
+        return answer._replace(message=JobAnswer(part=part))
+
+
+def test_garbage_of_a_seat_is_told_and_played_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    loaded, _, summary = two_worlds
+    out = tmp_path / "out"
+    again = run_sweep(loaded, out, Garbage(worker_setup(loaded, out)))
+    assert (again["failed"], again["rows_sha256"]) == (0, summary["rows_sha256"])
+    said = capsys.readouterr().err
+    assert "job 0: worker w0 gave no part: no Parquet: " in said
+    assert said.count("gave no part") == again["jobs"]
+    # Who gives nothing else costs the rows of these jobs, until the next start.
+    monkeypatch.setattr(Garbage, "always", True)
+    lost = run_sweep(loaded, tmp_path / "lost", Garbage(worker_setup(loaded, out)))
+    assert lost["failed"] == lost["rows"] == summary["rows"]
+    assert played(loaded, tmp_path / "lost")["rows_sha256"] == summary["rows_sha256"]
+
+
+def test_a_full_disk_loses_nothing_that_is_done(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded, _, summary = two_worlds
+    out, write_bytes = tmp_path / "out", Path.write_bytes
+    monkeypatch.setattr(Path, "write_bytes", _filled_by(out / "rows" / "job-000003.parquet"))
+    with pytest.raises(OSError, match="No space left"):
+        played(loaded, out)
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+    assert sorted(path.name for path in (out / "rows").iterdir()) == [
+        f"job-{number:06d}.parquet" for number in range(3)
+    ]
+    again = played(loaded, out)
+    assert again["jobs_played"] == again["jobs"] - 3
+    assert again["rows_sha256"] == summary["rows_sha256"]
+
+
+def _filled_by(part: Path) -> Callable[[Path, bytes], int]:
+    """Return how a disk writes that is full when one part comes."""
+    write_bytes = Path.write_bytes
+
+    def write(path: Path, data: bytes) -> int:
+        if path.name.startswith(part.name) and path.parent == part.parent:
+            write_bytes(path, data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        return write_bytes(path, data)
+
+    return write
 
 
 def test_rows_of_other_columns_are_played_again(
