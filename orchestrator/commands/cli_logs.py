@@ -167,5 +167,30 @@ def compare(
     compare_drives(**asked)
 
 
-ABOUT_LOGS = (declare, convert, merge, identify, gap, compare, judge, recover, repeat)
+def collect(
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[RUNS]...", help="folders of runs or sweeps, or of several"),
+    ] = None,
+    into: Annotated[
+        str, typer.Option(help="the lake: a folder, s3://BUCKET/PREFIX or gs://BUCKET/PREFIX")
+    ] = "lake",
+    replace: Annotated[
+        bool, typer.Option("--replace", help="a run that has changed since replaces what it was")
+    ] = False,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="also hold every file of the lake against its hash")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
+) -> None:
+    """Collect the tables of many runs and sweeps into one lake of partitioned Parquet."""
+    from foretwin.orchestrator.commands.collect import collect_runs
+
+    code = collect_runs(
+        tuple(runs or ()), into=into, replace=replace, verify=verify, as_json=as_json
+    )
+    raise typer.Exit(code)
+
+
+ABOUT_LOGS = (declare, convert, merge, identify, gap, compare, judge, recover, repeat, collect)
 """In the order in which help lists them."""

@@ -138,7 +138,7 @@ def _file_of(table: Path, column: str, value: str) -> Path:
     for path in files:
         try:
             with opened(path) as file:
-                _check_schema(path, file.schema_arrow)
+                check_result_schema(path, file.schema_arrow)
                 if value in file.read([column])[column].to_pylist():
                     return path
         except UserError as error:
@@ -155,7 +155,7 @@ def _row(path: Path, column: str, value: str, kind: type[_Row]) -> _Row:
     raise UserError(f"{path}: no {column} {value!r}")
 
 
-def _check_schema(path: Path, schema: pa.Schema) -> dict[str, str]:
+def check_result_schema(path: Path, schema: pa.Schema) -> dict[str, str]:
     """Return the metadata of a table; UserError where another foretwin wrote it."""
     said = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
     if said.get("result_schema") != str(RESULT_SCHEMA_VERSION):
@@ -168,7 +168,7 @@ def _check_schema(path: Path, schema: pa.Schema) -> dict[str, str]:
 
 def _check_same(path: Path, schema: pa.Schema) -> None:
     """Raise UserError where a table was written with what may come to other bits."""
-    said = _check_schema(path, schema)
+    said = check_result_schema(path, schema)
     known = msgspec.json.decode(said.get("versions", "null"))
     then = msgspec.convert({**said, "versions": known}, _PlayedWith)
     now = versions()
