@@ -122,18 +122,20 @@ def answers(
     runner: Runner,
     tasks: Iterable[Task],
     *,
-    ahead: int = AHEAD,
+    ahead: int | None = None,
     fault_in: Callable[[Answer], str] = _never,
 ) -> Iterator[Answer]:
     """Have tasks answered by a runner that has no others, and yield the answers as they come.
 
-    Tasks are taken as they are needed: the runner holds at most `ahead`. An answer in which
+    Tasks are taken as they are needed: the runner holds at most `ahead`; without, `AHEAD`,
+    or where that are more, twice as many as can be in work. An answer in which
     `fault_in` finds a fault does not count: its task is asked again, up to `TRIES` times in all.
     """
     left, held = iter(tasks), 0
     wrong: Counter[str] = Counter()
     while True:
-        for task in itertools.islice(left, ahead - held):
+        most = max(AHEAD, 2 * runner.capacity) if ahead is None else ahead
+        for task in itertools.islice(left, max(most - held, 0)):
             runner.submit(task)
             held += 1
         if not held:

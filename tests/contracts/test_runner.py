@@ -50,6 +50,15 @@ def task(number: int) -> Task:
     return Task(str(number), "prepare", "w", PrepareRequest(world_id="w"))
 
 
+def test_a_large_cluster_is_given_twice_as_many_as_it_can_work_at() -> None:
+    class Large(Newest):
+        capacity = AHEAD
+
+    runner = Large()
+    assert sum(1 for _ in answers(runner, map(task, range(3 * AHEAD)))) == 3 * AHEAD
+    assert runner.most == 2 * AHEAD
+
+
 @pytest.mark.parametrize(
     ("count", "ahead"), [(0, 3), (1, 3), (3, 3), (50, 3), (50, 1), (300, AHEAD)]
 )
