@@ -102,7 +102,7 @@ class _WorldAtHand:
         return checked_world(self.data, world_id, where="the World that came with the question")
 
 
-class _Lines(logging.Handler):
+class _SeatLog(logging.Handler):
     def __init__(self, seat: str) -> None:
         super().__init__(logging.WARNING)
         self.setFormatter(JsonLines(seat))
@@ -126,7 +126,7 @@ class Seat:
         """Answer one question; never raises."""
         if self._strange:
             return SeatAnswer(self.name, strange=self._strange)
-        log, lines = logging.getLogger(), _Lines(self.name)
+        log, lines = logging.getLogger(), _SeatLog(self.name)
         log.addHandler(lines)
         try:
             return self._answer(question, world)._replace(log=tuple(lines.lines))

@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
 from foretwin.orchestrator.commands.cli_options import (
@@ -34,6 +33,7 @@ from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_secure import doctor
 from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
+from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
@@ -228,32 +228,8 @@ def index_map(
     index_map_file(map_file, folder=folder)
 
 
-@app.command()
-def sweep(
-    spec: Annotated[
-        Path,
-        typer.Argument(
-            help="what to sweep over, TOML; its table of parameters lists "
-            + ", ".join(f"{name} ({row.range})" for name, row in FUTURE_NUMBERS.items())
-        ),
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="folder of the rows [default: sweeps/SPEC]")
-    ] = None,
-    workers: Annotated[int, typer.Option(help="worker processes")] = 2,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="start anew, not where it stopped")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
-) -> None:
-    """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
-    from foretwin.orchestrator.commands.sweep import sweep as run_sweep
-
-    raise typer.Exit(run_sweep(spec, out=out, workers=workers, fresh=fresh, as_json=as_json))
-
-
-for about_logs in (*ABOUT_LOGS, learn_progress):
-    app.command()(about_logs)
+for command in (sweep, *ABOUT_LOGS, learn_progress):
+    app.command()(command)
 
 app.command("set")(set_value)
 app.add_typer(secure_commands, name="secure")

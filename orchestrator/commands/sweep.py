@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
 import shutil
@@ -18,15 +17,14 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
-from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.parts import JobCells
 from foretwin.contracts.runner import Answer, Runner, Task, answers, job_task, place_task
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
-from foretwin.orchestrator.processors import trouble_with_workers
 from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.record.run_folder import keep_vehicles
-from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
+from foretwin.orchestrator.runner.worker_processes import NoWorkerError
+from foretwin.orchestrator.sweep.engines import LOCAL, Engine, workers_for
 from foretwin.orchestrator.sweep.folder import (
     SUMMARY,
     FoundPlaces,
@@ -39,7 +37,6 @@ from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, plan_sweep
 from foretwin.orchestrator.sweep.rows import Parts, fault_in
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
-from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.orchestrator.sweep.worlds import Building, all_there, choose_worlds, source_digest
 from foretwin.sim_worker.futures.finished_part import finished_part
 from foretwin.sim_worker.road_users.likeness import likenesses
@@ -48,22 +45,26 @@ SOME_FAILED = 3
 
 
 def sweep(
-    spec: Path, *, out: Path | None, workers: int = 2, fresh: bool = False, as_json: bool = False
+    spec: Path,
+    *,
+    out: Path | None,
+    engine: Engine = LOCAL,
+    fresh: bool = False,
+    as_json: bool = False,
 ) -> int:
     """Run a sweep, or go on with it; returns 0, or 3 where futures failed, where none was played,
     or where no worker can be started.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
-    if (trouble := trouble_with_workers(workers)) is not None:
-        raise UserError(trouble)
+    engine.check()
     loaded = load_spec(spec)
     out = out or Path("sweeps") / spec.stem
     if not out.is_file() and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     new = not out.exists()
     try:
-        with named_in_errors(f"--out {out}"), workers_for(loaded, out, workers) as runner:
+        with named_in_errors(f"--out {out}"), workers_for(loaded, out, engine) as runner:
             summary = run_sweep(loaded, out, runner, fresh=fresh)
     except OSError:
         if new and not (out / SUMMARY).is_file():  # else it goes on from there
@@ -78,21 +79,6 @@ def sweep(
         print_summary(out, summary)
     failed = summary["failed"] or summary["failures"] or not summary["placed"]
     return SOME_FAILED if failed else 0
-
-
-@contextlib.contextmanager
-def workers_for(loaded: Loaded, out: Path, workers: int) -> Iterator[WorkerProcesses]:
-    """Give the processes that play a sweep into the folder `out`, and end them."""
-    with (
-        temporary_folder("foretwin-sweep-") as folder,
-        WorkerProcesses(
-            workers,
-            worker_setup(loaded, out),
-            task_timeout_s=loaded.spec.job_timeout_s,
-            folder=folder,
-        ) as runner,
-    ):
-        yield runner
 
 
 def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False) -> dict[str, Any]:

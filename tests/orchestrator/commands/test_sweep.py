@@ -19,9 +19,10 @@ import pytest
 
 from foretwin.contracts.world import ATTRIBUTION
 from foretwin.orchestrator.commands.cli import run
-from foretwin.orchestrator.commands.sweep import run_sweep, workers_for
+from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.runner import worker_processes
+from foretwin.orchestrator.sweep.engines import Engine, workers_for
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from tests.orchestrator.sweeps import SMALL, alone, small_sweep
@@ -29,6 +30,7 @@ from tests.sim_worker.planners.installed import install
 from tests.starvation import kept_waiting
 
 COVERS = (
+    "foretwin.orchestrator.commands.cli_sweep",
     "foretwin.orchestrator.sweep.folder",
     "foretwin.orchestrator.sweep.jobs",
     "foretwin.orchestrator.sweep.workers",
@@ -102,7 +104,7 @@ def test_two_workers_give_the_same_rows_again_and_again(
 ) -> None:
     folder, summary = swept
     loaded = load_spec(folder / "small.toml")
-    with workers_for(loaded, tmp_path, 2) as runner:
+    with workers_for(loaded, tmp_path, Engine(workers=2)) as runner:
         for _ in range(2):
             again = run_sweep(loaded, tmp_path, runner, fresh=True)
             assert again["jobs_played"] == summary["jobs"]
@@ -268,7 +270,7 @@ def test_what_a_killed_sweep_left_goes_as_the_next_one_begins(
     _ended_by(signal.SIGKILL, spec, out)
     buses = tmp_path / "foretwin"
     left = {*(tmp_path / "temporary").iterdir(), *buses.iterdir()}
-    with workers_for(load_spec(spec), out, 1):
+    with workers_for(load_spec(spec), out, Engine(workers=1)):
         assert not any(folder.exists() for folder in left)
     assert [*(tmp_path / "temporary").iterdir(), *buses.iterdir()] == []
 
@@ -282,7 +284,7 @@ def test_100_of_100_runs_give_the_same_hash(
     folder, summary = swept
     loaded = load_spec(folder / "small.toml")
     hashes = []
-    with workers_for(loaded, tmp_path, workers) as runner:
+    with workers_for(loaded, tmp_path, Engine(workers=workers)) as runner:
         for number in range(100):
             if number % 25 == 10 and runner.pids:
                 os.kill(runner.pids[0], signal.SIGKILL)

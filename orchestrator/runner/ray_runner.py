@@ -1,0 +1,241 @@
+"""A runner whose workers are seats on Ray: Ray says which task is played where, and when again.
+
+All that it is given goes to Ray at once, each task with its World as an argument: Ray plays tasks
+with the same argument one after another in the same process as long as there are such, and
+prefers nodes that hold it.
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections import OrderedDict, deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from queue import Empty, SimpleQueue
+from typing import Any, NamedTuple, Protocol
+
+from foretwin.contracts.codec import encode
+from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.guard import Refused, opened
+from foretwin.contracts.keys import CHANNELS
+from foretwin.contracts.runner import Answer, Task, TaskCount
+from foretwin.orchestrator.runner.dispatch import ATTEMPTS
+from foretwin.orchestrator.runner.worker_processes import NoWorkerError
+from foretwin.sim_worker.seat import SeatAnswer, SeatQuestion
+
+_ON_A_WORLD = "job", "place"
+"""What is asked about a World that is there."""
+_KEPT_WORLDS = 8
+"""So many Worlds stay in the object store after the last question about them."""
+_LOOK_S = 1.0
+
+
+class Ended(NamedTuple):
+    """The end of a question: an answer, or in words what became of whom it was given to."""
+
+    answer: SeatAnswer | None
+    trouble: str = ""
+
+
+class SeatCluster(Protocol):
+    """What a runner needs of Ray."""
+
+    def seats(self) -> tuple[str, ...]:
+        """Return a name for each processor that there is now."""
+
+    def put(self, data: bytes) -> Any:
+        """Store bytes for whoever is asked; gone with the last reference to what is returned."""
+
+    def ask(self, question: SeatQuestion, world: Any | None) -> Future[Ended]:
+        """Have a question answered by any seat, again where that dies."""
+
+    def forget(self, asked: Future[Ended]) -> None:
+        """Let a question that was not begun not be begun any more."""
+
+
+class _AtSeats(NamedTuple):
+    task: Task
+    future: Future[Ended]
+
+
+class RayRunner:
+    """Has tasks answered by seats on a cluster; see Runner.
+
+    `world_file` gives the bytes of a World. `most` bounds how many tasks are with Ray at once, None
+    leaves it to the cluster. A seat gives an answer up after `task_timeout_s`.
+    """
+
+    def __init__(
+        self,
+        cluster: SeatCluster,
+        *,
+        world_file: Callable[[str], bytes],
+        task_timeout_s: float,
+        most: int | None = None,
+        log: Callable[[bytes], None] = lambda _: None,
+    ) -> None:
+        self._cluster, self._world_file, self._log = cluster, world_file, log
+        self._timeout_s, self._most = task_timeout_s, most
+        self._open: dict[str, _AtSeats | None] = {}
+        self._waiting: deque[Task] = deque()
+        self._ended: SimpleQueue[_AtSeats] = SimpleQueue()
+        self._answers: deque[Answer] = deque()
+        self._worlds: OrderedDict[str, Any] = OrderedDict()
+        self._asked_of: dict[str, int] = {}
+        """How many open questions there are about each World that is stored."""
+        self._count = TaskCount()
+        self._heard_s = time.monotonic()
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks can be in work at once: one for each processor of the cluster."""
+        seats = len(self._cluster.seats())
+        return max(seats if self._most is None else min(seats, self._most), 1)
+
+    @property
+    def workers(self) -> tuple[str, ...]:
+        """Names of the processors that are there now."""
+        return self._cluster.seats()
+
+    @property
+    def count(self) -> TaskCount:
+        """What became of the tasks submitted so far."""
+        return self._count
+
+    def submit(self, task: Task) -> None:
+        """Take a task; raises ValueError for one whose key is open already."""
+        if task.key in self._open:
+            raise ValueError(f"task {task.key} is submitted twice")
+        if not self._open:
+            self._heard_s = time.monotonic()
+        self._open[task.key] = None
+        self._count.given += 1
+        self._waiting.append(task)
+        self._give_out()
+
+    def cancel(self, key: str) -> None:
+        """Forget a task; see Runner."""
+        if key not in self._open:
+            return
+        asked = self._open.pop(key)
+        self._count.lost += 1
+        if asked is None:
+            self._waiting = deque(task for task in self._waiting if task.key != key)
+        else:
+            self._leave_world(asked.task)
+            self._cluster.forget(asked.future)
+        self._give_out()
+
+    def take(self, timeout_s: float | None = 0.0) -> Answer | None:
+        """Return one answer; see Runner.
+
+        Raises UserError where a node has other versions, NoWorkerError where none answers any more.
+        """
+        until_s = None if timeout_s is None else time.monotonic() + timeout_s
+        while not self._answers:
+            if not self._open:
+                return None
+            left_s = _LOOK_S if until_s is None else min(_LOOK_S, until_s - time.monotonic())
+            try:
+                asked = self._ended.get(timeout=max(left_s, 0.0))
+            except Empty:
+                self._look()
+                if until_s is not None and time.monotonic() >= until_s:
+                    return None
+            else:
+                self._take_end(asked)
+        return self._answers.popleft()
+
+    def _give_out(self) -> None:
+        at_work = len(self._open) - len(self._waiting)
+        while self._waiting and (self._most is None or at_work < self._most):
+            task = self._waiting.popleft()
+            try:
+                world = self._world_of(task)
+            except OSError as error:
+                del self._open[task.key]
+                self._count.refused += 1
+                self._answers.append(_given_up(task, one_line(error)))
+                continue
+            question = SeatQuestion(task.channel, task.world_id, encode(task.question))
+            asked = _AtSeats(task, self._cluster.ask(question, world))
+            self._open[task.key] = asked
+            at_work += 1
+            asked.future.add_done_callback(functools.partial(self._note_end, asked))
+
+    def _note_end(self, asked: _AtSeats, _: Future[Ended]) -> None:
+        self._ended.put(asked)  # By a thread of Ray's: the rest is for who takes answers.
+
+    def _world_of(self, task: Task) -> Any | None:
+        """Return the World of a task in the object store."""
+        if task.channel not in _ON_A_WORLD:
+            return None
+        name = task.world_id
+        if name not in self._worlds:
+            self._worlds[name] = self._cluster.put(self._world_file(name))
+        self._worlds.move_to_end(name)
+        self._asked_of[name] = self._asked_of.get(name, 0) + 1
+        return self._worlds[name]
+
+    def _leave_world(self, task: Task) -> None:
+        if task.channel not in _ON_A_WORLD:
+            return
+        self._asked_of[task.world_id] -= 1
+        idle = [name for name in self._worlds if not self._asked_of.get(name)]
+        for name in idle[: max(len(idle) - _KEPT_WORLDS, 0)]:
+            del self._worlds[name]
+            self._asked_of.pop(name, None)
+
+    def _take_end(self, asked: _AtSeats) -> None:
+        self._heard_s = time.monotonic()
+        task = asked.task
+        if self._open.get(task.key) is not asked:
+            return  # It was cancelled.
+        del self._open[task.key]
+        self._leave_world(task)
+        answer, trouble = asked.future.result()
+        if answer is None:
+            self._count.lost += 1
+            self._answers.append(_given_up(task, trouble))
+        else:
+            self._take_answer(task, answer)
+        self._give_out()
+
+    def _take_answer(self, task: Task, answer: SeatAnswer) -> None:
+        for line in answer.log:
+            self._log(line)
+        if answer.strange:
+            raise UserError(f"--engine ray: {answer.strange}: install there what is installed here")
+        if answer.late:
+            self._count.lost += 1
+            self._answers.append(_given_up(task, answer.refusal, answer.seat))
+            return
+        failure, message = answer.refusal, None
+        if not failure:
+            reply = CHANNELS[task.channel].reply
+            assert reply is not None
+            try:
+                where = f"{task.channel} of {answer.seat}"
+                message = opened(answer.data, reply, where=where).message
+            except Refused as refused:
+                failure = one_line(refused)
+        if message is None:
+            self._count.refused += 1
+            self._answers.append(_given_up(task, failure, answer.seat))
+            return
+        self._count.results += 1
+        self._answers.append(Answer(task, message, "", answer.seat, time.monotonic_ns()))
+
+    def _look(self) -> None:
+        """See that somebody can still answer: Ray itself waits for ever."""
+        silent_s = time.monotonic() - self._heard_s
+        if silent_s > self._timeout_s and not self._cluster.seats():
+            raise NoWorkerError(f"the Ray cluster has had no processor for {self._timeout_s:g} s")
+        most_s = (ATTEMPTS + 1) * self._timeout_s
+        if silent_s > most_s:
+            raise NoWorkerError(f"no node of the Ray cluster has answered anything in {most_s:g} s")
+
+
+def _given_up(task: Task, why: str, seat: str = "") -> Answer:
+    return Answer(task, None, why, seat, time.monotonic_ns())
