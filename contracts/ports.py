@@ -7,6 +7,8 @@ import re
 import socket
 from typing import NamedTuple
 
+from foretwin.contracts.errors import UserError
+
 LOOPBACK = "127.0.0.1"
 _PORTS = range(20_000, 32_000)
 """Below those that systems give to outgoing connections, any of which could take a port between
@@ -101,3 +103,24 @@ def trouble_with_bus(endpoint: str | None, *, insecure: bool, secure: str | None
             "that shall be so, add --insecure"
         )
     return None
+
+
+class MetricsPlace(NamedTuple):
+    """Where metrics are told."""
+
+    host: str
+    port: int
+
+
+_PLACE = re.compile(r"(?:(?P<host>[^:\s]+):)?(?P<port>\d{1,5})")
+
+
+def metrics_place(text: str) -> MetricsPlace:
+    """Return the place that `--metrics` names; of a port alone the loopback interface.
+
+    Raises UserError for what is no place.
+    """
+    named = _PLACE.fullmatch(text)
+    if named is None or not 0 < int(named["port"]) < 65536:
+        raise UserError(f"--metrics {text}: must be a port from 1 to 65535, or HOST:PORT")
+    return MetricsPlace(named["host"] or LOOPBACK, int(named["port"]))

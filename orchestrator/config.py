@@ -13,7 +13,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED
-from foretwin.contracts.ports import trouble_with_bus
+from foretwin.contracts.ports import metrics_place, trouble_with_bus
 from foretwin.contracts.roles import Correction, FollowLimits, Role
 from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.processors import processors, trouble_with_workers
@@ -123,6 +123,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How much of the run stays while it goes on: the newest hours (12h) or bytes (20GB)."""
     trace: bool = False
     """Whether all processes leave what they did when, as `trace.json`; docs/trace.md."""
+    metrics: str | None = None
+    """Where metrics are told to operators, a port or HOST:PORT; docs/operators.md."""
     radius_m: float = 150.0
     service_roads: bool = False
     """Whether driveways and parking aisles make junctions even where no given route uses them."""
@@ -197,6 +199,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             "it) or --source live",
         )
         parse_keep(self.keep)
+        if self.metrics is not None:
+            metrics_place(self.metrics)
         for other in self.vehicles:
             trouble = other.trouble()
             yield trouble is None, f"vehicles, {other.id}: {trouble}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -99,6 +100,8 @@ class DrivePlan(DriveInputs):
     """The bus of this host; None where anybody may join at `endpoint`."""
     order_keys: OrderKeys | None = None
     """Whose orders towards the vehicle count, while anything may go there."""
+    metrics: socket.socket | None = None
+    """Listens for who asks for metrics; None where nobody may."""
 
     @property
     def router_bus(self) -> BusSetup:

@@ -21,6 +21,7 @@ from foretwin.orchestrator.commands.cli_options import (
     LeastFuturesOption,
     MapAidingOption,
     MapArgument,
+    MetricsOption,
     OutOption,
     ProgressTableOption,
     SecureOption,
@@ -101,6 +102,7 @@ def drive(
     ] = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
     keep: KeepOption = None,
+    metrics: MetricsOption = None,
     endpoint: EndpointOption = None,
     insecure: InsecureOption = False,
     trace: Annotated[
@@ -233,16 +235,6 @@ for command in (sweep, *ABOUT_LOGS, learn_progress):
 
 app.command("set")(set_value)
 app.add_typer(secure_commands, name="secure")
-
-
-@app.command()
-def view(
-    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
-) -> None:
-    """Open the recording of a run in the viewer."""
-    from foretwin.orchestrator.commands.recordings import open_view
-
-    raise typer.Exit(open_view(run_folder))
 
 
 app.command()(doctor)

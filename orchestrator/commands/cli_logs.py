@@ -192,5 +192,26 @@ def collect(
     raise typer.Exit(code)
 
 
-ABOUT_LOGS = (declare, convert, merge, identify, gap, compare, judge, recover, repeat, collect)
+def view(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+) -> None:
+    """Open the recording of a run in the viewer."""
+    from foretwin.orchestrator.commands.recordings import open_view
+
+    raise typer.Exit(open_view(run_folder))
+
+
+ABOUT_LOGS = (
+    declare,
+    convert,
+    merge,
+    identify,
+    gap,
+    compare,
+    judge,
+    recover,
+    repeat,
+    collect,
+    view,
+)
 """In the order in which help lists them."""

@@ -78,4 +78,8 @@ SecureOption = Annotated[
     str | None,
     typer.Option(help="a campaign's folder (foretwin secure init): who speaks shows a certificate"),
 ]
+MetricsOption = Annotated[
+    str | None,
+    typer.Option(help="tell operators metrics on this port of 127.0.0.1, or on HOST:PORT"),
+]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import functools
 import logging
@@ -20,6 +21,7 @@ from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.foreground import Foreground, start_all
 from foretwin.orchestrator.drive.in_charge import SwornIn, sworn_in
+from foretwin.orchestrator.drive.metrics_server import listening
 from foretwin.orchestrator.drive.orchestrator import CrashError, Orchestrator
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, SUPERVISOR
@@ -38,8 +40,10 @@ log = logging.getLogger(ORCHESTRATOR)
 def drive(config: DriveConfig) -> int:
     """Run one drive; returns its exit code. Raises UserError before anything is written."""
     inputs = read_inputs(config)
-    with named_in_errors(f"--out {config.out}"), new_folder(Path(config.out)):
-        return carry_out(make_plan(inputs, datetime.datetime.now()))
+    out = f"--out {config.out}"
+    with listening(config.metrics) as metrics, named_in_errors(out), new_folder(Path(config.out)):
+        plan = make_plan(inputs, datetime.datetime.now())
+        return carry_out(dataclasses.replace(plan, metrics=metrics))
 
 
 def carry_out(plan: DrivePlan) -> int:

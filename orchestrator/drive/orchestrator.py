@@ -20,7 +20,9 @@ from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.drive.joining import Joining
 from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.lock_step import LockStepError, LockStepLoop
+from foretwin.orchestrator.drive.metrics_server import told_metrics
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
+from foretwin.orchestrator.drive.operator_metrics import DriveCounts
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.processes import BUILDER, ORCHESTRATOR, ROUTER
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
@@ -150,7 +152,8 @@ class Orchestrator:
         bus.declare_alive(alive_key(run=plan.run_id, process=ORCHESTRATOR))
         self._meter.ready()
 
-        keeper = self._keeper(conductor)
+        keeper, counts = self._keeper(conductor), DriveCounts(conductor)
+        told = told_metrics(plan.metrics, counts.samples, processes=plan.processes_dir)
 
         def housekeeping(now_s: float) -> None:
             self._look_after(conductor, now_s)
@@ -160,6 +163,8 @@ class Orchestrator:
             self._meter.look()
             keeper.look(now_s)
             line.update(now_s)
+            counts.look(now_s)
+            tell_metrics(now_s)
 
         loop: LockStepLoop | LiveLoop
         if plan.config.lock_step:
@@ -182,7 +187,8 @@ class Orchestrator:
             )
         ended = False
         try:
-            ended = loop.run()
+            with told as tell_metrics:
+                ended = loop.run()
         except LockStepError:
             # Who does not answer may have died: that is told next.
             if not self._hears_of_death(conductor):

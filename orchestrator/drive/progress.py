@@ -63,7 +63,7 @@ class ProgressLine:
         progress = self._progress(now_s)
         conductor = self._conductor
         conductor.context.publish("progress", progress)
-        for status in self._workers(progress.stamp_ns):
+        for status in worker_statuses(conductor, progress.stamp_ns):
             conductor.context.publish("worker_status", status)
         text = self._text(progress)
         if self._status is not None:
@@ -101,28 +101,6 @@ class ProgressLine:
             memory_mb=sum(conductor.context.memory.now_mb.values()) or None,
         )
 
-    def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
-        dispatch = self._conductor.rounds.dispatcher.dispatch
-        busy, sick = dispatch.busy, dispatch.sickness.sick
-        count = self._conductor.plan.config.workers
-        up = set(dispatch.workers)
-        statuses = []
-        for worker_id in (f"w{index}" for index in range(count)):
-            state: Literal["idle", "busy", "sick", "dead"] = "dead"
-            if worker_id in up:
-                state = "busy" if worker_id in busy else "idle"
-                state = "sick" if worker_id in sick else state
-            statuses.append(
-                WorkerStatus(
-                    stamp_ns=stamp_ns,
-                    worker_id=worker_id,
-                    state=state,
-                    rtf=self._conductor.rounds.rtf.get(worker_id),
-                    memory_mb=self._conductor.context.memory.now_mb.get(worker_id),
-                )
-            )
-        return statuses
-
     @property
     def _open_to_all(self) -> str:
         """Said on every line where nobody has to show who it is."""
@@ -158,3 +136,26 @@ def waiting_text(plan: DrivePlan) -> str:
         return f"waiting for a live car: its telemetry as {keys} on {endpoint}"
     where = plan.ros2.mapping.endpoint or endpoint
     return f"waiting for a live car: the ROS 2 topics of {plan.ros2.name} on {where}"
+
+
+def worker_statuses(conductor: Conductor, stamp_ns: int) -> list[WorkerStatus]:
+    """Return how each worker of a drive is, those that are not there included."""
+    dispatch, memory_mb = conductor.rounds.dispatcher.dispatch, conductor.context.memory.now_mb
+    busy, sick = dispatch.busy, dispatch.sickness.sick
+    up = set(dispatch.workers)
+    statuses = []
+    for worker_id in (f"w{index}" for index in range(conductor.plan.config.workers)):
+        state: Literal["idle", "busy", "sick", "dead"] = "dead"
+        if worker_id in up:
+            state = "busy" if worker_id in busy else "idle"
+            state = "sick" if worker_id in sick else state
+        statuses.append(
+            WorkerStatus(
+                stamp_ns=stamp_ns,
+                worker_id=worker_id,
+                state=state,
+                rtf=conductor.rounds.rtf.get(worker_id),
+                memory_mb=memory_mb.get(worker_id),
+            )
+        )
+    return statuses

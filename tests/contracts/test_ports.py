@@ -6,10 +6,12 @@ import socket
 
 import pytest
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.ports import (
     LOOPBACK,
     free_endpoint,
     free_port,
+    metrics_place,
     tls_place,
     trouble_with_bus,
     trouble_with_endpoint,
@@ -95,3 +97,14 @@ def test_a_place_is_host_and_port_and_nothing_else(
     endpoint: str, place: tuple[str, int] | None
 ) -> None:
     assert tls_place(endpoint) == place
+
+
+def test_metrics_are_told_on_the_loopback_interface_unless_a_host_is_named() -> None:
+    assert metrics_place("9464") == (LOOPBACK, 9464)
+    assert metrics_place("0.0.0.0:9464") == ("0.0.0.0", 9464)
+
+
+@pytest.mark.parametrize("text", ["", "0", "65536", "port", ":9464", "a b:9464", "9464:", "1.5"])
+def test_what_is_no_place_for_metrics_is_told(text: str) -> None:
+    with pytest.raises(UserError, match="must be a port from 1 to 65535, or HOST:PORT"):
+        metrics_place(text)

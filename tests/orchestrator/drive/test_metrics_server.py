@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.ports import LOOPBACK, free_port
+from foretwin.orchestrator.drive import metrics_server
+from foretwin.orchestrator.drive.metrics_server import TYPE, listening, told_metrics
+from foretwin.orchestrator.drive.operator_metrics import MetricSample
+
+
+@contextmanager
+def telling(folder: Path, *, turns: bool = True) -> Iterator[str]:
+    """Tell metrics beside a loop that has turns, or hangs; gives the address."""
+    read_in: list[str] = []
+
+    def read(now_s: float) -> list[MetricSample]:
+        read_in.append(threading.current_thread().name)
+        return [MetricSample("drive_seconds", now_s)]
+
+    over = threading.Event()
+
+    def loop() -> None:
+        while not over.wait(0.01):
+            if turns:
+                look(7.0)
+
+    port = free_port()
+    with listening(str(port)) as listener, told_metrics(listener, read, processes=folder) as look:
+        thread = threading.Thread(target=loop, name="the loop")
+        thread.start()
+        try:
+            yield f"http://{LOOPBACK}:{port}"
+        finally:
+            over.set()
+            thread.join()
+    assert set(read_in) <= {"the loop"}  # nobody reads beside it what it changes
+
+
+def test_who_asks_is_told_what_the_loop_reads(tmp_path: Path) -> None:
+    with telling(tmp_path) as address:
+        page = httpx.get(f"{address}/metrics")
+
+    assert (page.status_code, page.headers["content-type"]) == (200, TYPE)
+    assert page.text.splitlines()[-1] == "foretwin_drive_seconds 7"
+
+
+def test_a_loop_that_hangs_tells_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(metrics_server, "ANSWER_S", 0.1)
+    with telling(tmp_path, turns=False) as address:
+        assert httpx.get(f"{address}/metrics").status_code == 503
+
+
+def test_only_metrics_are_told_and_only_to_be_read(tmp_path: Path) -> None:
+    with telling(tmp_path) as address:
+        assert httpx.get(f"{address}/").status_code == 404
+        assert httpx.post(f"{address}/metrics", content=b"x").status_code == 501
+
+
+def test_who_says_nothing_keeps_nobody_out_for_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(metrics_server, "CLIENT_S", 0.1)
+    with telling(tmp_path) as address:
+        port = int(address.rsplit(":", 1)[1])
+        with socket.create_connection((LOOPBACK, port)):
+            assert httpx.get(f"{address}/metrics", timeout=30.0).status_code == 200
+
+
+def test_a_place_that_is_taken_is_told_before_anything_is_done() -> None:
+    with socket.socket() as other:
+        other.bind((LOOPBACK, 0))
+        other.listen()
+        place = f"{LOOPBACK}:{other.getsockname()[1]}"
+        told = pytest.raises(UserError, match=f"--metrics {place}: nothing can listen there")
+        with told, listening(place):
+            pass
+
+
+def test_nobody_listens_unless_asked(tmp_path: Path) -> None:
+    with (
+        listening(None) as listener,
+        told_metrics(listener, lambda _: [], processes=tmp_path) as look,
+    ):
+        look(1.0)
+    assert listener is None
