@@ -1,7 +1,7 @@
 """What the law-abiding make of those around them: follow, stop at red, leave ground to others.
 
-Free road and following: intelligent driver model (Treiber, Hennecke, Helbing 2000, eq. 2 and 3),
-the nearest of a leader, a red light and ground to be left to others counting as what is ahead.
+Free road and following: improved intelligent driver model (`driver_model.improved_idm_mps2`), the
+nearest of a leader, a red light and ground to be left to others counting as what is ahead.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.noticed import Noticed
@@ -19,6 +19,8 @@ from foretwin.sim_worker.road_users.right_of_way import PathRules
 
 _BESIDE_M = 0.3
 _CURVE_AHEAD_M = 15.0
+_AS_FAST_MPS, _CAUGHT_UP_SHARE = 1.0, 2.0
+"""Who is nearly as fast as another, and within twice the gap that it wants, follows it."""
 _ROWS_AT_ONCE = 512
 """Whose surroundings are looked at together: they stay in the cache."""
 
@@ -57,6 +59,8 @@ class LawAbiding:
         self._brisk = crowd.briskness[s, r]
         self.noticed = Noticed(crowd.reaction_s[s, r], s, r)
         self._desired = crowd.desired_mps[s, r]
+        self._keeps = np.full(len(s), np.nan)
+        """Of the gap that it would keep, the share that it does; unknown until it first looks."""
         self._parts = [
             slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(s), _ROWS_AT_ONCE)
         ]
@@ -68,6 +72,7 @@ class LawAbiding:
         arc, speed = now.arc_m[s, r], now.speed_mps[s, r]
         bend = self._bend(arc)
         gap, lead_speed = self._leader(now, ego, bend)
+        self._look_first(gap, speed, lead_speed)
         red = red_arcs_m[self._path] if red_arcs_m.ndim == 2 else red_arcs_m[s, self._path]
         still = np.minimum(self._before(red, arc, speed), self._wait(now, ego, arc, speed))
         nearer = still < gap
@@ -75,16 +80,45 @@ class LawAbiding:
             [
                 arc + np.where(nearer, still, gap),
                 np.where(nearer, 0.0, lead_speed),
-                np.where(nearer, 0.0, driver.STANDSTILL_GAP_M),
+                np.where(nearer, 0.0, self._keeps * driver.STANDSTILL_GAP_M),
             ]
         )
         end, lead_speed, least = self.noticed.after(ahead, every_s=every_s)
         gap = end - arc
-        wanted = least + driver.dynamic_gap_m(speed, lead_speed, self._time_gap, most, decel)
-        free = 1.0 - (speed / np.maximum(self._desired, 0.1)) ** driver.ACCEL_EXPONENT
-        accel = most * (free - np.square(wanted / np.maximum(gap, 0.1)))
+        wanted = least + driver.dynamic_gap_m(
+            speed, lead_speed, self._keeps * self._time_gap, most, decel
+        )
+        accel = driver.improved_idm_mps2(
+            speed, self._desired, wanted / np.maximum(gap, 0.1), most, decel
+        )
         accel = np.minimum(accel, self._for_bends(arc, speed))
         return np.asarray(np.clip(accel, -driver.EMERGENCY_DECEL_MPS2, most))
+
+    def _look_first(self, gap: Array, speed: Array, lead_speed: Array) -> None:
+        """Take what newcomers are first seen to do for their own way, as the speed that they have.
+
+        Who follows closer than it was drawn to keeps doing so, and who has caught up with another
+        wants to be faster.
+        """
+        new = np.isnan(self._keeps)
+        if not new.any():
+            return
+        share = gap / (driver.STANDSTILL_GAP_M + speed * self._time_gap)
+        follows = (np.abs(lead_speed - speed) < _AS_FAST_MPS) & (speed > driver.LEAST_START_MPS)
+        keeps = np.clip(np.where(follows, share, 1.0), driver.OTHERS_CLOSEST, 1.0)
+        wants = np.where(follows & (share < _CAUGHT_UP_SHARE), driver.CAUGHT_UP, 1.0)
+        self._keeps = np.where(new, keeps, self._keeps)
+        self._desired = np.where(new, wants * self._desired, self._desired)
+
+    def carry_on(self, before: LawAbiding, futures: Flags) -> None:
+        """Let those of the `futures` (S,) know what they knew before; the others begin anew."""
+        self.noticed.carry_on(before.noticed, futures)
+        same = self.noticed.same_as(before.noticed, futures)
+        for mine, theirs in (
+            (self._keeps, before._keeps),
+            (self._desired, before._desired),
+        ):
+            mine[same[0]] = theirs[same[1]]
 
     def _for_bends(self, arc: Array, speed: Array) -> Array:
         """Return what brings a driver to the speed that bends allow where it decides next."""

@@ -54,13 +54,17 @@ class Noticed:
         """Let those of the `futures` (S,) know what they knew before; the others begin anew."""
         if not len(before._seen):
             return
-        mine, theirs = ({who: k for k, who in enumerate(one._who())} for one in (self, before))
-        pairs = [(k, theirs[who]) for who, k in mine.items() if who in theirs and futures[who[0]]]
-        to, of = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+        to, of = self.same_as(before, futures)
         self._seen = np.zeros((*before._seen.shape[:2], len(self._number)))
         self._seen[:, :, to], self._known[to] = before._seen[:, :, of], before._known[of]
         self._count, self._every_s = before._count, before._every_s
         self._late = np.rint(self._reaction_s / self._every_s).astype(np.intp)
+
+    def same_as(self, before: Noticed, futures: Flags) -> Indices:
+        """Return (2, N) places here and there of those of the `futures` (S,) who are the same."""
+        mine, theirs = ({who: k for k, who in enumerate(one._who())} for one in (self, before))
+        pairs = [(k, theirs[who]) for who, k in mine.items() if who in theirs and futures[who[0]]]
+        return np.array(pairs, dtype=np.intp).reshape(-1, 2).T
 
     def _who(self) -> list[tuple[int, int]]:
         return list(zip(self._rows.tolist(), self._columns.tolist(), strict=True))

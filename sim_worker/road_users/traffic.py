@@ -111,7 +111,7 @@ class Traffic:
             (self._accel, before._accel),
         ):
             mine[futures] = theirs[futures]
-        self._lawful.noticed.carry_on(before._lawful.noticed, futures)
+        self._lawful.carry_on(before._lawful, futures)
         self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
         self._put()
 

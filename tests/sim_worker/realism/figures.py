@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import functools
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,10 +41,16 @@ class Distance(NamedTuple):
     recorded: int
 
 
-def collect(window: Window, seen: Seen) -> Samples:
-    """Return the values of each quantity of cars of a window, while they were recorded."""
+FOLLOWING = ("gap", "headway")
+
+
+def collect(window: Window, seen: Seen, replayed: Sequence[int] = ()) -> Samples:
+    """Return the values of each quantity of cars of a window, while they were recorded, but of
+    those `replayed`."""
     found: dict[str, list[Array]] = {name: [] for name in QUANTITIES}
     for r, (car, steps) in enumerate(zip(window.cars, window.steps, strict=True)):
+        if r in replayed:
+            continue
         at = window.begin - car.track.first
         mine = seen.xy_m[r]
         later = mine[: steps + EDGE]
@@ -62,7 +69,7 @@ def collect(window: Window, seen: Seen) -> Samples:
         headway = gap[follows] / speed[follows]
         found["headway"].append(headway[headway < _FOLLOWS_S])
     found["gap_accepted"].append(_accepted(window, seen))
-    return {name: np.concatenate(values) for name, values in found.items()}
+    return {name: np.concatenate([*values, np.zeros(0)]) for name, values in found.items()}
 
 
 def _gaps(window: Window, seen: Seen, r: int) -> Array:
@@ -121,22 +128,49 @@ class Crossing(NamedTuple):
 def crossing(name: str, recordings: tuple[Recording, ...], *, limit_mps: float) -> Crossing:
     """Return a crossing by its recordings."""
     found = tuple(w for recording in recordings for w in windows(drivers(recording)))
-    return Crossing(name, limit_mps, found, _joined(collect(w, recorded(w)) for w in found))
+    every = _joined(collect(w, recorded(w)) for w in found)
+    behind = _joined(collect(w, recorded(w), heads(w)) for w in found)
+    kept = {name: (behind if name in FOLLOWING else every)[name] for name in QUANTITIES}
+    return Crossing(name, limit_mps, found, kept)
 
 
 def samples(crossing: Crossing, *, draws: int, spreads: Spreads = SPREADS) -> Samples:
     """Return what is simulated of each quantity from the beginnings of all windows."""
-    return _joined(
-        collect(window, seen)
-        for window in crossing.windows
-        for seen in simulated(
-            window,
-            limit_mps=crossing.limit_mps,
-            draws=draws,
-            steps=max(window.steps) + EDGE,
-            spreads=spreads,
-        )
-    )
+
+    def played(replays: bool) -> Samples:
+        found = []
+        for window in crossing.windows:
+            rows = heads(window) if replays else ()
+            if replays and len(rows) == len(window.cars):
+                continue
+            steps = max(window.steps) + EDGE
+            found += [
+                collect(window, seen, rows)
+                for seen in simulated(
+                    window,
+                    limit_mps=crossing.limit_mps,
+                    draws=draws,
+                    steps=steps,
+                    spreads=spreads,
+                    replayed=rows,
+                )
+            ]
+        return _joined(found)
+
+    free, behind = played(False), played(True)
+    return {name: (behind if name in FOLLOWING else free)[name] for name in QUANTITIES}
+
+
+@functools.cache
+def heads(window: Window) -> tuple[int, ...]:
+    """Return the cars with nobody ahead of them as a window begins.
+
+    What they do next is not of anybody's following, and mostly for something that no recording
+    tells. So whoever follows them is judged behind what they really did (as Kesting and Treiber
+    2008, Calibrating car-following models by using trajectory data, do).
+    """
+    seen = recorded(window)
+    return tuple(r for r in range(len(window.cars)) if not _gaps(window, seen, r)[0] < _FOLLOWS_M)
 
 
 def _joined(found: Iterable[Samples]) -> Samples:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -26,9 +27,15 @@ _AWAY = FrenetPath(np.array([[9e3, 9e3], [9.1e3, 9e3]]))
 
 
 def simulated(
-    window: Window, *, limit_mps: float, draws: int, steps: int, spreads: Spreads = SPREADS
+    window: Window,
+    *,
+    limit_mps: float,
+    draws: int,
+    steps: int,
+    spreads: Spreads = SPREADS,
+    replayed: Sequence[int] = (),
 ) -> tuple[Seen, ...]:
-    """Return futures of a window's cars, `steps` long."""
+    """Return futures of a window's cars, `steps` long; those `replayed` do what they did."""
     players = [
         Player(
             name=car.track.name,
@@ -51,7 +58,15 @@ def simulated(
         poses=np.repeat(NOBODY.poses, draws, 0), speed_mps=np.zeros(draws),
         arc_m=np.full(draws, -9e3),
     )  # fmt: skip
+    rows = list(replayed)
+    was_m = (
+        np.stack([_arcs(window.cars[r], window.begin, steps + 1) for r in rows]) if rows else None
+    )
     for tick in range(steps * every):
+        if was_m is not None and tick % every == 0:
+            now_m, next_m = was_m[:, tick // every : tick // every + 2].T
+            traffic.arc_m[:, rows], traffic.speed_mps[:, rows] = now_m, (next_m - now_m) / STEP_S
+            traffic.step(time_s=tick * _TICK_S, dt_s=0.0)
         if tick % every == 0:
             poses.append(traffic.poses[..., :2].copy())
             arcs.append(traffic.arc_m.copy())
@@ -60,6 +75,12 @@ def simulated(
         traffic.step(time_s=tick * _TICK_S, dt_s=_TICK_S)
     xy, arc = np.stack(poses, axis=2), np.stack(arcs, axis=2)
     return tuple(Seen(*one) for one in zip(xy, arc, strict=True))
+
+
+def _arcs(car: Driver, begin: int, count: int) -> Array:
+    """Return where a car was on its line from a step of the recording on, at its end for long."""
+    steps = np.minimum(begin - car.track.first + np.arange(count), len(car.arc_m) - 1)
+    return car.arc_m[steps]
 
 
 @functools.cache
@@ -77,6 +98,7 @@ def _red(window: Window, time_s: float) -> Array:
     return np.array([[np.inf], *([line] for line in lines)])
 
 
+@functools.cache
 def _rules(cars: tuple[Driver, ...]) -> PathRules:
     """Return who waits for whom where lines cross: who passed there last."""
     count = len(cars) + 1

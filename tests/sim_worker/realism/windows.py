@@ -14,6 +14,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import OTHERS_REACTION_S
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from tests.sim_worker.realism.recordings import STEP_S, Motion, Recording, Track, motion
 
@@ -75,7 +76,9 @@ def _with_line(one: Driver, others: Sequence[Driver]) -> Driver:
             return one
     moves = np.flatnonzero(np.hypot(*(one.track.xy_m - here).T) > 1.0)
     later = moves[moves > at]
-    until = one.track.first + (int(later[0]) if len(later) else len(one.arc_m))
+    # The light has changed so long before anybody is seen to move as it takes to react.
+    went = stands[stands < later[0]][-1] - round(OTHERS_REACTION_S[0] / STEP_S) if len(later) else 0
+    until = one.track.first + (max(int(went), at) if len(later) else len(one.arc_m))
     front = arc + one.track.size_m[0] / 2.0
     return replace(one, waits_at_m=front + 1.0, waits_until=until)
 
@@ -96,7 +99,7 @@ def windows(cars: Sequence[Driver]) -> Iterator[Window]:
         for car in cars:
             at = begin - car.track.first
             left = len(car.arc_m) - EDGE - at
-            if at >= EDGE and left >= 1.0 / STEP_S and car.motion.speed_mps[at] > _STANDS_MPS:
+            if at >= EDGE and left >= 1.0 / STEP_S:
                 there.append((car, min(left, round(HORIZON_S / STEP_S) + 1)))
         if there:
             yield Window(begin, *map(tuple, zip(*there, strict=True)))

@@ -9,9 +9,17 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker import driver_model as driver
-from tests.sim_worker.road_users.crossroads import centre_arc, crossroads, run, straight_on, traffic
+from tests.sim_worker.road_users.crossroads import (
+    FAR_EGO,
+    centre_arc,
+    crossroads,
+    run,
+    straight_on,
+    traffic,
+)
 from tests.sim_worker.road_users.test_paces import hook
 
 EAST = (1.0, 0.0)
@@ -59,3 +67,73 @@ def test_nobody_brakes_harder_than_tyres_do_however_late_it_sees_who_stands(tmp_
     seen = run(moving, seconds=4.0)[:, 1]
     hardest = np.diff(seen[:, 1]).min() / 0.05
     assert hardest == pytest.approx(-driver.EMERGENCY_DECEL_MPS2, abs=1e-6)
+
+
+def followed(world: World, *, gap_m: float, leader_mps: float, seconds: float) -> tuple[Array, ...]:
+    """Gap and speed of a follower, which first has 8 m/s, as it wants, behind a steady leader."""
+    east = straight_on(world, EAST)
+    moving = traffic(
+        world,
+        [east, east],
+        before_m=[90.0, 94.5 + gap_m],
+        speed_mps=[leader_mps, 8.0],
+        lawful=[False, True],
+    )
+    seen = run(moving, seconds=seconds)
+    return seen[:, 0, 0] - seen[:, 1, 0] - 4.5, seen[:, 1, 1]
+
+
+WANTED_M = driver.STANDSTILL_GAP_M + 8.0 * 1.2
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "kept_m"),
+    [
+        (WANTED_M, WANTED_M),
+        (0.6 * WANTED_M, 0.6 * WANTED_M),
+        (0.2 * WANTED_M, driver.OTHERS_CLOSEST * WANTED_M),
+    ],
+)
+def test_who_is_first_seen_to_follow_closely_goes_on_doing_so(
+    tmp_path: Path, gap_m: float, kept_m: float
+) -> None:
+    gap, _ = followed(crossroads(tmp_path), gap_m=gap_m, leader_mps=8.0, seconds=14.0)
+    assert gap[-1] == pytest.approx(kept_m, rel=0.05)
+
+
+def test_who_has_caught_up_wants_to_be_faster_and_who_is_far_behind_does_not(
+    tmp_path: Path,
+) -> None:
+    world = crossroads(tmp_path)
+    for gap_m, keeps_up in ((WANTED_M, True), (2.5 * WANTED_M, False)):
+        _, speed = followed(world, gap_m=gap_m, leader_mps=8.9, seconds=10.0)
+        assert (speed[-1] > 8.5) == keeps_up
+
+
+def test_who_closes_in_on_another_has_not_shown_what_it_keeps(tmp_path: Path) -> None:
+    gap, _ = followed(crossroads(tmp_path), gap_m=0.6 * WANTED_M, leader_mps=5.0, seconds=20.0)
+    assert gap[-1] == pytest.approx(driver.STANDSTILL_GAP_M + 5.0 * 1.2, rel=0.05)
+
+
+def test_what_was_seen_at_first_is_known_when_others_begin_anew(tmp_path: Path) -> None:
+    world = crossroads(tmp_path)
+    east = straight_on(world, EAST)
+    behind = 94.5 + 0.6 * WANTED_M
+    began = traffic(
+        world, [east, east], before_m=[90.0, behind], speed_mps=[8.0, 8.0], lawful=[False, True]
+    )
+    before, after = began.begun(np.zeros(2, np.intp)), began.begun(np.zeros(2, np.intp))
+    two = FAR_EGO._replace(
+        poses=np.repeat(FAR_EGO.poses, 2, 0), speed_mps=np.zeros(2), arc_m=np.full(2, -500.0)
+    )
+    none = np.full((2, 0), np.inf)
+    before.decide(two, none)
+    after.carry_on(before, np.array([True, False]))
+    # The leader is gone: who was seen behind it wants to be faster still, who was not does not.
+    after.arc_m[:, 0] = -400.0
+    after.step(time_s=np.zeros((2, 1)), dt_s=0.0)
+    after.poses[:, 0] = np.nan
+    after.decide(two, none)
+    after.step(time_s=np.zeros((2, 1)), dt_s=1.0)
+    assert after.speed_mps[0, 1] > 8.5
+    assert after.speed_mps[1, 1] == pytest.approx(8.0, abs=0.05)
