@@ -109,6 +109,16 @@ class CarPlan(msgspec.Struct, frozen=True, kw_only=True):
     speed_mps: Array
 
 
+class PlannerTiming(msgspec.Struct, frozen=True, kw_only=True):
+    """When a driving stack of somebody else is asked and its answers count, in simulated time."""
+
+    rate_hz: float = 10.0
+    """So often it is asked, but not while it is still at its last answer."""
+    latency_s: float = 0.0
+    """So long after its question an answer counts, unless the stack says how long it took; of a
+    future's first question at once, as if it had driven before."""
+
+
 class Job(msgspec.Struct, frozen=True, kw_only=True):
     """Simulate `futures` from `state` for `horizon_s`, live or staged.
 
@@ -167,6 +177,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """(K,) the speed that the nominal future aims at, `SPEED_AHEAD_STEP_S` apart from its start;
     then it stays. A job without it aims at `cruise_speed_mps`, and has the bytes that it had before
     there was one."""
+    planner_timing: PlannerTiming | msgspec.UnsetType = msgspec.UNSET
+    """Of a driving stack that a sweep starts; a job without one has the bytes that it had before
+    there was one."""
     schema_version: int = JOB_SCHEMA_VERSION
 
 
@@ -200,6 +213,9 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     """Why a future is not valid, in words; empty where it is. One for each future, or none."""
     remarks: tuple[str, ...] = ()
     """What a planner says of a future that it did drive, such as that a fallback had to act."""
+    lost: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
+    """Places of those not valid that say nothing of the planner, whose process hung or died; not
+    told where there are none."""
 
 
 class RoadUserTracks(msgspec.Struct, frozen=True, kw_only=True):

@@ -49,6 +49,8 @@ for a car that sends twice as often as usual."""
 RESULT = Qos("data_high", block=False, express=False)
 WATCH = Qos("data", block=False, express=False)
 REQUEST = Qos("interactive_high", block=True, express=True)
+LOCK_STEP = Qos("interactive_high", block=False, express=True)
+"""Of what one side waits for: a batch that waited for more would hold both up."""
 
 
 BusRole = Literal["car", "orchestrator", "worker", "viewer", "recorder", "planner", "operator"]
@@ -201,14 +203,17 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
         "virtual_objects": Channel(drive.RoadUsers, 10, "road users that are simulated"),
     },
     # A driving stack in another process as planner under test.
-    (_WORKER, LIVE, _ANY_WORKER): {
+    (_WORKER, LOCK_STEP, _ANY_WORKER): {
         "planner_scene": Channel(
             planner_link.PlannerScene, None, "futures at one instant: what to do?"
         ),
     },
-    (_WORKER, LIVE, _PLANNER): {
+    (_WORKER, LOCK_STEP, _PLANNER): {
         "planned_motions": Channel(
             planner_link.PlannedMotions, None, "what a driving stack would do"
+        ),
+        "planner_joined": Channel(
+            planner_link.PlannerJoined, None, "a driving stack that a sweep started is there"
         ),
     },
 }

@@ -1,7 +1,8 @@
 """A driving stack in another process as planner under test: what it is shown, what it answers.
 
 In lock step: the worker publishes a `PlannerScene` and waits for the `PlannedMotions` of the same
-job and question before it simulates on.
+job and question before it simulates on. A stack that a sweep has started first says what it is, by
+`PlannerJoined`, and is asked nothing before.
 """
 
 from __future__ import annotations
@@ -9,6 +10,10 @@ from __future__ import annotations
 import msgspec
 
 from foretwin.contracts.arrays import Array
+
+LINK_VERSION = 2
+"""Of these messages: raised where one of them means something else. 1 told neither its version nor
+who the road users are, and knew no reset."""
 
 
 class PlannerScene(msgspec.Struct, frozen=True, kw_only=True):
@@ -31,6 +36,8 @@ class PlannerScene(msgspec.Struct, frozen=True, kw_only=True):
     time_s: float
     """From the job's start."""
     answer_within_s: float
+    """Of wall time: in a live drive another planner acts after it, in a sweep the stack is taken
+    for hung."""
     states: Array
     road_users: Array
     path_xy_m: Array
@@ -44,6 +51,23 @@ class PlannerScene(msgspec.Struct, frozen=True, kw_only=True):
     rear_overhang_m: float
     """From the rear bumper to base_link."""
     wheelbase_m: float
+    link: int = 1
+    """The version of the link that is spoken; see LINK_VERSION."""
+    reset: bool = False
+    """The futures begin with this scene: what is remembered of others is of no use."""
+    stamp_ns: int = 0
+    """The vehicle's clock at this instant, which goes on as the future does."""
+    world_id: str | None = None
+    future_ids: tuple[str, ...] = ()
+    """(S,) as in the tables of results."""
+    seeds: tuple[int, ...] = ()
+    """(S,) for whatever a stack draws: the same in each planner's future of one case."""
+    user_ids: tuple[tuple[str, ...], ...] = ()
+    user_kinds: tuple[tuple[str, ...], ...] = ()
+    user_lane_ids: tuple[tuple[str, ...], ...] = ()
+    path_lane_ids: tuple[str, ...] = ()
+    signals: dict[str, str] = {}
+    """Colours of the World's lights by the ids of their groups; who is missing is not known."""
 
 
 class PlannedMotions(msgspec.Struct, frozen=True, kw_only=True):
@@ -59,3 +83,27 @@ class PlannedMotions(msgspec.Struct, frozen=True, kw_only=True):
     xy_m: Array
     yaw_rad: Array
     speed_mps: Array
+    link: int = 1
+    took_s: float | None = None
+    """What the stack says that it took, in simulated time: until then cars do what the answer
+    before told them. None: as the sweep's spec says."""
+    failure: str = ""
+    """Why there is no motion, in words."""
+
+
+class PlannerJoined(msgspec.Struct, frozen=True, kw_only=True):
+    """A driving stack that a sweep has started is there, and says what it is."""
+
+    name: str
+    version: str
+    link: int = 1
+
+
+def other_link(spoken: int) -> str | None:
+    """Return what is wrong with the version of the link that somebody speaks, None if nothing."""
+    if spoken == LINK_VERSION:
+        return None
+    return (
+        f"it speaks version {spoken} of the planner link, this foretwin version {LINK_VERSION}: "
+        "update the older of the two"
+    )

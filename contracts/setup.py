@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.contracts.process_setup import BusSetup as BusSetup
 from foretwin.contracts.process_setup import ProcessSetup as ProcessSetup
 from foretwin.contracts.process_setup import read_setup as read_setup
@@ -61,6 +64,25 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Of a vehicle beside the car: nothing goes out to it, whatever the mapping says."""
 
 
+STACK_LOGS = "stacks"
+"""Beside a sweep's log: the folder of what the processes of driving stacks print."""
+
+
+class StackSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A driving stack of somebody else, which each worker of a sweep starts for itself."""
+
+    command: tuple[str, ...]
+    instances: int = 1
+    """So many processes, among which the futures of a job are dealt out."""
+    answer_within_s: float = 60.0
+    """Of wall time: who has not answered by then hangs. Chosen as `ALIVE_S` of `remote`, doubled,
+    since in a sweep the whole machine is at work."""
+    start_within_s: float = 120.0
+    """Of wall time, from its start until it joins. Chosen: a stack may load maps and models."""
+    says: PlannerJoined | None = None
+    """Who it was when the sweep began."""
+
+
 class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A worker of one role; `drive_frame` is the frame of MirrorSample, None where none is made."""
 
@@ -82,6 +104,8 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     threads: int = 1
     planners: tuple[str, ...] = ()
     """Loaded before the first job: those of other packages live in processes of their own."""
+    stacks: tuple[tuple[str, StackSetup], ...] = ()
+    """Driving stacks, by the names under which a sweep's futures know them."""
 
 
 class TuningSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -13,6 +13,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.joining import RunningDrive, newest_running, running_drive
 from foretwin.contracts.keys import alive_key, run_of_alive_key
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
+from foretwin.contracts.planner_serving import serve_planner
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.towards_vehicle import VehicleCommand
@@ -40,4 +41,5 @@ __all__ = [
     "newest_running",
     "run_of_alive_key",
     "running_drive",
+    "serve_planner",
 ]

@@ -38,6 +38,10 @@ class InProcessRunner:
         """What became of the tasks submitted so far; what its only worker cannot do is refused."""
         return self._count
 
+    def close(self) -> None:
+        """End what it has started; see FuturesWorker."""
+        self._worker.close()
+
     def submit(self, task: Task) -> None:
         """Take a task; raises ValueError for one whose key is open already."""
         if task.key in self._waiting:

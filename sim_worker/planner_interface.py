@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from foretwin.contracts.arrays import Array, Flags, Indices
@@ -121,6 +121,51 @@ class RemembersWithinJob(Protocol):
 
     def begin(self, count: int) -> JobDriver:
         """Return what drives the `count` cars of one job."""
+
+
+class Briefing(NamedTuple):
+    """What a job's S futures are called and where they take place, for who is told of more than a
+    view: a driving stack of somebody else.
+
+    `user_ids` and `user_kinds` (S, R) are those of `SeenUsers`, in its order; `colours_at` gives
+    the colours of the World's lights by the ids of their groups, at a time of the job; `lanes_at`
+    the ids of the lanes or connections on which points (K, 2) with headings (K,) are, else "".
+    Every 1 / `rate_hz` of simulated time a stack is asked, and its answers count `latency_s` later.
+    """
+
+    world_id: str
+    stamp_ns: int
+    future_ids: tuple[str, ...]
+    seeds: tuple[int, ...]
+    user_ids: tuple[tuple[str, ...], ...]
+    user_kinds: tuple[tuple[str, ...], ...]
+    colours_at: Callable[[float], Mapping[str, str]]
+    lanes_at: Callable[[Array, Array], tuple[str, ...]]
+    rate_hz: float
+    latency_s: float
+
+    def of_rows(self, rows: Indices) -> Briefing:
+        """Return the briefing of some of the futures."""
+        some = rows.tolist()
+        return self._replace(
+            future_ids=tuple(self.future_ids[row] for row in some),
+            seeds=tuple(self.seeds[row] for row in some),
+            user_ids=tuple(self.user_ids[row] for row in some),
+            user_kinds=tuple(self.user_kinds[row] for row in some),
+        )
+
+
+@runtime_checkable
+class TakesBriefing(Protocol):
+    """A planner that is told more of a job as it begins than how many cars there are."""
+
+    def begin_briefed(self, briefing: Briefing) -> JobDriver:
+        """Return what drives the cars of one job."""
+
+
+class PlayAgain(Exception):  # noqa: N818
+    """A planner has lost what it knew of a job, through no fault of its answers: the job has to be
+    played from its start."""
 
 
 def rows_of(view: PlannerView, rows: Indices) -> PlannerView:

@@ -16,13 +16,14 @@ import scipy.spatial  # noqa: F401  A search for many points needs it: not withi
 from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.job_identity import JobBytes, vehicle_digest
 from foretwin.contracts.placement import PlaceRequest, WorldPlaces
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.runner import JobAnswer, JobRequest
-from foretwin.contracts.setup import WorkerSetup
+from foretwin.contracts.setup import STACK_LOGS, WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.contracts.trace import came, since, span
 from foretwin.contracts.tuning import UseVehicle
@@ -31,8 +32,10 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.world_places import places_in
+from foretwin.sim_worker.planner_interface import PlayAgain
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
+from foretwin.sim_worker.planners.stack import StackPlanner
 from foretwin.sim_worker.world_file import WorldFolder, WorldSource
 
 _IDLE_S = 0.2
@@ -109,6 +112,15 @@ class FuturesWorker:
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
         self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
+        self._stacks = {
+            name: StackPlanner(
+                name,
+                stack,
+                folder=Path(setup.log_file).parent / STACK_LOGS,
+                owner=setup.process_id,
+            )
+            for name, stack in setup.stacks
+        }
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
             "use_vehicle": self._use_vehicle,
@@ -171,7 +183,7 @@ class FuturesWorker:
                 f"worker with version {self._version}"
             )
         prepared = self._swept.get(job.vehicle, self._stages).get(job.world_id)
-        result = run_job(job, prepared.stage, worker_id=self._id, scenes=prepared.scenes)
+        result = self._played(job, prepared)
         if question.cells is None:
             return JobAnswer(result=result)
         # Parquet takes 40 MB and 0.2 s to import, and a drive's workers write none.
@@ -180,6 +192,25 @@ class FuturesWorker:
         recorded = JobBytes(bytes(question.job), question.sha256)
         with span("rows"):
             return JobAnswer(part=finished_part(job, recorded, result, question.cells))
+
+    def _played(self, job: Job, prepared: _Prepared) -> FuturesResult:
+        """Play a job, from its start again where a driving stack was lost and says so."""
+        while True:
+            try:
+                return run_job(
+                    job,
+                    prepared.stage,
+                    worker_id=self._id,
+                    scenes=prepared.scenes,
+                    stacks=self._stacks,
+                )
+            except PlayAgain as lost:
+                log.warning("job %s is played again: %s", job.job_index, lost)
+
+    def close(self) -> None:
+        """End the driving stacks that it has started."""
+        for stack in self._stacks.values():
+            stack.close()
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:
         assert isinstance(question, PlaceRequest)
@@ -206,7 +237,8 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     if "remote" in setup.planners:
         remote = load_planner("remote")
         assert isinstance(remote, RemotePlanner)
-        remote.connect(bus, run=setup.run_id, process=setup.process_id)
+        lock_step = setup.bus.lossless
+        remote.connect(bus, run=setup.run_id, process=setup.process_id, lock_step=lock_step)
     for name in setup.planners:
         try:
             load_planner(name)
@@ -217,3 +249,4 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
         request = mailbox.take(_IDLE_S)
         if isinstance(request, Request):
             worker.handle(request)
+    worker.close()

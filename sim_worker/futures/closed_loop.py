@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -13,13 +14,20 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.play import Play
 from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import (
+    Briefing,
     Planner,
     PlannerOutput,
     PlannerView,
+    PlayAgain,
     RemembersWithinJob,
+    TakesBriefing,
     rows_of,
 )
 from foretwin.sim_worker.planners.registry import load_planner
+
+Stacks = Mapping[str, TakesBriefing]
+"""Driving stacks of a sweep, by the names under which its futures know them."""
+NO_STACKS: Stacks = MappingProxyType({})
 
 
 class DriveRecord(NamedTuple):
@@ -27,7 +35,8 @@ class DriveRecord(NamedTuple):
 
     States (S, T, 8), static contacts and validity (S, T), progress (S,) along the path; of road
     users poses (S, T, R, 3) and speeds (S, T, R). `failures` (S,) says why a planner failed,
-    `remarks` (S,) what one that did not has to say.
+    `remarks` (S,) what one that did not has to say; `lost` are places of those whose planner's
+    process hung or died.
     """
 
     states: Array
@@ -38,11 +47,23 @@ class DriveRecord(NamedTuple):
     user_speed_mps: Array
     failures: tuple[str, ...]
     remarks: tuple[str, ...]
+    lost: tuple[int, ...] = ()
 
 
-def drive(scene: JobScene, stage: BatchSimulation, *, ticks: int) -> DriveRecord:
-    """Seed the stage with the scene's starts and drive for a number of control ticks."""
-    play, planners = Play(scene, stage), _Planners(scene.planners)
+def drive(
+    scene: JobScene,
+    stage: BatchSimulation,
+    *,
+    ticks: int,
+    stacks: Stacks = NO_STACKS,
+    brief: Callable[[], Briefing] | None = None,
+) -> DriveRecord:
+    """Seed the stage with the scene's starts and drive for a number of control ticks.
+
+    Planners that are none of foretwin's are looked for among the `stacks`; who wants it is told
+    what `brief` returns. Raises PlayAgain as they do.
+    """
+    play, planners = Play(scene, stage), _Planners(scene.planners, stacks, brief)
     count, traffic = len(scene.starts), scene.traffic
     most = 0 if traffic is None else traffic.arc_m.shape[1]
     states = np.empty((count, ticks + 1, 8))
@@ -84,22 +105,23 @@ def drive(scene: JobScene, stage: BatchSimulation, *, ticks: int) -> DriveRecord
         user_speed,
         tuple(failures),
         tuple(planners.remarks()),
+        planners.lost(),
     )
 
 
 class _Planners:
     """All planners of a job, each with its rows; one that fails takes only its own rows along."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(
+        self, names: Sequence[str], stacks: Stacks, brief: Callable[[], Briefing] | None
+    ) -> None:
         self.failed: Flags = np.zeros(len(names), dtype=bool)
         self.any_failed = False
         self.reasons = [""] * len(names)
         self._groups: list[tuple[str, Planner, Indices]] = []
         for kind in sorted(set(names)):
             rows = np.flatnonzero([name == kind for name in names])
-            planner = load_planner(kind)
-            if isinstance(planner, RemembersWithinJob):
-                planner = planner.begin(len(rows))
+            planner = _begun(kind, rows, stacks, brief)
             self._groups.append((kind, planner, rows))
 
     def plan(self, view: PlannerView) -> PlannerOutput:
@@ -122,6 +144,8 @@ class _Planners:
                 raise ValueError(
                     f"answers of shapes {np.shape(accel)} and {np.shape(angle)}, not {(len(rows),)}"
                 )
+        except PlayAgain:
+            raise
         except Exception as error:
             # The others go on without it, whatever it was.
             self._fail(name, rows, f"{type(error).__name__}: {error}", view.time_s)
@@ -145,8 +169,29 @@ class _Planners:
                     found[rows[place]] = said
         return found
 
+    def lost(self) -> tuple[int, ...]:
+        """Return the places of those whose planner's process hung or died."""
+        found = [
+            int(rows[place])
+            for _, planner, rows in self._groups
+            for place in getattr(planner, "lost", ())
+        ]
+        return tuple(sorted(found))
+
     def _fail(self, name: str, rows: Indices, reason: str, time_s: float) -> None:
         for row in rows[~self.failed[rows]]:
             self.reasons[row] = f"planner {name!r} at {time_s:g} s: {' '.join(reason.split())}"
         self.failed[rows] = True
         self.any_failed = True
+
+
+def _begun(
+    name: str, rows: Indices, stacks: Stacks, brief: Callable[[], Briefing] | None
+) -> Planner:
+    """Return what drives some rows of a job from its first tick to its last."""
+    if name in stacks and brief is not None:
+        return stacks[name].begin_briefed(brief().of_rows(rows))
+    planner = load_planner(name)
+    if isinstance(planner, TakesBriefing) and brief is not None:
+        return planner.begin_briefed(brief().of_rows(rows))
+    return planner.begin(len(rows)) if isinstance(planner, RemembersWithinJob) else planner

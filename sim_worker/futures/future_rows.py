@@ -118,7 +118,7 @@ def _result_columns(job: Job, future: Future, result: FuturesResult, place: int)
     users = np.ascontiguousarray(result.road_users.poses[place])
     x, y, yaw, ahead_mps, left_mps = states[-1, :5].astype(np.float64)
     row: Row = {
-        "valid": bool(outcome.valid[place]),
+        "valid": None if place in (outcome.lost or ()) else bool(outcome.valid[place]),
         "failure": outcome.failures[place] if outcome.failures else "",
         "remark": outcome.remarks[place] if outcome.remarks else "",
         "left_out": result.left_out[place],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32, Flags, Indices
@@ -79,6 +80,7 @@ def judge(drive: DriveRecord, collisions: Collisions, measured: JobMetrics) -> O
         valid=valid,
         failures=drive.failures if any(drive.failures) else (),
         remarks=drive.remarks if any(drive.remarks) else (),
+        lost=drive.lost or msgspec.UNSET,
     )
 
 

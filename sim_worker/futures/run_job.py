@@ -8,10 +8,10 @@ islands are contacts of the physics.
 
 from __future__ import annotations
 
+import functools
 import hashlib
-import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import msgspec
@@ -32,26 +32,21 @@ from foretwin.contracts.futures import (
 from foretwin.contracts.trace import span
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.batch.accident import (
-    ACCIDENT_S,
-    DELTA_V_WITHIN_S,
-    Accidents,
-    run_accidents,
-)
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.batch.collision_detection import Touches
-from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
+from foretwin.sim_worker.futures.briefing import briefing_of
+from foretwin.sim_worker.futures.closed_loop import NO_STACKS, DriveRecord, Stacks, drive
 from foretwin.sim_worker.futures.ego_dry_run import rehearsed_cases
+from foretwin.sim_worker.futures.job_accidents import accident_messages, run_on
 from foretwin.sim_worker.futures.measuring import measure
 from foretwin.sim_worker.futures.outcomes import (
     OVERLAP_STEPS,
-    Collisions,
     find_collisions,
     judge,
     with_collisions,
 )
 from foretwin.sim_worker.futures.planned_impacts import planned_impacts
 from foretwin.sim_worker.futures.scene import JobScene, SceneMaker
+from foretwin.sim_worker.planner_interface import Briefing
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roles import StagedCase
@@ -63,12 +58,15 @@ def run_job(
     *,
     worker_id: str = "",
     scenes: SceneMaker | None = None,
+    stacks: Stacks = NO_STACKS,
 ) -> FuturesResult:
-    """Simulate a job on a stage that holds the job's World; `scenes` are those of that World.
+    """Simulate a job on a stage that holds the job's World; `scenes` are those of that World,
+    `stacks` the driving stacks that its futures may name besides foretwin's planners.
 
     A staged future whose case has no place there is not played, but listed in `unplaced`. Raises
     ValueError for another World, more futures than simulations, an unknown planner, scenario or
-    number, a step that is no multiple of the control tick, or a state that is not finite.
+    number, a step that is no multiple of the control tick, or a state that is not finite; PlayAgain
+    where a stack was lost and the whole job has to be played anew.
     """
     wall_start, cpu_start = time.perf_counter(), time.process_time()
     world = stage.world
@@ -78,10 +76,12 @@ def run_job(
     check_job(job, stage)
     ticks, every = _ticks(job, stage)
     maker = SceneMaker(world) if scenes is None else scenes
+    given = job
     job, staged, unplaced = _placed(job, rehearsed_cases(job, stage.vehicle, maker))
     time_s = np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s
     if job.futures:
-        played = _play(job, staged, stage, maker, ticks=ticks, every=every)
+        brief = functools.partial(briefing_of, given, job, maker)
+        played = _play(job, staged, stage, maker, stacks, brief, ticks=ticks, every=every)
     else:
         played = _nothing_played(job, len(time_s))
     return FuturesResult(
@@ -122,6 +122,8 @@ def _play(
     staged: Mapping[int, StagedCase],
     stage: BatchSimulation,
     maker: SceneMaker,
+    stacks: Stacks,
+    brief: Callable[[JobScene], Briefing],
     *,
     ticks: int,
     every: int,
@@ -129,7 +131,9 @@ def _play(
     with span("cast"):
         scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s, staged=staged)
     with span("step", ticks=ticks), np.errstate(over="ignore", invalid="ignore"):
-        record = drive(scene, stage, ticks=ticks)
+        record = drive(
+            scene, stage, ticks=ticks, stacks=stacks, brief=functools.partial(brief, scene)
+        )
         states = record.states[:, ::every].astype(np.float32)
     sizes = _sizes(scene)
     with span("collisions"):
@@ -141,10 +145,10 @@ def _play(
         )
     outcome = judge(record, hits, measured)
     with span("accidents"):
-        ran_on = _accidents(job, scene, stage, hits) if job.accidents else None
+        ran_on = run_on(job, scene, stage, hits) if job.accidents else None
     motion = ran_on if job.accident_motion else None
     states = with_collisions(states, hits, motion, step_s=job.step_s)
-    accidents = () if ran_on is None else _accident_messages(ran_on)
+    accidents = () if ran_on is None else accident_messages(ran_on)
     planned = planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s)
     tracks = _tracks(scene, record, sizes, every)
     return _Played(states, tracks, outcome, measured.values, accidents, scene.left_out, planned)
@@ -263,38 +267,4 @@ def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> R
         size_m=sizes.astype(np.float32),
         kinds=kinds.astype(np.int32),
         kind_names=KIND_NAMES,
-    )
-
-
-def _accidents(job: Job, scene: JobScene, stage: BatchSimulation, hits: Collisions) -> Accidents:
-    touches = Touches._make(field[hits.counts] for field in hits.touches)
-    kinds = []
-    if scene.traffic is not None:
-        met = scene.traffic.crowd.kinds[touches.future, touches.user]
-        kinds = [KIND_NAMES[kind] for kind in met]
-    # Without the motion after it, an accident is over once its delta-v is.
-    enough_s = math.ceil(DELTA_V_WITHIN_S / job.step_s - 1e-9) * job.step_s
-    return run_accidents(
-        stage.vehicle,
-        touches,
-        kinds=kinds,
-        friction_factor=scene.numbers.applied("ground.friction_factor", 1.0)[touches.future],
-        duration_s=ACCIDENT_S if job.accident_motion else enough_s,
-        step_s=job.step_s,
-    )
-
-
-def _accident_messages(accidents: Accidents) -> tuple[Accident, ...]:
-    return tuple(
-        Accident(
-            future=int(accidents.future[i]),
-            road_user=int(accidents.user[i]),
-            time_s=float(accidents.time_s[i]),
-            point_m=accidents.point_m[i],
-            angle_rad=float(accidents.angle_rad[i]),
-            closing_mps=float(accidents.closing_mps[i]),
-            ego_delta_v_mps=float(np.hypot(*accidents.ego_delta_v_mps[i])),
-            user_delta_v_mps=float(np.hypot(*accidents.user_delta_v_mps[i])),
-        )
-        for i in np.flatnonzero(accidents.valid)
     )

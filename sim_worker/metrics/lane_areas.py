@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import shapely
 
@@ -10,6 +12,7 @@ from foretwin.contracts.world import Connection, Lane, World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.driver_model import ALONG_COS
 from foretwin.sim_worker.metrics.ground import polygon_of
+from foretwin.sim_worker.metrics.lane_lookup import LaneLookup
 from foretwin.sim_worker.metrics.route_rules import direction_near
 
 _EVERY_M = 3.0
@@ -20,6 +23,7 @@ class LaneAreas:
     """The lanes and connections of a World as strips of their width, and its junctions' areas."""
 
     def __init__(self, world: World) -> None:
+        self._world = world
         self._ways: list[Lane | Connection] = [*world.lanes, *world.connections]
         self._strips = np.array([_strip(way) for way in self._ways], dtype=object)
         self._tree = shapely.STRtree(self._strips)
@@ -27,6 +31,11 @@ class LaneAreas:
         areas = [polygon_of(j.area) for j in world.junctions if j.area is not None]
         self._junctions = shapely.union_all(areas)
         shapely.prepare(self._junctions)
+
+    @functools.cached_property
+    def lookup(self) -> LaneLookup:
+        """The one lane or connection on which each of many points is."""
+        return LaneLookup(self._world)
 
     def in_junction(self, points: Array) -> Flags:
         """Return whether points (K, 2) lie in a junction (K,)."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.bus import Mailbox, Received
-from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
+from foretwin.contracts.planner_link import LINK_VERSION, PlannedMotions, PlannerScene
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.remote import RemoteDriver, RemotePlanner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -34,7 +34,7 @@ def eastwards(scene: PlannerScene, *, speed: float = 6.0) -> PlannedMotions:
     return PlannedMotions(
         job=scene.job, question=scene.question, futures=scene.futures, time_s=time_s,
         xy_m=np.stack([x, np.broadcast_to(y, x.shape)], axis=-1), yaw_rad=np.zeros_like(x),
-        speed_mps=np.full_like(x, speed),
+        speed_mps=np.full_like(x, speed), link=LINK_VERSION,
     )  # fmt: skip
 
 
@@ -163,10 +163,13 @@ def test_futures_that_an_answer_leaves_out_are_driven_by_the_fallback() -> None:
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        ({"speed_mps": np.full((1, 31), np.nan)}, "no use: speed_mps holds what is no number"),
-        ({"futures": (3,)}, r"no use: futures (3,) of a job with 1"),
+        ({"speed_mps": np.full((1, 31), np.nan)}, "the answer holds what is no number"),
+        ({"futures": (3,)}, "no use: futures (3,) of 1 that were asked for"),
         ({"time_s": np.zeros(31)}, "no use: time_s does not rise"),
         ({"yaw_rad": np.zeros((1, 7))}, "no use: yaw_rad of shape (1, 7)"),
+        ({"link": 1}, "no use: it speaks version 1 of the planner link, this foretwin version 2"),
+        ({"took_s": -1.0}, "no use: took_s -1: 0 to 10 s"),
+        ({"failure": "lost its way"}, "no use: lost its way"),
     ],
 )
 def test_an_answer_of_no_use_is_named(spoil: dict[str, object], words: str) -> None:
