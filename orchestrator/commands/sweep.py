@@ -191,7 +191,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
     return {
         "complete": True,
         "spec": loaded.spec,
-        "planners": planner_origins(loaded.spec),
+        "planners": planner_origins(loaded),
         "worlds": len(places.worlds),
         "jobs": len(plan.jobs),
         **counted.totals(),

@@ -17,7 +17,7 @@ from foretwin.orchestrator.processors import trouble_with_workers
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
 from foretwin.orchestrator.sweep.folder import built_worlds, planner_origins
 from foretwin.orchestrator.sweep.spec import Loaded
-from foretwin.orchestrator.sweep.workers import worker_setup
+from foretwin.orchestrator.sweep.workers import task_timeout_s, worker_setup
 from foretwin.orchestrator.sweep.worlds import SUFFIX
 
 ENGINES = "zenoh", "ray"
@@ -52,10 +52,10 @@ LOCAL = Engine()
 @contextlib.contextmanager
 def workers_for(loaded: Loaded, out: Path, engine: Engine) -> Iterator[Runner]:
     """Give a runner that plays a sweep into the folder `out`, and end all that it started."""
-    setup, timeout_s = worker_setup(loaded, out), loaded.spec.job_timeout_s
+    setup, timeout_s = worker_setup(loaded, out), task_timeout_s(loaded)
     if engine.name == "ray":
         with _seats_on_ray(
-            setup, engine, out=out, planners=planner_origins(loaded.spec), timeout_s=timeout_s
+            setup, engine, out=out, planners=planner_origins(loaded), timeout_s=timeout_s
         ) as runner:
             yield runner
         return

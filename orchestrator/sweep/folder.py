@@ -13,13 +13,14 @@ import msgspec
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.placement import WorldPlaces
+from foretwin.contracts.setup import STACK_LOGS
 from foretwin.contracts.versions import versions
 from foretwin.orchestrator.record.run_folder import METRICS_FILE, REPEATED, SWEPT_TABLES, VEHICLES
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from foretwin.orchestrator.sweep.manifest import MANIFEST
 from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
-from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec
+from foretwin.orchestrator.sweep.spec import Loaded
 from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
 from foretwin.sim_worker.planners.registry import planner_origin
 from foretwin.world_gen.build import GENERATOR_VERSION
@@ -97,7 +98,7 @@ class SweepFolder:
         """Note what the folder is for, where nothing is there yet."""
         if not (self.path / SUMMARY).is_file():
             self.summarise(
-                {"complete": False, "spec": loaded.spec, "planners": planner_origins(loaded.spec)}
+                {"complete": False, "spec": loaded.spec, "planners": planner_origins(loaded)}
             )
 
     def summarise(self, what: dict[str, Any]) -> dict[str, Any]:
@@ -136,17 +137,23 @@ def built_worlds(out: Path) -> Path:
     return out / WORLDS
 
 
-def planner_origins(spec: SweepSpec) -> dict[str, dict[str, str]]:
-    """Return what each planner of a sweep is made of, by name."""
+def planner_origins(loaded: Loaded) -> dict[str, dict[str, str]]:
+    """Return what each planner of a sweep is made of, by name; of a driving stack, what starts it
+    and what it says that it is."""
+    spec, stacks = loaded.spec, loaded.stacks
     # Egos that go backwards may be driven by one that the spec does not name.
-    names = sorted({*spec.planners, BACKWARDS_PLANNER})
-    return {name: planner_origin(name)._asdict() for name in names}
+    names = sorted({*spec.planners, BACKWARDS_PLANNER} - stacks.keys())
+    return {name: planner_origin(name)._asdict() for name in names} | {
+        name: {"command": spec.remote[name].command, "name": says.name, "version": says.version}
+        for name, says in stacks.items()
+    }
 
 
 def fingerprint_of(loaded: Loaded, source: str) -> str:
     """Return a hash of everything that decides the rows of a sweep."""
-    # How long one waits for a job does not.
-    spec = msgspec.structs.replace(loaded.spec, job_timeout_s=1.0)
+    # How long one waits for a job, or for an answer in it, does not.
+    remote = {name: stack.for_identity() for name, stack in loaded.spec.remote.items()}
+    spec = msgspec.structs.replace(loaded.spec, job_timeout_s=1.0, remote=remote)
     parts = (
         spec,
         loaded.scenarios,
@@ -157,7 +164,7 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
         GENERATOR_VERSION,
         versions(),
         RESULT_SCHEMA_VERSION,
-        planner_origins(loaded.spec),
+        planner_origins(loaded),
     )
     return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 
@@ -168,5 +175,5 @@ def _clear(path: Path) -> None:
         return
     for name in (SUMMARY, PLAN, LOG, METRICS_FILE, MANIFEST):
         (path / name).unlink(missing_ok=True)
-    for name in (*SWEPT_TABLES.values(), VEHICLES, WORLDS, REPEATED):
+    for name in (*SWEPT_TABLES.values(), VEHICLES, WORLDS, REPEATED, STACK_LOGS):
         shutil.rmtree(path / name, ignore_errors=True)

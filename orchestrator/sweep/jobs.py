@@ -56,6 +56,11 @@ class JobMaker:
             accidents=spec.accidents,
             vehicle=self._vehicles[planned.vehicle],
             control_hz=spec.control_hz,
+            planner_timing=(
+                spec.remote[planned.planner].timing
+                if planned.planner in spec.remote
+                else msgspec.UNSET
+            ),
             **(self._staged(planned) if cells[0].start is None else self._recorded(planned)),
         )
 

@@ -17,7 +17,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.placement import AS_RECORDED, PlacedHere, WorldPlaces
 from foretwin.contracts.scenario import FAULTS, Scenario
-from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec
+from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, futures_per_job
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 
@@ -128,7 +128,8 @@ def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
                 for case, values in cases[here.scenario_id]
                 for parameters in sets
             )
-            while batch := tuple(itertools.islice(cells, FUTURES_PER_JOB)):
+            most = futures_per_job(spec, planner)
+            while batch := tuple(itertools.islice(cells, most)):
                 job = SweepJob(
                     number=len(jobs),
                     world_id=world.world_id,

@@ -12,14 +12,21 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.numbers import FUTURE_NUMBERS, MAX_SEED, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
+from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.settings import read_toml, settings_from
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, read_drive
+from foretwin.orchestrator.sweep.stacks import (
+    FUTURES_PER_JOB,
+    RemoteStack,
+    check_remote,
+    introduced,
+)
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
-from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.planners.registry import REMOTE, check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
@@ -30,9 +37,12 @@ _IMPACTS = "drac", "required_deceleration", "impact_speed", "delta_v"
 _COMFORT = "max_deceleration", "max_lateral_acceleration", "max_jerk", "comfortable"
 _RULES = "off_road_share", "red_light_violations", "right_of_way_violations", "driving_score"
 DEFAULT_METRICS = (*_TIMES, *_IMPACTS, *_COMFORT, *_RULES)
+_START_IT = (
+    "planners: remote asks a stack that somebody has started beside a drive; a sweep starts it "
+    'itself: [remote.NAME] with command = "…", and NAME among the planners'
+)
 _SHOWS = "The ego drives on from where the car was, among those who were there."
 JUST_RECORDED = Scenario(id=AS_RECORDED, title="As recorded", source="the drive", shows=_SHOWS)
-FUTURES_PER_JOB = 64
 
 
 class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -62,6 +72,8 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     samples: int | None = None
     """Draws for each combination of listed values; None takes the scenario's own number."""
     planners: tuple[str, ...] = ("pure_pursuit_idm",)
+    remote: dict[str, RemoteStack] = {}
+    """Driving stacks by the names under which `planners` knows them."""
     vehicles: tuple[str, ...] = ("bmw_320i",)
     metrics: tuple[str, ...] = DEFAULT_METRICS
     parameters: dict[str, tuple[float, ...]] = {}
@@ -85,6 +97,8 @@ class Loaded(msgspec.Struct, frozen=True, kw_only=True):
     """Where a recorded car was; without them, egos start where their cases say."""
     road_users: RoadUserLog | None = None
     """Who was around the recorded car."""
+    stacks: dict[str, PlannerJoined] = {}
+    """Of those `remote` that are among the planners, who they say that they are."""
 
 
 def load_spec(path: Path) -> Loaded:
@@ -111,18 +125,27 @@ def check_spec(spec: SweepSpec) -> Loaded:
     if spec.junctions != "all":
         for name in spec.junctions if spec.map is not None else ():
             node_of_id(name)
+    check_remote(spec.remote, control_hz=spec.control_hz)
     for name in spec.planners:
-        check_planner(name, in_drive=False)
+        if name == REMOTE and name not in spec.remote:
+            raise UserError(_START_IT)
+        if name not in spec.remote:
+            check_planner(name, in_drive=False)
     _check_metrics(spec.metrics)
     _check_parameters(spec.parameters)
     scenarios = _scenarios(spec)
     vehicles = {name: load_vehicle(name) for name in spec.vehicles}
-    if spec.recorded is None:
-        return Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles)
-    starts, users = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
-    return Loaded(
-        spec=spec, scenarios=scenarios, vehicles=vehicles, starts=starts, road_users=users
-    )
+    loaded = Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles)
+    if spec.recorded is not None:
+        starts, users = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
+        loaded = msgspec.structs.replace(loaded, starts=starts, road_users=users)
+    stacks = {name: one for name, one in spec.remote.items() if name in spec.planners}
+    return msgspec.structs.replace(loaded, stacks=introduced(stacks))
+
+
+def futures_per_job(spec: SweepSpec, planner: str) -> int:
+    """Return how many futures of a planner are played side by side at most."""
+    return spec.remote[planner].futures_per_job if planner in spec.remote else FUTURES_PER_JOB
 
 
 def worlds_folder(spec: SweepSpec) -> Path | None:

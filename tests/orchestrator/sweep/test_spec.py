@@ -50,7 +50,7 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
         ('map = "a"\nplanners = ["nobody"]', "unknown planner 'nobody'"),
         (
             'map = "a"\nplanners = ["constant_speed", "remote"]',
-            "planner remote asks a stack over the bus of a drive; there is none here",
+            "planners: remote asks a stack that somebody has started beside a drive; a sweep",
         ),
         (
             'map = "a"\nplanners = ["as_planned"]',
