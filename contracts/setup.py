@@ -72,6 +72,8 @@ class StackSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """A driving stack of somebody else, which each worker of a sweep starts for itself."""
 
     command: tuple[str, ...]
+    folder: str | None = None
+    """In which it is started; None: where its worker was."""
     instances: int = 1
     """So many processes, among which the futures of a job are dealt out."""
     answer_within_s: float = 60.0

@@ -140,13 +140,19 @@ class Seat:
             with _within(limit_s):
                 return SeatAnswer(self.name, encode(self._reply(question)))
         except _TooLateError:
-            self._worker = None  # What it was in the middle of nobody knows.
+            self.close()  # What it was in the middle of nobody knows.
             return SeatAnswer(self.name, refusal=f"no answer in {limit_s:g} s", late=True)
         except Exception as error:
             logging.getLogger("sim_worker").exception("%s refused", question.channel)
             return SeatAnswer(self.name, refusal=one_line(error))
         finally:
             self._at_hand.data = None
+
+    def close(self) -> None:
+        """End what its worker has started; the next question finds another one."""
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
 
     def _reply(self, question: SeatQuestion) -> msgspec.Struct:
         if self._worker is None:
@@ -165,6 +171,8 @@ def answer_here(setup: bytes, question: SeatQuestion, world: bytes | None) -> Se
     """Answer one question in this process, whose seat stays as long as the setup is the same."""
     name = hashlib.sha256(setup).hexdigest()
     if name not in _HERE:
+        for earlier in _HERE.values():
+            earlier.close()
         _HERE.clear()
         _HERE[name] = Seat(decode_content(setup, SeatSetup, where="the setup of a seat"))
     return _HERE[name].answer(question, world)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import msgspec
 
@@ -50,6 +51,7 @@ class RemoteStack(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         """Return what a worker starts it with; `says` is who it was when the sweep began."""
         return StackSetup(
             command=tuple(shlex.split(self.command)),
+            folder=str(Path.cwd()),
             instances=self.instances,
             answer_within_s=self.answer_within_s,
             start_within_s=self.start_within_s,

@@ -10,13 +10,13 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import BinaryIO, Literal, NamedTuple
 
 import msgspec
 
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.bus import Mailbox, Received, ZenohBus
-from foretwin.contracts.errors import UserError
+from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.local_bus import make_local_bus, private_files
 from foretwin.contracts.owned_folder import make_temporary
@@ -136,7 +136,10 @@ class StackProcesses:
             if one.process is not None and one.process.poll() is not None:
                 self.end(one.number)
             if one.process is None and not one.unusable:
-                self._start(one)
+                try:
+                    self._start(one)
+                except OSError as error:
+                    one.unusable = f"cannot be started: {one_line(error)}"
         end = time.monotonic() + self._setup.start_within_s
         troubles: dict[int, str] = {}
         while waits := [
@@ -208,10 +211,10 @@ class StackProcesses:
             run_id=RUN,
             process_id=self.process_id(one.number),
         )
-        one.log.parent.mkdir(parents=True, exist_ok=True)
-        with one.log.open("ab") as said:
+        with _log_at(one.log) as said:
             one.process = subprocess.Popen(
                 [sys.executable, "-I", "-S", stack_keeper.__file__, *self._setup.command],
+                cwd=self._setup.folder,
                 stdin=subprocess.PIPE,
                 stdout=said,
                 stderr=said,
@@ -275,6 +278,14 @@ def _answers(said: PlannedMotions | Trouble, question: PlannerScene) -> bool:
     if isinstance(said, Trouble):
         return True
     return (said.job, said.question) == (question.job, question.question)
+
+
+def _log_at(file: Path) -> BinaryIO:
+    """Open a log to append to; where it cannot be, what is said is lost."""
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        return file.open("ab")
+    return Path(os.devnull).open("ab")
 
 
 def _last_line(log: Path) -> str:
