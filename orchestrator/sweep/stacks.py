@@ -11,11 +11,12 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import PlannerTiming
 from foretwin.contracts.guard import is_identifier
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.contracts.setup import StackSetup
 from foretwin.sim_worker.planners.answered_motions import MOST_TOOK_S
 from foretwin.sim_worker.planners.registry import planner_names
-from foretwin.sim_worker.planners.stack_processes import introduce
+from foretwin.sim_worker.planners.stack_processes import StackProcesses
 
 FUTURES_PER_JOB = 64
 MOST_INSTANCES = FUTURES_PER_JOB
@@ -75,7 +76,20 @@ def check_remote(remote: Mapping[str, RemoteStack], *, control_hz: float) -> Non
 
 def introduced(remote: Mapping[str, RemoteStack]) -> dict[str, PlannerJoined]:
     """Start each stack once and return what it says that it is; UserError where one cannot be."""
-    return {name: introduce(name, stack.setup(None)) for name, stack in remote.items()}
+    return {name: _introduced(name, stack) for name, stack in remote.items()}
+
+
+def _introduced(name: str, stack: RemoteStack) -> PlannerJoined:
+    one = msgspec.structs.replace(stack.setup(None), instances=1)
+    with temporary_folder("foretwin-stack-") as folder:
+        processes = StackProcesses(name, one, folder=folder, owner="first")
+        try:
+            troubles = processes.make_ready()
+            if troubles or processes.said is None:
+                raise UserError(f"remote.{name} ({stack.command}): {troubles[0]}")
+            return processes.said
+        finally:
+            processes.close()
 
 
 def longest_wait_s(remote: Mapping[str, RemoteStack], *, horizon_s: float) -> float:

@@ -61,7 +61,7 @@ class StackPlanner:
         self.processes.close()
 
 
-class _Part:
+class _Share:
     """The futures of a job that one process drives."""
 
     def __init__(self, number: int, rows: Indices, briefing: Briefing) -> None:
@@ -90,7 +90,7 @@ class StackDriver:
         self._planner, self._job = planner, job
         count, among = len(briefing.future_ids), planner.setup.instances
         rows = [np.arange(number, count, among) for number in range(among)]
-        self._parts = [_Part(n, mine, briefing) for n, mine in enumerate(rows) if len(mine)]
+        self._shares = [_Share(n, mine, briefing) for n, mine in enumerate(rows) if len(mine)]
         self._begun = False
 
     def plan(self, view: PlannerView) -> PlannerOutput:
@@ -98,16 +98,16 @@ class StackDriver:
         if not self._begun:
             self._begun = True
             self._begin()
-        due = [one for one in self._parts if len(one.rows) and one.motions.due(view.time_s)]
+        due = [one for one in self._shares if len(one.rows) and one.motions.due(view.time_s)]
         if due:
             self._ask(due, view)
         accel, angle = np.full((2, len(view.arc_m)), np.nan)
-        for part in self._parts:
-            rows = part.rows
+        for share in self._shares:
+            rows = share.rows
             if len(rows) == len(accel):
-                accel, angle = part.motions.track(view, rows)
+                accel, angle = share.motions.track(view, rows)
             elif len(rows):
-                accel[rows], angle[rows] = part.motions.track(rows_of(view, rows), rows)
+                accel[rows], angle[rows] = share.motions.track(rows_of(view, rows), rows)
         return PlannerOutput(accel, angle)
 
     def _begin(self) -> None:
@@ -115,64 +115,64 @@ class StackDriver:
         if planner.hung_jobs >= MOST_HUNG_JOBS:
             self.hung = True
             words = f"hung in {MOST_HUNG_JOBS} jobs in a row and is asked no more"
-            for part in self._parts:
-                self._lose(part, words)
+            for share in self._shares:
+                self._lose(share, words)
             return
         troubles = planner.processes.make_ready()
-        for part in self._parts:
-            if part.number in troubles:
-                self._lose(part, troubles[part.number])
+        for share in self._shares:
+            if share.number in troubles:
+                self._lose(share, troubles[share.number])
 
-    def _ask(self, due: list[_Part], view: PlannerView) -> None:
-        questions = {part.number: self._question(part, view) for part in due}
+    def _ask(self, due: list[_Share], view: PlannerView) -> None:
+        questions = {share.number: self._question(share, view) for share in due}
         outcomes = self._planner.processes.ask(questions)
-        for part in due:
-            outcome, asked = outcomes[part.number], part.rows
+        for share in due:
+            outcome, asked = outcomes[share.number], share.rows
             if isinstance(outcome, Trouble):
-                self._take_trouble(part, outcome)
+                self._take_trouble(share, outcome)
                 continue
             try:
-                why = part.motions.take(outcome, asked, view.time_s)
+                why = share.motions.take(outcome, asked, view.time_s)
             except (TypeError, ValueError) as error:
                 why = dict.fromkeys(map(int, asked), str(error))
-            self._fail(part, why)
+            self._fail(share, why)
 
-    def _question(self, part: _Part, view: PlannerView) -> PlannerScene:
-        part.motions.asked(view.time_s)
-        part.questions += 1
+    def _question(self, share: _Share, view: PlannerView) -> PlannerScene:
+        share.motions.asked(view.time_s)
+        share.questions += 1
         asked = Asked(
             run_id=RUN,
-            worker_id=self._planner.processes.process_id(part.number),
+            worker_id=self._planner.processes.process_id(share.number),
             job=self._job,
-            question=part.questions,
+            question=share.questions,
             within_s=self._planner.setup.answer_within_s,
-            reset=part.questions == 1,
+            reset=share.questions == 1,
         )
-        return scene_message(view, asked, part.rows, self.briefing)
+        return scene_message(view, asked, share.rows, self.briefing)
 
-    def _take_trouble(self, part: _Part, trouble: Trouble) -> None:
+    def _take_trouble(self, share: _Share, trouble: Trouble) -> None:
         planner = self._planner
         if trouble.kind == "nonsense":
-            self._fail(part, dict.fromkeys(map(int, part.rows), trouble.words))
+            self._fail(share, dict.fromkeys(map(int, share.rows), trouble.words))
             return
-        log.warning("planner %r, process %d: %s", planner.name, part.number, trouble.words)
-        planner.processes.end(part.number)
+        log.warning("planner %r, process %d: %s", planner.name, share.number, trouble.words)
+        planner.processes.end(share.number)
         if trouble.kind == "hung":
             if not self.hung:
                 planner.hung_jobs += 1
             self.hung = True
-            self._lose(part, trouble.words)
+            self._lose(share, trouble.words)
             return
         planner.deaths += 1
         if planner.deaths < ATTEMPTS:
             raise PlayAgain(f"planner {planner.name!r}: its process {trouble.words}")
-        self._lose(part, f"{ATTEMPTS} of its processes died of the job, the last {trouble.words}")
+        self._lose(share, f"{ATTEMPTS} of its processes died of the job, the last {trouble.words}")
 
-    def _lose(self, part: _Part, words: str) -> None:
-        self.lost.update(map(int, part.rows))
-        self._fail(part, dict.fromkeys(map(int, part.rows), words))
+    def _lose(self, share: _Share, words: str) -> None:
+        self.lost.update(map(int, share.rows))
+        self._fail(share, dict.fromkeys(map(int, share.rows), words))
 
-    def _fail(self, part: _Part, why: dict[int, str]) -> None:
+    def _fail(self, share: _Share, why: dict[int, str]) -> None:
         if why:
             self.remarks |= why
-            part.fail(list(why))
+            share.fail(list(why))

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import secrets
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import msgspec
 
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.bus import Mailbox, Received, ZenohBus
-from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.errors import one_line
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.local_bus import make_local_bus, private_files
 from foretwin.contracts.owned_folder import make_temporary
@@ -28,7 +25,7 @@ from foretwin.contracts.planner_link import (
 )
 from foretwin.contracts.planner_serving import LINK_GIVEN, GivenLink
 from foretwin.contracts.setup import StackSetup
-from foretwin.sim_worker.planners import stack_keeper
+from foretwin.sim_worker.planners.kept_program import KeptProgram
 
 RUN = "stack"
 MOST_FAILED_STARTS = 3
@@ -37,7 +34,6 @@ _MEMBER = BusMember("planner", "planner")
 _LOOK_S = 0.05
 _REPEAT_S = 1.0
 """The first question of a process is repeated, should it have come before anybody listened."""
-_MOST_LOG_BYTES = 4096
 
 
 class Trouble(NamedTuple):
@@ -54,7 +50,7 @@ class _Instance:
     number: int
     log: Path
     lives: int = 0
-    process: subprocess.Popen[bytes] | None = None
+    process: KeptProgram | None = None
     joined: bool = False
     asked: bool = False
     failed_starts: int = 0
@@ -119,8 +115,8 @@ class StackProcesses:
     def close(self) -> None:
         """End all of them, and the bus."""
         for one in self._instances:
-            if one.process is not None and one.process.stdin is not None:
-                one.process.stdin.close()
+            if one.process is not None:
+                one.process.tell_to_end()
         for one in self._instances:
             self.end(one.number)
         self._held.close()
@@ -133,7 +129,7 @@ class StackProcesses:
         """Start those that do not run, and wait until they have joined; returns which of them are
         of no use, and why."""
         for one in self._instances:
-            if one.process is not None and one.process.poll() is not None:
+            if one.process is not None and one.process.has_ended:
                 self.end(one.number)
             if one.process is None and not one.unusable:
                 try:
@@ -151,13 +147,16 @@ class StackProcesses:
                 continue
             for one in waits:
                 assert one.process is not None
-                if one.process.poll() is not None:
-                    troubles[one.number] = f"{self._ending(one)} before it joined"
+                if one.process.has_ended:
+                    troubles[one.number] = f"{one.process.ending()} before it joined"
                 elif time.monotonic() > end:
                     within = f"{self._setup.start_within_s:g} s"
                     troubles[one.number] = f"did not join within {within} and was ended"
                 if one.number in troubles:
                     self._failed_to_start(one, troubles[one.number])
+        for one in self._instances:
+            if one.unusable:
+                self.end(one.number)
         return troubles | {one.number: one.unusable for one in self._instances if one.unusable}
 
     def ask(self, questions: dict[int, PlannerScene]) -> dict[int, PlannedMotions | Trouble]:
@@ -178,8 +177,9 @@ class StackProcesses:
                 continue
             now = time.monotonic()
             for one in [self._instances[number] for number in waits]:
-                if one.process is None or one.process.poll() is not None:
-                    outcomes[one.number] = Trouble("died", self._ending(one))
+                assert one.process is not None
+                if one.process.has_ended:
+                    outcomes[one.number] = Trouble("died", one.process.ending())
                 elif now > end:
                     words = f"gave no answer within {within_s:g} s of wall time and was ended"
                     outcomes[one.number] = Trouble("hung", words)
@@ -192,15 +192,8 @@ class StackProcesses:
         """End one of the processes, and whatever it has started; the next one is another life."""
         one = self._instances[number]
         process, one.process, one.joined = one.process, None, False
-        if process is None:
-            return
-        assert process.stdin is not None
-        process.stdin.close()
-        try:
-            process.wait(timeout=2.0 * stack_keeper.GRACE_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        if process is not None:
+            process.end()
 
     def _start(self, one: _Instance) -> None:
         self._open()
@@ -211,15 +204,12 @@ class StackProcesses:
             run_id=RUN,
             process_id=self.process_id(one.number),
         )
-        with _log_at(one.log) as said:
-            one.process = subprocess.Popen(
-                [sys.executable, "-I", "-S", stack_keeper.__file__, *self._setup.command],
-                cwd=self._setup.folder,
-                stdin=subprocess.PIPE,
-                stdout=said,
-                stderr=said,
-                env=os.environ | {LINK_GIVEN: msgspec.json.encode(given).decode()},
-            )
+        one.process = KeptProgram(
+            self._setup.command,
+            folder=self._setup.folder,
+            log=one.log,
+            told={LINK_GIVEN: msgspec.json.encode(given).decode()},
+        )
 
     def _publish(self, scene: PlannerScene) -> None:
         assert self._bus is not None
@@ -263,52 +253,9 @@ class StackProcesses:
         if one.failed_starts >= MOST_FAILED_STARTS:
             one.unusable = f"{words}, {MOST_FAILED_STARTS} times: it is not started any more"
 
-    def _ending(self, one: _Instance) -> str:
-        """Return in words how a process ended, with the last line that it printed."""
-        assert one.process is not None
-        code = one.process.wait()
-        signal = -code if code < 0 else code - stack_keeper.BY_SIGNAL
-        how = f"signal {signal}" if signal > 0 else f"exit code {code}"
-        said = _last_line(one.log)
-        return f"ended by {how}{f' ({said})' if said else ''}"
-
 
 def _answers(said: PlannedMotions | Trouble, question: PlannerScene) -> bool:
     """Whether what a process said ends a question: an answer to it, or nonsense."""
     if isinstance(said, Trouble):
         return True
     return (said.job, said.question) == (question.job, question.question)
-
-
-def _log_at(file: Path) -> BinaryIO:
-    """Open a log to append to; where it cannot be, what is said is lost."""
-    with contextlib.suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        return file.open("ab")
-    return Path(os.devnull).open("ab")
-
-
-def _last_line(log: Path) -> str:
-    with contextlib.suppress(OSError), log.open("rb") as file:
-        file.seek(max(0, log.stat().st_size - _MOST_LOG_BYTES))
-        lines = file.read().decode(errors="replace").split("\n")
-        return next((line.strip() for line in reversed(lines) if line.strip()), "")[:200]
-    return ""
-
-
-def introduce(name: str, setup: StackSetup) -> PlannerJoined:
-    """Start one process of a stack, and return what it says that it is; it is ended again.
-
-    Raises UserError in one line where it cannot be started, or speaks another version of the link.
-    """
-    temporary = make_temporary("foretwin-stack-")
-    one = msgspec.structs.replace(setup, instances=1)
-    processes = StackProcesses(name, one, folder=temporary.path, owner="first")
-    try:
-        troubles = processes.make_ready()
-        if troubles or processes.said is None:
-            raise UserError(f"remote.{name} ({' '.join(setup.command)}): {troubles[0]}")
-        return processes.said
-    finally:
-        processes.close()
-        temporary.remove()

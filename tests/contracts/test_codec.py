@@ -36,7 +36,6 @@ from tests.contracts.messages import messages, same
 COVERS = (
     "foretwin.contracts.arrays",
     "foretwin.contracts.drive",
-    "foretwin.contracts.planner_link",
     "foretwin.contracts.provenance",
     "foretwin.contracts.side_by_side",
     "foretwin.contracts.signals",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,12 +22,9 @@ from foretwin.sim_worker.planners.stack_processes import MOST_FAILED_STARTS
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.sim_worker.places import crossroads, job
-from tests.system.foretwin_command import REPOSITORY, is_running, wait_for
+from tests.system.foretwin_command import REPOSITORY
 
-COVERS = (
-    "foretwin.sim_worker.planners.stack_processes",
-    "foretwin.sim_worker.planners.stack_keeper",
-)
+COVERS = ("foretwin.sim_worker.planners.stack_processes",)
 
 MODULE = "tests.sim_worker.planners.a_stack"
 VEHICLE = load_vehicle()
@@ -209,16 +205,3 @@ def test_what_cannot_be_started_is_not_tried_for_ever(tmp_path: Path) -> None:
     assert once in told[0]
     assert told[-2] == told[-1]
     assert f"{MOST_FAILED_STARTS} times: it is not started any more" in told[-1]
-
-
-def test_all_its_processes_end_with_it(tmp_path: Path) -> None:
-    child = tmp_path / "child"
-    script = f"sleep 600 & echo $! > {child}; exec {sys.executable} -m {MODULE} straight"
-    setup = StackSetup(command=("sh", "-c", script), start_within_s=DEADLINE_S)
-    planner = StackPlanner("mine", setup, folder=tmp_path, owner="w0")
-    assert played(planner).outcome.valid.all()
-    started = [*planner.processes.pids, int(child.read_text())]
-    assert all(map(is_running, started))
-    planner.close()
-    wait_for(lambda: not any(map(is_running, started)), "the end of what it started")
-    assert os.environ["PYTHONPATH"], "as it was"
