@@ -51,6 +51,7 @@ class KeptProgram:
     def ending(self) -> str:
         """Wait for its end and return in words how it ended, with the last line that it printed."""
         code = self._keeper.wait()
+        self.tell_to_end()  # There is a pipe to it still.
         signal = -code if code < 0 else code - stack_keeper.BY_SIGNAL
         how = f"signal {signal}" if signal > 0 else f"exit code {code}"
         said = self._last_line()

@@ -1,4 +1,4 @@
-"""Programs of others: told how they ended, and gone, with their children, when nobody wants them."""
+"""Programs of others: told how they ended, and gone with their children when nobody wants them."""
 
 from __future__ import annotations
 
