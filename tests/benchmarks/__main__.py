@@ -38,6 +38,7 @@ BENCHMARKS = (
     "live_total_cpu",
     "metrics_64x80x10",
     "estimator_bad_network",
+    "told_metrics",
     "tuning_cost",
     "help_startup",
 )
