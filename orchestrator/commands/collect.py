@@ -12,6 +12,7 @@ from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.lake.collect import collect, damaged
+from foretwin.orchestrator.lake.manifest import MANIFEST
 from foretwin.orchestrator.lake.sources import folders_of_runs
 from foretwin.orchestrator.lake.store import FolderStore, LakeStore, store_at
 
@@ -31,6 +32,8 @@ def collect_runs(
         raise UserError("name folders of runs or sweeps, or of several of them")
     store = store_at(into)
     try:
+        if not folders and store.read(MANIFEST) is None:
+            raise UserError(f"--into {into}: no lake is there")
         return _collect(store, folders, replace=replace, verify=verify, as_json=as_json)
     except (OSError, pa.ArrowException) as error:
         if isinstance(store, FolderStore):

@@ -129,7 +129,7 @@ def _steps(sources: Iterator[SourceTables]) -> Iterator[list[SourceTables]]:
     step_bytes = 0
     for one in sources:
         step.append(one)
-        step_bytes += one.source.size_bytes
+        step_bytes += one.size_bytes
         if step_bytes >= STEP_BYTES:
             yield step
             step, step_bytes = [], 0

@@ -153,7 +153,7 @@ def _all_rows(
         try:
             for batch in source.batches(table):
                 yield run_id, batch
-        except UserError as error:
+        except (UserError, FileNotFoundError) as error:
             raise UncollectableError(run_id, str(error)) from error
 
 

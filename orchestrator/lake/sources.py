@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import hashlib
 import json
 import re
 from collections.abc import Iterator
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,11 +55,6 @@ class RunSource(NamedTuple):
     files: dict[str, tuple[Path, ...]]
     """Of each table."""
     sha256: str
-
-    @property
-    def size_bytes(self) -> int:
-        """Return how large its tables are."""
-        return sum(path.stat().st_size for paths in self.files.values() for path in paths)
 
 
 def folders_of_runs(given: Path) -> list[Path]:
@@ -137,6 +132,7 @@ class SourceTables:
         self.rows = {RUNS: 1}
         self.attribution = ""
         """Whose data the map is."""
+        self.size_bytes = 0
         self._files: dict[str, list[Path]] = {}
         for name, paths in source.files.items():
             for path in paths:
@@ -146,11 +142,13 @@ class SourceTables:
                     if rows := file.metadata.num_rows:
                         self.rows[name] = self.rows.get(name, 0) + rows
                         self._files.setdefault(name, []).append(path)
-                        self.schemas[name] = _with_run_id(file.schema_arrow)
+                        self.schemas[name] = _with_run_id(file.schema_arrow.remove_metadata())
+                        self.size_bytes += path.stat().st_size
+        self._map_sha256 = self._sha256_of_map()
+        self.partition = self._partition()
+        """Where the run belongs."""
 
-    @cached_property
-    def partition(self) -> Partition:
-        """Return where the run belongs."""
+    def _partition(self) -> Partition:
         record, sha256 = self.source.record, self._map_sha256
         return Partition(
             day=_day(self.source),
@@ -159,8 +157,7 @@ class SourceTables:
             map=f"osm-{sha256[:_MAP_DIGITS]}" if sha256 else NONE,
         )
 
-    @cached_property
-    def _map_sha256(self) -> str:
+    def _sha256_of_map(self) -> str:
         """Return the hash of the map; of a sweep of given Worlds there may be several."""
         record = self.source.record
         if self.source.kind == "drive":
@@ -185,7 +182,8 @@ class SourceTables:
                 for batch in file.iter_batches(BATCH_ROWS):
                     run_ids = pa.repeat(pa.scalar(self.source.run_id), batch.num_rows)
                     yield pa.RecordBatch.from_arrays(
-                        [run_ids, *batch.columns], schema=_with_run_id(batch.schema)
+                        [run_ids, *batch.columns],
+                        schema=_with_run_id(batch.schema.remove_metadata()),
                     )
 
     def _run_row(self) -> dict[str, Any]:
@@ -217,5 +215,7 @@ def _day(source: RunSource) -> str:
     return datetime.datetime.fromtimestamp(record.stat().st_mtime).date().isoformat()
 
 
+@functools.cache
 def _with_run_id(found: pa.Schema) -> pa.Schema:
+    """Return the columns of a lake's table; of a thousand runs they are the same few objects."""
     return pa.schema([pa.field(RUN_ID, pa.string()), *found])

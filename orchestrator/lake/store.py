@@ -21,6 +21,8 @@ from foretwin.orchestrator.sweep.lock import folder_lock
 
 STAGED, CLAIMS = "_staged", "_collecting"
 """Folders that readers of a lake pass by: what is not published yet, and who collects."""
+LOCK = "collect.lock"
+"""In a lake that is a folder, from its first moment on."""
 CLAIM_S = 600.0
 """After so long without a word who collects into an object store is held for dead."""
 RENEWED_S = 60.0
@@ -118,8 +120,13 @@ class FolderStore(LakeStore):
     @contextmanager
     def held(self) -> Iterator[None]:
         """Hold the folder's lock, which ends with the process."""
+        if self._folder.exists() and not self._folder.is_dir():
+            raise UserError(f"--into {self.where}: is a file; a lake is a folder")
+        there = {one.name for one in self._folder.iterdir()} if self._folder.exists() else set()
+        if there and LOCK not in there:
+            raise UserError(f"--into {self.where}: holds other files and no lake")
         self._folder.mkdir(parents=True, exist_ok=True)
-        with folder_lock(self._folder, name="collect.lock", option="--into", who="collect"):
+        with folder_lock(self._folder, name=LOCK, option="--into", who="collect"):
             yield
 
     def write(self, name: str, data: bytes) -> None:

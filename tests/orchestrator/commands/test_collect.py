@@ -59,6 +59,7 @@ def test_a_damaged_file_of_the_lake_is_named(
         ([], "name folders of runs or sweeps"),
         (["nowhere"], "nowhere: no such folder"),
         (["--into", "ftp://a/b", "."], "neither a run nor a sweep"),
+        (["--into", "nowhere", "--verify"], "--into nowhere: no lake is there"),
     ],
 )
 def test_what_cannot_be_collected_is_one_line(

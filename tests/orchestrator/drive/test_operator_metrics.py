@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -90,6 +91,26 @@ def test_processes_are_told_by_what_they_wrote(tmp_path: Path) -> None:
     assert page['process_starts_total{process="w0"}'] == 1
     assert page['process_cpu_seconds_total{process="w0"}'] > 0.0
     assert not any("w1" in name for name in page)
+
+
+@pytest.mark.judge
+def test_prometheus_own_parser_reads_a_page(house: House, tmp_path: Path) -> None:
+    python = Path(os.environ.get("JUDGES_VENV", "nowhere")) / "bin" / "python"
+    if not python.is_file():
+        pytest.skip("JUDGES_VENV names no environment with prometheus-client")
+    house.drive(10)
+    samples = DriveCounts(house.conductor).samples(1.0)
+    (tmp_path / "page").write_text(exposition(samples), encoding="utf-8")
+    code = (
+        "import sys; from prometheus_client.parser import text_string_to_metric_families as read;"
+        "print(sum(len(one.samples) for one in read(open(sys.argv[1]).read())))"
+    )
+
+    counted = subprocess.run(
+        [python, "-c", code, tmp_path / "page"], capture_output=True, text=True, check=True
+    ).stdout
+
+    assert int(counted) == len(samples) > 30
 
 
 def test_every_metric_is_in_the_document_and_none_else() -> None:

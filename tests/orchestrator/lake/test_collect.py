@@ -136,6 +136,23 @@ def test_a_run_whose_pages_are_damaged_is_refused_and_the_others_are_taken(tmp_p
     assert set(rows_by_run(lake, "runs")) == {runs[0].name, runs[2].name}
 
 
+def test_a_run_that_goes_away_meanwhile_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = three_runs(tmp_path)
+    staged = collecting.write_parts
+
+    def removing(*given: Any, **more: Any) -> Any:
+        shutil.rmtree(runs[1], ignore_errors=True)
+        return staged(*given, **more)
+
+    monkeypatch.setattr(collecting, "write_parts", removing)
+    done = collect(FolderStore(tmp_path / "lake"), runs)
+
+    assert done.added == [runs[0].name, runs[2].name]
+    assert str(runs[1]) in done.refused[0]
+
+
 def test_a_sweep_is_the_same_however_its_parts_are_cut(tmp_path: Path) -> None:
     lake, sweep = tmp_path / "lake", made_sweep(tmp_path / "sweep")
     collect(FolderStore(lake), [sweep])

@@ -82,3 +82,15 @@ def test_where_no_lake_can_be_is_told_with_what_would_be_right() -> None:
 
 def test_a_file_address_is_a_folder(tmp_path: Path) -> None:
     assert isinstance(store_at(f"file://{tmp_path}"), FolderStore)
+
+
+def test_a_folder_of_something_else_is_no_lake(tmp_path: Path) -> None:
+    (tmp_path / "run.json").touch()
+
+    with (
+        pytest.raises(UserError, match="holds other files and no lake"),
+        FolderStore(tmp_path).held(),
+    ):
+        pass
+    with pytest.raises(UserError, match="is a file"), FolderStore(tmp_path / "run.json").held():
+        pass
