@@ -61,6 +61,19 @@ def test_a_page_tells_what_the_record_of_the_drive_will_say(house: House) -> Non
     assert page["telemetry_age_seconds"] > 0.0
 
 
+def test_jobs_wait_or_are_at_work(house: House) -> None:
+    house.drive(20)
+    assert house.conductor.start_round()
+
+    page = told(DriveCounts(house.conductor).samples(1.0))
+
+    jobs = len(house.conductor.rounds.open.orders[0].jobs)
+    open_jobs = {state: page[f'jobs_open{{state="{state}"}}'] for state in ("at_work", "waiting")}
+    assert page["rounds_open"] == 1
+    assert sum(open_jobs.values()) == jobs == page["jobs_given_total"]
+    assert 0 < open_jobs["at_work"] <= house.plan.config.workers
+
+
 def test_the_age_of_results_begins_with_the_first_one(house: House) -> None:
     counts = DriveCounts(house.conductor)
     counts.look(10.0)
