@@ -15,8 +15,9 @@ PLAIN_PERIOD_S = 5.0
 @contextmanager
 def progress_bar(
     total: int, what: str
-) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
-    """Give a function that counts one more and one that prints a line beside the bar."""
+) -> Iterator[tuple[Callable[..., None], Callable[[str], None]]]:
+    """Give a function that counts one more of a name, or `by` so many, and one that prints a line
+    beside the bar."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
     shown = console(error=True)
@@ -28,13 +29,17 @@ def progress_bar(
         counted = BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         with Progress(described(), *counted, console=shown) as bar:
             task = bar.add_task(what, total=total)
-            yield lambda name: bar.update(task, advance=1, description=plain(name)), say
+
+            def show(name: str, *, by: int = 1) -> None:
+                bar.update(task, advance=by, description=plain(name))
+
+            yield show, say
         return
     done, last_s = 0, time.monotonic()
 
-    def advance(name: str) -> None:
+    def advance(name: str, *, by: int = 1) -> None:
         nonlocal done, last_s
-        done += 1
+        done += by
         if time.monotonic() - last_s >= PLAIN_PERIOD_S:
             last_s = time.monotonic()
             say(f"{done} of {total} {what}, {name}")

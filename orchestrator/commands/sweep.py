@@ -7,18 +7,15 @@ import hashlib
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import Job
-from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
-from foretwin.contracts.parts import JobCells
-from foretwin.contracts.runner import Answer, Runner, Task, answers, job_task, place_task
+from foretwin.contracts.runner import Runner, answers, place_task
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.ledger import jobs_ledger
@@ -32,13 +29,14 @@ from foretwin.orchestrator.sweep.folder import (
     fingerprint_of,
     planner_origins,
 )
-from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of, place_request
-from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, plan_sweep
-from foretwin.orchestrator.sweep.rows import Parts, fault_in
+from foretwin.orchestrator.sweep.jobs import JobMaker, place_request
+from foretwin.orchestrator.sweep.places import PlacedWorlds, are_kept, keep_places
+from foretwin.orchestrator.sweep.plan import SweepPlan
+from foretwin.orchestrator.sweep.play import jobs_left, play
+from foretwin.orchestrator.sweep.rows import Parts
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from foretwin.orchestrator.sweep.worlds import Building, all_there, choose_worlds, source_digest
-from foretwin.sim_worker.futures.finished_part import finished_part
 from foretwin.sim_worker.road_users.likeness import likenesses
 
 SOME_FAILED = 3
@@ -90,24 +88,19 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         chosen()  # what is wrong with them is told before anything is written
     with sweep_folder as folder:
         folder.begin(loaded)
-        places = _find_places(loaded, folder, runner, chosen)
-        plan = plan_sweep(loaded, places.worlds)
+        found = _find_places(loaded, folder, runner, chosen)
+        worlds = PlacedWorlds(folder.places_dir, found.worlds)
+        plan = SweepPlan(loaded, worlds)
         keep_vehicles(folder.path, loaded.vehicles.values())
-        maker = JobMaker(loaded, plan.worlds)
-        with Parts(folder.path, attribution=plan.attribution) as parts:
-            parts.keep_first(len(plan.jobs))
-            left = [
-                one
-                for one in plan.jobs
-                if one.number >= parts.listed
-                or not parts.hold(one.number, job_bytes(maker.job(one)).sha256)
-            ]
+        with Parts(folder.path, jobs=plan.jobs, attribution=plan.attribution) as parts:
+            maker = JobMaker(loaded)
+            left = jobs_left(plan, maker, parts)
             started_s, before = time.monotonic(), jobs_ledger(runner.count)
-            _play(left, maker, parts, runner, plan.attribution)
+            play(plan, left, maker, parts, runner, progress_bar)
             playing_s = round(time.monotonic() - started_s, 3)
             ledger = {"jobs": jobs_ledger(runner.count).since(before)}
-            now = {"jobs_played": len(left), "playing_s": playing_s, "ledger": ledger}
-            return folder.summarise(_summary(loaded, plan, places, parts) | now)
+            now = {"jobs_played": sum(left), "playing_s": playing_s, "ledger": ledger}
+            return folder.summarise(_summary(loaded, plan, worlds, found, parts) | now)
 
 
 def _find_places(
@@ -118,82 +111,46 @@ def _find_places(
     What was found before is kept; what failed before is tried again, and Worlds that are lost are
     built or read again.
     """
-    kept = folder.places()
-    found = {} if kept is None else {world.world_id: world for world in kept.worlds}
-    there = all_there(folder.worlds_dir, found)
-    if kept is not None and there and not kept.failures:
+    kept, at = folder.found(), folder.places_dir
+    if (
+        kept is not None
+        and not kept.failures
+        and all_there(folder.worlds_dir, kept.worlds)
+        and all(are_kept(at, world_id) for world_id in kept.worlds)
+    ):
         return kept
     worlds = chosen()(folder.worlds_dir, progress_bar)
     failures = dict(worlds.failures)
-    left = [world_id for world_id in worlds.ids if world_id not in found]
+    left = [world_id for world_id in worlds.ids if not are_kept(at, world_id)]
     tasks = [place_task(place_request(loaded, world_id)) for world_id in left]
-    with progress_bar(len(tasks), "Worlds placed on") as (advance_one, say):
+    with progress_bar(len(tasks), "Worlds placed on") as (advance, say):
         for answer in answers(runner, tasks):
             world_id = answer.task.world_id
             if answer.message is None:
                 failures[world_id] = answer.failure
                 say(f"failed: world {world_id}: {answer.failure}")
             else:
-                found[world_id] = answer.message
-            advance_one(world_id)
-    return folder.save_places(tuple(found[one] for one in worlds.ids if one in found), failures)
+                keep_places(at, answer.message)
+            advance(world_id)
+    return folder.save_found(tuple(one for one in worlds.ids if are_kept(at, one)), failures)
 
 
-class _AtWork(NamedTuple):
-    planned: SweepJob
-    job: Job
-    named: JobBytes
-    cells: JobCells
-
-
-def _play(
-    left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner, attribution: str
-) -> None:
-    """Play jobs, and keep the parts that come back of them."""
-    at_work: dict[str, _AtWork] = {}
-
-    def tasks() -> Iterator[Task]:
-        for one in left:
-            job = maker.job(one)
-            at = _AtWork(one, job, job_bytes(job), cells_of(one, attribution))
-            at_work[at.named.sha256] = at
-            yield job_task(job, at.named, cells=at.cells)
-
-    with progress_bar(sum(len(one.cells) for one in left), "futures") as (advance, say):
-
-        def fault(answer: Answer) -> str:
-            at = at_work[answer.task.key]
-            found = fault_in(answer.message.part, at.job, at.named.sha256, at.cells)
-            if found:
-                say(f"job {at.planned.number}: worker {answer.worker_id} gave no part: {found}")
-            return found
-
-        for answer in answers(runner, tasks(), fault_in=fault):
-            one, job, named, cells = at_work.pop(answer.task.key)
-            if answer.message is None:
-                say(f"failed: job {one.number}: {answer.failure}")
-                part = finished_part(job, named, None, cells, failure=answer.failure)
-            else:
-                part = answer.message.part
-            parts.write(one.number, part)
-            for _ in one.cells:
-                advance(f"{cells.junction_id} {one.planner}")
-
-
-def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:
+def _summary(
+    loaded: Loaded, plan: SweepPlan, worlds: PlacedWorlds, found: FoundPlaces, parts: Parts
+) -> dict[str, Any]:
     digest, counted = hashlib.sha256(), Summary(loaded.spec)
-    for entry in parts.entries(len(plan.jobs)):
+    for entry in parts.entries():
         digest.update(bytes.fromhex(entry.rows_sha256))
         for count in entry.counts:
             counted.add(count)
-    unplaced = [one for world in places.worlds for one in world.unplaced]
-    placed = {one.scenario_id for world in places.worlds for one in world.placed}
+    unplaced = [one for world in worlds for one in world.unplaced]
+    placed = {one.scenario_id for world in worlds for one in world.placed}
     return {
         "complete": True,
         "spec": loaded.spec,
         "planners": planner_origins(loaded),
-        "worlds": len(places.worlds),
-        "jobs": len(plan.jobs),
+        "worlds": len(found.worlds),
+        "jobs": plan.jobs,
         **counted.totals(),
         "rows_sha256": digest.hexdigest(),
         "scenarios": counted.table(),
@@ -201,6 +158,6 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
         "unplaced": [one for one in unplaced if one.applies],
         "placed_nowhere": sorted({one.id for one in loaded.scenarios} - placed),
         "does_not_apply": sum(not one.applies for one in unplaced),
-        "failures": places.failures,
+        "failures": found.failures,
         "attribution": plan.attribution,
     }

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.log_file import JsonLines, LogFile
+from foretwin.contracts.one_heap import share_one_heap
 from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.runner import Runner
 from foretwin.contracts.setup import WorkerSetup
@@ -59,6 +60,7 @@ def workers_for(loaded: Loaded, out: Path, engine: Engine) -> Iterator[Runner]:
         ) as runner:
             yield runner
         return
+    share_one_heap()
     count = PROCESSES if engine.workers is None else engine.workers
     with (
         temporary_folder("foretwin-sweep-") as folder,

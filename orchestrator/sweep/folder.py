@@ -12,12 +12,12 @@ import msgspec
 
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.placement import WorldPlaces
 from foretwin.contracts.setup import STACK_LOGS
 from foretwin.contracts.versions import versions
 from foretwin.orchestrator.record.run_folder import METRICS_FILE, REPEATED, SWEPT_TABLES, VEHICLES
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from foretwin.orchestrator.sweep.manifest import MANIFEST
+from foretwin.orchestrator.sweep.places import PLACES
 from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
 from foretwin.orchestrator.sweep.spec import Loaded
@@ -32,7 +32,8 @@ class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
     """What a sweep found out before it played anything."""
 
     fingerprint: str
-    worlds: tuple[WorldPlaces, ...]
+    worlds: tuple[str, ...]
+    """Ids of those that scenarios were placed on, in the order of the plan."""
     failures: dict[str, str]
     """Junctions or Worlds of which nothing is known, and why: tried again at the next start."""
 
@@ -73,6 +74,11 @@ class SweepFolder:
         """Return where the Worlds are."""
         return built_worlds(self.path)
 
+    @property
+    def places_dir(self) -> Path:
+        """Return where it is kept where scenarios take place in each World."""
+        return self.path / PLACES
+
     def _refuse_strangers(self) -> None:
         if self.path.exists() and not self.path.is_dir():
             raise UserError(f"--out {self.path}: is a file; a sweep writes into a folder")
@@ -111,9 +117,9 @@ class SweepFolder:
         self._write(SUMMARY, msgspec.json.format(msgspec.json.encode(whole), indent=2) + b"\n")
         return whole
 
-    def save_places(self, found: tuple[WorldPlaces, ...], failures: dict[str, str]) -> FoundPlaces:
-        """Keep where scenarios take place: it need not be found out again."""
-        places = FoundPlaces(fingerprint=self.fingerprint, worlds=found, failures=failures)
+    def save_found(self, worlds: tuple[str, ...], failures: dict[str, str]) -> FoundPlaces:
+        """Keep on which Worlds scenarios were placed: it need not be found out again."""
+        places = FoundPlaces(fingerprint=self.fingerprint, worlds=worlds, failures=failures)
         self._write(PLAN, encode(places))
         return places
 
@@ -123,7 +129,7 @@ class SweepFolder:
         partial.write_bytes(data)
         partial.replace(self.path / name)
 
-    def places(self) -> FoundPlaces | None:
+    def found(self) -> FoundPlaces | None:
         """Return what was kept, None where there is nothing."""
         try:
             kept = read_message(self.path / PLAN, FoundPlaces)
@@ -175,5 +181,5 @@ def _clear(path: Path) -> None:
         return
     for name in (SUMMARY, PLAN, LOG, METRICS_FILE, MANIFEST):
         (path / name).unlink(missing_ok=True)
-    for name in (*SWEPT_TABLES.values(), VEHICLES, WORLDS, REPEATED, STACK_LOGS):
+    for name in (*SWEPT_TABLES.values(), VEHICLES, WORLDS, PLACES, REPEATED, STACK_LOGS):
         shutil.rmtree(path / name, ignore_errors=True)

@@ -10,7 +10,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.futures import RESULT_STEP_S, Future, Job
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.parts import JobCells
-from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
+from foretwin.contracts.placement import AS_RECORDED, PlaceRequest
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob
 from foretwin.orchestrator.sweep.road_users import NO_OTHERS, others_at
 from foretwin.orchestrator.sweep.spec import Loaded
@@ -32,10 +32,9 @@ def place_request(loaded: Loaded, world_id: str) -> PlaceRequest:
 class JobMaker:
     """Makes jobs of what the plan names: a function of the spec and of where it takes place."""
 
-    def __init__(self, loaded: Loaded, worlds: tuple[WorldPlaces, ...]) -> None:
+    def __init__(self, loaded: Loaded) -> None:
         self._loaded = loaded
         self._scenarios = {scenario.id: scenario for scenario in loaded.scenarios}
-        self._worlds = {world.world_id: world for world in worlds}
         self._vehicles = {n: vehicle_digest(vehicle) for n, vehicle in loaded.vehicles.items()}
 
     def job(self, planned: SweepJob) -> Job:
@@ -45,7 +44,7 @@ class JobMaker:
         return Job(
             round_id=0,
             job_index=planned.number,
-            world_id=planned.world_id,
+            world_id=planned.world.world_id,
             futures=tuple(_future(i, cell, planned.planner) for i, cell in enumerate(cells)),
             horizon_s=planned.horizon_s,
             step_s=RESULT_STEP_S,
@@ -66,7 +65,7 @@ class JobMaker:
 
     def _staged(self, planned: SweepJob) -> dict[str, Any]:
         """Return how staged futures begin: each where its case says, nobody measured a car."""
-        world, first = self._worlds[planned.world_id], planned.cells[0]
+        world, first = planned.world, planned.cells[0]
         state = VehicleState(
             vehicle_id=planned.vehicle,
             stamp_ns=0,
@@ -81,7 +80,7 @@ class JobMaker:
 
     def _recorded(self, planned: SweepJob) -> dict[str, Any]:
         """Return how futures begin where a car was; those who meet it are timed to it."""
-        loaded, frame = self._loaded, self._worlds[planned.world_id].frame
+        loaded, frame = self._loaded, planned.world.frame
         start = loaded.starts[planned.cells[0].start or 0]
         path, others = start.path(frame), NO_OTHERS
         if loaded.road_users is not None and loaded.spec.recorded is not None:

@@ -12,15 +12,15 @@ from typing import Annotated, Self
 import msgspec
 
 from foretwin.contracts.parts import CaseCount
-from foretwin.orchestrator.sweep.plan import MOST_CELLS
 
 MANIFEST = "manifest.jsonl"
+_NOWHERE = -1
 
 
 class PartEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One job whose parts are there; `tables` has the SHA-256 of each of its files."""
 
-    job: Annotated[int, msgspec.Meta(ge=0, le=MOST_CELLS)]
+    job: Annotated[int, msgspec.Meta(ge=0)]
     job_sha256: str
     rows: int
     rows_sha256: str
@@ -33,14 +33,15 @@ _decoder = msgspec.json.Decoder(PartEntry)
 
 
 class Manifest:
-    """Entries of jobs, the last one of each counts; in memory is only where each of them stands.
+    """Entries of the first `jobs` jobs, the last one of each counts; in memory is only where each
+    of them stands.
 
     A line that a kill or a full disk cut short is passed by. Use it as a context.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, jobs: int) -> None:
         self.path = folder / MANIFEST
-        self._at = array("q")
+        self._at = array("q", [_NOWHERE]) * jobs
 
     def __enter__(self) -> Self:
         self._file = self.path.open("a+b", buffering=0)
@@ -59,9 +60,9 @@ class Manifest:
         self._file.close()
         self._lines.close()
 
-    def __len__(self) -> int:
-        """One more than the greatest number of a job of which there was an entry."""
-        return len(self._at)
+    def lists(self, job: int) -> bool:
+        """Return whether there is an entry of a job."""
+        return self._at[job] != _NOWHERE
 
     def add(self, entry: PartEntry) -> None:
         """Write an entry at the end; raises OSError, and then there is none."""
@@ -74,22 +75,20 @@ class Manifest:
 
     def entry(self, job: int) -> PartEntry | None:
         """Return the entry of a job, None where there is none."""
-        if not 0 <= job < len(self._at) or self._at[job] < 0:
+        if not self.lists(job):
             return None
         self._lines.seek(self._at[job])
         return _read(self._lines.readline())
 
-    def entries(self, jobs: int) -> Iterator[PartEntry]:
-        """Yield the entries of the first so many jobs, in the order of the plan."""
-        for job in range(min(jobs, len(self._at))):
+    def entries(self) -> Iterator[PartEntry]:
+        """Yield the entries in the order of the jobs."""
+        for job in range(len(self._at)):
             if (entry := self.entry(job)) is not None:
                 yield entry
 
     def _note(self, job: int, offset: int) -> None:
-        missing = job + 1 - len(self._at)
-        if missing > 0:
-            self._at.extend([-1] * missing)
-        self._at[job] = offset
+        if job < len(self._at):  # else of a longer plan
+            self._at[job] = offset
 
 
 def _read(line: bytes) -> PartEntry | None:

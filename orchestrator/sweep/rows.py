@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
+import os
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from foretwin.contracts.futures import Job
 from foretwin.contracts.partial_file import partial_file
 from foretwin.contracts.parts import FinishedPart, JobCells
 from foretwin.orchestrator.record.durable import WRITING
@@ -23,26 +22,26 @@ from foretwin.sim_worker.futures.finished_part import parquet_bytes
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES, as_table, metric_rows, played_with
 
 _HASH = re.compile("[0-9a-f]{64}")
+_PART = re.compile(r"job-(\d+)\.parquet")
 
 
 class Parts:
     """The tables of a sweep in its folder: Parquet files of each job that is done, whole or not
     there, and listed once they are. No row is read here. Use it as a context."""
 
-    def __init__(self, folder: Path, *, attribution: str) -> None:
-        self._folder, self._attribution = folder, attribution
+    def __init__(self, folder: Path, *, jobs: int, attribution: str) -> None:
+        self._folder, self._jobs, self._attribution = folder, jobs, attribution
         self._held = ExitStack()
 
     def __enter__(self) -> Self:
         for name in SWEPT_TABLES.values():
             (self._folder / name).mkdir(parents=True, exist_ok=True)
-            for left in (self._folder / name).glob(f"*{WRITING}"):
-                left.unlink()
+        self._remove_strangers()
         metadata = {"attribution": self._attribution, **played_with()}
         metrics = as_table("metrics", metric_rows(), metadata)
         _write(self._folder / METRICS_FILE, parquet_bytes(metrics))
         with ExitStack() as held:
-            self._manifest = held.enter_context(Manifest(self._folder))
+            self._manifest = held.enter_context(Manifest(self._folder, jobs=self._jobs))
             self._held = held.pop_all()
         return self
 
@@ -68,17 +67,17 @@ class Parts:
     def _part(self, table: str, job: int) -> Path:
         return self._folder / SWEPT_TABLES[table] / f"job-{job:06d}.parquet"
 
-    def keep_first(self, count: int) -> None:
-        """Remove parts of jobs that are not among the first so many: of another plan."""
+    def _remove_strangers(self) -> None:
+        """Remove what was never whole, and parts of jobs of another, longer plan."""
         for name in SWEPT_TABLES.values():
-            for path in (self._folder / name).glob("job-*.parquet"):
-                if int(path.stem.removeprefix("job-")) >= count:
-                    path.unlink()
+            for entry in os.scandir(self._folder / name):
+                number = _PART.fullmatch(entry.name)
+                if entry.name.endswith(WRITING) or (number and int(number[1]) >= self._jobs):
+                    Path(entry.path).unlink()
 
-    @property
-    def listed(self) -> int:
-        """Return one more than the greatest number of a job that may be there."""
-        return len(self._manifest)
+    def lists(self, number: int) -> bool:
+        """Return whether a job may be done."""
+        return self._manifest.lists(number)
 
     def hold(self, number: int, job_sha256: str) -> bool:
         """Return whether a job is done: all its files are there as they were written, and none of
@@ -92,36 +91,47 @@ class Parts:
             return False
         return found == entry.tables
 
-    def entries(self, jobs: int) -> Iterator[PartEntry]:
-        """Yield what is listed of the first so many jobs, in the order of the plan."""
-        return self._manifest.entries(jobs)
+    def entries(self) -> Iterator[PartEntry]:
+        """Yield what is listed, in the order of the plan."""
+        return self._manifest.entries()
 
 
-def fault_in(part: FinishedPart | None, job: Job, job_sha256: str, cells: JobCells) -> str:
-    """Return why something is not the finished part of a job, "" where it is one.
+class Due(NamedTuple):
+    """What a finished part is expected of: a job by its number and hash, who drives in it, and how
+    many others are around as its futures begin."""
+
+    number: int
+    job_sha256: str
+    planner: str
+    road_users: int
+    cells: JobCells
+
+
+def fault_in(part: FinishedPart | None, due: Due) -> str:
+    """Return why something is not the finished part that is due, "" where it is.
 
     Of its files what stands at their ends is read: columns, how many rows, of which job and cells.
     """
-    if part is None or part.job_sha256 != job_sha256:
+    if part is None or part.job_sha256 != due.job_sha256:
         return "no part of this job"
-    count = len(job.futures)
-    rows = {"futures": count, "jobs": 1, "road_users": len(job.replayed) + len(job.road_users)}
+    count, first = len(due.cells.cases), due.cells.first
+    rows = {"futures": count, "jobs": 1, "road_users": due.road_users}
     if part.tables.keys() != rows.keys():
         return f"holds tables {', '.join(sorted(part.tables)) or 'none'}"
     try:
-        ends = {name: pq.read_metadata(pa.BufferReader(part.tables[name])) for name in rows}
+        ends = {name: _end_of(data) for name, data in part.tables.items()}
     except (pa.ArrowException, OSError) as error:
         return f"no Parquet: {' '.join(str(error).split())}"
-    for name, end in ends.items():
-        if not end.schema.equals(_parquet_schema(name)):
+    for name, (schema, end) in ends.items():
+        if not schema.equals(JOB_TABLES[name]):
             return f"{name} have other columns"
         if end.num_rows != rows[name]:
             return f"{end.num_rows} rows of {name}; {rows[name]} are due"
-    spans = {"job_sha256": (job_sha256, job_sha256), "cell": (cells.first, cells.first + count - 1)}
+    spans = {"job_sha256": 2 * (due.job_sha256,), "cell": (first, first + count - 1)}
     for column, span in spans.items():
-        if _span(ends["futures"], column) != span:
+        if _span(ends["futures"][1], column) != span:
             return f"futures of another {column}"
-    who = {(scenario, job.futures[0].planner) for scenario in cells.scenarios}
+    who = {(scenario, due.planner) for scenario in due.cells.scenarios}
     counted = {(one.scenario, one.planner): one.cases for one in part.counts}
     if counted.keys() != who or sum(counted.values()) != count:
         return "counts other rows than it holds"
@@ -130,10 +140,13 @@ def fault_in(part: FinishedPart | None, job: Job, job_sha256: str, cells: JobCel
     return ""
 
 
-@functools.cache
-def _parquet_schema(table: str) -> pq.ParquetSchema:
-    empty = parquet_bytes(JOB_TABLES[table].empty_table())
-    return pq.read_metadata(pa.BufferReader(empty)).schema
+def _end_of(data: bytes) -> tuple[pa.Schema, pq.FileMetaData]:
+    """Return what stands at the end of a file; raises ArrowException or OSError.
+
+    The schema is Arrow's: metadata and the Parquet schema that they give hold one another.
+    """
+    with pq.ParquetFile(pa.BufferReader(data)) as file:
+        return file.schema_arrow, file.metadata
 
 
 def _span(end: pq.FileMetaData, column: str) -> tuple[object, object]:

@@ -29,7 +29,7 @@ from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
 from foretwin.sim_worker.planners.registry import REMOTE, check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 from foretwin.telemetry.logs.road_users import RoadUserLog
 
 _TIMES = "ttc", "pet", "thw"

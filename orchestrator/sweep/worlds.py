@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -14,6 +13,7 @@ from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world_identity import with_id
 from foretwin.orchestrator.record.recorded_jobs import kept_world
+from foretwin.orchestrator.sweep.play import Progress
 from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
 from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
@@ -27,9 +27,6 @@ from foretwin.world_gen.world_store import WorldStore, cached_build
 
 _Choice = TypeVar("_Choice")
 SUFFIX = ".world"
-
-Progress = Callable[[int, str], AbstractContextManager[tuple[Callable[[str], None], object]]]
-"""Given how many there are of what; in it, what is called first names each that is done."""
 
 
 class SweepWorlds(NamedTuple):

@@ -18,8 +18,9 @@ from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
+from foretwin.sim_worker.vehicle.planar import JOINTS, check_steering_delay
 from foretwin.sim_worker.vehicle.reference_points import cog_from_base
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
 _SANE = np.full((8, 1), np.inf)
 _SANE[[3, 5], 0] = 200.0, 50.0

@@ -17,8 +17,8 @@ from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch import compiled
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
-from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 from foretwin.world_gen.export.mjcf import VEHICLE
 
 _BORDER_M = compiled.FAR * compiled.STEP_M + 2.0 * compiled.CELL_M

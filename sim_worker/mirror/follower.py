@@ -6,7 +6,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.roles import FollowLimits
-from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
 FASTEST_PACE_PER_S = 1.0 / (3.0 * TIMESTEP_S)
 """At a higher one a step would overrun the acceleration that it aims at."""

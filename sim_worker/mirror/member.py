@@ -15,7 +15,8 @@ from foretwin.sim_worker.mirror.follower import plane_follower
 from foretwin.sim_worker.mirror.track import MeasuredPose, Track
 from foretwin.sim_worker.mirror.twin_body import TwinBody
 from foretwin.sim_worker.vehicle.commands import CommandMemory
-from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
 STEP_NS = round(TIMESTEP_S * 1e9)
 _PASSES_OVER_S = 2.0

@@ -18,7 +18,8 @@ from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
 from foretwin.sim_worker.mirror.track import Track
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory, TwinCommand
-from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
 _ALONE = MirrorCast()
 _GRID_TOLERANCE = 0.05

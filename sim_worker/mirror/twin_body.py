@@ -10,8 +10,9 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
 from foretwin.sim_worker.vehicle.gravity import climb_mps2
-from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S
+from foretwin.sim_worker.vehicle.planar import JOINTS
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
 _REFRESH_STEPS = 2
 """Physics steps between two updates of tyre forces."""

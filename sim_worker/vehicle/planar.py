@@ -17,9 +17,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
-TIMESTEP_S = 0.01
 MAX_STEERING_DELAY_S = 1.0
 """The longest delay the sample buffer of the steering actuator holds."""
 

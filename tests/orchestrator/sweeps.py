@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 import pyarrow as pa
@@ -16,9 +17,11 @@ from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import Loaded, worlds_folder
 from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.sim_worker.futures.future_rows import Row
-from foretwin.sim_worker.in_process_runner import InProcessRunner
 from foretwin.world_gen.world_store import WorldStore
 from tests.sim_worker.scenarios.worlds import cross
+
+if TYPE_CHECKING:
+    from foretwin.sim_worker.in_process_runner import InProcessRunner
 
 SMALL = """
 worlds = "{worlds}"
@@ -43,6 +46,9 @@ def small_sweep(folder: Path, text: str = SMALL) -> Path:
 
 def alone(loaded: Loaded) -> InProcessRunner:
     """A runner of this process alone: what it answers is what any worker would."""
+    # What it takes is not to count as a sweep's where that is measured.
+    from foretwin.sim_worker.in_process_runner import InProcessRunner
+
     setup = worker_setup(loaded, Path("nowhere"))
     there = str(worlds_folder(loaded.spec))
     return InProcessRunner(msgspec.structs.replace(setup, worlds_dir=there))
@@ -57,8 +63,8 @@ def places_of(runner: Runner, loaded: Loaded, world_id: str) -> WorldPlaces:
 
 def rows_of(runner: Runner, plan: SweepPlan, loaded: Loaded, *, step: int = 1) -> list[Row]:
     """Play the jobs of a plan one by one, in their order or, with -1, from the last."""
-    maker, rows = JobMaker(loaded, plan.worlds), []
-    for planned in plan.jobs[::step]:
+    maker, rows = JobMaker(loaded), []
+    for planned in list(plan.planned())[::step]:
         job = maker.job(planned)
         cells = cells_of(planned, plan.attribution)
         (answer,) = answers(runner, [job_task(job, job_bytes(job), cells=cells)])

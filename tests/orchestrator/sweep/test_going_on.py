@@ -12,7 +12,7 @@ import msgspec
 import pyarrow.parquet as pq
 import pytest
 
-from foretwin.contracts.runner import Answer, JobAnswer
+from foretwin.contracts.runner import Answer, JobAnswer, Task
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.record.ledger import JobsLedger
@@ -23,7 +23,11 @@ from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.sweeps import small_sweep
 from tests.sim_worker.scenarios.worlds import tee
 
-COVERS = ("foretwin.orchestrator.sweep.folder",)
+COVERS = (
+    "foretwin.orchestrator.sweep.folder",
+    "foretwin.orchestrator.sweep.places",
+    "foretwin.orchestrator.sweep.play",
+)
 
 
 class Leaving(InProcessRunner):
@@ -222,6 +226,28 @@ def test_what_was_given_up_is_tried_again(
     assert played(loaded, tmp_path / "out")["jobs_played"] == 0
 
 
+def test_what_was_placed_before_a_stop_is_not_asked_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    loaded, whole, summary = two_worlds
+    out = Path(shutil.copytree(whole, tmp_path / "out"))
+    (out / "places.msgpack").unlink()
+    kept, lost = sorted((out / "places").iterdir())
+    harm = lost.read_bytes()
+    cut(lost)
+    asked: list[str] = []
+
+    class Asked(InProcessRunner):
+        def submit(self, task: Task) -> None:
+            asked.append(task.key)
+            super().submit(task)
+
+    again = run_sweep(loaded, out, Asked(worker_setup(loaded, out)))
+    assert asked == [f"places in {lost.stem}"] != [f"places in {kept.stem}"]
+    assert (again["jobs_played"], again["rows_sha256"]) == (0, summary["rows_sha256"])
+    assert lost.read_bytes() == harm
+
+
 def test_places_found_later_come_to_the_rows_of_a_sweep_at_once(
     two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -232,7 +258,7 @@ def test_places_found_later_come_to_the_rows_of_a_sweep_at_once(
     again = played(loaded, tmp_path / "out")
     assert again["rows_sha256"] == summary["rows_sha256"]
     # A World that is not placed on any more leaves no rows behind.
-    (tmp_path / "out" / "places.msgpack").unlink()
+    (tmp_path / "out" / "places" / f"{first}.places").unlink()
     again = played(loaded, tmp_path / "out", "place", first)
     assert again["rows_sha256"] == early["rows_sha256"]
     assert pq.read_table(tmp_path / "out" / "rows").num_rows == early["rows"]

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import functools
+
+import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.orchestrator.sweep.plan import (
     PlacedHere,
+    SweepPlan,
     WorldPlaces,
     cases_of,
     parameter_sets,
-    plan_sweep,
     planners_for,
 )
 from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec, check_spec
+from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.reading import catalogue
 
 
@@ -47,27 +53,74 @@ def test_every_combination_is_a_cell_and_each_job_is_of_one_kind() -> None:
         vehicles=("bmw_320i", "vw_vanagon"),
         parameters={"friction_factor": (1.0, 0.5), "target_speed_factor": (0.9, 1.0, 1.1)},
     )
-    plan = plan_sweep(loaded, _places(loaded))
+    plan = SweepPlan(loaded, _places(loaded))
     cases = sum(len(cases_of(scenario, loaded.spec)) for scenario in loaded.scenarios)
     assert plan.cells == 2 * cases * 2 * 2 * 6
-    cells = [cell for job in plan.jobs for cell in job.cells]
+    jobs = list(plan.planned())
+    cells = [cell for job in jobs for cell in job.cells]
     assert [cell.number for cell in cells] == list(range(len(cells)))
-    assert [job.number for job in plan.jobs] == list(range(len(plan.jobs)))
-    assert all(0 < len(job.cells) <= FUTURES_PER_JOB for job in plan.jobs)
+    assert [job.number for job in jobs] == list(range(plan.jobs))
+    assert list(plan.sizes()) == [len(job.cells) for job in jobs]
+    assert all(0 < len(job.cells) <= FUTURES_PER_JOB for job in jobs)
     seen = {
-        (job.world_id, job.planner, job.vehicle, cell.scenario_id, cell.case,
+        (job.world.world_id, job.planner, job.vehicle, cell.scenario_id, cell.case,
          tuple(cell.parameters.items()))
-        for job in plan.jobs for cell in job.cells
+        for job in jobs for cell in job.cells
     }  # fmt: skip
     assert len(seen) == len(cells)
-    for job in plan.jobs:
+    for job in jobs:
         turns = {catalogue()[cell.scenario_id].ego.turn for cell in job.cells}
         assert len(turns) == 1
 
 
+@given(st.sets(st.integers(0, 40)))
+def test_jobs_that_are_wanted_alone_are_those_of_the_whole_plan(wanted: set[int]) -> None:
+    loaded, places = _small()
+    plan = SweepPlan(loaded, places)
+    whole = {job.number: job for job in plan.planned()}
+    assert list(plan.planned(lambda number: number in wanted)) == [
+        whole[number] for number in sorted(wanted & whole.keys())
+    ]
+
+
+@functools.cache
+def _small() -> tuple[Loaded, tuple[WorldPlaces, ...]]:
+    loaded = _loaded(
+        scenarios=("scp", "ccftap"), parameters={"friction_factor": (1.0, 0.9, 0.8, 0.7, 0.6)}
+    )
+    return loaded, _places(loaded)
+
+
+def test_what_is_too_long_to_be_kept_is_made_anew_with_the_same_numbers() -> None:
+    scenario = msgspec.structs.replace(catalogue()["scp"], samples=6000)
+    spec = SweepSpec(map="a.osm", seed=5)
+    cases = cases_of(scenario, spec)
+    assert cases._kept is None
+    assert tuple(cases) == tuple(cases)
+    assert tuple(cases) == tuple(enumerate(draw_cases(scenario, seed=5)))
+    assert len(cases) == len(tuple(cases))
+    few = cases_of(scenario, msgspec.structs.replace(spec, cases=4500))
+    assert few._kept is None
+    every = dict(cases)
+    assert len({number for number, _ in few}) == 4500
+    assert all(every[number] == values for number, values in few)
+
+
+def test_more_cells_than_a_plan_may_have_are_refused() -> None:
+    frictions = tuple(0.1 + n / 20_000 for n in range(10_000))
+    speeds = tuple(0.1 + n / 20_000 for n in range(10_000))
+    loaded = _loaded(
+        scenarios=("scp",),
+        parameters={"friction_factor": frictions, "target_speed_factor": speeds},
+    )
+    with pytest.raises(UserError, match=r"cells; at most 100000000: take a sample"):
+        SweepPlan(loaded, _places(loaded))
+
+
 def test_the_same_places_give_the_same_plan() -> None:
     loaded = _loaded(scenarios=("scp", "cpta"), cases=3, seed=7)
-    assert plan_sweep(loaded, _places(loaded)) == plan_sweep(loaded, _places(loaded))
+    first, second = (list(SweepPlan(loaded, _places(loaded)).planned()) for _ in range(2))
+    assert first == second
 
 
 @given(st.integers(1, 12), st.integers(0, 1000))
@@ -82,7 +135,7 @@ def test_so_many_cases_are_drawn_as_are_wished_for(wished: int, seed: int) -> No
 
 
 def test_without_parameters_there_is_one_set() -> None:
-    assert parameter_sets(SweepSpec(map="a.osm")) == ({},)
+    assert tuple(parameter_sets(SweepSpec(map="a.osm"))) == ({},)
 
 
 def test_only_planners_that_can_drive_backwards_do() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_from_local, local_from_geo
-from foretwin.orchestrator.sweep.plan import plan_sweep
+from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
 from tests.orchestrator.recorded_runs import write_run
@@ -64,7 +64,7 @@ def test_scenarios_are_timed_to_the_recorded_car(run: Path) -> None:
     assert {place.scenario_id for place in places.placed} == {"scp"}
     assert [place.start for place in places.placed][:3] == [0, 1, 2]
     assert len(places.placed) < len(loaded.starts)
-    plan = plan_sweep(loaded, [places])
+    plan = SweepPlan(loaded, [places])
     rows = rows_of(runner, plan, loaded)
     assert [row["cell"] for row in rows] == list(range(plan.cells))
     assert not any(row["failure"] for row in rows)

@@ -14,7 +14,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.sweep.folder import fingerprint_of
-from foretwin.orchestrator.sweep.plan import plan_sweep
+from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.road_users import others_at
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec
@@ -74,7 +74,7 @@ def _rows(loaded: Loaded, *, backwards: bool = False) -> list[Row]:
     runner = alone(loaded)
     (world,) = {start.world_id for start in loaded.starts}
     places = places_of(runner, loaded, world)
-    rows = rows_of(runner, plan_sweep(loaded, [places]), loaded, step=-1 if backwards else 1)
+    rows = rows_of(runner, SweepPlan(loaded, [places]), loaded, step=-1 if backwards else 1)
     assert not any(row["failure"] for row in rows)
     return sorted(rows, key=lambda row: row["stamp_ns"])
 

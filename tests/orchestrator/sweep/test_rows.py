@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.parts import FinishedPart
-from foretwin.orchestrator.sweep.rows import fault_in
+from foretwin.orchestrator.sweep.rows import Due, fault_in
 from foretwin.sim_worker.futures.finished_part import finished_part, parquet_bytes
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from tests.sim_worker.futures.cells import cells_for
@@ -31,7 +31,16 @@ def part_of(question: Job, *, first: int = 100) -> FinishedPart:
 
 def fault(part: FinishedPart | None) -> str:
     question = planned()
-    return fault_in(part, question, job_bytes(question).sha256, cells_for(question))
+    return fault_in(
+        part,
+        Due(
+            number=0,
+            job_sha256=job_bytes(question).sha256,
+            planner="pure_pursuit_idm",
+            road_users=0,
+            cells=cells_for(question),
+        ),
+    )
 
 
 def with_table(name: str, data: bytes) -> FinishedPart:

@@ -13,7 +13,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.orchestrator.sweep.folder import fingerprint_of, planner_origins
 from foretwin.orchestrator.sweep.jobs import JobMaker
-from foretwin.orchestrator.sweep.plan import plan_sweep
+from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, load_spec
 from foretwin.orchestrator.sweep.stacks import RemoteStack
 from foretwin.orchestrator.sweep.workers import task_timeout_s, worker_setup
@@ -105,12 +105,13 @@ def test_a_stack_that_remembers_is_given_as_many_futures_as_it_has_processes(
     runner = alone(loaded)
     world_id = places_of_all(loaded)
     worlds = [places_of(runner, loaded, world_id)]
-    at_once = plan_sweep(with_stack(loaded), worlds)
-    alone_each = plan_sweep(with_stack(loaded, stateful=True, instances=2), worlds)
-    mine = [job for job in alone_each.jobs if job.planner == "mine"]
+    at_once = SweepPlan(with_stack(loaded), worlds)
+    alone_each = SweepPlan(with_stack(loaded, stateful=True, instances=2), worlds)
+    assert list(alone_each.sizes()) == [len(job.cells) for job in alone_each.planned()]
+    mine = [job for job in alone_each.planned() if job.planner == "mine"]
     assert mine
     assert max(len(job.cells) for job in mine) == 2
-    assert max(len(job.cells) for job in at_once.jobs) > 2
+    assert max(len(job.cells) for job in at_once.planned()) > 2
     assert alone_each.cells == at_once.cells
 
 
@@ -123,9 +124,9 @@ def places_of_all(loaded: Loaded) -> str:
 def test_a_job_says_when_its_stack_is_asked_and_others_stay_as_they_were(loaded: Loaded) -> None:
     worlds = [places_of(alone(loaded), loaded, places_of_all(loaded))]
     ours = with_stack(loaded, rate_hz=20.0, latency_s=0.05)
-    plan = plan_sweep(ours, worlds)
-    maker = JobMaker(ours, plan.worlds)
-    by_planner = {job.planner: maker.job(job).planner_timing for job in plan.jobs}
+    plan = SweepPlan(ours, worlds)
+    maker = JobMaker(ours)
+    by_planner = {job.planner: maker.job(job).planner_timing for job in plan.planned()}
     assert by_planner["mine"] == ours.spec.remote["mine"].timing
     assert by_planner["reverse_pursuit"] is msgspec.UNSET
 

@@ -13,6 +13,7 @@ COVERS = (
     "foretwin.sim_worker.batch.model",
     "foretwin.sim_worker.batch.physics",
     "foretwin.sim_worker.vehicle.clock",
+    "foretwin.sim_worker.vehicle.timestep",
 )
 
 CAR = load_vehicle()

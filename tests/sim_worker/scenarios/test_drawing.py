@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
 
 from foretwin.contracts.scenario import ActorPart, Distribution, EgoPart, Scenario
-from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.drawing import case_count, draw_cases
 from foretwin.sim_worker.scenarios.reading import catalogue
 
 
@@ -76,3 +78,23 @@ def test_normal_numbers_have_their_mean_and_stay_within_bounds() -> None:
     assert drawn.mean() == pytest.approx(10.0, abs=0.05)
     # Of a normal distribution cut at 1.5 standard deviations: 2 · √(1 - 3 φ(1.5) / (2 Φ(1.5) - 1)).
     assert drawn.std() == pytest.approx(2.0 * 0.7423, abs=0.05)
+
+
+@pytest.mark.parametrize(("listed", "samples"), [(1, 9000), (3, 2000), (2, 1), (1, 4096)])
+def test_cases_are_drawn_in_pieces_as_the_sequence_has_them_at_once(
+    listed: int, samples: int
+) -> None:
+    one = scenario(
+        ego=Distribution(values=tuple(5.0 + n for n in range(listed))),
+        other=Distribution(min=3.0, max=9.0, mean=5.0, std=1.0),
+        samples=samples,
+    )
+    count = case_count(one)
+    assert count == listed * samples
+    sobol = qmc.Sobol(d=1, scramble=True, rng=np.random.default_rng(3))
+    even = sobol.random_base2(max(0, (count - 1).bit_length()))[:count, 0]
+    low, high = ndtr(-2.0), ndtr(4.0)
+    expected = np.clip(5.0 + ndtri(np.clip(low + (high - low) * even, 1e-12, 1 - 1e-12)), 3.0, 9.0)
+    drawn = [(case["ego.speed_mps"], case["other.speed_mps"]) for case in draw_cases(one, seed=3)]
+    assert [speed for _, speed in drawn] == expected.tolist()
+    assert [speed for speed, _ in drawn] == [5.0 + n // samples for n in range(count)]
