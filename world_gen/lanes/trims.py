@@ -11,6 +11,7 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.fork_trims import fork_trims
 from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, lateral_positions
 from foretwin.world_gen.lanes.stopping import NodeTags, stop_line_m
@@ -73,6 +74,9 @@ def trims(
     for cluster in clusters:
         for leg in cluster.legs:
             wanted.setdefault(leg.key, 0.0)
+    for key, metres in fork_trims(clusters, sections, heads).items():
+        least[key] = max(least.get(key, 0.0), metres)
+        wanted[key] = max(wanted[key], metres)
     _share(least, wanted, edges)
     return wanted
 
