@@ -5,11 +5,14 @@
     FOLDER/ROLE/certificate.pem      whom to trust, who it is,
     FOLDER/ROLE/key.pem              and the proof of it
 
-The common name of a certificate is its role; the router's access rules go by it.
+The common name of a certificate is its role; the router's access rules go by it. A machine whose
+workers join a drive has a role of its own, worker-NAME, so that it can be told from others, and
+shut out by taking its folder away.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -21,6 +24,8 @@ CampaignRole = Literal[
     "router", "orchestrator", "worker", "viewer", "recorder", "car", "planner", "operator"
 ]
 CAMPAIGN_ROLES: tuple[CampaignRole, ...] = get_args(CampaignRole)
+NAMED_WORKER = "worker-NAME"
+_NAMED_WORKER = re.compile(r"worker-([a-z0-9]{1,40})")
 AUTHORITY, AUTHORITY_KEY = "ca.pem", "ca.key"
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
 _OTHERS = 0o077
@@ -34,7 +39,20 @@ class TlsFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     key: str
 
 
-def role_files(campaign: Path, role: CampaignRole) -> TlsFiles:
+def worker_name(role: str) -> str | None:
+    """Return the NAME of worker-NAME, small letters and digits; None for any other role."""
+    found = _NAMED_WORKER.fullmatch(role)
+    return None if found is None else found[1]
+
+
+def named_workers(campaign: Path) -> tuple[str, ...]:
+    """Return the roles worker-NAME of a campaign."""
+    return tuple(
+        sorted(one.name for one in campaign.iterdir() if one.is_dir() and worker_name(one.name))
+    )
+
+
+def role_files(campaign: Path, role: str) -> TlsFiles:
     """Return a role's files in the folder of a campaign; raises UserError, see `certificate_in`."""
     if not (campaign / AUTHORITY).is_file() and not (campaign / role).is_dir():
         how = f"`foretwin secure init --folder {campaign}` begins one"

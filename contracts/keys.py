@@ -12,6 +12,7 @@ import msgspec
 
 from foretwin.contracts import (
     drive,
+    fleet,
     gap,
     placement,
     planner_link,
@@ -153,6 +154,13 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
             tuning.TuneRequest, None, "lock step: weigh what was sent", tuning.TuneReply
         ),
         "use_roles": Channel(roles.UseRoles, None, "the mirror's roles", roles.UseRoles),
+        # Of workers on other machines.
+        "enlist": Channel(fleet.EnlistRequest, None, "with what we play", fleet.Enlisted),
+        "admit": Channel(fleet.Admittance, None, "whether it may", fleet.Admittance),
+        "clock": Channel(fleet.ClockQuestion, 1, "its clock and link", fleet.ClockAnswer),
+    },
+    (_RUN, REQUEST, _ANY_WORKER): {
+        "world_file": Channel(fleet.WorldRequest, None, "a World by its hash", fleet.WorldBytes),
     },
     (f"{_RUN}/builder/{{process}}", REQUEST, _ORCHESTRATOR): {
         "build": Channel(simulation.BuildRequest, None, "build a World", simulation.BuildReply),

@@ -42,6 +42,8 @@ class JobAnswer(msgspec.Struct, frozen=True, kw_only=True):
 
     result: FuturesResult | None = None
     part: FinishedPart | None = None
+    leaving: bool = False
+    """Its worker takes no more: it was told to end."""
 
 
 class Task(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from foretwin.contracts.fleet import MachineInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.contracts.process_setup import BusSetup as BusSetup
@@ -108,6 +109,14 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     """Loaded before the first job: those of other packages live in processes of their own."""
     stacks: tuple[tuple[str, StackSetup], ...] = ()
     """Driving stacks, by the names under which a sweep's futures know them."""
+
+
+class FarWorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A worker on another machine: all else it is told by the drive that it joins."""
+
+    machine: MachineInfo
+    cache_dir: str
+    """Where Worlds are kept, by their ids, for this drive and the next."""
 
 
 class TuningSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -108,7 +108,8 @@ class DrivePlan(DriveInputs):
         """How the router is set."""
         if self.config.secure is not None:
             tls = role_files(Path(self.config.secure), "router")
-            return msgspec.structs.replace(self.bus, tls=tls, admits=admission(self.run_id))
+            admits = admission(self.run_id, Path(self.config.secure))
+            return msgspec.structs.replace(self.bus, tls=tls, admits=admits)
         return self.bus if self.local is None else self.local.router
 
     def bus_of(self, member: BusMember) -> BusSetup:

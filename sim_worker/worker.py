@@ -227,13 +227,8 @@ def warm_up(stage: BatchSimulation) -> None:
     stage.step(Controls(np.zeros(1), np.zeros(1)))
 
 
-def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
-    """Answer until the run is over; alive only once it can take work."""
-    worker = FuturesWorker(setup, refusals=life.refusals)
-    mailbox = Mailbox(64)
-    ids = {"run": setup.run_id, "process": setup.process_id}
-    for channel in ("prepare", "use_vehicle", "job", "place"):
-        bus.serve(channel, mailbox, **ids)
+def connect_planners(setup: WorkerSetup, bus: Bus) -> None:
+    """Load the planners of a worker before its first job; one that cannot be refuses that job."""
     if "remote" in setup.planners:
         remote = load_planner("remote")
         assert isinstance(remote, RemotePlanner)
@@ -244,6 +239,16 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
             load_planner(name)
         except ValueError as error:
             log.warning("%s", error)
+
+
+def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
+    """Answer until the run is over; alive only once it can take work."""
+    worker = FuturesWorker(setup, refusals=life.refusals)
+    mailbox = Mailbox(64)
+    ids = {"run": setup.run_id, "process": setup.process_id}
+    for channel in ("prepare", "use_vehicle", "job", "place"):
+        bus.serve(channel, mailbox, **ids)
+    connect_planners(setup, bus)
     life.ready()
     while not life.over:
         request = mailbox.take(_IDLE_S)

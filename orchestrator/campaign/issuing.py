@@ -18,7 +18,6 @@ from foretwin.contracts.campaign import (
     AUTHORITY_KEY,
     CERTIFICATE,
     KEY,
-    CampaignRole,
 )
 from foretwin.contracts.certificates import read_certificate, time_trouble
 from foretwin.contracts.errors import UserError
@@ -56,7 +55,7 @@ def make_authority(folder: Path, *, name: str, days: int, now: datetime.datetime
 
 def issue(
     folder: Path,
-    role: CampaignRole,
+    role: str,
     *,
     days: int,
     now: datetime.datetime,

@@ -12,7 +12,9 @@ from foretwin.contracts.campaign import (
     CampaignRole,
     TlsFiles,
     certificate_in,
+    named_workers,
     role_files,
+    worker_name,
 )
 from foretwin.contracts.certificates import (
     UTC,
@@ -22,6 +24,7 @@ from foretwin.contracts.certificates import (
     troubles,
 )
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.fleet import far_id
 from foretwin.contracts.ports import tls_place
 from foretwin.contracts.process_setup import Admission
 
@@ -48,12 +51,19 @@ def check_campaign(
         raise UserError(trouble)
 
 
-def admission(run_id: str) -> Admission:
-    """Return whom a run's router lets in by their certificates, and what each role may say."""
+def admission(run_id: str, campaign: Path | None = None) -> Admission:
+    """Return whom a run's router lets in by their certificates, and what each role may say.
+
+    The machines of a `campaign` whose workers join have names: each speaks for its own alone.
+    """
     members = [
         BusMember(role, role, process_id=role if role in _ONE_PROCESS else "*")
         for role in CAMPAIGN_ROLES
         if role != "router"
+    ]
+    members += [
+        BusMember(role, "worker", process_id=far_id(str(worker_name(role)), "$*"))
+        for role in (() if campaign is None else named_workers(campaign))
     ]
     access = access_control(members, subject="cert_common_names", run_id=run_id)
     return Admission(access=json.dumps(access))

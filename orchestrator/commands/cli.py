@@ -36,6 +36,7 @@ from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
 from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
+from foretwin.orchestrator.commands.cli_worker import worker
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
     drop_output,
@@ -230,14 +231,11 @@ def index_map(
     index_map_file(map_file, folder=folder)
 
 
-for command in (sweep, *ABOUT_LOGS, learn_progress):
+for command in (sweep, *ABOUT_LOGS, learn_progress, doctor, worker):
     app.command()(command)
 
 app.command("set")(set_value)
 app.add_typer(secure_commands, name="secure")
-
-
-app.command()(doctor)
 
 
 def run(arguments: list[str]) -> int:

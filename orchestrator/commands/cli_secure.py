@@ -36,7 +36,9 @@ def init(
 
 @secure.command("add")
 def add(
-    role: Annotated[str, typer.Argument(help="car, planner, operator, or any to renew it")],
+    role: Annotated[
+        str, typer.Argument(help="car, planner, operator, worker-NAME, or any to renew it")
+    ],
     folder: FolderOption,
     host: HostOption = None,
     days: Annotated[int, typer.Option(help="how long the certificate holds")] = 7,

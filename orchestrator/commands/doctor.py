@@ -45,7 +45,7 @@ def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> int:
     Raises UserError where endpoint or folder are missing or no such thing.
     """
     from foretwin.contracts.bus import BusUnreachable, ZenohBus
-    from foretwin.contracts.campaign import CAMPAIGN_ROLES, certificate_in, role_files
+    from foretwin.contracts.campaign import CAMPAIGN_ROLES, certificate_in, role_files, worker_name
     from foretwin.contracts.ports import tls_place
     from foretwin.contracts.setup import BusSetup
     from foretwin.contracts.why_refused import ADMITTED, likely_causes
@@ -54,12 +54,11 @@ def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> int:
         raise UserError(
             "doctor needs both --endpoint tls/HOST:PORT and --secure FOLDER, or neither"
         )
-    known = next((one for one in CAMPAIGN_ROLES if one == role), None)
-    if known is None:
+    if role not in CAMPAIGN_ROLES and worker_name(role) is None:
         raise UserError(f"--role {role}: one of {', '.join(CAMPAIGN_ROLES)}")
-    own = not (folder / known).is_dir()
+    own = not (folder / role).is_dir()
     setup = BusSetup(
-        endpoint=endpoint, tls=certificate_in(folder) if own else role_files(folder, known)
+        endpoint=endpoint, tls=certificate_in(folder) if own else role_files(folder, role)
     )
     causes = list(likely_causes(setup))
     for cause in causes:

@@ -10,7 +10,10 @@ from foretwin.contracts.campaign import (
     AUTHORITY,
     CAMPAIGN_ROLES,
     CERTIFICATE,
+    NAMED_WORKER,
     certificate_in,
+    named_workers,
+    worker_name,
 )
 from foretwin.contracts.certificates import UTC, read_certificate, time_trouble, troubles
 from foretwin.contracts.errors import UserError
@@ -35,12 +38,12 @@ def begin(folder: Path, *, hosts: Sequence[str], days: int, role_days: int) -> i
 
 def add(folder: Path, role: str, *, hosts: Sequence[str], days: int) -> int:
     """Make or renew the certificate of one role."""
-    for known in CAMPAIGN_ROLES:
-        if known == role:
-            place = issue(folder, known, days=days, now=datetime.datetime.now(UTC), hosts=hosts)
-            say(f"{place}: {role}, until {_day(place / CERTIFICATE)}; copy the folder to its host")
-            return EXIT_DONE
-    raise UserError(f"role {role!r}: one of {', '.join(CAMPAIGN_ROLES)}")
+    if role not in CAMPAIGN_ROLES and worker_name(role) is None:
+        known = ", ".join((*CAMPAIGN_ROLES, NAMED_WORKER))
+        raise UserError(f"role {role!r}: one of {known} (NAME of small letters and digits)")
+    place = issue(folder, role, days=days, now=datetime.datetime.now(UTC), hosts=hosts)
+    say(f"{place}: {role}, until {_day(place / CERTIFICATE)}; copy the folder to its host")
+    return EXIT_DONE
 
 
 def show(folder: Path) -> int:
@@ -51,7 +54,7 @@ def show(folder: Path) -> int:
         raise UserError(f"{authority}: missing; foretwin secure init --folder {folder} makes it")
     faults = [time_trouble(read_certificate(authority), str(authority), now=now)]
     say(f"campaign {folder}: until {_day(authority)}")
-    for role in CAMPAIGN_ROLES:
+    for role in (*CAMPAIGN_ROLES, *named_workers(folder)):
         if not (folder / role).is_dir():
             continue
         files = certificate_in(folder / role)

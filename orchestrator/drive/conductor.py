@@ -10,10 +10,12 @@ from foretwin.contracts import keys
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.guard import Refused, is_identifier
-from foretwin.contracts.simulation import ActiveWorld
 from foretwin.contracts.world import World
 from foretwin.orchestrator.context import DriveContext
+from foretwin.orchestrator.drive.active_world import ActiveWorldNews
 from foretwin.orchestrator.drive.events import EventHandler
+from foretwin.orchestrator.drive.far_member import FleetTag
+from foretwin.orchestrator.drive.fleet_handler import FleetHandler
 from foretwin.orchestrator.drive.intake import Intake, unplaced
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
@@ -88,9 +90,10 @@ class Conductor:
         self.changes = RuntimeConfiguration(handlers)
         self.beside = OtherVehicleFeed(context)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
-        self._active_world: str | None = None
-        self._world_untold = False
-        self._told_world: ActiveWorld | None = None
+        self.active_world = ActiveWorldNews(
+            context, self.questions, next_stamp_ns=lambda: self.intake.now_stamp_ns + 1
+        )
+        self.fleet = FleetHandler(context, self.rounds, self.tuning.parameters)
         self._on_message: dict[str, Callable[[Received], object]] = {
             **dict.fromkeys(keys.TELEMETRY_CHANNELS, self.take_telemetry),
             **dict.fromkeys(FINDINGS, self.tuning.heard),
@@ -103,9 +106,12 @@ class Conductor:
             **dict.fromkeys(("use_world", "use_roles"), lambda _: self.questions.answered()),
             **dict.fromkeys(("use_vehicle", "tune"), self._tuning_reply),
             "job": self.rounds.reply,
-            "build": self._build_reply,
+            "build": lambda item: self.worlds.build_reply(
+                item, workers=self._near, builder_up=BUILDER in self.alive
+            ),
             "prepare": self.worlds.prepare_reply,
             "info": lambda item: self.beside.take_info(item.tag, item.message),
+            **dict.fromkeys(("enlist", "admit", "clock"), self.fleet.reply),
         }
         """What takes the answers to each question that is asked through the mailbox."""
 
@@ -120,6 +126,8 @@ class Conductor:
         self.context.subscribe("mirror", "event")
         self.tuning.join()
         self.bus.serve("set", self.mailbox, run=run)
+        if self.fleet.open:
+            self.bus.serve("world_file", self.mailbox, run=run)
         self.bus.watch_alive(keys.alive_key(run=run, process="*"), self.mailbox)
 
     def take_info(self, info: VehicleInfo) -> None:
@@ -146,17 +154,16 @@ class Conductor:
                 case Reply(channel=channel) if channel in self._on_reply:
                     if item.refused is not None:
                         self.refusals.take(item.refused)
-                    self._on_reply[channel](item)
+                    far = isinstance(item.tag, FleetTag)
+                    (self.fleet.reply if far else self._on_reply[channel])(item)
                 case Request(channel="set"):
                     self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
+                case Request(channel="world_file"):
+                    self.fleet.give_world(item)
                 case Alive():
                     self._alive(item)
         except Refused as refused:
             self.refusals.take(refused)
-
-    def _build_reply(self, item: Reply) -> None:
-        workers, builder_up = self.rounds.dispatcher.workers, BUILDER in self.alive
-        self.worlds.build_reply(item, workers=workers, builder_up=builder_up)
 
     def _tuning_reply(self, item: Reply) -> None:
         process_id = self.tuning.reply(item)
@@ -219,29 +226,16 @@ class Conductor:
         for instruction in instructions:
             match instruction:
                 case BuildWorld(junction_id, load):
-                    self.worlds.want(junction_id, load=load, workers=self.rounds.dispatcher.workers)
+                    self.worlds.want(junction_id, load=load, workers=self._near)
                 case UseWorld(world_id):
-                    self._active_world = world_id
-                    self._world_untold = True
+                    self.active_world.use(world_id)
                     if not self.plan.config.lock_step:
-                        self.announce_world()
+                        self.active_world.announce()
                 case Notice():
                     self.tell(instruction)
 
-    def announce_world(self) -> None:
-        """Tell those who watch, and the mirror, which World counts from the next state on.
-
-        In lock step only between steps, when no state is on its way that may overtake this.
-        """
-        if not self._world_untold:
-            return
-        self._world_untold = False
-        active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
-        self._told_world = active
-        self.context.publish("active_world", active)
-        self.questions.ask(MIRROR, "use_world", active)
-
     def _world_ready(self, junction_id: str, world: World) -> None:
+        self.fleet.world_ready(world)
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
 
     def _world_failed(self, junction_id: str, reason: str) -> None:
@@ -257,14 +251,22 @@ class Conductor:
             self.tell(Notice("info", f"set {change.text}"))
             self.tables.add("changes", [change.row()])
         self.tuning.hand_over()
+        self.fleet.keep_up()
 
     # Processes.
+
+    @property
+    def _near(self) -> tuple[str, ...]:
+        """The drive's own workers, for which a World waits."""
+        return tuple(one for one in self.rounds.dispatcher.workers if one in self.alive)
 
     def _alive(self, item: Alive) -> None:
         process_id = keys.process_of_alive_key(item.key)
         if not is_identifier(process_id):
             raise Refused(item.key, "a token of no plain name")
-        if process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
+        if self.fleet.takes(process_id):
+            self.fleet.alive(process_id, up=item.up)
+        elif process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
             (self._process_up if item.up else self.process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:
@@ -272,13 +274,12 @@ class Conductor:
         if not self.tuning.process_up(process_id):
             self._worker_up(process_id)
         if process_id == MIRROR:
-            self._world_untold = True
-            self.announce_world()
+            self.active_world.mirror_up()
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
-        elif process_id == VIEWER and self._told_world is not None:  # one started again
-            self.context.publish("active_world", self._told_world)
+        elif process_id == VIEWER:
+            self.active_world.viewer_up()
 
     def _worker_up(self, process_id: str) -> None:
         """Give a worker that has the parameters in force its Worlds, and jobs."""

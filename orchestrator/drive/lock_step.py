@@ -59,7 +59,7 @@ class LockStepLoop:
                 for sample in self._in_order():
                     conductor.handle(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
-            conductor.announce_world()
+            conductor.active_world.announce()
             self._wait("the mirror", lambda: not conductor.questions.unanswered)
             self._wait("tuning", lambda: not conductor.tuning.weighing)
             conductor.tuning.take_weighed()

@@ -159,6 +159,7 @@ class Orchestrator:
             self._look_after(conductor, now_s)
             self._processes.let_give_way(conductor.alive, now_s)
             conductor.rounds.dispatcher.give_out()
+            conductor.fleet.look(now_s)
             self._keep_junctions(conductor, now_s)
             self._meter.look()
             keeper.look(now_s)

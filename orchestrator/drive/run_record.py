@@ -78,6 +78,8 @@ def run_record(
             "late_results": dispatch.late,
             "refusals": dispatch.sickness.record(),
             "strangers": conductor.strangers.count,
+            "far": conductor.fleet.record(),
+            "taken_over": dispatch.far.taken_over,
         },
         "dropped": {
             "orchestrator_mailbox": conductor.mailbox.dropped,

@@ -22,6 +22,7 @@ class RoundNews:
         self._planners: set[str] = set()
         self._failures: set[str] = set()
         self._sick: frozenset[str] = frozenset()
+        self._slow_told = False
 
     def given_up(self, order: RoundOrder, reason: str) -> None:
         """Log that a round is given up, and tell each reason once."""
@@ -29,6 +30,15 @@ class RoundNews:
         if reason not in self._failures and len(self._failures) < _FAILURES_TOLD:
             self._failures.add(reason)
             self._tell(Notice("error", f"round {order.round_id} is given up: {reason}"))
+
+    def pace(self, short_of: str, *, rate_hz: float) -> None:
+        """Tell that the rounds have another pace: `short_of` of what was asked for, or all."""
+        if not short_of:
+            self._tell(Notice("info", "the machine keeps up: all futures in every round again"))
+            return
+        text = f"{short_of} from now on: the machine is too slow for all at {rate_hz:g} Hz"
+        self._tell(Notice("info" if self._slow_told else "warning", text))
+        self._slow_told = True
 
     def health(self, sick: Mapping[str, str]) -> None:
         """Tell who newly is sick, with the reason, and who is well again."""

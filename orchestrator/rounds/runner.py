@@ -19,7 +19,7 @@ from foretwin.orchestrator.agreement.known_windows import into_table
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import OpenWindows
 from foretwin.orchestrator.context import DriveContext
-from foretwin.orchestrator.instructions import LatestReports, LatestState, Notice, RoundIntent
+from foretwin.orchestrator.instructions import LatestReports, LatestState, RoundIntent
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.forecast_count import ForecastCount
 from foretwin.orchestrator.record.ledger import RoundTally
@@ -75,7 +75,9 @@ class RoundRunner:
         self.failed_jobs = 0
         self.start_stamp_ns = 0
         self._context, self._plan = context, plan
-        self._tables, self._tell = context.tables, context.tell
+        self._tables = context.tables
+        self.on_other: Callable[[Answer], None] = lambda _: None
+        """Takes what became of a task that is no round's."""
         self._world_of, self._on_round = world_of, on_round
         self._open_comparisons = OpenComparisons(plan.drive_frame, plan.config.horizon_s)
         keep = into_table(context.tables.add, plan.vehicle)
@@ -90,8 +92,7 @@ class RoundRunner:
         )
         self.next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
-        self._slow_reported = False
-        self._news = RoundNews(self._tell)
+        self._news = RoundNews(context.tell)
         self.forecast_count = ForecastCount()
         self.progress = None
         if plan.progress is not None:
@@ -133,8 +134,9 @@ class RoundRunner:
             # In lock step nothing hurries; a drive that stands still ends by itself.
             deadline_mono_ns=None if lock_step else started_mono_ns + pace.one_of * period_ns,
         )
+        within_s = None if lock_step else GIVEN_UP_AFTER_S
         for task in order.tasks:
-            self.dispatcher.submit(task, within_s=None if lock_step else GIVEN_UP_AFTER_S)
+            self.dispatcher.submit(task, within_s=within_s, due_s=order.due_s)
         self.dispatcher.give_out()
         self.open.open(order)  # last: what raises before is no round
 
@@ -165,6 +167,11 @@ class RoundRunner:
         self._expected -= {worker_id}
         self._take(self.dispatcher.expect(self._expected))
 
+    def enroll(self, worker_id: str) -> None:
+        """Count with a worker that nobody has started here."""
+        self._expected |= {worker_id}
+        self._take(self.dispatcher.expect(self._expected))
+
     def worker_up(self, worker_id: str) -> None:
         """A worker can take jobs, as soon as these are given out."""
         self._take(self.dispatcher.worker_up(worker_id))
@@ -190,11 +197,15 @@ class RoundRunner:
         answers = self.dispatcher.reply(reply)
         self._news.health(self.dispatcher.dispatch.sickness.sick)
         self._take(answers)
+        if reply.message is not None and reply.message.leaving:
+            self.never_again(worker_id)
         self.dispatcher.give_out()
 
     def _take(self, answers: list[Answer]) -> None:
         for answer in answers:
             match self.open.take(answer):
+                case None:
+                    self.on_other(answer)
                 case RoundDone() as done:
                     self._take_apart(done)
                 case RoundGivenUp(order):
@@ -269,17 +280,8 @@ class RoundRunner:
 
     def _take_time(self, pace: Pace, seconds: float, by: tuple[Played, ...] = ()) -> None:
         """Count how long a round took, and tell where the next ones have another pace."""
-        if not self.pace.take(pace, seconds, by):
-            return
-        if not self.pace.slowed:
-            self._tell(Notice("info", "the machine keeps up: all futures in every round again"))
-            return
-        text = (
-            f"{self.pace.short_of} from now on: the machine is too slow for all at "
-            f"{self._plan.config.rate_hz:g} Hz"
-        )
-        self._tell(Notice("info" if self._slow_reported else "warning", text))
-        self._slow_reported = True
+        if self.pace.take(pace, seconds, by):
+            self._news.pace(self.pace.short_of, rate_hz=self._plan.config.rate_hz)
 
     def _keep_plan(self, done: RoundDone, compared: PlanComparison | None) -> None:
         if compared is None:

@@ -39,15 +39,28 @@ class BusDispatcher:
         self._allowed: dict[str, tuple[float, float]] = {}
         """Of tasks with a deadline: when it is, and how long that was from their start."""
         self._silent_since_s: dict[str, float] = {}
+        self._given_s: dict[tuple[str, str], float] = {}
+        """When each task was given to whom."""
 
     @property
     def workers(self) -> tuple[str, ...]:
         """Ids of the workers that are up."""
         return self.dispatch.workers
 
-    def submit(self, task: Task, *, within_s: float | None = None) -> None:
-        """Take a task; one that is not answered `within_s` from now is given up."""
-        self.dispatch.submit(task)
+    def submit(
+        self,
+        task: Task,
+        *,
+        within_s: float | None = None,
+        due_s: float | None = None,
+        near: bool = False,
+    ) -> None:
+        """Take a task; one that is not answered `within_s` from now is given up.
+
+        `due_s` (monotonic) and `near` say who may be given it; see Dispatch.
+        """
+        span_s = 0.0 if due_s is None else due_s - time.monotonic()
+        self.dispatch.submit(task, due_s=due_s, span_s=span_s, near=near)
         if within_s is not None:
             self._allowed[task.key] = (time.monotonic() + within_s, within_s)
 
@@ -91,8 +104,10 @@ class BusDispatcher:
             if now_s - since_s > _SILENT_S:
                 del self._silent_since_s[worker_id]
                 self.dispatch.trust(worker_id)
+        self.dispatch.take_over(now_s=now_s)
         for worker_id, task in self.dispatch.assignments(now_s=now_s):
             sent(task.channel, task.key)
+            self._given_s[worker_id, task.key] = now_s
             until_s, _ = self._allowed.get(task.key, (now_s + _FOR_EVER_S, 0.0))
             self._bus.request(
                 task.channel,
@@ -107,7 +122,11 @@ class BusDispatcher:
     def reply(self, reply: Reply) -> list[Answer]:
         """Take what the bus says of a task; returns what became of the task, nothing if not yet."""
         worker_id, task = reply.tag
+        given_s = self._given_s.pop((worker_id, task.key), None)
         if reply.message is not None:
+            if given_s is not None:
+                received_s = reply.received_mono_ns / 1e9
+                self.dispatch.far.took(worker_id, received_s - given_s, now_s=received_s)
             if not self.dispatch.answered(worker_id, task.key):
                 return []
             self._allowed.pop(task.key, None)
@@ -117,6 +136,12 @@ class BusDispatcher:
             self.dispatch.unanswered(worker_id, task.key)
             self.dispatch.trust(worker_id)  # It may be slow alone.
             given_up = self.dispatch.give_up(task.key, f"no answer in {within_s:g} s")
+        elif reply.error == NO_ANSWER and worker_id in self.dispatch.far:
+            # Its link may be back, and its answers not yet: it has to be heard first.
+            self.dispatch.take_back(worker_id, task.key)
+            self.dispatch.far.answered(worker_id, task.key)
+            self.dispatch.far.silent(worker_id)
+            return []
         elif reply.error == NO_ANSWER:
             self.dispatch.unanswered(worker_id, task.key)
             self._silent_since_s.setdefault(worker_id, time.monotonic())

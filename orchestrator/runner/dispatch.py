@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from foretwin.contracts.runner import Task, TaskCount
+from foretwin.orchestrator.runner.far_workers import FarWorkers
+from foretwin.orchestrator.runner.open_tasks import OpenTask, WorkerAtWork
 from foretwin.orchestrator.runner.sickness import Sickness
 
 ATTEMPTS = 3
@@ -33,26 +35,6 @@ class GivenUp(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Worker:
-    at_work: deque[Task] = field(default_factory=deque)
-    """In the order in which it answers: it is at the first one."""
-    world_id: str = ""
-    silent: set[str] = field(default_factory=set)
-    """Keys of those tasks at work whose questions ended without an answer."""
-
-
-@dataclass(slots=True)
-class _Open:
-    task: Task
-    waits: bool = True
-    deaths: int = 0
-    refused_by: set[str] = field(default_factory=set)
-    """Workers that are not asked for it again."""
-    refusal: str = ""
-    """The last of their reasons."""
-
-
-@dataclass(slots=True)
 class Dispatch:
     """Holds the tasks that are not ended, and the workers that are up.
 
@@ -67,11 +49,12 @@ class Dispatch:
     """Answers to tasks that were answered or cancelled before."""
     count: TaskCount = field(default_factory=TaskCount)
     sickness: Sickness = field(default_factory=Sickness)
+    far: FarWorkers = field(default_factory=FarWorkers)
     _expected: frozenset[str] = frozenset()
-    _open: dict[str, _Open] = field(default_factory=dict)
+    _open: dict[str, OpenTask] = field(default_factory=dict)
     _waiting: OrderedDict[str, deque[Task]] = field(default_factory=OrderedDict)
     """By World, none of them empty."""
-    _workers: dict[str, _Worker] = field(default_factory=dict)
+    _workers: dict[str, WorkerAtWork] = field(default_factory=dict)
 
     @property
     def workers(self) -> tuple[str, ...]:
@@ -88,12 +71,18 @@ class Dispatch:
         """How many tasks are neither answered nor given up."""
         return len(self._open)
 
-    def submit(self, task: Task) -> None:
-        """Take a task; raises ValueError for one whose key is open already."""
+    def submit(
+        self, task: Task, *, due_s: float | None = None, span_s: float = 0.0, near: bool = False
+    ) -> None:
+        """Take a task; raises ValueError for one whose key is open already.
+
+        What is due `due_s`, `span_s` after its start, goes to a far worker only where that is
+        expected to answer in time; what is `near` to none.
+        """
         if task.key in self._open:
             raise ValueError(f"task {task.key} is submitted twice")
         self.count.given += 1
-        self._open[task.key] = _Open(task)
+        self._open[task.key] = OpenTask(task, due_s=due_s, span_s=span_s, near=near)
         self._waiting.setdefault(task.world_id, deque()).append(task)
 
     def cancel(self, key: str) -> None:
@@ -122,7 +111,7 @@ class Dispatch:
             return []
         lost = self.worker_down(worker_id)
         self.sickness.well(worker_id)
-        self._workers[worker_id] = _Worker()
+        self._workers[worker_id] = WorkerAtWork()
         return lost
 
     def worker_down(self, worker_id: str, *, how: str = "") -> list[GivenUp]:
@@ -158,6 +147,24 @@ class Dispatch:
             worker.world_id = one.task.world_id
             given.append(one)
         return given
+
+    def take_over(self, *, now_s: float) -> None:
+        """Let near workers take over what far ones will not answer in time."""
+        for worker_id, worker in self._workers.items():
+            if worker_id not in self.far:
+                continue
+            for task in list(worker.at_work):
+                known = self._open.get(task.key)
+                if known is None or known.due_s is None:
+                    continue
+                if now_s >= self.far.latest_s(due_s=known.due_s, span_s=known.span_s):
+                    self.take_back(worker_id, task.key)
+
+    def take_back(self, worker_id: str, key: str) -> None:
+        """Give a far worker's task to another; should it answer first, its answer counts."""
+        self._leaves(worker_id, key)
+        self.far.take_back(worker_id, key)
+        self._wait_again(key)
 
     def answered(self, worker_id: str, key: str) -> bool:
         """Take note of an answer; returns whether it counts."""
@@ -218,41 +225,49 @@ class Dispatch:
         self.sickness.forgive(known.refused_by, key)
         return [GivenUp(known.task, known.refusal)]
 
-    def _ends(self, key: str) -> _Open | None:
+    def _ends(self, key: str) -> OpenTask | None:
         known = self._open.pop(key, None)
         if known is not None:
             self._no_longer_waits(known)
         return known
 
     def _assignment(self, now_s: float) -> Assignment | None:
-        """Return the next task to be given, to the idlest worker that has not refused it."""
+        """Return the next task to be given, to the idlest, then fastest worker that may take it."""
         waiting = sum(map(len, self._waiting.values()))
         most = self.in_flight if waiting >= len(self._workers) else 1
         may_hold = self.sickness.may_hold(self._workers, most, now_s=now_s)
         free = [
-            (len(worker.at_work), worker_id)
+            (len(worker.at_work), self.far.expected_s(worker_id, now_s=now_s), worker_id)
             for worker_id, worker in self._workers.items()
             if not worker.silent and len(worker.at_work) < may_hold[worker_id]
         ]
-        for _, worker_id in sorted(free):
-            if (task := self._next(worker_id)) is not None:
+        for _, _, worker_id in sorted(free):
+            if (task := self._next(worker_id, now_s)) is not None:
                 return Assignment(worker_id, task)
         return None
 
-    def _next(self, worker_id: str) -> Task | None:
+    def _next(self, worker_id: str, now_s: float) -> Task | None:
         own = self._workers[worker_id].world_id
         taken = {one.world_id for name, one in self._workers.items() if name != worker_id}
         for world_id in sorted(self._waiting, key=lambda name: (name != own, name in taken)):
             for task in self._waiting[world_id]:
-                if worker_id not in self._open[task.key].refused_by:
+                if self._may_take(worker_id, self._open[task.key], now_s):
                     return task
         return None
+
+    def _may_take(self, worker_id: str, known: OpenTask, now_s: float) -> bool:
+        if worker_id in known.refused_by or (known.near and worker_id in self.far):
+            return False
+        return self.far.may_take(
+            worker_id, known.task.world_id, due_s=known.due_s, span_s=known.span_s, now_s=now_s
+        )
 
     def _leaves(self, worker_id: str, key: str) -> None:
         worker = self._workers.get(worker_id)
         if worker is not None:
             worker.at_work = deque(task for task in worker.at_work if task.key != key)
             worker.silent.discard(key)
+        self.far.answered(worker_id, key)
 
     def _at_work(self, key: str) -> bool:
         return any(task.key == key for one in self._workers.values() for task in one.at_work)
@@ -268,7 +283,7 @@ class Dispatch:
         self._waiting.move_to_end(world_id, last=False)
         self.requeued += 1
 
-    def _no_longer_waits(self, known: _Open) -> None:
+    def _no_longer_waits(self, known: OpenTask) -> None:
         if not known.waits:
             return
         known.waits = False

@@ -42,6 +42,11 @@ class RoundOrder:
         return tuple(future for job in self.jobs for future in job.futures)
 
     @property
+    def due_s(self) -> float | None:
+        """When it is late, on the monotonic clock."""
+        return None if self.deadline_mono_ns is None else self.deadline_mono_ns / 1e9
+
+    @property
     def tasks(self) -> tuple[Task, ...]:
         """The tasks of playing the jobs, in their order."""
         return tuple(

@@ -68,7 +68,7 @@ def test_how_often_each_is_said() -> None:
         5: {"progress"},
         4: {"gap"},
         2: {"job", "round", "plan_comparison", "worker_status"},
-        1: {"signals", "route"},
+        1: {"signals", "route", "clock"},
         0.2: {"identification"},
     }
 
@@ -85,7 +85,7 @@ def test_only_questions_wait_and_what_a_car_says_is_kept_for_who_missed_it() -> 
 @pytest.mark.parametrize(
     ("name", "server"),
     [("job", "worker"), ("build", "worker"), ("info", "car"), ("set", "orchestrator"),
-     ("gnss", None), ("planner_scene", None)],
+     ("world_file", "orchestrator"), ("gnss", None), ("planner_scene", None)],
 )  # fmt: skip
 def test_a_question_is_answered_by_whom_its_key_names(name: str, server: str | None) -> None:
     assert CHANNELS[name].server == server

@@ -1,0 +1,1 @@
+"""The worker on another machine: Worlds over the bus, settings by the drive, no path shared."""
