@@ -28,7 +28,7 @@ class ClockOffset:
     def __len__(self) -> int:
         return len(self._samples)
 
-    def take(self, *, asked_s: float, answered_s: float, ours_ns: int, theirs_ns: int) -> None:
+    def take(self, asked_s: float, answered_s: float, *, ours_ns: int, theirs_ns: int) -> None:
         """Take an answer: seconds are monotonic, `ours_ns` is our UTC when it came."""
         link_s = answered_s - asked_s
         middle_ns = ours_ns - link_s / 2 * 1e9

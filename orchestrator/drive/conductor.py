@@ -94,6 +94,7 @@ class Conductor:
             context, self.questions, next_stamp_ns=lambda: self.intake.now_stamp_ns + 1
         )
         self.fleet = FleetHandler(context, self.rounds, self.tuning.parameters)
+        self.worlds.on_load = self.fleet.load
         self._on_message: dict[str, Callable[[Received], object]] = {
             **dict.fromkeys(keys.TELEMETRY_CHANNELS, self.take_telemetry),
             **dict.fromkeys(FINDINGS, self.tuning.heard),
@@ -235,7 +236,6 @@ class Conductor:
                     self.tell(instruction)
 
     def _world_ready(self, junction_id: str, world: World) -> None:
-        self.fleet.world_ready(world)
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
 
     def _world_failed(self, junction_id: str, reason: str) -> None:
@@ -256,8 +256,7 @@ class Conductor:
     # Processes.
 
     @property
-    def _near(self) -> tuple[str, ...]:
-        """The drive's own workers, for which a World waits."""
+    def _near(self) -> tuple[str, ...]:  # those for which a World waits
         return tuple(one for one in self.rounds.dispatcher.workers if one in self.alive)
 
     def _alive(self, item: Alive) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from foretwin.contracts.fleet import Enlisted, MachineInfo, machine_of
+from foretwin.contracts.fleet import MOST_CLOCK_OFFSET_S, Enlisted, MachineInfo, machine_of
 from foretwin.orchestrator.drive.clock_offset import ClockOffset
+from foretwin.orchestrator.record.machine import differences
 
 Stage = Literal["asked", "clock", "waiting", "probing", "playing", "refused", "gone"]
 """In the order in which a worker goes through them; it waits for a World to be tried in."""
@@ -54,6 +55,40 @@ class FarMember:
     def machine(self) -> str:
         """The name of its machine."""
         return machine_of(self.worker_id)
+
+    @property
+    def instance(self) -> str:
+        """The word of the process that it is; empty before it has said one."""
+        return "" if self.said is None else self.said.instance
+
+    def version_trouble(self, ours: MachineInfo) -> str | None:
+        """Return why its program does not fit ours, None where it does."""
+        assert self.said is not None
+        theirs = self.said.machine.versions.get("foretwin", "of no version")
+        if theirs == ours.versions["foretwin"]:
+            return None
+        here = ours.versions["foretwin"]
+        return f"{self.machine} runs foretwin {theirs}, this drive {here}: install the same"
+
+    def clock_trouble(self) -> str | None:
+        """Return how far its clock is off, None where that is near enough."""
+        if not self.clock.beyond(MOST_CLOCK_OFFSET_S):
+            return None
+        return (
+            f"the clock of {self.machine} is {self.clock.best.offset_s:+.3f} s off, at most "
+            f"{MOST_CLOCK_OFFSET_S:g} s is allowed: set it (timedatectl set-ntp true)"
+        )
+
+    def bits_trouble(self, ours: MachineInfo) -> str:
+        """Return in words that its probe came to other bits, and what may have made them."""
+        assert self.said is not None
+        why = differences(self.said.machine, ours)
+        return f"{self.machine} plays other bits than this machine: {why}"
+
+    def measured(self, took_s: float, *, futures: int) -> None:
+        """Take how long the probe took from question to answer."""
+        self.work_s = max(took_s - self.clock.last.link_s, 0.0)
+        self.futures_per_s = futures / took_s
 
     @property
     def text(self) -> str:

@@ -15,7 +15,6 @@ import msgspec
 
 from foretwin.contracts.bus import Reply, Request
 from foretwin.contracts.fleet import (
-    MOST_CLOCK_OFFSET_S,
     Admittance,
     ClockQuestion,
     EnlistRequest,
@@ -28,7 +27,7 @@ from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.far_member import FarMember, FleetTag
 from foretwin.orchestrator.drive.reference_probe import ReferenceProbe
 from foretwin.orchestrator.instructions import Notice
-from foretwin.orchestrator.record.machine import differences, this_machine
+from foretwin.orchestrator.record.machine import this_machine
 from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions
@@ -92,10 +91,11 @@ class FleetHandler:
             member.stage = "gone"
             self._tell("info", f"{process_id} is gone")
 
-    def world_ready(self, world: World) -> None:
-        """A World is there: members load it, and the first one is that of the probe."""
-        if not self.open or world.id in self._worlds:
+    def load(self, world: World) -> None:
+        """Let members load a World as the drive's own workers do; the first is the probe's."""
+        if not self.open:
             return
+        self._worlds.pop(world.id, None)
         self._worlds[world.id] = None
         self._reference.use(world)
         for member in self._members.values():
@@ -186,11 +186,9 @@ class FleetHandler:
                 self._refuse(member, f"{member.machine} does not join: {reply.error}")
             return
         member.said = reply.message
-        theirs, ours = member.said.machine.versions.get("foretwin"), self._ours.versions["foretwin"]
-        if theirs != ours:
-            text = f"{member.machine} runs foretwin {theirs}, this drive {ours}: install the same"
-            self._refuse(member, text)
-        elif member.said.instance in self._proved:
+        if trouble := member.version_trouble(self._ours):
+            self._refuse(member, trouble)
+        elif member.instance in self._proved:
             self._play(member)
         else:
             member.stage = "clock"
@@ -205,18 +203,10 @@ class FleetHandler:
                 self._again(member, reply)
             return
         ours_ns = time.time_ns() - (time.monotonic_ns() - reply.received_mono_ns)
-        theirs_ns = reply.message.utc_ns
-        member.clock.take(
-            asked_s=asked_s, answered_s=answered_s, ours_ns=ours_ns, theirs_ns=theirs_ns
-        )
+        member.clock.take(asked_s, answered_s, ours_ns=ours_ns, theirs_ns=reply.message.utc_ns)
         self._far.heard(member.worker_id, answered_s - asked_s)
-        if member.clock.beyond(MOST_CLOCK_OFFSET_S):
-            off_s = member.clock.best.offset_s
-            self._refuse(
-                member,
-                f"the clock of {member.machine} is {off_s:+.3f} s off, at most "
-                f"{MOST_CLOCK_OFFSET_S:g} s is allowed: set it (timedatectl set-ntp true)",
-            )
+        if (trouble := member.clock_trouble()) and member.stage != "refused":
+            self._refuse(member, trouble)
         elif member.stage == "clock":
             if len(member.clock) < CLOCK_QUESTIONS:
                 self._ask_clock(member)
@@ -255,20 +245,13 @@ class FleetHandler:
         member.probes += 1
         expected = self._reference.digest(reply.tag.detail)
         if result_digest(reply.message.result) != expected:
-            assert member.said is not None
-            self._refuse(
-                member,
-                f"{member.machine} plays other bits than this machine: "
-                f"{differences(member.said.machine, self._ours)}",
-            )
+            self._refuse(member, member.bits_trouble(self._ours))
         elif member.probes < PROBES:
             self._ask_probe(member)
         else:
             took_s = reply.received_mono_ns * 1e-9 - reply.tag.asked_s
-            member.work_s = max(took_s - member.clock.last.link_s, 0.0)
-            member.futures_per_s = len(reply.message.result.future_indices) / took_s
-            assert member.said is not None
-            self._proved.add(member.said.instance)
+            member.measured(took_s, futures=len(reply.message.result.future_indices))
+            self._proved.add(member.instance)
             self._play(member)
 
     # What follows.

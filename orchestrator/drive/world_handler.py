@@ -50,6 +50,8 @@ class WorldHandler:
     context: DriveContext
     on_ready: Callable[[str, World], None]
     on_failed: Callable[[str, str], None]
+    on_load: Callable[[World], None] = lambda _: None
+    """Called with each World that the workers load."""
     _orders: dict[str, _Order] = field(default_factory=dict)
     _junction_of: dict[str, str] = field(default_factory=dict)
     _worlds: OrderedDict[str, World] = field(default_factory=OrderedDict)
@@ -143,6 +145,7 @@ class WorldHandler:
         self.on_failed(junction_id, reason)
 
     def _load(self, order: _Order, world: World, workers: tuple[str, ...]) -> None:
+        self.on_load(world)
         if order.pending is None:
             junction_id, file = self._junction_of[world.id], f"{world.id}.world"
             notice = WorldNotice(world_id=world.id, intersection_id=junction_id, file=file)
