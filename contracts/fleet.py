@@ -64,7 +64,7 @@ class ClockAnswer(msgspec.Struct, frozen=True, kw_only=True):
     utc_ns: int
 
 
-class WorldRequest(msgspec.Struct, frozen=True, kw_only=True):
+class WorldQuestion(msgspec.Struct, frozen=True, kw_only=True):
     """Asks for a World of the drive by its id, which is the hash of its content."""
 
     world_id: str

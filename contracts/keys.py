@@ -160,7 +160,7 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
         "clock": Channel(fleet.ClockQuestion, 1, "its clock and link", fleet.ClockAnswer),
     },
     (_RUN, REQUEST, _ANY_WORKER): {
-        "world_file": Channel(fleet.WorldRequest, None, "a World by its hash", fleet.WorldBytes),
+        "world_file": Channel(fleet.WorldQuestion, None, "a World by its hash", fleet.WorldBytes),
     },
     (f"{_RUN}/builder/{{process}}", REQUEST, _ORCHESTRATOR): {
         "build": Channel(simulation.BuildRequest, None, "build a World", simulation.BuildReply),

@@ -221,6 +221,10 @@ class WorkerStatus(msgspec.Struct, frozen=True, kw_only=True):
     """A `sick` one refuses jobs; it is tried again after a pause."""
     rtf: float | None = None
     memory_mb: float | None = None
+    link_ms: float | None = None
+    """Of a worker on another machine, there and back."""
+    clock_offset_ms: float | None = None
+    """Its clock less ours."""
 
 
 class Progress(msgspec.Struct, frozen=True, kw_only=True):

@@ -16,6 +16,8 @@ WORKER_COLOURS = {
     "sick": 0xFB8C00FF,
     "dead": 0xE53935FF,
 }
+_MEASURED = "rtf", "memory_mb", "link_ms", "clock_offset_ms"
+"""What a worker's status tells in numbers; the last two of one on another machine alone."""
 LEVELS = {
     "info": rr.TextLogLevel.INFO,
     "warning": rr.TextLogLevel.WARN,
@@ -40,7 +42,7 @@ class RunLog:
         return Row("status", 0, document(f"**{self._title}** · {self._source}"), True)
 
     def worker(self, status: WorkerStatus, drive_ns: int) -> list[Row]:
-        """Return a change of state and the real-time factor."""
+        """Return a change of state, and what was measured of it."""
         part = path_part(status.worker_id)
         rows: list[Row] = []
         if status.worker_id not in self._states:
@@ -56,15 +58,14 @@ class RunLog:
             )
             rows += [
                 static(f"workers/{what}/{part}", rr.SeriesLines(names=status.worker_id))
-                for what in ("rtf", "memory_mb")
+                for what in _MEASURED
             ]
         if self._states.get(status.worker_id) != status.state:
             self._states[status.worker_id] = status.state
             rows.append(Row(f"workers/state/{part}", drive_ns, rr.StateChange(state=status.state)))
-        if status.rtf is not None:
-            rows.append(Row(f"workers/rtf/{part}", drive_ns, rr.Scalars(status.rtf)))
-        if status.memory_mb is not None:
-            rows.append(Row(f"workers/memory_mb/{part}", drive_ns, rr.Scalars(status.memory_mb)))
+        for what in _MEASURED:
+            if (value := getattr(status, what)) is not None:
+                rows.append(Row(f"workers/{what}/{part}", drive_ns, rr.Scalars(value)))
         return rows
 
     def progress(self, progress: Progress, drive_ns: int) -> list[Row]:

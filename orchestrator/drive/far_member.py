@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from foretwin.contracts.fleet import MOST_CLOCK_OFFSET_S, Enlisted, MachineInfo, machine_of
-from foretwin.orchestrator.drive.clock_offset import ClockOffset
+from foretwin.orchestrator.drive.far_clock import FarClock
 from foretwin.orchestrator.record.machine import differences
 
 Stage = Literal["asked", "clock", "waiting", "probing", "playing", "refused", "gone"]
@@ -34,7 +34,7 @@ class FarMember:
     version: int = -1
     """Of the parameters that it was told."""
     said: Enlisted | None = None
-    clock: ClockOffset = field(default_factory=ClockOffset)
+    clock: FarClock = field(default_factory=FarClock)
     clock_asked: bool = False
     next_clock_s: float = 0.0
     again_s: float | None = None
@@ -99,6 +99,16 @@ class FarMember:
             f"clock {1e3 * best.offset_s:+.1f} ms"
         )
 
+    @property
+    def link_ms(self) -> float:
+        """What a question takes there and back, of late."""
+        return round(1e3 * self.clock.last.link_s, 3)
+
+    @property
+    def clock_offset_ms(self) -> float:
+        """Its clock less ours."""
+        return round(1e3 * self.clock.best.offset_s, 3)
+
     def record(self, ours: MachineInfo) -> dict[str, Any]:
         """Return what run.json says of it."""
         row: dict[str, Any] = {"worker": self.worker_id, "stage": self.stage}
@@ -114,10 +124,7 @@ class FarMember:
                 },
             }
         if len(self.clock):
-            row |= {
-                "link_ms": round(1e3 * self.clock.best.link_s, 3),
-                "clock_offset_ms": round(1e3 * self.clock.best.offset_s, 3),
-            }
+            row |= {"link_ms": self.link_ms, "clock_offset_ms": self.clock_offset_ms}
         if self.futures_per_s:
             row["futures_per_s"] = round(self.futures_per_s, 1)
         return row | ({"refused": self.refused} if self.refused else {})

@@ -167,7 +167,7 @@ class FleetHandler:
             vehicle=parameters.in_force.vehicle,
             version=parameters.version,
             foretwin=self._ours.versions["foretwin"],
-            planners=tuple(planners_of(config.planner)),
+            planners=tuple(dict.fromkeys(planners_of(config.planner))),
             simulations=config.futures_per_job,
             kept_worlds=MOST_LOADED,
         )

@@ -109,7 +109,7 @@ class ProgressLine:
 
     def _text(self, progress: Progress) -> str:
         conductor = self._conductor
-        dispatch = conductor.rounds.dispatcher.dispatch
+        dispatch, far = conductor.rounds.dispatcher.dispatch, len(conductor.fleet.playing)
         sick = " ".join(name for name in dispatch.workers if name in dispatch.sickness.sick)
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
@@ -121,8 +121,8 @@ class ProgressLine:
             f"{self._open_to_all}{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}"
             f"  {short}"
             f"{progress.futures_per_s:.0f} futures/s  "
-            f"workers {len(dispatch.workers)}/{conductor.plan.config.workers}"
-            f"{f' ({sick} sick)' if sick else ''}  "
+            f"workers {len(dispatch.workers) - far}/{conductor.plan.config.workers}"
+            f"{f' +{far} far' if far else ''}{f' ({sick} sick)' if sick else ''}  "
             f"missed {conductor.rounds.tally.missed}  "
             f"dropped {progress.dropped}"
         )
@@ -142,9 +142,10 @@ def worker_statuses(conductor: Conductor, stamp_ns: int) -> list[WorkerStatus]:
     """Return how each worker of a drive is, those that are not there included."""
     dispatch, memory_mb = conductor.rounds.dispatcher.dispatch, conductor.context.memory.now_mb
     busy, sick = dispatch.busy, dispatch.sickness.sick
-    up = set(dispatch.workers)
+    up, far = set(dispatch.workers), {one.worker_id: one for one in conductor.fleet.playing}
+    near = (f"w{index}" for index in range(conductor.plan.config.workers))
     statuses = []
-    for worker_id in (f"w{index}" for index in range(conductor.plan.config.workers)):
+    for worker_id in (*near, *sorted(far)):
         state: Literal["idle", "busy", "sick", "dead"] = "dead"
         if worker_id in up:
             state = "busy" if worker_id in busy else "idle"
@@ -156,6 +157,8 @@ def worker_statuses(conductor: Conductor, stamp_ns: int) -> list[WorkerStatus]:
                 state=state,
                 rtf=conductor.rounds.rtf.get(worker_id),
                 memory_mb=memory_mb.get(worker_id),
+                link_ms=far[worker_id].link_ms if worker_id in far else None,
+                clock_offset_ms=far[worker_id].clock_offset_ms if worker_id in far else None,
             )
         )
     return statuses

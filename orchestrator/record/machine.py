@@ -7,8 +7,8 @@ import platform
 from pathlib import Path
 
 from foretwin.contracts.fleet import MachineInfo
+from foretwin.contracts.versions import versions
 from foretwin.orchestrator.processors import processors
-from foretwin.orchestrator.record.versions import versions
 
 _SWITCHES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES"
 """What makes numba and numpy take a processor for another one."""

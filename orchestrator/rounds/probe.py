@@ -33,13 +33,20 @@ def probe_task(
     """Return the probe in a World, None where nothing can be driven in it."""
     lanes = {lane.id: lane for lane in world.lanes}
     ways = [
-        (lanes[one.from_lane_id], one, lanes[one.to_lane_id])
-        for one in sorted(world.connections, key=lambda one: one.id)
-        if one.from_lane_id in lanes and one.to_lane_id in lanes
+        one for one in world.connections if one.from_lane_id in lanes and one.to_lane_id in lanes
     ]
     if not ways:
         return None
-    into, across, out = ways[0]
+    # Where most meet, most can happen.
+    across = min(
+        ways,
+        key=lambda one: (
+            one.junction_id != world.intersection.id,
+            -len(one.conflicts_with),
+            one.id,
+        ),
+    )
+    into, out = lanes[across.from_lane_id], lanes[across.to_lane_id]
     before = into.centerline
     xy_m = without_repeats(np.concatenate([before, across.centerline, out.centerline]))
     start_m = max(0.0, length(before) - _BEFORE_JUNCTION_M - _BEHIND_M)

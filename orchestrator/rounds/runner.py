@@ -76,8 +76,7 @@ class RoundRunner:
         self.start_stamp_ns = 0
         self._context, self._plan = context, plan
         self._tables = context.tables
-        self.on_other: Callable[[Answer], None] = lambda _: None
-        """Takes what became of a task that is no round's."""
+        self.on_other: Callable[[Answer], None] = lambda _: None  # of a task that is no round's
         self._world_of, self._on_round = world_of, on_round
         self._open_comparisons = OpenComparisons(plan.drive_frame, plan.config.horizon_s)
         keep = into_table(context.tables.add, plan.vehicle)

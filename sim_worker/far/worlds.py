@@ -10,7 +10,7 @@ from pathlib import Path
 
 from foretwin.contracts.bus import Bus, ask
 from foretwin.contracts.codec import SchemaMismatch
-from foretwin.contracts.fleet import WorldBytes, WorldRequest
+from foretwin.contracts.fleet import WorldBytes, WorldQuestion
 from foretwin.contracts.partial_file import partial_file
 from foretwin.contracts.world import World
 from foretwin.contracts.world_identity import checked_world
@@ -50,7 +50,7 @@ class CachedWorlds:
         return self._fetched(world_id, file)
 
     def _fetched(self, world_id: str, file: Path) -> World:
-        question = WorldRequest(world_id=world_id)
+        question = WorldQuestion(world_id=world_id)
         answer = ask(self._bus, "world_file", question, timeout_s=FETCH_S, run=self._run)
         assert isinstance(answer, WorldBytes)
         where = f"what the drive sent as World {world_id}"

@@ -67,9 +67,12 @@ class ProxyLink:
 
 
 class PacketLink:
-    """Two tun devices, one of them in a network of its own, and who carries packets between."""
+    """Two tun devices, one of them in a network of its own, and who carries packets between.
 
-    def __init__(self, network: int, name: str, *, seed: int) -> None:
+    The other one is in our network, or in that of the process `near`.
+    """
+
+    def __init__(self, network: int, name: str, *, seed: int, near: int | None = None) -> None:
         subnet = f"10.{213 + network % 30}.{network % 250}"
         self.router = self.endpoint = f"tcp/{subnet}.1:{free_port()}"
         self.prefix = ("nsenter", "-t", str(network), "-n")
@@ -77,12 +80,9 @@ class PacketLink:
         self._loss, self._delay_s = 0.0, 0.0
         self._over = threading.Event()
         self._ends = [_tun(f"{name}a"), _tun(f"{name}b")]
-        _ip("addr", "add", f"{subnet}.1/30", "dev", f"{name}a")
-        _ip("link", "set", f"{name}a", "up")
-        _ip("link", "set", f"{name}b", "netns", str(network))
-        for words in (("addr", "add", f"{subnet}.2/30", "dev", f"{name}b"),
-                      ("link", "set", f"{name}b", "up"), ("link", "set", "lo", "up")):  # fmt: skip
-            _ip(*words, prefix=self.prefix)
+        self.host = f"{subnet}.1"
+        _end(f"{name}a", f"{subnet}.1/30", near)
+        _end(f"{name}b", f"{subnet}.2/30", network)
         self._thread = threading.Thread(target=self._carry, daemon=True)
         self._thread.start()
 
@@ -127,6 +127,17 @@ def _tun(name: str) -> int:
     return end
 
 
+def _end(name: str, address: str, network: int | None) -> None:
+    """Move a device into a network, and give it an address there."""
+    prefix: tuple[str, ...] = ()
+    if network is not None:
+        prefix = ("nsenter", "-t", str(network), "-n")
+        _ip("link", "set", name, "netns", str(network))
+        _ip("link", "set", "lo", "up", prefix=prefix)
+    _ip("addr", "add", address, "dev", name, prefix=prefix)
+    _ip("link", "set", name, "up", prefix=prefix)
+
+
 def _ip(*words: str, prefix: tuple[str, ...] = ()) -> None:
     subprocess.run([*prefix, "ip", *words], check=True, capture_output=True)
 
@@ -146,7 +157,8 @@ def link_for(seed: int, *, packets: bool) -> Iterator[Link]:
 
 
 @contextmanager
-def _packet_link(seed: int) -> Iterator[PacketLink]:
+def own_network() -> Iterator[int]:
+    """Give a process in a network of its own; raises OSError where this user may have none."""
     holder = subprocess.Popen(
         ["unshare", "-n", "sh", "-c", "echo there; exec sleep 900"], stdout=subprocess.PIPE
     )
@@ -154,11 +166,17 @@ def _packet_link(seed: int) -> Iterator[PacketLink]:
         assert holder.stdout is not None
         if holder.stdout.readline() != b"there\n":
             raise OSError("no network of its own here")
-        link = PacketLink(holder.pid, f"ft{os.getpid() % 100_000}", seed=seed)
+        yield holder.pid
+    finally:
+        holder.kill()
+        holder.communicate()
+
+
+@contextmanager
+def _packet_link(seed: int) -> Iterator[PacketLink]:
+    with own_network() as network:
+        link = PacketLink(network, f"ft{os.getpid() % 100_000}", seed=seed)
         try:
             yield link
         finally:
             link.close()
-    finally:
-        holder.kill()
-        holder.communicate()

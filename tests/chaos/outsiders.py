@@ -55,11 +55,13 @@ class Outsider:
             )  # fmt: skip
 
 
-def live_car(folder: Path, run_id: str, bus: BusSetup, *, prefix: Sequence[str]) -> Outsider:
+def live_car(
+    folder: Path, run_id: str, bus: BusSetup, *, prefix: Sequence[str], end_s: float | None = END_S
+) -> Outsider:
     """Return a car that drives the town; `prefix` is what its command line begins with."""
     setup = StandinSetup(
         run_id=run_id, process_id="car", vehicle_id="ego", bus=bus,
-        log_file=str(folder / "car.jsonl"), path_file=str(path_file(folder)), end_s=END_S,
+        log_file=str(folder / "car.jsonl"), path_file=str(path_file(folder)), end_s=end_s,
     )  # fmt: skip
     file = folder / "car.json"
     write_setup(setup, file)

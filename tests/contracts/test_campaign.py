@@ -6,7 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.contracts.campaign import CAMPAIGN_ROLES, certificate_in, role_files
+from foretwin.contracts.campaign import (
+    CAMPAIGN_ROLES,
+    certificate_in,
+    named_workers,
+    role_files,
+    worker_name,
+)
 from foretwin.contracts.errors import UserError
 
 
@@ -22,7 +28,7 @@ def role_folder(campaign: Path, role: str) -> Path:
 @pytest.mark.parametrize("role", CAMPAIGN_ROLES)
 def test_a_roles_files_are_named_whole(tmp_path: Path, role: str) -> None:
     folder = role_folder(tmp_path, role)
-    files = role_files(tmp_path, role)  # type: ignore[arg-type]
+    files = role_files(tmp_path, role)
     assert files == certificate_in(folder)
     assert [Path(one).read_text() for one in (files.authority, files.certificate, files.key)] == [
         "ca.pem", "certificate.pem", "key.pem"
@@ -41,3 +47,14 @@ def test_a_key_that_others_may_read_is_none(tmp_path: Path, mode: int) -> None:
     (role_folder(tmp_path, "car") / "key.pem").chmod(mode)
     with pytest.raises(UserError, match=f"mode 0{mode & 0o77:02o}"):
         role_files(tmp_path, "car")
+
+
+def test_a_machine_has_a_role_of_its_own(tmp_path: Path) -> None:
+    assert worker_name("worker-laptop2") == "laptop2"
+    assert [worker_name(one) for one in ("worker", "worker-", "worker-a-b", "worker-A", "car")] == (
+        [None] * 5
+    )
+    for name in ("worker-b", "worker-a", "worker", "worker-a-b"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "worker-file").write_text("")
+    assert named_workers(tmp_path) == ("worker-a", "worker-b")

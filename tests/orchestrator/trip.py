@@ -85,9 +85,7 @@ def town_plan(folder: Path, **settings: Any) -> DrivePlan:
     config = DriveConfig(
         view="none",
         out=str(folder / "runs"),
-        endpoint="tcp/127.0.0.1:7447",
-        insecure=True,
-        **settings,
+        **{"endpoint": "tcp/127.0.0.1:7447", "insecure": True, **settings},
     )
     return make_plan(replace(town(), config=config.validate()), NOW)
 

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from foretwin.contracts.bus import Mailbox, ZenohBus
 from foretwin.contracts.campaign import certificate_in, role_files
 from foretwin.contracts.certificates import read_certificate
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.fleet import ClockAnswer, ClockQuestion
+from foretwin.contracts.keys import alive_key, process_of_alive_key
+from foretwin.contracts.ports import free_port
 from foretwin.contracts.setup import BusSetup
 from foretwin.orchestrator.campaign.issuing import issue
 from foretwin.orchestrator.campaign.joining import (
     LOCAL_ROLES,
+    admission,
     check_campaign,
     ends,
     own_certificate,
 )
 from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, member, process_ids
+from tests.contracts.bus_sides import take
 from tests.orchestrator.campaign.campaigns import campaign, expired, now
 from tests.orchestrator.trip import town_plan
 
@@ -93,3 +100,41 @@ def test_ros_has_no_certificate_of_the_runs_bus(tmp_path: Path) -> None:
     )
     with pytest.raises(UserError, match="endpoint must be named, that of the car"):
         read_inputs(config)
+
+
+def test_a_machine_speaks_for_its_own_workers_alone(tmp_path: Path) -> None:
+    folder, endpoint = campaign(tmp_path / "c"), f"tls/localhost:{free_port()}"
+    for role in ("worker-laptop", "worker-desk"):
+        issue(folder, role, days=2, now=now())
+
+    def joined(role: str) -> ZenohBus:
+        return ZenohBus(BusSetup(endpoint=endpoint, tls=role_files(folder, role)))
+
+    router = BusSetup(
+        endpoint=endpoint, tls=role_files(folder, "router"), admits=admission("r", folder)
+    )
+    seen, asked = Mailbox(16), Mailbox(16)
+    with ZenohBus(router, router=True), joined("orchestrator") as orchestrator:
+        orchestrator.watch_alive(alive_key(run="r", process="*"), seen)
+        with joined("worker-laptop") as laptop, joined("worker-desk") as desk:
+            for process in ("w0", "mirror", "w-desk-0", "w-laptop-0"):
+                laptop.declare_alive(alive_key(run="r", process=process))
+                laptop.serve("clock", asked, run="r", process=process)
+            desk.declare_alive(alive_key(run="r", process="w-desk-1"))
+            found = {process_of_alive_key(take(seen).key) for _ in range(2)}
+            assert found == {"w-laptop-0", "w-desk-1"}
+            assert seen.take_last(0.3) is None
+            answers = Mailbox(4)
+            for process in ("w-desk-0", "w0", "w-laptop-0"):
+                ids = {"run": "r", "process": process}
+                orchestrator.request("clock", ClockQuestion(), answers, timeout_s=1.0, **ids)
+            take(asked).reply(ClockAnswer(utc_ns=1))
+            assert sorted(str(take(answers).error) for _ in range(3)) == [
+                "None",
+                *["no answer"] * 2,
+            ]
+            assert asked.take() is None
+    # Whose folder is gone is let in by its certificate, and may say nothing.
+    assert '"worker-desk"' in admission("r", folder).access
+    shutil.rmtree(folder / "worker-desk")
+    assert '"worker-desk"' not in admission("r", folder).access

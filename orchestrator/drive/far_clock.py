@@ -19,7 +19,7 @@ class ClockSample(NamedTuple):
     offset_s: float
 
 
-class ClockOffset:
+class FarClock:
     """The last questions to one clock."""
 
     def __init__(self) -> None:

@@ -1,0 +1,44 @@
+"""What of two machines may make other bits is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foretwin.contracts.fleet import MachineInfo
+from foretwin.orchestrator.record.machine import differences, this_machine
+
+OURS = MachineInfo(cores=2, cpu="AMD EPYC", versions={"numpy": "2.3.5", "numba": "0.62"})
+
+
+def test_this_machine_is_the_same_as_itself() -> None:
+    here = this_machine()
+    assert here.cores >= 1
+    assert here.versions["foretwin"]
+    assert "are said to be the same" in differences(here, this_machine())
+
+
+def test_a_processor_is_told_by_its_model_and_what_is_switched_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cpuinfo = tmp_path / "cpuinfo"
+    cpuinfo.write_text("processor\t: 0\nmodel name\t: Ryzen 9\nmodel name\t: Ryzen 9\n")
+    monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", "AVX2")
+    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)
+    assert this_machine(cpuinfo).cpu == "Ryzen 9 NPY_DISABLE_CPU_FEATURES=AVX2"
+    assert this_machine(tmp_path / "none").cpu
+
+
+@pytest.mark.parametrize(
+    ("theirs", "text"),
+    [
+        ({"versions": {"numpy": "2.4.0", "numba": "0.62"}}, "numpy 2.4.0 there, 2.3.5 here"),
+        ({"versions": {"numpy": "2.3.5"}}, "numba missing there, 0.62 here"),
+        ({"cpu": "Ryzen 9"}, "Ryzen 9 there, AMD EPYC here"),
+        ({"cores": 16}, "versions and processor (AMD EPYC) are said to be the same"),
+    ],
+)
+def test_differences_name_both(theirs: dict[str, object], text: str) -> None:
+    assert differences(msgspec.structs.replace(OURS, **theirs), OURS) == text

@@ -1,0 +1,43 @@
+"""The probe plays what rounds play, to the same bits each time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foretwin.contracts.runner import JobRequest
+from foretwin.orchestrator.rounds.probe import probe_task
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.orchestrator.trip import town, town_plan, town_world
+from tests.sim_worker.places import crossroads
+
+CAR = load_vehicle()
+
+
+@pytest.mark.parametrize("which", [1, 2])
+def test_a_probe_holds_faults_scenarios_and_road_users(tmp_path: Path, which: int) -> None:
+    config = town_plan(tmp_path, futures=24, futures_per_job=12).config
+    world = town_world(town().junctions[which].summary.id)
+    task, again = (probe_task(config, world, CAR, 0) for _ in range(2))
+    assert task == again
+    assert task is not None
+    assert isinstance(task.question, JobRequest)
+    job = task.question.decoded()
+    assert len(job.futures) == 12
+    assert job.accidents
+    results = [run_job(job, BatchSimulation(world, CAR, nsim=12)) for _ in range(2)]
+    assert result_digest(results[0]) == result_digest(results[1])
+    assert results[0].outcome.valid.all()
+    assert results[0].outcome.progress_m.max() > 40.0
+    happens = {future.scenario_id for future in job.futures} - {""}
+    assert len(happens) >= 3
+    assert results[0].road_users.kinds.size
+
+
+def test_where_nothing_can_be_driven_there_is_none(tmp_path: Path) -> None:
+    bare = msgspec.structs.replace(crossroads(), connections=())
+    assert probe_task(town_plan(tmp_path).config, bare, CAR, 0) is None
