@@ -136,6 +136,11 @@ class FarWorker:
         worlds = CachedWorlds(folder, self._bus, run=given.run_id, trouble=self._tell)
         return _Leaving(setup, self._life, worlds)
 
+    def close(self) -> None:
+        """End what it has started."""
+        if self._worker is not None:
+            self._worker.close()
+
     def _tell(self, text: str) -> None:
         log.warning("%s", text)
         say(f"{self._setup.process_id}: {text}", error=True)
@@ -161,3 +166,4 @@ def serve_far(setup: FarWorkerSetup, bus: Bus, life: ProcessLife) -> None:
             raise UserError(worker.refused)
     while not life.run_ended and isinstance(request := mailbox.take(), Request):
         worker.handle(request)
+    worker.close()
