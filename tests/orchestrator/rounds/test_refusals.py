@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.orchestrator.drive.progress import ProgressLine
+from foretwin.orchestrator.drive.progress import ProgressLine, worker_statuses
 from foretwin.orchestrator.rounds.runner import GIVEN_UP_AFTER_S
 from tests.orchestrator.house import House, Worker
 
@@ -64,7 +64,7 @@ def test_the_jobs_of_a_sick_worker_are_done_by_the_other_and_it_is_shown(house: 
     assert told == "w0 is sick, it refuses jobs: no disk; others are asked"
     line = ProgressLine(house.conductor, house.mission)
     assert "workers 2/2 (w0 sick)" in line._text(line._progress(0.0))
-    assert [one.state for one in line._workers(0)] == ["sick", "idle"]
+    assert [one.state for one in worker_statuses(house.conductor, 0)] == ["sick", "idle"]
 
 
 def test_a_round_that_no_worker_which_is_up_will_do_ends_when_the_next_is_due(house: House) -> None:
