@@ -7,15 +7,18 @@ from typing import Annotated
 
 import typer
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 
 
 def sweep(
-    spec: Annotated[
-        Path,
+    specs: Annotated[
+        list[Path],
         typer.Argument(
-            help="what to sweep over, TOML; its table of parameters lists "
-            + ", ".join(f"{name} ({row.range})" for name, row in FUTURE_NUMBERS.items())
+            metavar="SPEC",
+            help="what to sweep over, TOML (with --merge the folders of shards); its table of "
+            "parameters lists "
+            + ", ".join(f"{name} ({row.range})" for name, row in FUTURE_NUMBERS.items()),
         ),
     ],
     out: Annotated[
@@ -34,10 +37,31 @@ def sweep(
         bool, typer.Option("--fresh", help="start anew, not where it stopped")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="only one of N parts, I from 0 to N - 1"),
+    ] = None,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="put the folders of all shards together into --out")
+    ] = False,
 ) -> None:
     """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
+    from foretwin.orchestrator.commands.sweep import merge_shards
     from foretwin.orchestrator.commands.sweep import sweep as run_sweep
     from foretwin.orchestrator.sweep.engines import Engine
 
-    played_by = Engine(engine, workers, address)
-    raise typer.Exit(run_sweep(spec, out=out, engine=played_by, fresh=fresh, as_json=as_json))
+    if merge:
+        if shard is not None:
+            raise UserError(f"--shard {shard}: goes with a SPEC, not with --merge")
+        raise typer.Exit(merge_shards(specs, out=out, as_json=as_json))
+    if len(specs) != 1:
+        raise UserError("sweep takes one SPEC; --merge takes the folders of shards")
+    code = run_sweep(
+        specs[0],
+        out=out,
+        engine=Engine(engine, workers, address),
+        fresh=fresh,
+        as_json=as_json,
+        shard=shard,
+    )
+    raise typer.Exit(code)

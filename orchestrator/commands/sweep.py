@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +29,14 @@ from foretwin.orchestrator.sweep.folder import (
     planner_origins,
 )
 from foretwin.orchestrator.sweep.jobs import JobMaker, place_request
+from foretwin.orchestrator.sweep.merge import merge
 from foretwin.orchestrator.sweep.places import PlacedWorlds, are_kept, keep_places
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.play import jobs_left, play
 from foretwin.orchestrator.sweep.rows import Parts
+from foretwin.orchestrator.sweep.shard import WHOLE, Shard
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
-from foretwin.orchestrator.sweep.summary import Summary, print_summary
+from foretwin.orchestrator.sweep.summary import print_summary, summed
 from foretwin.orchestrator.sweep.worlds import Building, all_there, choose_worlds, source_digest
 from foretwin.sim_worker.road_users.likeness import likenesses
 
@@ -49,21 +50,24 @@ def sweep(
     engine: Engine = LOCAL,
     fresh: bool = False,
     as_json: bool = False,
+    shard: str | None = None,
 ) -> int:
-    """Run a sweep, or go on with it; returns 0, or 3 where futures failed, where none was played,
-    or where no worker can be started.
+    """Run a sweep or one `shard` of it, or go on with it; returns 0, or 3 where futures failed,
+    where none was played, or where no worker can be started.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
     """
     engine.check()
+    part = WHOLE if shard is None else Shard.named(shard)
     loaded = load_spec(spec)
-    out = out or Path("sweeps") / spec.stem
+    of_shard = "" if part == WHOLE else f"-{part.number}-of-{part.of}"
+    out = out or Path("sweeps") / f"{spec.stem}{of_shard}"
     if not out.is_file() and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     new = not out.exists()
     try:
         with named_in_errors(f"--out {out}"), workers_for(loaded, out, engine) as runner:
-            summary = run_sweep(loaded, out, runner, fresh=fresh)
+            summary = run_sweep(loaded, out, runner, fresh=fresh, shard=part)
     except OSError:
         if new and not (out / SUMMARY).is_file():  # else it goes on from there
             shutil.rmtree(out, ignore_errors=True)
@@ -71,19 +75,38 @@ def sweep(
     except NoWorkerError as error:
         say(f"foretwin: {error}; what is done is kept", error=True)
         return SOME_FAILED
+    return _told(out, summary, as_json=as_json)
+
+
+def merge_shards(folders: Sequence[Path], *, out: Path | None, as_json: bool = False) -> int:
+    """Put the shards of a sweep together; returns what one sweep would have returned.
+
+    Raises UserError, in one line, where they do not come to one sweep.
+    """
+    if out is None or not folders:
+        raise UserError("--merge takes the folders of all shards, and --out FOLDER for the whole")
+    with named_in_errors(f"--out {out}"):
+        return _told(out, merge(folders, out), as_json=as_json)
+
+
+def _told(out: Path, summary: dict[str, Any], *, as_json: bool) -> int:
+    """Print a summary; returns the exit code that it comes to."""
     if as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
         print_summary(out, summary)
-    failed = summary["failed"] or summary["failures"] or not summary["placed"]
-    return SOME_FAILED if failed else 0
+    nothing = not summary["placed"] and (summary["jobs"] or "shard" not in summary)
+    return SOME_FAILED if summary["failed"] or summary["failures"] or nothing else 0
 
 
-def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False) -> dict[str, Any]:
-    """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
+def run_sweep(
+    loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False, shard: Shard = WHOLE
+) -> dict[str, Any]:
+    """Play what is not yet played of a sweep or one of its shards, and return its summary as
+    `sweep.json` has it."""
     fingerprint = fingerprint_of(loaded, source_digest(loaded.spec))
     chosen = functools.cache(lambda: choose_worlds(loaded.spec))
-    sweep_folder = SweepFolder(out, fingerprint, fresh=fresh)
+    sweep_folder = SweepFolder(out, fingerprint, fresh=fresh, shard=shard)
     if sweep_folder.is_new() or fresh:
         chosen()  # what is wrong with them is told before anything is written
     with sweep_folder as folder:
@@ -94,13 +117,13 @@ def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False)
         keep_vehicles(folder.path, loaded.vehicles.values())
         with Parts(folder.path, jobs=plan.jobs, attribution=plan.attribution) as parts:
             maker = JobMaker(loaded)
-            left = jobs_left(plan, maker, parts)
+            left = jobs_left(plan, maker, parts, shard)
             started_s, before = time.monotonic(), jobs_ledger(runner.count)
             play(plan, left, maker, parts, runner, progress_bar)
             playing_s = round(time.monotonic() - started_s, 3)
             ledger = {"jobs": jobs_ledger(runner.count).since(before)}
             now = {"jobs_played": sum(left), "playing_s": playing_s, "ledger": ledger}
-            return folder.summarise(_summary(loaded, plan, worlds, found, parts) | now)
+            return folder.summarise(_summary(loaded, plan, worlds, found, parts, shard) | now)
 
 
 def _find_places(
@@ -136,13 +159,13 @@ def _find_places(
 
 
 def _summary(
-    loaded: Loaded, plan: SweepPlan, worlds: PlacedWorlds, found: FoundPlaces, parts: Parts
+    loaded: Loaded,
+    plan: SweepPlan,
+    worlds: PlacedWorlds,
+    found: FoundPlaces,
+    parts: Parts,
+    shard: Shard,
 ) -> dict[str, Any]:
-    digest, counted = hashlib.sha256(), Summary(loaded.spec)
-    for entry in parts.entries():
-        digest.update(bytes.fromhex(entry.rows_sha256))
-        for count in entry.counts:
-            counted.add(count)
     unplaced = [one for world in worlds for one in world.unplaced]
     placed = {one.scenario_id for world in worlds for one in world.placed}
     return {
@@ -150,10 +173,10 @@ def _summary(
         "spec": loaded.spec,
         "planners": planner_origins(loaded),
         "worlds": len(found.worlds),
-        "jobs": plan.jobs,
-        **counted.totals(),
-        "rows_sha256": digest.hexdigest(),
-        "scenarios": counted.table(),
+        "places_sha256": worlds.sha256,
+        "jobs": len(shard.numbers(plan.jobs)),
+        "jobs_of_all": plan.jobs,
+        **summed(loaded.spec, parts.entries()),
         "road_users": [msgspec.to_builtins(row) for row in likenesses()],
         "unplaced": [one for one in unplaced if one.applies],
         "placed_nowhere": sorted({one.id for one in loaded.scenarios} - placed),

@@ -13,13 +13,14 @@ import msgspec
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.setup import STACK_LOGS
-from foretwin.contracts.versions import versions
+from foretwin.contracts.versions import processor, versions
 from foretwin.orchestrator.record.run_folder import METRICS_FILE, REPEATED, SWEPT_TABLES, VEHICLES
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from foretwin.orchestrator.sweep.manifest import MANIFEST
 from foretwin.orchestrator.sweep.places import PLACES
 from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
+from foretwin.orchestrator.sweep.shard import WHOLE, Shard
 from foretwin.orchestrator.sweep.spec import Loaded
 from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
 from foretwin.sim_worker.planners.registry import planner_origin
@@ -44,8 +45,8 @@ class SweepFolder:
     Entering raises UserError where it holds something else or another process sweeps there.
     """
 
-    def __init__(self, path: Path, fingerprint: str, *, fresh: bool) -> None:
-        self.path, self.fingerprint = path, fingerprint
+    def __init__(self, path: Path, fingerprint: str, *, fresh: bool, shard: Shard = WHOLE) -> None:
+        self.path, self.fingerprint, self._shard = path, fingerprint, shard
         self._fresh = fresh
         self._held = ExitStack()
 
@@ -91,13 +92,20 @@ class SweepFolder:
         if not summary.is_file():
             return
         try:
-            known = msgspec.json.decode(summary.read_bytes()).get("fingerprint")
+            said = msgspec.json.decode(summary.read_bytes())
+            known, shard = said.get("fingerprint"), said.get("shard", "")
         except (msgspec.DecodeError, AttributeError) as error:
             raise UserError(f"{summary}: is no summary of a sweep: {error}") from error
         if known != self.fingerprint:
             raise UserError(
                 f"--out {self.path}: holds a sweep of another spec, map, planner or version; "
                 "--fresh starts anew, another --out keeps both"
+            )
+        if shard != self._of_shard().get("shard", ""):
+            holds = f"shard {shard}" if shard else "the whole"
+            raise UserError(
+                f"--out {self.path}: holds {holds} of this sweep; each shard, and the whole, has "
+                "a folder of its own"
             )
 
     def begin(self, loaded: Loaded) -> None:
@@ -111,7 +119,9 @@ class SweepFolder:
         """Write the summary; returns the whole of it."""
         whole = {
             "fingerprint": self.fingerprint,
+            **self._of_shard(),
             "versions": versions(),
+            "processor": processor(),
             **what,
         }
         self._write(SUMMARY, msgspec.json.format(msgspec.json.encode(whole), indent=2) + b"\n")
@@ -122,6 +132,9 @@ class SweepFolder:
         places = FoundPlaces(fingerprint=self.fingerprint, worlds=worlds, failures=failures)
         self._write(PLAN, encode(places))
         return places
+
+    def _of_shard(self) -> dict[str, str]:
+        return {} if self._shard == WHOLE else {"shard": str(self._shard)}
 
     def _write(self, name: str, data: bytes) -> None:
         """Write a file that is whole or not there."""

@@ -11,6 +11,7 @@ from foretwin.contracts.runner import Answer, JobRequest, Runner, Task, answers,
 from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.rows import Due, Parts, fault_in
+from foretwin.orchestrator.sweep.shard import Shard
 from foretwin.sim_worker.futures.finished_part import finished_part
 
 Progress = Callable[
@@ -20,10 +21,11 @@ Progress = Callable[
 so many, and what is called second says a line."""
 
 
-def jobs_left(plan: SweepPlan, maker: JobMaker, parts: Parts) -> bytearray:
-    """Return for each job whether it is left to be played, 1 or 0."""
-    left = bytearray(b"\1") * plan.jobs
-    for one in plan.planned(parts.lists):
+def jobs_left(plan: SweepPlan, maker: JobMaker, parts: Parts, shard: Shard) -> bytearray:
+    """Return for each job whether it is left to be played by a shard, 1 or 0."""
+    numbers, left = shard.numbers(plan.jobs), bytearray(plan.jobs)
+    left[numbers.start : numbers.stop] = b"\1" * len(numbers)
+    for one in plan.planned(lambda number: number in numbers and parts.lists(number)):
         left[one.number] = not parts.hold(one.number, job_bytes(maker.job(one)).sha256)
     return left
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -64,8 +65,14 @@ class Parts:
             )
         )
 
+    def adopt(self, entry: PartEntry, files: Mapping[str, Path]) -> None:
+        """Keep the part of a job from files of another folder; raises OSError as `write` does."""
+        for table, file in files.items():
+            link_whole(file, self._part(table, entry.job))
+        self._manifest.add(entry)
+
     def _part(self, table: str, job: int) -> Path:
-        return self._folder / SWEPT_TABLES[table] / f"job-{job:06d}.parquet"
+        return part_file(self._folder, table, job)
 
     def _remove_strangers(self) -> None:
         """Remove what was never whole, and parts of jobs of another, longer plan."""
@@ -86,7 +93,7 @@ class Parts:
         if entry is None or entry.job_sha256 != job_sha256 or entry.given_up:
             return False
         try:
-            found = {name: _sha256(self._part(name, number).read_bytes()) for name in SWEPT_TABLES}
+            found = {name: sha256_of(self._part(name, number)) for name in SWEPT_TABLES}
         except OSError:
             return False
         return found == entry.tables
@@ -94,6 +101,29 @@ class Parts:
     def entries(self) -> Iterator[PartEntry]:
         """Yield what is listed, in the order of the plan."""
         return self._manifest.entries()
+
+
+def part_file(folder: Path, table: str, job: int) -> Path:
+    """Return where a sweep's folder has the part of a job."""
+    return folder / SWEPT_TABLES[table] / f"job-{job:06d}.parquet"
+
+
+def sha256_of(file: Path) -> str:
+    """Return the hash of a file; raises OSError."""
+    return _sha256(file.read_bytes())
+
+
+def link_whole(file: Path, to: Path) -> None:
+    """Let a file be at another place too: the same one, or where that is on another disk a copy,
+    whole or not there. Raises OSError."""
+    if to.exists() and to.samefile(file):
+        return  # and POSIX would leave both names of one file where one is to replace the other
+    with partial_file(to, ending=WRITING) as partial:
+        partial.unlink(missing_ok=True)
+        try:
+            os.link(file, partial)
+        except OSError:
+            shutil.copyfile(file, partial)
 
 
 class Due(NamedTuple):

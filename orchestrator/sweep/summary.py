@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import collections
+import hashlib
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.parts import CaseCount
 from foretwin.contracts.running import RunningQuantiles
 from foretwin.contracts.terminal import console, plain, say, words
+from foretwin.orchestrator.sweep.manifest import PartEntry
 from foretwin.orchestrator.sweep.spec import SweepSpec
 from foretwin.sim_worker.road_users.likeness import likeness_words
 
@@ -76,6 +79,20 @@ class Summary:
         ]
 
 
+def summed(spec: SweepSpec, entries: Iterable[PartEntry]) -> dict[str, Any]:
+    """Return what the listed parts of a sweep come to, in the order of their jobs."""
+    digest, counted = hashlib.sha256(), Summary(spec)
+    for entry in entries:
+        digest.update(bytes.fromhex(entry.rows_sha256))
+        for count in entry.counts:
+            counted.add(count)
+    return {
+        **counted.totals(),
+        "rows_sha256": digest.hexdigest(),
+        "scenarios": counted.table(),
+    }
+
+
 def _most(reasons: collections.Counter[str]) -> dict[str, int]:
     """Return the three most frequent, whoever counted them first."""
     return dict(sorted(reasons.items(), key=lambda one: (-one[1], one[0]))[:3])
@@ -105,10 +122,11 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     if not shown.is_terminal:
         shown.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
     shown.print(table)
+    shard = f", shard {summary['shard']}" if "shard" in summary else ""
     say(
-        f"{out}: {summary['rows']} rows of {summary['worlds']} Worlds, {summary['jobs_played']} of "
-        f"{summary['jobs']} jobs played now in {summary['playing_s']:.1f} s; "
-        f"{len(summary['unplaced'])} unplaced"
+        f"{out}{shard}: {summary['rows']} rows of {summary['worlds']} Worlds, "
+        f"{summary['jobs_played']} of {summary['jobs']} jobs played now in "
+        f"{summary['playing_s']:.1f} s; {len(summary['unplaced'])} unplaced"
     )
     say(likeness_words())
     if summary["placed_nowhere"]:
