@@ -22,6 +22,7 @@ BENCHMARKS = (
     "closed_loop_20hz",
     "closed_loop_50hz",
     "two_cores",
+    "sweep_two_cores",
     "boxes_200",
     "boxes_1000",
     "full_scene",
