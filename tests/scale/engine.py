@@ -103,11 +103,6 @@ class Thread:
         self._at_work = False
         self.work_s = 0.0
 
-    @property
-    def free(self) -> bool:
-        """Whether it has nothing to do."""
-        return not self._at_work
-
     def do(self, work_s: float, done: Call) -> None:
         """Do so much work after all that was asked before, then call."""
         self._waiting.append((work_s, done))

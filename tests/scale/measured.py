@@ -17,8 +17,8 @@ import pyarrow.parquet as pq
 
 from foretwin.contracts.codec import encode
 from foretwin.contracts.runner import Task
+from foretwin.contracts.versions import processor
 from foretwin.orchestrator.embedded import MAP_FILE
-from foretwin.orchestrator.record.job_tables import processor
 from foretwin.orchestrator.runner.dispatch import Dispatch
 from foretwin.orchestrator.runner.worker_processes import IN_FLIGHT
 from foretwin.orchestrator.worlds.opening import open_map
@@ -80,10 +80,12 @@ class Worlds(msgspec.Struct, frozen=True):
 
 
 class Stored(msgspec.Struct, frozen=True):
-    """Bytes of a sweep's files by future, and of its questions and answers by job of 64."""
+    """Bytes of a sweep's files, and of its questions and answers by job of 64."""
 
+    part_bytes: float
+    """Of the tables of a job, however many futures it has: schemas, statistics, the job."""
     row_bytes: float
-    other_bytes: float
+    """Of each future besides."""
     files_per_job: float
     question_bytes: float
     answer_bytes: float
@@ -172,26 +174,25 @@ def measure_worlds(folder: Path, loaded: Workload) -> Worlds:
     files = list((folder / "built").rglob("*.world"))
     return Worlds(
         build_cpu_s=statistics.mean(taken_s),
-        place_cpu_s=statistics.mean(loaded.place_cpu_s),
+        place_cpu_s=loaded.place_cpu_s,
         compile_cpu_s=0.0,
         file_bytes=statistics.mean(file.stat().st_size for file in files),
     )
 
 
-def measure_stored(workload: Workload, answer_bytes: float) -> Stored:
-    """Weigh the folder of a sweep that was played."""
-    out = workload.played
-    weights = {
-        folder.name: sum(file.stat().st_size for file in folder.rglob("*.parquet"))
-        for folder in out.iterdir()
-        if folder.is_dir()
-    }
-    files = list(out.rglob("job-*.parquet"))
-    rows = [r for p in (out / "jobs").glob("*.parquet") for r in pq.read_table(p).to_pylist()]
+def measure_stored(few: Workload, many: Workload, answer_bytes: float) -> Stored:
+    """Weigh the folders of two sweeps, of as many jobs with few futures and with many."""
+    weights = [
+        sum(file.stat().st_size for file in load.played.rglob("job-*.parquet")) / load.jobs
+        for load in (few, many)
+    ]
+    row_bytes = (weights[1] - weights[0]) / ((many.futures - few.futures) / many.jobs)
+    parts = (many.played / "jobs").glob("*.parquet")
+    rows = [row for part in parts for row in pq.read_table(part).to_pylist()]
     return Stored(
-        row_bytes=weights["rows"] / workload.futures,
-        other_bytes=(weights["jobs"] + weights["road_users"]) / workload.futures,
-        files_per_job=len(files) / workload.jobs,
+        part_bytes=weights[1] - row_bytes * many.futures / many.jobs,
+        row_bytes=row_bytes,
+        files_per_job=len(list(many.played.rglob("job-*.parquet"))) / many.jobs,
         question_bytes=statistics.mean(len(row["job"]) for row in rows),
         answer_bytes=answer_bytes,
     )
@@ -277,6 +278,6 @@ def measure() -> Measured:
             shapes={size: tuple(load.shapes.values()) for size, load in loads.items()},
             dispatched=tuple(measure_dispatch(count) for count in DISPATCH_WORKERS),
             worlds=msgspec.structs.replace(worlds, compile_cpu_s=compiled_s),
-            stored=measure_stored(loads["64"], statistics.mean(answers)),
+            stored=measure_stored(loads["16"], loads["64"], statistics.mean(answers)),
             car=car,
         )

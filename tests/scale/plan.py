@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import msgspec
-
 from tests.scale.car_model import PERIOD_S, CarCosts, CarsModel, Cluster, Rounds
 from tests.scale.fit import fitted_costs
 from tests.scale.measured import FITTED, Measured
@@ -60,7 +58,7 @@ def costs_of(measured: Measured) -> SweepCosts:
     return fitted_costs(measured, [run for pair in FITTED for run in measured.runs_of(*pair)])
 
 
-def throughput(costs: SweepCosts, workers: int, *, ahead: int = 256) -> float:
+def throughput(costs: SweepCosts, workers: int, *, ahead: int | None = None) -> float:
     """Return futures a second of one parent with so many workers on machines of their own."""
     jobs = max(24 * workers, 256)
     shapes = in_worlds(jobs, worlds=-(-jobs // JOBS_PER_WORLD), futures=FUTURES_PER_JOB)
@@ -75,14 +73,6 @@ def throughput(costs: SweepCosts, workers: int, *, ahead: int = 256) -> float:
     return jobs * FUTURES_PER_JOB / model.play(shapes).wall_s
 
 
-def bare_of_rows(costs: SweepCosts) -> SweepCosts:
-    """Return the costs where seats write the rows themselves: the parent is left with what it does
-    for a job, whatever is in it."""
-    return msgspec.structs.replace(
-        costs, future_s=costs.future_s + costs.parent_future_s, parent_future_s=0.0
-    )
-
-
 def sweep_at_scale(measured: Measured, futures: float, prices: Prices) -> SweepAtScale:
     """Return what a sweep costs in jobs of 64, one World for each 64 jobs, all cores busy."""
     costs, stored, worlds = costs_of(measured), measured.stored, measured.worlds
@@ -92,7 +82,7 @@ def sweep_at_scale(measured: Measured, futures: float, prices: Prices) -> SweepA
     job_s *= 1.0 + costs.contention
     job_s += costs.parent_job_s + costs.parent_future_s * FUTURES_PER_JOB
     core_hours = jobs * job_s / 3600.0
-    stored_bytes = futures * (stored.row_bytes + stored.other_bytes)
+    stored_bytes = futures * (stored.row_bytes + stored.part_bytes / FUTURES_PER_JOB)
     files = jobs * stored.files_per_job
     dollars = core_hours * prices.core_hour + stored_bytes / 1e9 * prices.gigabyte_month
     dollars += files / 1e3 * prices.thousand_files

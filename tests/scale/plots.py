@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from foretwin.contracts.runner import AHEAD
 from tests.scale.fit import predictions
 from tests.scale.measured import Measured
 from tests.scale.plan import (
@@ -15,7 +16,6 @@ from tests.scale.plan import (
     FUTURES_PER_JOB,
     SEATS_PER_CAR,
     WORKERS,
-    bare_of_rows,
     car_costs,
     costs_of,
     rounds_of,
@@ -58,9 +58,9 @@ def _parent(axes: Any, measured: Measured) -> None:
     alone = throughput(costs, 1)
     axes.plot(WORKERS, [alone * n for n in WORKERS], color="0.6", ls="--", lw=1, label="ideal")
     now = [throughput(costs, n) for n in WORKERS]
-    axes.plot(WORKERS, now, "o-", ms=4, label="one parent as it is")
-    wide = [throughput(bare_of_rows(costs), n, ahead=4 * n) for n in WORKERS]
-    axes.plot(WORKERS, wide, "s-", ms=4, label="tasks ahead grow with the workers")
+    axes.plot(WORKERS, now, "o-", ms=4, label="one parent")
+    few = [throughput(costs, n, ahead=AHEAD) for n in WORKERS]
+    axes.plot(WORKERS, few, "s-", ms=3, label=f"holding {AHEAD} tasks at most")
     for count in (1, 2):
         runs = measured.runs_of(count, FUTURES_PER_JOB)
         axes.plot([count] * len(runs), [r.futures / r.unhindered_s for r in runs], "kx", ms=6)

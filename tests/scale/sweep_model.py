@@ -81,10 +81,12 @@ class SweepModel:
         cores: int,
         hosts: int = 1,
         others: float = 0.0,
-        ahead: int = AHEAD,
+        ahead: int | None = None,
         local: bool = True,
     ) -> None:
-        self._clock, self._costs, self._ahead = Clock(), costs, ahead
+        self._clock, self._costs = Clock(), costs
+        # As `contracts.runner.answers` has it: twice what can be at workers, where that is more.
+        self._ahead = max(AHEAD, 2 * IN_FLIGHT * workers) if ahead is None else ahead
         made = [
             Host(self._clock, cores, contention=costs.contention, others=others)
             for _ in range(hosts)
