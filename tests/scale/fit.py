@@ -50,14 +50,20 @@ def fitted_costs(measured: Measured, runs: Sequence[SweepRun]) -> SweepCosts:
     """Return the costs by least squares over the jobs, and over the parents, of these runs."""
     slowed = {id(run): 1.0 + measured.contention * neighbour_busy(run) for run in runs}
     jobs = [(job, slowed[id(run)]) for run in runs for job in run.jobs]
-    job_s, future_s, first_s = _least_squares(
-        [(1.0, job.futures, job.compiled) for job, _ in jobs],
-        [job.cpu_s / slow for job, slow in jobs],
+    job_s, future_s, first_s = map(
+        float,
+        _least_squares(
+            [(1.0, job.futures, job.compiled) for job, _ in jobs],
+            [job.cpu_s / slow for job, slow in jobs],
+        ),
     )
     own = [run for run in measured.runs if run in runs or run.vehicles > 1]
-    _, parent_job_s, parent_future_s = _least_squares(
-        [(1.0, len(run.jobs), run.futures) for run in own],
-        [run.parent_cpu_s / (1.0 + measured.contention * neighbour_busy(run)) for run in own],
+    _, parent_job_s, parent_future_s = map(
+        float,
+        _least_squares(
+            [(1.0, len(run.jobs), run.futures) for run in own],
+            [run.parent_cpu_s / (1.0 + measured.contention * neighbour_busy(run)) for run in own],
+        ),
     )
     few, many = measured.dispatched[0], measured.dispatched[-1]
     gaps = [gap for run in runs for worker in run.by_worker().values() for gap in worker.gaps_s]
@@ -74,13 +80,15 @@ def fitted_costs(measured: Measured, runs: Sequence[SweepRun]) -> SweepCosts:
 
 
 def _least_squares(rows: Sequence[tuple[float, ...]], values: Sequence[float]) -> Array:
-    """Return the factors, none below 0, that explain values best by their shares."""
-    # Shares of the values: a job of 16 counts as much as one of 64.
+    """Return the factors, none below 0, that explain values best.
+
+    Not by their shares: a sum of jobs is wanted, and shares make sums too small.
+    """
     each = np.array(values)
-    table = np.array(rows, dtype=float) / each[:, None]
+    table = np.array(rows, dtype=float)
     kept = list(range(table.shape[1]))
     while True:
-        found, *_ = np.linalg.lstsq(table[:, kept], np.ones(len(each)), rcond=None)
+        found, *_ = np.linalg.lstsq(table[:, kept], each, rcond=None)
         if (found >= 0.0).all():
             factors = np.zeros(table.shape[1])
             factors[kept] = found

@@ -78,8 +78,16 @@ class SweepRun(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def unhindered_s(self) -> float:
         """Return that time less what jobs were kept from a processor: by the worker that took
-        longest."""
-        return max(sum(w.busy_s) + sum(w.gaps_s) for w in self.by_worker().values())
+        longest.
+
+        Before its first job a worker starts; how long it was kept from a processor then is not
+        known, and taken to be the share that its jobs were.
+        """
+        share = self.share_of_core
+        return max(
+            sum(worker.busy_s) + share * worker.gaps_s[0] + sum(worker.gaps_s[1:])
+            for worker in self.by_worker().values()
+        )
 
     @property
     def share_of_core(self) -> float:
