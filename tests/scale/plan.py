@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 from tests.scale.car_model import PERIOD_S, CarCosts, CarsModel, Cluster, Rounds
@@ -14,10 +15,10 @@ JOBS_PER_WORLD = 64
 """Of a large sweep: some 4,000 futures at a junction."""
 HOST_CORES = 32
 """Of a machine in a cluster; each core has one seat."""
-WORKERS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
+WORKERS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 CARS = (1, 10, 1000)
-SEATS_PER_CAR = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0)
-_ROUNDS_WANTED = 12_000
+SEATS_PER_CAR = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0)
+_ROUNDS_WANTED = 8_000
 """Of all cars together: so that one late in a hundred is told."""
 
 
@@ -30,6 +31,13 @@ class Prices(NamedTuple):
     gigabyte_out: float = 0.09
 
 
+class Throughput(NamedTuple):
+    """Futures a second of a sweep, and the share of the time in which its parent was busy."""
+
+    futures_per_s: float
+    parent_use: float
+
+
 class SweepAtScale(NamedTuple):
     """A sweep of so many futures, played by shards of a thousand workers at most."""
 
@@ -38,7 +46,8 @@ class SweepAtScale(NamedTuple):
     stored_bytes: float
     files: float
     bus_bytes: float
-    dollars: float
+    dollars: tuple[float, float, float]
+    """For cores, for putting the files, and for keeping them a month."""
 
 
 class CarsAtScale(NamedTuple):
@@ -58,19 +67,20 @@ def costs_of(measured: Measured) -> SweepCosts:
     return fitted_costs(measured, [run for pair in FITTED for run in measured.runs_of(*pair)])
 
 
-def throughput(costs: SweepCosts, workers: int, *, ahead: int | None = None) -> float:
-    """Return futures a second of one parent with so many workers on machines of their own."""
-    jobs = max(24 * workers, 256)
+@functools.cache
+def one_parent(costs: SweepCosts, workers: int) -> Throughput:
+    """Return what one parent gets of so many workers on machines of their own."""
+    jobs = max(12 * workers, 128)
     shapes = in_worlds(jobs, worlds=-(-jobs // JOBS_PER_WORLD), futures=FUTURES_PER_JOB)
     model = SweepModel(
         costs,
         workers=workers,
         cores=min(workers, HOST_CORES),
         hosts=-(-workers // HOST_CORES),
-        ahead=ahead,
         local=False,
     )
-    return jobs * FUTURES_PER_JOB / model.play(shapes).wall_s
+    time = model.play(shapes)
+    return Throughput(jobs * FUTURES_PER_JOB / time.wall_s, time.parent_cpu_s / time.wall_s)
 
 
 def sweep_at_scale(measured: Measured, futures: float, prices: Prices) -> SweepAtScale:
@@ -84,8 +94,11 @@ def sweep_at_scale(measured: Measured, futures: float, prices: Prices) -> SweepA
     core_hours = jobs * job_s / 3600.0
     stored_bytes = futures * (stored.row_bytes + stored.part_bytes / FUTURES_PER_JOB)
     files = jobs * stored.files_per_job
-    dollars = core_hours * prices.core_hour + stored_bytes / 1e9 * prices.gigabyte_month
-    dollars += files / 1e3 * prices.thousand_files
+    dollars = (
+        core_hours * prices.core_hour,
+        files / 1e3 * prices.thousand_files,
+        stored_bytes / 1e9 * prices.gigabyte_month,
+    )
     bus_bytes = jobs * (stored.question_bytes + stored.answer_bytes)
     return SweepAtScale(futures, core_hours, stored_bytes, files, bus_bytes, dollars)
 
@@ -106,9 +119,10 @@ def car_costs(measured: Measured) -> CarCosts:
     )
 
 
+@functools.cache
 def rounds_of(costs: CarCosts, cars: int, seats: int, *, away_s: float = 0.0) -> Rounds:
     """Return the rounds of so many cars on so many seats."""
-    seconds = 5.0 + max(_ROUNDS_WANTED * PERIOD_S / cars, 10.0)
+    seconds = 5.0 + max(_ROUNDS_WANTED * PERIOD_S / cars, 15.0)
     cluster = Cluster(seats, min(seats, HOST_CORES), away_s=away_s)
     return CarsModel(costs, cars, cluster).drive(min(seconds, 600.0))
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
-from foretwin.contracts.runner import AHEAD
 from tests.scale.fit import predictions
 from tests.scale.measured import Measured
 from tests.scale.plan import (
@@ -18,8 +18,8 @@ from tests.scale.plan import (
     WORKERS,
     car_costs,
     costs_of,
+    one_parent,
     rounds_of,
-    throughput,
 )
 
 PICTURE = Path(__file__).parents[2] / "docs" / "scale.png"
@@ -49,18 +49,18 @@ def _held_out(axes: Any, measured: Measured) -> None:
         marks = axes.plot(one.measured_s, one.predicted_s, _MARKS[one.what], ms=5, label=label)
         marks[0].set_alpha(0.8)
     axes.set(xscale="log", yscale="log", xlabel="measured, s", ylabel="predicted, s")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title("Sweeps that were not fitted (band: 15 %)", fontsize=10)
     axes.legend(fontsize=6.5)
 
 
 def _parent(axes: Any, measured: Measured) -> None:
     costs = costs_of(measured)
-    alone = throughput(costs, 1)
+    alone = one_parent(costs, 1).futures_per_s
     axes.plot(WORKERS, [alone * n for n in WORKERS], color="0.6", ls="--", lw=1, label="ideal")
-    now = [throughput(costs, n) for n in WORKERS]
-    axes.plot(WORKERS, now, "o-", ms=4, label="one parent")
-    few = [throughput(costs, n, ahead=AHEAD) for n in WORKERS]
-    axes.plot(WORKERS, few, "s-", ms=3, label=f"holding {AHEAD} tasks at most")
+    found = [one_parent(costs, n).futures_per_s for n in WORKERS]
+    axes.plot(WORKERS, found, "o-", ms=4, label="one parent")
     for count in (1, 2):
         runs = measured.runs_of(count, FUTURES_PER_JOB)
         axes.plot([count] * len(runs), [r.futures / r.unhindered_s for r in runs], "kx", ms=6)
@@ -79,5 +79,6 @@ def _cars(axes: Any, measured: Measured) -> None:
     axes.axhline(1.0, color="0.6", lw=1, ls="--")
     axes.set(xlabel="seats for each car", ylabel="% of rounds late or missed", xlim=(0.0, 1.6))
     axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_ylim(0.0, 100.0)
     axes.set_title("Two rounds a second of 64 futures", fontsize=10)
     axes.legend(fontsize=8)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from foretwin.contracts.runner import AHEAD
 from tests.scale.fit import predictions
 from tests.scale.measured import Measured
 from tests.scale.plan import (
@@ -17,8 +17,8 @@ from tests.scale.plan import (
     Prices,
     cars_at_scale,
     costs_of,
+    one_parent,
     sweep_at_scale,
-    throughput,
 )
 from tests.scale.sweep_runs import PARTS, SweepRun
 
@@ -120,26 +120,20 @@ def speed_up(measured: Measured) -> str:
 
 
 def workers(measured: Measured) -> str:
-    """Return what one parent gets out of so many workers, and what fewer tasks ahead would."""
+    """Return what one parent gets out of so many workers."""
     costs = costs_of(measured)
-    alone = throughput(costs, 1)
-    rows = []
-    for count in WORKERS:
-        now, few = throughput(costs, count), throughput(costs, count, ahead=AHEAD)
-        rows.append(
-            (
-                f"{count}",
-                f"{now:,.0f}",
-                f"{now / alone / count:.0%}",
-                f"{few:,.0f}",
-                f"{few / alone / count:.0%}",
-            )
+    alone = one_parent(costs, 1).futures_per_s
+    found = {count: one_parent(costs, count) for count in WORKERS}
+    rows = [
+        (
+            f"{count}",
+            f"{one.futures_per_s:,.0f}",
+            f"{one.futures_per_s / alone / count:.0%}",
+            f"{one.parent_use:.0%}",
         )
-    head = (
-        "workers", "futures/s, tasks ahead grow with the workers", "of ideal",
-        f"futures/s, {AHEAD} tasks ahead", "of ideal",
-    )  # fmt: skip
-    return table(head, rows)
+        for count, one in found.items()
+    ]
+    return table(("workers", "futures/s", "of ideal", "parent's use"), rows)
 
 
 def sweeps(measured: Measured) -> str:
@@ -149,18 +143,18 @@ def sweeps(measured: Measured) -> str:
         one = sweep_at_scale(measured, futures, Prices())
         rows.append(
             (
-                f"{futures:.0e}".replace("e+0", " · 10^").replace("1 · ", ""),
-                f"{one.core_hours:,.0f}",
-                f"{one.core_hours / 1000:,.2f} h",
+                f"10^{math.log10(futures):.0f}",
+                f"{one.core_hours:,.2f}",
+                f"{3.6 * one.core_hours:,.0f} s",
                 f"{one.stored_bytes / 1e9:,.1f} GB",
                 f"{one.files:,.0f}",
                 f"{one.bus_bytes / 1e9:,.1f} GB",
-                f"{one.dollars:,.0f}",
+                " + ".join(f"{part:,.2f}" for part in one.dollars),
             )
         )
     head = (
         "futures", "core-hours", "on 1,000 cores", "Parquet", "files", "over the bus",
-        "US$, with a month of storage",
+        "US$: cores + putting files + a month",
     )  # fmt: skip
     return table(head, rows)
 
@@ -201,9 +195,9 @@ TABLES = {
 def written_into(page: str, measured: Measured, names: Iterable[str] = TABLES) -> str:
     """Return the page with its tables made anew; raises ValueError where one has no place."""
     for name in names:
-        place = re.compile(rf"(<!-- table {name} -->\n).*?(\n<!-- end -->)", re.DOTALL)
+        place = re.compile(rf"(<!-- table {name} -->\n).*?(<!-- end -->)", re.DOTALL)
         text = TABLES[name](measured)
-        page, found = place.subn(lambda match, text=text: match[1] + text + match[2], page)  # type: ignore[misc]
+        page, found = place.subn(lambda match, text=text: f"{match[1]}{text}\n{match[2]}", page)  # type: ignore[misc]
         if found != 1:
             raise ValueError(f"{DOC}: table {name} has {found} places, not one")
     return page

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.scale.__main__ import kept, main
-from tests.scale.plan import Prices, cars_at_scale, sweep_at_scale, throughput
+from tests.scale.plan import Prices, cars_at_scale, one_parent, sweep_at_scale
 from tests.scale.tables import DOC, TABLES, table, written_into
 from tests.scale.test_fit import COSTS, all_runs, measured
 
@@ -43,7 +43,7 @@ def test_a_sweep_costs_its_jobs_and_keeps_its_rows() -> None:
     assert million.core_hours == pytest.approx(jobs * job_s / 3600.0, rel=0.01)
     assert million.stored_bytes == pytest.approx(1e6 * 800.0)
     assert million.files == pytest.approx(3 * jobs)
-    dollars = 0.0408 * million.core_hours + 0.8 * 0.023 + 3 * jobs / 1e3 * 0.005
+    dollars = 0.0408 * million.core_hours, 3 * jobs / 1e3 * 0.005, 0.8 * 0.023
     assert million.dollars == pytest.approx(dollars)
     milliard = sweep_at_scale(told, 1e9, Prices())
     assert milliard.core_hours == pytest.approx(1e3 * million.core_hours)
@@ -51,8 +51,11 @@ def test_a_sweep_costs_its_jobs_and_keeps_its_rows() -> None:
 
 def test_one_parent_gets_no_more_than_it_can_work_on() -> None:
     job_s = COSTS.parent_job_s + 64 * COSTS.parent_future_s
-    assert throughput(COSTS, 128) == pytest.approx(64 / job_s, rel=0.1)
-    assert throughput(COSTS, 4) == pytest.approx(4 * throughput(COSTS, 1), rel=0.15)
+    many = one_parent(COSTS, 128)
+    assert many.futures_per_s == pytest.approx(64 / job_s, rel=0.1)
+    assert many.parent_use > 0.9
+    few = 4.0 * one_parent(COSTS, 1).futures_per_s
+    assert one_parent(COSTS, 4).futures_per_s == pytest.approx(few, rel=0.15)
 
 
 def test_ten_cars_need_fewer_seats_each_than_one() -> None:
