@@ -32,6 +32,8 @@ def places_in(world: World, request: PlaceRequest, vehicle: VehicleParameters) -
     placed, unplaced = [], []
     ways: dict[str, PathAhead] = {}
     for scenario in request.scenarios:
+        if scenario.id == AS_RECORDED:
+            continue  # Nobody was recorded to begin in this World.
         found = places(scenario, world, scenes=scenes, stage=stage, most=request.most)
         for here in found.places:
             ego = here.ego

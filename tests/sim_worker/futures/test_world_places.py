@@ -75,3 +75,11 @@ def test_around_a_recorded_car_what_fits_its_way_is_numbered() -> None:
     assert (same.place, same.ego, same.start) == ("round 7", "round 7", 3)
     (why,) = found.unplaced
     assert why.reason == "round 7: does not apply on the recorded way"
+
+
+def test_where_no_recorded_car_began_nothing_is_as_recorded() -> None:
+    scenario = catalogue()["scp"]
+    as_it_was = type(scenario)(id=AS_RECORDED, title="as it was", shows="it", source="here")
+    asked = PlaceRequest(world_id=WORLD.id, scenarios=(as_it_was,), vehicle="", most=1)
+    found = places_in(WORLD, asked, CAR)
+    assert (found.placed, found.unplaced) == ((), ())
