@@ -112,7 +112,7 @@ class FuturesWorker:
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
         self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
-        self._stacks = {
+        self.stacks = {
             name: StackPlanner(
                 name,
                 stack,
@@ -202,14 +202,14 @@ class FuturesWorker:
                     prepared.stage,
                     worker_id=self._id,
                     scenes=prepared.scenes,
-                    stacks=self._stacks,
+                    stacks=self.stacks,
                 )
             except PlayAgain as lost:
                 log.warning("job %s is played again: %s", job.job_index, lost)
 
     def close(self) -> None:
         """End the driving stacks that it has started."""
-        for stack in self._stacks.values():
+        for stack in self.stacks.values():
             stack.close()
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:

@@ -15,14 +15,14 @@ import pytest
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import ControlCommand
-from foretwin.contracts.futures import Job
+from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.parts import JobCells
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.runner import job_task
-from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
+from foretwin.contracts.setup import BusSetup, StackSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import (
     ActiveWorld,
     MirrorSample,
@@ -37,6 +37,8 @@ from foretwin.sim_worker.futures.finished_part import finished_part
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
+from foretwin.sim_worker.planners.registry import load_planner
+from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import FuturesWorker, SimulationCache, serve_futures
 from foretwin.sim_worker.world_file import WorldFolder, load_world
@@ -46,6 +48,7 @@ from tests.sim_worker.driving import altered
 from tests.sim_worker.futures.cells import cells_for
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 from tests.starvation import unhindered_wait_s
+from tests.system.foretwin_command import REPOSITORY, is_running, wait_for
 
 COVERS = ("foretwin.sim_worker.world_file",)
 
@@ -103,6 +106,38 @@ def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
     assert result.worker_id == "w0"
     here = run_job(question, BatchSimulation(crossroads(), CAR, nsim=32))
     assert result_digest(result) == result_digest(here)
+
+
+@pytest.mark.parametrize("lossless", [True, False])
+def test_in_lock_step_a_driving_stack_is_waited_for(folder: Path, lossless: bool) -> None:
+    bus, setup = MemoryBus(), _setup(folder)
+    setup = msgspec.structs.replace(
+        setup,
+        planners=("remote",),
+        bus=msgspec.structs.replace(setup.bus, lossless=lossless),
+    )
+    life = ProcessLife(setup, bus)
+    bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+    load_planner.cache_clear()
+    serve_futures(setup, bus, life)
+    remote = load_planner("remote")
+    load_planner.cache_clear()
+    assert isinstance(remote, RemotePlanner)
+    assert remote.lock_step == lossless
+
+
+def test_a_worker_ends_the_stacks_that_it_started(folder: Path) -> None:
+    command = (sys.executable, "-m", "tests.sim_worker.planners.a_stack", "straight")
+    stack = StackSetup(command=command, folder=str(REPOSITORY), start_within_s=DEADLINE_S)
+    setup = msgspec.structs.replace(_setup(folder), stacks=(("mine", stack),))
+    worker = FuturesWorker(setup)
+    question = job((Future(index=0, name="f", planner="mine"),), horizon_s=1.0)
+    result = worker.answer("job", request(question)).result
+    assert result.outcome.failures == ()
+    pids = worker.stacks["mine"].processes.pids
+    assert all(map(is_running, pids))
+    worker.close()
+    wait_for(lambda: not any(map(is_running, pids)), "the end of the stack")
 
 
 def test_a_part_is_what_the_result_comes_to_and_the_job_is_the_same(served: MemoryBus) -> None:

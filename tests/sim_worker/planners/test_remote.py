@@ -194,6 +194,39 @@ def test_an_answer_to_an_older_question_does_not_count() -> None:
     assert "no answer within 0.3 s" in driver.remarks[0]
 
 
+def test_in_lock_step_an_answer_is_waited_for_however_long_it_takes() -> None:
+    bus = MemoryBus()
+
+    def slow(scene: PlannerScene) -> PlannedMotions:
+        time.sleep(0.1)
+        return eastwards(scene)
+
+    planner = RemotePlanner(first_answer_s=0.02, answer_s=0.02, alive_s=DEADLINE_S)
+    planner.connect(bus, **IDS, lock_step=True)
+    kept = _Kept(planner)
+    with stack(bus, slow):
+        drive(kept, straight(), at_rest_on(straight(), 5.0, 4.0), vehicle=VEHICLE, seconds=0.5)
+    assert kept.drivers[0].remarks == {}
+
+
+def test_in_lock_step_who_is_not_there_is_waited_for_once_until_it_comes() -> None:
+    bus = MemoryBus()
+    planner = RemotePlanner(first_answer_s=0.02, answer_s=0.01, alive_s=0.3)
+    planner.connect(bus, **IDS, lock_step=True)
+    view = view_of(straight(), at_rest_on(straight(), 5.0, 4.0), VEHICLE)
+    nobody, still_nobody = planner.begin(1), planner.begin(1)
+    nobody.plan(view)
+    still_nobody.plan(view)
+    assert "no answer within 0.3 s" in nobody.remarks[0]
+    assert "no answer within 0.02 s" in still_nobody.remarks[0]
+    planner.first_answer_s = DEADLINE_S
+    with stack(bus, eastwards):
+        back = planner.begin(1)
+        back.plan(view)
+    assert back.remarks == {}
+    assert planner.within_s(first=False) == 0.3
+
+
 def test_without_a_bus_it_says_so() -> None:
     view = view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE)
     with pytest.raises(ValueError, match="'remote' asks over the bus of a run; there is none here"):
