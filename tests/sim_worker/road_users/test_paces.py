@@ -68,6 +68,16 @@ def test_no_bend_asks_for_more_than_a_driver_gives(
     assert along.max() <= 1.02 * brisk * driver.MAX_ACCEL_MPS2
 
 
+def test_beyond_the_end_of_a_path_the_last_speed_is_kept() -> None:
+    """Behind the hook nobody has 60 m/s before the nodes of the path are over."""
+    paces = alone(HOOK, 60.0)
+    end = paces.time_at(0, np.array(HOOK.arc_m[-1]))
+    before, at_end, later = (paces.at(0, end + late_s) for late_s in (-0.2, 0.0, 4.0))
+    assert at_end.speed_mps > before.speed_mps + 0.1
+    assert later.speed_mps == pytest.approx(at_end.speed_mps, abs=1e-6)
+    assert later.arc_m - at_end.arc_m == pytest.approx(4.0 * at_end.speed_mps, rel=1e-6)
+
+
 @given(arc=st.floats(-200.0, 400.0), speed=st.floats(0.2, 40.0))
 def test_when_somebody_is_somewhere_it_is_there(arc: float, speed: float) -> None:
     paces = Paces([STRAIGHT, HOOK], np.array([1, 0, 1]), np.array([9.0, 5.0, speed]), np.ones(3))
