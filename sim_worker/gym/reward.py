@@ -15,6 +15,11 @@ brakes more than it accelerates: with a dear crash and comfort by the second the
 first, stand before the junction, and find nothing that leads away from there. A crash is no bargain
 for that: it ends the episode, and V with it. Who waits 3 s for a gap loses 1 - g^30 = 26 % of V,
 less than by any crash that is likelier than one in five.
+
+What is wrong long before it ends badly has to be worth less at once. A learner paid by metres and
+crashes alone drives up to who is ahead in a ring, at 0.3 s of distance for seconds, and into it
+where that one brakes; and into bends as fast as it likes. So a metre is worth the less, the shorter
+the distance is that it is driven at, and speed counts up to what a brisk driver has in the bend.
 """
 
 from __future__ import annotations
@@ -36,6 +41,10 @@ COMFORT_SHARE = 0.2
 """So much of a metre's worth discomfort may take: less than all, or standing would be better."""
 COMFORT_ACCEL_MPS2, COMFORT_JERK_MPS3 = 8.5, 14.0
 """So much acceleration, or jerk, takes all of it; half as much takes a quarter."""
+DISTANCE_SHARE = 0.8
+"""So much of a metre's worth it takes to drive it without any distance to who is in the way. A
+crash from behind is met after seconds of driving too close, of which a learner sees nothing that
+was worth less until then."""
 SPEEDING_PER_M = -0.04
 """For each metre that more than 1.1 times the speed aimed at has gained: it is worth no more."""
 COLLISION, OFF_ROAD, RAN_RED, DID_NOT_WAIT, ARRIVED = -0.8, -0.8, -2.0, -0.4, 2.0
@@ -49,11 +58,14 @@ def default_reward(step: StepFacts) -> Array:
     accel = np.hypot(step.accel_mps2, step.lateral_accel_mps2) / COMFORT_ACCEL_MPS2
     discomfort = np.minimum(np.square(accel) + np.square(step.jerk_mps3 / COMFORT_JERK_MPS3), 1.0)
     metres = np.abs(step.speed_mps) * step.dt_s
-    worth = PROGRESS_PER_M * (step.progress_m - COMFORT_SHARE * discomfort * metres)
-    before = np.minimum(step.speed_mps - step.speed_gain_mps, step.target_speed_mps)
-    gain = np.minimum(step.speed_mps, step.target_speed_mps) - before
+    closeness = DISTANCE_SHARE * (1.0 - step.distance_share)
+    lost = 1.0 - (1.0 - COMFORT_SHARE * discomfort) * (1.0 - closeness)
+    worth = PROGRESS_PER_M * (step.progress_m - lost * metres)
+    aimed, speed = step.aimed_speed_mps, step.speed_mps
+    before = np.minimum(speed - step.speed_gain_mps, aimed - step.aimed_gain_mps)
+    gain = np.minimum(speed, aimed) - before
     worth += SPEED_PER_MPS * np.where(step.terminated, 0.0, gain)
-    over = np.maximum(step.speed_mps - 1.1 * step.target_speed_mps, 0.0)
+    over = np.maximum(speed - 1.1 * aimed, 0.0)
     worth += SPEEDING_PER_M * over * step.dt_s
     worth += COLLISION * step.collided + OFF_ROAD * (step.off_road | step.failed)
     worth += RAN_RED * step.ran_red + DID_NOT_WAIT * step.did_not_wait + ARRIVED * step.arrived

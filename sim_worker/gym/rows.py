@@ -9,6 +9,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import touched
 from foretwin.sim_worker.futures.play import Play
@@ -40,10 +41,13 @@ class StepFacts(NamedTuple):
     """What happened to S cars in one step, each (S,): a reward is a function of these.
 
     `progress_m` along the path, `speed_mps` after the step and `speed_gain_mps` in it,
-    `target_speed_mps`, `accel_mps2`, `lateral_accel_mps2` and `jerk_mps3`. `collided` with a road
-    user, building or island; `off_road` with the middle of the car, or far beside the path;
-    `arrived` at the path's end; `ran_red` over a stop line, `did_not_wait` where others have
-    priority and need the ground; `failed` where the physics diverged.
+    `target_speed_mps`, `accel_mps2`, `lateral_accel_mps2` and `jerk_mps3`. `aimed_speed_mps` is the
+    target, or what the bend there lets a brisk driver have, and `aimed_gain_mps` by how much that
+    rose in the step. `distance_share` is how much there was, up to 1, of the distance that a driver
+    keeps to who is in the way. `collided` with a road user, building or island; `off_road` with the
+    middle of the car, or far beside the path; `arrived` at the path's end; `ran_red` over a stop
+    line, `did_not_wait` where others have priority and need the ground; `failed` where the physics
+    diverged.
     """
 
     dt_s: float
@@ -54,6 +58,9 @@ class StepFacts(NamedTuple):
     accel_mps2: Array
     lateral_accel_mps2: Array
     jerk_mps3: Array
+    aimed_speed_mps: Array
+    aimed_gain_mps: Array
+    distance_share: Array
     collided: Flags
     off_road: Flags
     arrived: Flags
@@ -149,6 +156,7 @@ class EpisodeRows:
         place = play.scene.path.locate(after[:, :2], near_arc_m=seen.view.arc_m)
         front = np.column_stack([seen.view.arc_m, place.arc_m]) + play.front_m
         accel = after[:, 7]
+        aimed = _aimed_mps(seen.view, np.column_stack([seen.view.arc_m, place.arc_m]))
         return StepFacts(
             dt_s=dt_s,
             progress_m=place.arc_m - seen.view.arc_m,
@@ -158,6 +166,9 @@ class EpisodeRows:
             accel_mps2=accel.copy(),
             lateral_accel_mps2=after[:, 3] * after[:, 5],
             jerk_mps3=(accel - before[:, 7]) / dt_s,
+            aimed_speed_mps=aimed[:, 1],
+            aimed_gain_mps=aimed[:, 1] - aimed[:, 0],
+            distance_share=_distance_share(seen.view, before[:, 3]),
             collided=self._collided(before, after, users),
             off_road=self._off_road(after, place.offset_m),
             arrived=np.asarray(place.arc_m >= self.episodes.end_arc_m),
@@ -235,6 +246,27 @@ def _playable(pool: JobScene) -> Indices:
         why = why or f"they begin {np.abs(place.offset_m).min():.1f} m beside the path"
         raise UserError(f"none of {len(pool.left_out)} episodes can be played: {why}")
     return np.array(found, dtype=np.intp)
+
+
+def _aimed_mps(view: PlannerView, arc_m: Array) -> Array:
+    """Return (S, N) the target speed, or what a brisk driver has in the bends at places (S, N)."""
+    bend = view.path.speed_profile(
+        lateral_accel_mps2=driver.HEEDLESS_BRISKNESS * driver.LATERAL_ACCEL_MPS2,
+        decel_mps2=driver.HEEDLESS_BRISKNESS * driver.COMFORT_DECEL_MPS2,
+    )
+    return np.minimum(view.target_speed_mps[:, None], view.path.at_nodes(bend, arc_m))
+
+
+def _distance_share(view: PlannerView, speed_mps: Array) -> Array:
+    """Return (S,) the gap ahead as a share, up to 1, of what a driver wants at that speed."""
+    wanted = driver.STANDSTILL_GAP_M + driver.dynamic_gap_m(
+        speed_mps,
+        view.lead_speed_mps,
+        driver.BRISK_TIME_GAP_S,
+        driver.MAX_ACCEL_MPS2,
+        driver.COMFORT_DECEL_MPS2,
+    )
+    return np.clip(view.lead_gap_m / wanted, 0.0, 1.0)
 
 
 def _crossed(line_arc_m: Array | None, front_arc_m: Array) -> Flags:

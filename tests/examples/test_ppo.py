@@ -11,8 +11,8 @@ import pytest
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ppo.py"
 LEARNERS_VENV = "LEARNERS_VENV"
-MOST_COLLIDED = 12.0
-"""Percent: 6 to 9 were measured with three seeds. No more than 5 is wanted, and not reached."""
+MOST_COLLIDED = 5.0
+"""Percent: 0 was measured with seed 1, and no more than 2.3 halfway with the others."""
 
 
 @pytest.mark.judge

@@ -182,6 +182,40 @@ def test_a_reward_can_be_given() -> None:
     assert reward == env.course.rows.stage.states[0, 3]
 
 
+def test_facts_tell_what_bends_allow_and_how_close_the_one_ahead_is() -> None:
+    told: list[StepFacts] = []
+
+    def keep(step: StepFacts) -> Any:
+        told.append(step)
+        return step.speed_mps
+
+    ahead = {"circulating_car.arrives_after_s": -1.5}
+    env = JunctionEnv(
+        ring(), cases=4, reward=keep, control="along_path", early_or_late_s=0.0, values=ahead
+    )
+    seen, _ = env.reset(seed=1)
+    names = env.course.features
+    over = late = False
+    while not over and not late:
+        gap_m, lead_mps = (
+            float(seen[names.index(name)]) * worth
+            for name, worth in (("lead_gap", 60.0), ("lead_speed", 20.0))
+        )
+        seen, _, over, late, _ = env.step(np.array([0.05], np.float32))
+        step = told[-1]
+        speed = float((step.speed_mps - step.speed_gain_mps)[0])
+        wanted_m = 2.0 + max(speed * 1.2 + speed * (speed - lead_mps) / (2.0 * 3.0**0.5), 0.0)
+        share = 1.0 if gap_m >= 60.0 else min(gap_m / wanted_m, 1.0)
+        assert step.distance_share[0] == pytest.approx(share, abs=1e-4)
+
+    assert min(step.distance_share[0] for step in told) < 0.5
+    aimed = np.array([step.aimed_speed_mps[0] for step in told])
+    assert (aimed <= np.array([step.target_speed_mps[0] for step in told])).all()
+    assert aimed.min() < 0.9 * aimed.max()
+    gains = np.array([step.aimed_gain_mps[0] for step in told])
+    assert gains[1:] == pytest.approx(np.diff(aimed), abs=1e-9)
+
+
 def test_options_choose_the_scenario_its_values_and_the_case() -> None:
     env = JunctionEnv(ring(), cases=4)
     world = cross()

@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.sim_worker.driver_model import BRISK_TIME_GAP_S, STANDSTILL_GAP_M
 from foretwin.sim_worker.gym.reward import (
     ARRIVED,
     COLLISION,
     COMFORT_SHARE,
     DID_NOT_WAIT,
+    DISTANCE_SHARE,
     OFF_ROAD,
     PROGRESS_PER_M,
     RAN_RED,
@@ -23,7 +25,7 @@ from foretwin.sim_worker.gym.rows import StepFacts
 
 STEADY = StepFacts(
     0.1,
-    *(np.array([v]) for v in (0.8, 8.0, 0.0, 8.0, 0.0, 0.0, 0.0)),
+    *(np.array([v]) for v in (0.8, 8.0, 0.0, 8.0, 0.0, 0.0, 0.0, 8.0, 0.0, 1.0)),
     *(np.zeros((6, 1), dtype=bool)),
 )
 QUIET = 0.8 * PROGRESS_PER_M
@@ -38,7 +40,8 @@ def worth(**changed: float) -> float:
 def test_steady_driving_pays_metres_and_speed_only_up_to_a_tenth_above_the_target() -> None:
     assert worth() == pytest.approx(QUIET)
     assert worth(speed_mps=8.8) == pytest.approx(QUIET)
-    assert worth(speed_mps=10.8) == pytest.approx(QUIET + 2.0 * 0.1 * SPEEDING_PER_M)
+    over = (10.8 - 1.1 * 8.0) * TICK_S
+    assert worth(speed_mps=10.8) == pytest.approx(QUIET + over * SPEEDING_PER_M)
     # The two metres a second that were too many paid as much as they cost.
     assert worth(speed_mps=10.8, progress_m=1.08) <= worth(progress_m=0.88) + 1e-12
 
@@ -48,6 +51,48 @@ def test_discomfort_takes_a_share_of_the_metres_and_nothing_of_who_stands() -> N
     assert hard == pytest.approx(4.0 * gentle)
     assert worth(jerk_mps3=1e6, accel_mps2=-50.0) == pytest.approx((1.0 - COMFORT_SHARE) * QUIET)
     assert worth(jerk_mps3=1e6, speed_mps=0.0, progress_m=0.0) == 0.0
+
+
+def test_a_metre_driven_without_distance_is_worth_little_and_more_than_none() -> None:
+    assert worth(distance_share=0.0) == pytest.approx((1.0 - DISTANCE_SHARE) * QUIET)
+    assert worth(distance_share=0.5) == pytest.approx((1.0 - DISTANCE_SHARE / 2.0) * QUIET)
+    # Discomfort takes its share of what is left: there is always something left.
+    worst = worth(distance_share=0.0, jerk_mps3=1e6)
+    assert worst == pytest.approx((1.0 - DISTANCE_SHARE) * (1.0 - COMFORT_SHARE) * QUIET)
+    assert worst > 0.0
+    assert worth(distance_share=0.0, speed_mps=0.0, progress_m=0.0) == 0.0
+
+
+def test_who_is_too_close_is_ahead_by_falling_back() -> None:
+    """At 6 m/s, 3 m behind another who is as fast: for the next 3 s, discounted."""
+    wanted_m = STANDSTILL_GAP_M + BRISK_TIME_GAP_S * 6.0
+    steps = np.arange(30)
+    stays = [worth(progress_m=0.6, speed_mps=6.0, distance_share=3.0 / wanted_m)] * len(steps)
+    # It brakes by 1 m/s for as long as it takes, and then accelerates again.
+    speed = np.where(steps < 10, 6.0 - 0.1 * steps, np.minimum(5.0 + 0.1 * (steps - 10), 6.0))
+    gap = 3.0 + np.cumsum(6.0 - speed) * TICK_S
+    falls = [
+        worth(
+            progress_m=v * TICK_S,
+            speed_mps=v,
+            speed_gain_mps=gain,
+            accel_mps2=gain / TICK_S,
+            distance_share=min(d / wanted_m, 1.0),
+        )
+        for v, gain, d in zip(speed, np.diff(speed, prepend=6.0), gap, strict=True)
+    ]
+    discounts = DISCOUNT**steps
+    assert np.array(falls) @ discounts > np.array(stays) @ discounts
+
+
+def test_speed_counts_up_to_what_the_bend_allows_and_too_much_is_lost_as_it_comes() -> None:
+    into = worth(speed_mps=8.0, aimed_speed_mps=6.0, aimed_gain_mps=-0.5, progress_m=0.8)
+    assert into == pytest.approx(
+        QUIET - 0.5 * SPEED_PER_MPS + (8.0 - 6.6) * TICK_S * SPEEDING_PER_M
+    )
+    # Who slows down with the bend loses the same speed, and metres are not spoilt.
+    slows = worth(speed_mps=6.0, speed_gain_mps=-0.5, aimed_speed_mps=6.0, aimed_gain_mps=-0.5)
+    assert slows == pytest.approx(QUIET - 0.5 * SPEED_PER_MPS)
 
 
 def test_events_settle_once_each() -> None:
