@@ -41,6 +41,7 @@ BENCHMARKS = (
     "estimator_bad_network",
     "told_metrics",
     "tuning_cost",
+    "ray_overhead",
     "help_startup",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""

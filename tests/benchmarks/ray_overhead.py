@@ -1,0 +1,145 @@
+"""What a job of 64 futures costs beside its computing, on Ray and, in turn, on worker processes.
+
+Both carry a real job to one worker that computes nothing, and a real finished part back. Needs root
+and RAY_VENV, an environment with foretwin[ray]: Ray gets a network of its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.codec import encode
+from foretwin.contracts.job_identity import job_bytes
+from foretwin.contracts.runner import Runner, Task, answers, job_task
+from foretwin.contracts.setup import ProcessSetup, WorkerSetup
+from foretwin.orchestrator.runner.ray_cluster import ray_cluster
+from foretwin.orchestrator.runner.ray_runner import RayRunner
+from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
+from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
+from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of
+from foretwin.orchestrator.sweep.plan import plan_sweep
+from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, load_spec
+from foretwin.orchestrator.sweep.workers import worker_setup
+from foretwin.sim_worker.seat import SeatSetup
+from tests.benchmarks.canned_worker import ANSWER, answer_here
+from tests.benchmarks.measuring import Measurement, UnavailableError
+from tests.orchestrator.sweeps import alone, places_of, small_sweep
+from tests.system.foretwin_command import REPOSITORY
+from tests.system.ray_nodes import RayNodes
+
+JOBS, REPEATS = 200, 7
+TIMEOUT_S = 60.0
+FULL = """
+worlds = "{worlds}"
+scenarios = ["cpta"]
+planners = ["pure_pursuit_idm"]
+horizon_s = 5.0
+[parameters]
+friction_factor = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]
+target_speed_factor = [0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05]
+"""
+
+
+def measure() -> Measurement:
+    """Return milliseconds a job on Ray, against those on a worker process: medians of blocks."""
+    try:
+        with RayNodes(1) as machine:
+            found = machine.run("-m", "tests.benchmarks.ray_overhead", check=True)
+    except pytest.skip.Exception as missing:
+        raise UnavailableError(str(missing)) from missing
+    ray_ms, zenoh_ms, job_bytes_, answer_bytes = json.loads(found.stdout.splitlines()[-1])
+    return Measurement(
+        float(np.median(ray_ms)),
+        "ms a job of 64 futures",
+        float(np.median(zenoh_ms)),
+        {
+            "fewest_ray": min(ray_ms),
+            "most_ray": max(ray_ms),
+            "fewest_zenoh": min(zenoh_ms),
+            "most_zenoh": max(zenoh_ms),
+            "job_bytes": job_bytes_,
+            "answer_bytes": answer_bytes,
+        },
+    )
+
+
+def taken_ms(runner: Runner, made: list[Task]) -> float:
+    """Return how long a job took from question to answer, of many on their way at once."""
+    start_s = time.perf_counter()
+    for answer in answers(runner, made):
+        assert answer.message is not None, answer.failure
+    return 1e3 * (time.perf_counter() - start_s) / len(made)
+
+
+def jobs_of_64(folder: Path) -> tuple[list[Task], WorkerSetup]:
+    """Return as many jobs as a block has, and put the answer to the first into the folder."""
+    loaded = load_spec(small_sweep(folder, FULL))
+    here = alone(loaded)
+    world_id = next((folder / "drawn").glob("*.world")).stem
+    plan = plan_sweep(loaded, [places_of(here, loaded, world_id)])
+    planned = next(job for job in plan.jobs if len(job.cells) == FUTURES_PER_JOB)
+    job = JobMaker(loaded, plan.worlds).job(planned)
+    cells = cells_of(planned, plan.attribution)
+    numbered = (msgspec.structs.replace(job, job_index=number) for number in range(JOBS))
+    made = [job_task(one, job_bytes(one), cells=cells) for one in numbered]
+    (answer,) = answers(here, made[:1])
+    (folder / ANSWER).write_bytes(encode(answer.message))
+    return made, msgspec.structs.replace(worker_setup(loaded, folder), worlds_dir=str(folder))
+
+
+class _CannedWorkers:
+    def __init__(self, folder: Path) -> None:
+        self._launch = FreshInterpreter(folder, package="tests.benchmarks")
+
+    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
+        return self._launch(module="canned_worker", setup=setup)
+
+
+@contextlib.contextmanager
+def on_ray(folder: Path, setup: WorkerSetup) -> Iterator[Runner]:
+    """Give a runner on a Ray of its own, with one seat that is canned."""
+    seat = SeatSetup(worker=setup, made_of={}, limit_s=TIMEOUT_S)
+    (world,) = (folder / "drawn").glob("*.world")
+    with ray_cluster(seat, address=None, processors=1) as cluster:
+        import ray
+
+        cluster._answer = ray.remote(num_cpus=1)(answer_here)
+        cluster._setup = ray.put(str(folder).encode())
+        yield RayRunner(cluster, world_file=lambda _: world.read_bytes(), task_timeout_s=TIMEOUT_S)
+
+
+def main(folder: Path) -> None:
+    """Print the figures of both, block by block in turn."""
+    made, setup = jobs_of_64(folder)
+    processes = folder / "processes"
+    with (
+        WorkerProcesses(
+            1, setup, task_timeout_s=TIMEOUT_S, folder=processes, launch=_CannedWorkers(processes)
+        ) as zenoh,
+        on_ray(folder, setup) as ray,
+    ):
+        for runner in ray, zenoh:
+            taken_ms(runner, made)  # Until both are there and warm.
+        by_ray, by_zenoh = zip(
+            *((taken_ms(ray, made), taken_ms(zenoh, made)) for _ in range(REPEATS)), strict=True
+        )
+    answer = (folder / ANSWER).stat().st_size
+    print(json.dumps([by_ray, by_zenoh, len(encode(made[0].question)), answer]), flush=True)
+
+
+if __name__ == "__main__":
+    os.environ["PYTHONPATH"] = str(REPOSITORY)
+    with tempfile.TemporaryDirectory() as temporary:
+        main(Path(temporary))
+    sys.exit(0)
