@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
+import math
 import os
 import re
 import signal
@@ -30,7 +31,9 @@ _SEATS_STAY_S = 2.0
 """To ask for the nodes takes a millisecond, and more in a large cluster."""
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _MOST_CHARACTERS = 500
-_QUIET = {
+_NODE_DIGITS = 6
+"""Of a node's id: one that comes back at its address is another one."""
+_SETTINGS = {
     "RAY_USAGE_STATS_ENABLED": "0",
     # An address where no Ray is keeps it for minutes else.
     "RAY_NUM_REDIS_GET_RETRIES": "1",
@@ -44,7 +47,7 @@ class RayCluster:
         self._ray = ray
         self._setup = ray.put(content_bytes(setup))
         self._seats: tuple[str, ...] = ()
-        self._look_again_s = 0.0
+        self._look_again_s, self._lost_s = 0.0, -math.inf
         self._refs: dict[Future[Ended], Any] = {}
         # A node or process that dies costs a life, a mistake of ours none: it is an answer.
         self._answer = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(answer_here)
@@ -54,12 +57,19 @@ class RayCluster:
         now_s = time.monotonic()
         if now_s >= self._look_again_s:
             self._look_again_s = now_s + _SEATS_STAY_S
-            self._seats = self._seats_now()
+            before, self._seats = self._seats, self._seats_now()
+            if set(before) - set(self._seats):
+                self._lost_s = now_s
         return self._seats
+
+    @property
+    def lost_s(self) -> float:
+        """When a node was last found to be gone; see SeatCluster."""
+        return self._lost_s
 
     def _seats_now(self) -> tuple[str, ...]:
         return tuple(
-            f"{node['NodeManagerHostname']}-{number}"
+            f"{node['NodeManagerAddress']} {node['NodeID'][:_NODE_DIGITS]}-{number}"
             for node in self._ray.nodes()
             if node["Alive"]
             for number in range(int(node["Resources"].get("CPU", 0.0)))
@@ -110,7 +120,7 @@ def ray_cluster(
 
     Raises UserError, in one line, without Ray, where none is there, or one of another version.
     """
-    for name, value in _QUIET.items():
+    for name, value in _SETTINGS.items():
         os.environ.setdefault(name, value)
     try:
         import ray

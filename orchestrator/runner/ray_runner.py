@@ -7,11 +7,14 @@ prefers nodes that hold it.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import itertools
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple, Protocol
 
@@ -29,6 +32,9 @@ _ON_A_WORLD = "job", "place"
 _KEPT_WORLDS = 8
 """So many Worlds stay in the object store after the last question about them."""
 _LOOK_S = 1.0
+_AGAIN_S = 5.0
+"""Of a node that is killed Ray knows by then, and plays its tasks again. Of one whose power or link
+is cut it waits for an answer for minutes, though it knows that the node is gone."""
 
 
 class Ended(NamedTuple):
@@ -44,6 +50,10 @@ class SeatCluster(Protocol):
     def seats(self) -> tuple[str, ...]:
         """Return a name for each processor that there is now."""
 
+    @property
+    def lost_s(self) -> float:
+        """When a processor was last found to be gone, by the monotonic clock; -inf: never."""
+
     def put(self, data: bytes) -> Any:
         """Store bytes for whoever is asked; gone with the last reference to what is returned."""
 
@@ -54,8 +64,17 @@ class SeatCluster(Protocol):
         """Let a question that was not begun not be begun any more."""
 
 
-class _AtSeats(NamedTuple):
+@dataclass(slots=True, eq=False)
+class _AtSeats:
+    """A task that was given to the cluster, once or, after a node was lost, twice."""
+
     task: Task
+    since_s: float
+    futures: list[Future[Ended]] = field(default_factory=list)
+
+
+class _EndOfOne(NamedTuple):
+    of: _AtSeats
     future: Future[Ended]
 
 
@@ -79,13 +98,14 @@ class RayRunner:
         self._timeout_s, self._most = task_timeout_s, most
         self._open: dict[str, _AtSeats | None] = {}
         self._waiting: deque[Task] = deque()
-        self._ended: SimpleQueue[_AtSeats] = SimpleQueue()
+        self._ended: SimpleQueue[_EndOfOne] = SimpleQueue()
         self._answers: deque[Answer] = deque()
         self._worlds: OrderedDict[str, Any] = OrderedDict()
         self._asked_of: dict[str, int] = {}
         """How many open questions there are about each World that is stored."""
         self._count = TaskCount()
         self._heard_s = time.monotonic()
+        self._next_look_s = 0.0
 
     @property
     def capacity(self) -> int:
@@ -124,7 +144,8 @@ class RayRunner:
             self._waiting = deque(task for task in self._waiting if task.key != key)
         else:
             self._leave_world(asked.task)
-            self._cluster.forget(asked.future)
+            for future in asked.futures:
+                self._cluster.forget(future)
         self._give_out()
 
     def take(self, timeout_s: float | None = 0.0) -> Answer | None:
@@ -137,35 +158,45 @@ class RayRunner:
             if not self._open:
                 return None
             left_s = _LOOK_S if until_s is None else min(_LOOK_S, until_s - time.monotonic())
-            try:
-                asked = self._ended.get(timeout=max(left_s, 0.0))
-            except Empty:
+            if time.monotonic() >= self._next_look_s:
                 self._look()
+            try:
+                end = self._ended.get(timeout=max(left_s, 0.0))
+            except Empty:
                 if until_s is not None and time.monotonic() >= until_s:
                     return None
             else:
-                self._take_end(asked)
+                self._take_end(end)
         return self._answers.popleft()
 
     def _give_out(self) -> None:
         at_work = len(self._open) - len(self._waiting)
         while self._waiting and (self._most is None or at_work < self._most):
             task = self._waiting.popleft()
+            asked = _AtSeats(task, time.monotonic())
             try:
-                world = self._world_of(task)
+                self._ask(asked)
             except OSError as error:
                 del self._open[task.key]
                 self._count.refused += 1
                 self._answers.append(_given_up(task, one_line(error)))
                 continue
-            question = SeatQuestion(task.channel, task.world_id, encode(task.question))
-            asked = _AtSeats(task, self._cluster.ask(question, world))
             self._open[task.key] = asked
+            self._asked_of[task.world_id] = self._asked_of.get(task.world_id, 0) + 1
             at_work += 1
-            asked.future.add_done_callback(functools.partial(self._note_end, asked))
 
-    def _note_end(self, asked: _AtSeats, _: Future[Ended]) -> None:
-        self._ended.put(asked)  # By a thread of Ray's: the rest is for who takes answers.
+    def _ask(self, asked: _AtSeats) -> None:
+        """Give a task to the cluster; raises OSError where its World cannot be read."""
+        task, world = asked.task, self._world_of(asked.task)
+        question = SeatQuestion(task.channel, task.world_id, encode(task.question))
+        future = self._cluster.ask(question, world)
+        asked.futures.append(future)
+        future.add_done_callback(functools.partial(self._note_end, asked))
+
+    def _note_end(self, asked: _AtSeats, future: Future[Ended]) -> None:
+        self._ended.put(
+            _EndOfOne(asked, future)
+        )  # By a thread of Ray's: the rest is for who takes.
 
     def _world_of(self, task: Task) -> Any | None:
         """Return the World of a task in the object store."""
@@ -175,26 +206,23 @@ class RayRunner:
         if name not in self._worlds:
             self._worlds[name] = self._cluster.put(self._world_file(name))
         self._worlds.move_to_end(name)
-        self._asked_of[name] = self._asked_of.get(name, 0) + 1
         return self._worlds[name]
 
     def _leave_world(self, task: Task) -> None:
-        if task.channel not in _ON_A_WORLD:
-            return
         self._asked_of[task.world_id] -= 1
         idle = [name for name in self._worlds if not self._asked_of.get(name)]
         for name in idle[: max(len(idle) - _KEPT_WORLDS, 0)]:
             del self._worlds[name]
             self._asked_of.pop(name, None)
 
-    def _take_end(self, asked: _AtSeats) -> None:
+    def _take_end(self, end: _EndOfOne) -> None:
         self._heard_s = time.monotonic()
-        task = asked.task
-        if self._open.get(task.key) is not asked:
-            return  # It was cancelled.
+        task = end.of.task
+        if self._open.get(task.key) is not end.of:
+            return  # It was cancelled, or its other half was sooner.
         del self._open[task.key]
         self._leave_world(task)
-        answer, trouble = asked.future.result()
+        answer, trouble = end.future.result()
         if answer is None:
             self._count.lost += 1
             self._answers.append(_given_up(task, trouble))
@@ -229,12 +257,30 @@ class RayRunner:
 
     def _look(self) -> None:
         """See that somebody can still answer: Ray itself waits for ever."""
-        silent_s = time.monotonic() - self._heard_s
+        now_s = time.monotonic()
+        self._next_look_s = now_s + _LOOK_S
+        self._ask_again(now_s)
+        silent_s = now_s - self._heard_s
         if silent_s > self._timeout_s and not self._cluster.seats():
             raise NoWorkerError(f"the Ray cluster has had no processor for {self._timeout_s:g} s")
         most_s = (ATTEMPTS + 1) * self._timeout_s
         if silent_s > most_s:
             raise NoWorkerError(f"no node of the Ray cluster has answered anything in {most_s:g} s")
+
+    def _ask_again(self, now_s: float) -> None:
+        """Ask once more what a node that is gone may have: the eldest, as many as can be in work.
+
+        What is answered twice counts once.
+        """
+        can_be_in_work = self.capacity
+        lost_s = self._cluster.lost_s
+        if now_s - lost_s < _AGAIN_S:
+            return
+        given = (asked for asked in self._open.values() if asked is not None)
+        for asked in itertools.islice(given, can_be_in_work):
+            if asked.since_s < lost_s and len(asked.futures) == 1:
+                with contextlib.suppress(OSError):
+                    self._ask(asked)
 
 
 def _given_up(task: Task, why: str, seat: str = "") -> Answer:

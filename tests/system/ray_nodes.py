@@ -153,6 +153,20 @@ class RayNodes:
             timeout=within_s,
         )
 
+    def alone(
+        self, *command: str, on: int = 0, within_s: float = 240.0
+    ) -> subprocess.CompletedProcess[str]:
+        """Run any command to its end on a node that sees no processes but its own."""
+        return subprocess.run(
+            (*self._within(on, apart=True), *command),
+            env=self.environment(),
+            cwd=REPOSITORY,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=within_s,
+        )
+
 
 def _ip(*arguments: str) -> None:
     subprocess.run(["ip", *arguments], check=True, capture_output=True)

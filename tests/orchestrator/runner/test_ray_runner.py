@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -14,61 +15,13 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.codec import encode
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.runner import Runner, Task, answers
+from foretwin.contracts.runner import answers
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.orchestrator.runner import ray_runner
-from foretwin.orchestrator.runner.ray_runner import Ended, RayRunner
+from foretwin.orchestrator.runner.ray_runner import Ended
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError
-from foretwin.sim_worker.seat import SeatAnswer, SeatQuestion
-
-DONE = encode(PrepareReply(world_id="A", worker_id="w", seconds=0.0))
-
-
-class OneByOne:
-    """A cluster on which a question ends when the test says so."""
-
-    def __init__(self, *seats: str) -> None:
-        self.names = seats or ("n1-0", "n1-1")
-        self.asked: list[tuple[SeatQuestion, Any, Future[Ended]]] = []
-        self.stored: list[bytes] = []
-        self.forgotten = 0
-
-    def seats(self) -> tuple[str, ...]:
-        return self.names
-
-    def put(self, data: bytes) -> Any:
-        self.stored.append(data)
-        return data
-
-    def ask(self, question: SeatQuestion, world: Any | None) -> Future[Ended]:
-        ended: Future[Ended] = Future()
-        self.asked.append((question, world, ended))
-        return ended
-
-    def forget(self, asked: Future[Ended]) -> None:
-        self.forgotten += 1
-
-    def end(self, which: int = 0, **answer: Any) -> None:
-        *_, ended = self.asked.pop(which)
-        ended.set_result(Ended(SeatAnswer("n1-0", **{"data": DONE, **answer})))
-
-    def lose(self, trouble: str) -> None:
-        *_, ended = self.asked.pop(0)
-        ended.set_result(Ended(None, trouble))
-
-
-def task(key: str, world_id: str = "A", channel: str = "prepare") -> Task:
-    return Task(key, channel, world_id, PrepareRequest(world_id=world_id))
-
-
-def on(cluster: OneByOne, *, most: int | None = None, **options: Any) -> RayRunner:
-    options = {"world_file": lambda name: name.encode(), "task_timeout_s": 60.0} | options
-    return RayRunner(cluster, most=most, **options)
-
-
-def counted(runner: Runner) -> tuple[int, int, int, int]:
-    count = runner.count
-    return count.given, count.results, count.refused, count.lost
+from foretwin.sim_worker.seat import SeatQuestion
+from tests.orchestrator.runner.one_by_one import OneByOne, counted, on, task
 
 
 def test_an_answer_is_a_message_and_names_its_seat() -> None:
@@ -218,6 +171,44 @@ def test_who_waits_for_ever_waits_no_longer_than_a_cluster_without_processors_ma
     cluster.names = ("n1-0",)
     with pytest.raises(NoWorkerError, match=r"has answered anything in 0.2 s"):
         runner.take(None)
+
+
+def test_after_a_node_is_gone_the_eldest_are_asked_once_more_and_count_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(ray_runner, "_LOOK_S", 0.0)
+    cluster = OneByOne("n1-0", "n2-0")
+    runner = on(cluster)
+    for key in "abc":
+        runner.submit(task(key, key, "job"))
+    cluster.lost_s = time.monotonic()
+    assert runner.take() is None
+    assert len(cluster.asked) == 3  # Ray may be at it
+    monkeypatch.setattr(ray_runner, "_AGAIN_S", 0.0)
+    runner.submit(task("d"))  # after that
+    for _ in range(2):
+        assert runner.take() is None
+        assert [question.world_id for question, *_ in cluster.asked] == [
+            "a",
+            "b",
+            "c",
+            "A",
+            "a",
+            "b",
+        ]
+    cluster.end(4)
+    cluster.end(0)
+    answer = runner.take()
+    assert answer is not None
+    assert answer.task.key == "a"
+    assert runner.take() is None  # the other answer to it; c is among the eldest now
+    assert [question.world_id for question, *_ in cluster.asked] == ["b", "c", "A", "b", "c"]
+    runner.cancel("b")
+    assert cluster.forgotten == 2
+    for _ in range(4):
+        cluster.end()
+    assert len(list(iter(runner.take, None))) == 2
+    assert counted(runner) == (4, 3, 0, 1)
 
 
 def test_an_answer_wakes_who_waits_for_it() -> None:
