@@ -46,7 +46,8 @@ class KinematicFilter:
         self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
         spread = np.zeros(SIZE)
         spread[: CURVATURE + 1] = 0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05
-        spread[GYRO_BIAS], spread[ACCEL_BIAS] = motion_noise.GYRO_BIAS_STD_RADPS, 0.1
+        spread[GYRO_BIAS] = motion_noise.GYRO_BIAS_STD_RADPS
+        spread[ACCEL_BIAS] = motion_noise.ACCEL_BIAS_STD_MPS2
         self.covariance: Array = np.diag(spread * spread)
         self.may_reverse = speed_mps < 0.0
         self._gnss_std_m = 0.0

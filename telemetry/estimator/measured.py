@@ -122,20 +122,20 @@ class MotionSamples:
 
 
 class Doubt:
-    """The standard deviation to give a sensor that states none: its recent surprises, at least.
+    """What standard deviation to give a sensor that states none: its recent surprises, bounded.
 
     Speeds and courses of a satellite receiver lag behind its positions by up to a second; taken at
     their word they would lead the track away.
     """
 
-    def __init__(self, least: float) -> None:
-        self._least = least
+    def __init__(self, least: float, most: float = math.inf) -> None:
+        self._least, self._most = least, most
         self._mean_square = 0.0
 
     def std(self, surprise: float) -> float:
         """Take the latest surprise and return the standard deviation to use for it."""
         self._mean_square += 0.02 * (surprise * surprise - self._mean_square)
-        return max(self._least, 2.0 * math.sqrt(self._mean_square))
+        return min(max(self._least, 2.0 * math.sqrt(self._mean_square)), self._most)
 
 
 def _fault(message: Any) -> str | None:

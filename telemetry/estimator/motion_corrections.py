@@ -10,6 +10,8 @@ from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, Stee
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.innovations import LINE_95, SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import (
+    ACCEL,
+    ACCEL_BIAS,
     GYRO_BIAS,
     SPEED,
     YAW,
@@ -24,18 +26,23 @@ STANDING_MPS = 0.05
 _STOPPING_MPS, _STOPPING_S, _STOPPING_MPS2 = 1.0, 0.5, 4.0
 """A car that is faster than the first does not stand because wheels say so at once: they must say
 it for the time that braking takes, and half a second more. Chosen."""
+_MOST_SPEED_STD_MPS = 3.0
+"""However much a measured speed surprises: heard less, it could not contradict a filter that forces
+mislead. Chosen: with less, wheels that say nought for half a second stop a car at 9 m/s."""
 
 
 class MotionCorrections:
-    """Gives each kind of sample its weight; speeds and headings lose theirs as they surprise."""
+    """Gives each kind of sample its weight; speeds, headings and forward forces lose theirs as they
+    surprise."""
 
     def __init__(
         self, measured: MotionSamples, surprises: SurpriseCount, *, wheelbase_m: float
     ) -> None:
         self._measured = measured
         self._wheelbase_m = wheelbase_m
-        self._speed_doubt = Doubt(0.05)
+        self._speed_doubt = Doubt(0.05, _MOST_SPEED_STD_MPS)
         self._yaw_doubt = Doubt(0.02)
+        self._accel_doubt = Doubt(0.5)
         self._gyro = Gyro()
         self._stands = False
         self._nought_ns: int | None = None
@@ -50,6 +57,7 @@ class MotionCorrections:
         other._measured = measured
         other._speed_doubt = shallow_copy(self._speed_doubt)
         other._yaw_doubt = shallow_copy(self._yaw_doubt)
+        other._accel_doubt = shallow_copy(self._accel_doubt)
         other._gyro = shallow_copy(self._gyro)
         other._surprises = surprises
         other.mounting = self.mounting.copy()
@@ -98,7 +106,8 @@ class MotionCorrections:
                 square = filter_.correct_yaw_rate(rate[2], self._gyro.std_radps, biased=True)
                 self._surprises.take("imu", square, LINE_95)
                 self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
-                filter_.correct_accel(accel[0], 0.5)
+                expected = filter_.mean.item(ACCEL) + filter_.mean.item(ACCEL_BIAS)
+                filter_.correct_accel(accel[0], self._accel_doubt.std(abs(accel[0] - expected)))
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
                 local_yaw = yaw + convergence_rad
                 surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))

@@ -23,6 +23,9 @@ GYRO_BIAS_STD_RADPS = 0.01
 """Of a gyro that was switched on. Chosen: half a degree per second."""
 GYRO_BIAS_DENSITY = (2e-5) ** 2
 """(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute. Chosen."""
+ACCEL_BIAS_STD_MPS2 = 1.0
+"""Of an accelerometer that was switched on: gravity, where it is mounted 3.5° askew and the road
+rises by 8 % (0.6 and 0.8 m/s²). Chosen."""
 _ACCEL_BIAS_DENSITY = 0.02**2
 """(m/s²)² / s: the grade of the road changes with the place. Chosen."""
 SLIP_RADPMPS2 = (0.004, 0.002)

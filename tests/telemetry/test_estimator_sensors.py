@@ -18,7 +18,6 @@ from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
 COVERS = (
     "foretwin.telemetry.estimator.kinematic_filter",
-    "foretwin.telemetry.estimator.motion_corrections",
     "foretwin.telemetry.estimator.motion_noise",
 )
 
