@@ -242,6 +242,22 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     """What is run of what was asked for where the machine is too slow for all; empty where not."""
     memory_mb: float | None = None
     """Of all processes of the run together."""
+    arrival_early_s: float | None = None
+    """One of ten arrives before; None where that is not known."""
+    arrival_late_s: float | None = None
+    """Nine of ten have arrived; None with `arrival_early_s` known: one of ten may stand before."""
+
+    @property
+    def arrival_text(self) -> str:
+        """When the car will be at the junction ahead, for people."""
+        if self.arrival_in_s is None:
+            return "waiting"
+        text = f"in {self.arrival_in_s:.0f} s"
+        if self.arrival_early_s is None:
+            return text
+        if self.arrival_late_s is None:
+            return f"{text} ({self.arrival_early_s:.0f} s or later)"
+        return f"{text} ({self.arrival_early_s:.0f} to {self.arrival_late_s:.0f} s)"
 
 
 class RunEnd(msgspec.Struct, frozen=True, kw_only=True):

@@ -72,9 +72,8 @@ class RunLog:
         """Return the status line."""
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
-            ahead = f"next **{in_markdown(progress.next_intersection)}**"
-            in_s = progress.arrival_in_s
-            ahead += " waiting" if in_s is None else f" in {in_s:.0f} s"
+            name = in_markdown(progress.next_intersection)
+            ahead = f"next **{name}** {progress.arrival_text}"
         memory = f" · {progress.memory_mb:.0f} MB" if progress.memory_mb is not None else ""
         short = (
             f"**{in_markdown(progress.too_slow)}** (too slow for all) · "

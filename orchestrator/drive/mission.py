@@ -22,6 +22,7 @@ from foretwin.orchestrator.instructions import (
     RoundIntent,
     UseWorld,
 )
+from foretwin.orchestrator.routing.arrival import NextJunction
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_ahead import WayAhead
@@ -135,11 +136,11 @@ class Mission:
         return (self._car.stamp_ns - self.start_stamp_ns) / 1e9
 
     @property
-    def next_junction(self) -> tuple[str, float | None] | None:
-        """Name of the junction ahead and seconds until the car is there, None while it stands."""
+    def next_junction(self) -> NextJunction | None:
+        """The junction ahead, as it is shown."""
         for ahead in self.way.junctions[:1]:
             name = ahead.junction.summary.name or ahead.junction.summary.id
-            return name, self.way.countdown_s
+            return NextJunction(name, self.way.countdown_s, ahead.distance_m)
         return None
 
     @property

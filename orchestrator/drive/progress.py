@@ -15,6 +15,8 @@ from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.rounds.arrival_band import ArrivalBand
+from foretwin.orchestrator.routing.arrival import NextJunction
 
 PERIOD_S = 0.25
 PLAIN_PERIOD_S = 10.0
@@ -89,17 +91,28 @@ class ProgressLine:
             else 0.0
         )
         ahead = mission.next_junction
+        band = self._band(ahead)
         return Progress(
             stamp_ns=conductor.intake.now_stamp_ns,
             drive_time_s=mission.drive_time_s,
             mission_state=mission.state,
-            next_intersection=ahead[0] if ahead else None,
-            arrival_in_s=ahead[1] if ahead else None,
+            next_intersection=ahead.name if ahead else None,
+            arrival_in_s=ahead.in_s if ahead else None,
+            arrival_early_s=band.early_s if band else None,
+            arrival_late_s=band.late_s if band else None,
             futures_per_s=rate,
             dropped=conductor.mailbox.dropped + conductor.tables.dropped,
             too_slow=conductor.rounds.pace.short_of,
             memory_mb=sum(conductor.context.memory.now_mb.values()) or None,
         )
+
+    def _band(self, ahead: NextJunction | None) -> ArrivalBand | None:
+        forecasts = self._conductor.rounds.progress
+        if ahead is None or ahead.in_s is None or forecasts is None:
+            return None
+        usual_mps = self._mission.way.usual_speed_mps
+        band = forecasts.arrival_band(ahead.distance_m, usual_mps=usual_mps)
+        return None if band is None else band.around(ahead.in_s)
 
     @property
     def _open_to_all(self) -> str:
@@ -113,9 +126,7 @@ class ProgressLine:
         sick = " ".join(name for name in dispatch.workers if name in dispatch.sickness.sick)
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
-            in_s = progress.arrival_in_s
-            when = "waiting" if in_s is None else f"in {in_s:.0f} s"
-            ahead = f"{progress.next_intersection} {when}"
+            ahead = f"{progress.next_intersection} {progress.arrival_text}"
         short = f"{progress.too_slow} (machine too slow for all)  " if progress.too_slow else ""
         return (
             f"{self._open_to_all}{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}"

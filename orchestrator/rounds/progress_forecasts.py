@@ -27,14 +27,25 @@ from foretwin.orchestrator.forecast.features import (
     feature_row,
     lead_on,
 )
-from foretwin.orchestrator.forecast.motion_history import MotionHistory
+from foretwin.orchestrator.forecast.motion_history import MotionHistory, MotionMoment
 from foretwin.orchestrator.forecast.own_error import with_own_error
 from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.orchestrator.instructions import RoundIntent
+from foretwin.orchestrator.rounds.arrival_band import ArrivalBand, arrival_band
 from foretwin.orchestrator.rounds.path_from_car import CAR_WITHIN_M
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.futures.likelihood import travelled_m
+
+TOLD_FOR_S = 2.0
+"""An older forecast tells no arrival any more: where no rounds are run nothing is forecast."""
+
+
+class _NewestForecast(NamedTuple):
+    """The newest round's forecast, and the motion that it began with."""
+
+    forecast: ProgressForecast
+    begun: MotionMoment
 
 
 class _Given(NamedTuple):
@@ -66,6 +77,7 @@ class ProgressForecasts:
         self._instants = [k for k, t in enumerate(model.time_s) if t <= horizon_s + 1e-9]
         self.history = MotionHistory()
         self.calibration = Calibration(model.time_s)
+        self._newest: _NewestForecast | None = None
         self._given: dict[int, _Given] = {}
         self._waiting: list[_NotYet] = []
 
@@ -114,7 +126,28 @@ class ProgressForecasts:
         calibrated = self.calibration.calibrated(table)
         given = _Given(table, calibrated, now.stamp_ns, now.travelled_m, now.stretch)
         self._given[round_id] = given
-        return with_own_error(calibrated, state.speed_std_mps or 0.0)
+        told = with_own_error(calibrated, state.speed_std_mps or 0.0)
+        self._newest = _NewestForecast(told, now)
+        return told
+
+    def arrival_band(self, distance_m: float, *, usual_mps: float) -> ArrivalBand | None:
+        """Return between when and when the car, as it is now, will have gone so far.
+
+        `usual_mps` is what the driver usually drives. None where no round of late has a forecast.
+        """
+        now = self.history.now
+        if self._newest is None or now is None or now.stretch != self._newest.begun.stretch:
+            return None
+        forecast, begun = self._newest
+        since_s = (now.stamp_ns - begun.stamp_ns) / 1e9
+        if since_s > TOLD_FOR_S:
+            return None
+        gone_m = now.travelled_m - begun.travelled_m
+        band = arrival_band(forecast, gone_m + distance_m, usual_mps=usual_mps)
+        if band is None:
+            return None
+        late_s = None if band.late_s is None else max(band.late_s - since_s, 0.0)
+        return ArrivalBand(max(band.early_s - since_s, 0.0), late_s)
 
     def take_round(self, done: RoundDone) -> None:
         """Take a complete round: its forecast counts from when its instants have come."""

@@ -127,6 +127,14 @@ class DrivingPace:
         return found
 
 
+class NextJunction(NamedTuple):
+    """What is shown of the junction ahead; `in_s` is None while the car waits."""
+
+    name: str
+    in_s: float | None
+    distance_m: float
+
+
 class Countdown:
     """The seconds until the next junction as they are shown: steady, and none while a car waits."""
 

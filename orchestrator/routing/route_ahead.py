@@ -167,6 +167,11 @@ class WayAhead:
         return self._match.directed_edge.edge.speed_limit_mps.value
 
     @property
+    def usual_speed_mps(self) -> float:
+        """What the driver is taken to drive here where nothing is in the way."""
+        return self._pace.share * self.speed_limit_mps
+
+    @property
     def cruise_speed_mps(self) -> float:
         """The speed that the nominal future aims at."""
         return self._cruise.aim_mps(self.speed_limit_mps)

@@ -14,6 +14,7 @@ from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
 from foretwin.orchestrator.rounds.pace import Pace
+from foretwin.orchestrator.routing.arrival import NextJunction
 from foretwin.telemetry.ros2.mapping import read_mapping
 from tests.orchestrator.house import House
 
@@ -49,7 +50,22 @@ def test_the_next_junction_and_when_the_car_is_there(house: House) -> None:
     assert progress.mission_state == "following"
     assert "Mill Lane" in progress.next_intersection
     assert 5.0 < progress.arrival_in_s < 20.0
+    assert progress.arrival_early_s is None  # nothing is forecast before the first round
     assert progress.dropped == 0
+
+
+def test_with_a_round_it_is_said_between_when_and_when(
+    house: House, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen = watched(house, "progress")
+    house.drive(20, round_every=5)
+    with ProgressLine(house.conductor, house.mission) as line:
+        line.update(line._last_plain_s + 11.0)
+    (progress,) = messages(seen)
+
+    assert progress.arrival_early_s <= progress.arrival_in_s
+    assert progress.arrival_late_s is None or progress.arrival_late_s >= progress.arrival_in_s
+    assert progress.arrival_text in capsys.readouterr().err
 
 
 def test_the_line_is_renewed_a_few_times_a_second_at_most(house: House) -> None:
@@ -146,7 +162,7 @@ def test_a_street_named_like_markup_is_shown_as_it_is_named(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name = "[/a] Lane \x1b[2J"
-    monkeypatch.setattr(type(house.mission), "next_junction", (name, 5.0))
+    monkeypatch.setattr(type(house.mission), "next_junction", NextJunction(name, 5.0, 40.0))
     monkeypatch.setenv("FORCE_COLOR", "1")
     house.drive(5)
     said = io.StringIO()
@@ -171,8 +187,8 @@ def test_before_a_junction_a_standing_car_waits(
         state = msgspec.structs.replace(stood, stamp_ns=stamp_ns)
         house.mission.on_state(state, mono_s=0.0)
     assert house.mission.next_junction is not None
-    assert house.mission.next_junction[1] is None
+    assert house.mission.next_junction.in_s is None
     with ProgressLine(house.conductor, house.mission) as line:
         line.update(line._last_plain_s + 11.0)
 
-    assert f"{house.mission.next_junction[0]} waiting" in capsys.readouterr().err
+    assert f"{house.mission.next_junction.name} waiting" in capsys.readouterr().err

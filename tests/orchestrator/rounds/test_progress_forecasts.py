@@ -191,3 +191,32 @@ def test_a_round_that_completes_after_a_hole_does_not_count() -> None:
     found = drive(forecasts, from_s=10.1, until_s=20.0, rounds=False)
 
     assert [one.round_id for one in found] == [8] * 8
+
+
+def test_an_arrival_is_told_from_where_the_car_is_now() -> None:
+    forecasts = fresh()
+    drive(forecasts, until_s=20.0)
+    then = forecasts.arrival_band(60.0, usual_mps=10.0)
+    forecasts.take_state(state(20.4), START_NS)
+    now = forecasts.arrival_band(56.0, usual_mps=10.0)
+
+    assert then is not None
+    assert now is not None
+    assert then.early_s < 6.0 < (then.late_s or np.inf)
+    assert now.early_s == pytest.approx(then.early_s - 0.4)
+    assert then.late_s is None or now.late_s == pytest.approx(then.late_s - 0.4)
+
+
+def test_without_a_round_of_late_no_arrival_is_told() -> None:
+    forecasts = fresh()
+    assert forecasts.arrival_band(60.0, usual_mps=10.0) is None
+    drive(forecasts, until_s=5.0)
+    drive(forecasts, from_s=5.1, until_s=8.0, rounds=False)
+    assert forecasts.arrival_band(60.0, usual_mps=10.0) is None
+
+
+def test_a_forecast_from_before_a_hole_tells_no_arrival() -> None:
+    forecasts = fresh()
+    drive(forecasts, until_s=5.0)
+    forecasts.take_state(state(4.0), START_NS)  # the clock stepped back
+    assert forecasts.arrival_band(60.0, usual_mps=10.0) is None
