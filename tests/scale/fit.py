@@ -41,28 +41,39 @@ class Prediction(NamedTuple):
         return statistics.median(self.errors)
 
 
-def neighbour_busy(run: SweepRun) -> float:
-    """Return the share of a job's time in which the other core was busy, as far as is known."""
-    return min(run.others_cores + run.workers - 1.0, 1.0)
-
-
 def fitted_costs(measured: Measured, runs: Sequence[SweepRun]) -> SweepCosts:
-    """Return the costs by least squares over the jobs, and over the parents, of these runs."""
-    slowed = {id(run): 1.0 + measured.contention * neighbour_busy(run) for run in runs}
-    jobs = [(job, slowed[id(run)]) for run in runs for job in run.jobs]
+    """Return the costs by least squares: jobs of one worker tell what a job takes, those of several
+    by how much longer it takes beside another.
+
+    Others are at work beside both alike, so what they slow is in all that is measured.
+    """
+    alone = [job for run in runs if run.workers == 1 for job in run.jobs]
     job_s, future_s, first_s = map(
         float,
         _least_squares(
-            [(1.0, job.futures, job.compiled) for job, _ in jobs],
-            [job.cpu_s / slow for job, slow in jobs],
+            [(1.0, job.futures, job.compiled) for job in alone], [job.cpu_s for job in alone]
         ),
     )
+    contention = max(
+        statistics.median(
+            run.jobs_cpu_s
+            / sum(job_s + future_s * job.futures + first_s * job.compiled for job in run.jobs)
+            for run in runs
+            if run.workers > 1
+        )
+        - 1.0,
+        0.0,
+    )
+
+    def slowed(run: SweepRun) -> float:
+        return 1.0 + (contention if run.workers > 1 else 0.0)
+
     own = [run for run in measured.runs if run in runs or run.vehicles > 1]
     _, parent_job_s, parent_future_s = map(
         float,
         _least_squares(
             [(1.0, len(run.jobs), run.futures) for run in own],
-            [run.parent_cpu_s / (1.0 + measured.contention * neighbour_busy(run)) for run in own],
+            [run.parent_cpu_s / slowed(run) for run in own],
         ),
     )
     few, many = measured.dispatched[0], measured.dispatched[-1]
@@ -75,7 +86,7 @@ def fitted_costs(measured: Measured, runs: Sequence[SweepRun]) -> SweepCosts:
         parent_future_s=parent_future_s,
         parent_worker_s=max(many.cpu_s - few.cpu_s, 0.0) / (many.workers - few.workers),
         between_s=statistics.median(gaps),
-        contention=measured.contention,
+        contention=contention,
     )
 
 
@@ -110,10 +121,8 @@ def predictions(measured: Measured) -> list[Prediction]:
         held = measured.runs_of(workers, size)
         shapes = measured.jobs_of(size)
         idle = SweepModel(costs, workers=workers, cores=measured.cores).play(shapes)
-        # Of what neighbours slow down, the model knows the time alone.
-        cpu_s = tuple(
-            idle.jobs_cpu_s * (1.0 + costs.contention * neighbour_busy(run)) for run in held
-        )
+        # Beside another job, all of them take longer.
+        cpu_s = (idle.jobs_cpu_s * (1.0 + costs.contention),) * len(held)
         jobs_cpu_s = tuple(run.jobs_cpu_s for run in held)
         found.append(Prediction(workers, size, "CPU of the jobs", cpu_s, jobs_cpu_s))
         if workers <= measured.cores:

@@ -25,7 +25,6 @@ from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.world_store import WorldStore, cached_build
-from tests.benchmarks import two_cores
 from tests.benchmarks.live_drive import SETTLED_S, drive_live
 from tests.scale.sweep_model import JobShape
 from tests.scale.sweep_runs import SweepRun, play
@@ -99,8 +98,6 @@ class Measured(msgspec.Struct, frozen=True, kw_only=True):
     cores: int
     load: tuple[float, float]
     """Of the machine, as the measuring began and ended."""
-    contention: float
-    """By how much a core is slowed while the other one is busy, by `two_cores`."""
     runs: tuple[SweepRun, ...]
     shapes: dict[str, tuple[tuple[str, int], ...]]
     """The jobs of the sweep by futures a job: their Worlds and futures."""
@@ -262,7 +259,6 @@ def measure() -> Measured:
     with tempfile.TemporaryDirectory(prefix="scale-") as name:
         folder = Path(name)
         car = measure_car(folder / "car")
-        found = two_cores.measure()
         runs, loads = measure_sweeps(folder)
         answers = [run.answer_bytes for run in runs if run.futures_per_job == 64]
         worlds = measure_worlds(folder, loads["64"])
@@ -273,7 +269,6 @@ def measure() -> Measured:
             processor=processor(),
             cores=os.cpu_count() or 1,
             load=(before, os.getloadavg()[0]),
-            contention=max(2.0 * found.baseline / found.value - 1.0, 0.0),
             runs=tuple(runs),
             shapes={size: tuple(load.shapes.values()) for size, load in loads.items()},
             dispatched=tuple(measure_dispatch(count) for count in DISPATCH_WORKERS),

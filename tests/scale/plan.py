@@ -80,7 +80,8 @@ def one_parent(costs: SweepCosts, workers: int) -> Throughput:
         local=False,
     )
     time = model.play(shapes)
-    return Throughput(jobs * FUTURES_PER_JOB / time.wall_s, time.parent_cpu_s / time.wall_s)
+    wall_s = max(time.wall_s, time.parent_cpu_s)  # it may have answers left at the end
+    return Throughput(jobs * FUTURES_PER_JOB / wall_s, time.parent_cpu_s / wall_s)
 
 
 def sweep_at_scale(measured: Measured, futures: float, prices: Prices) -> SweepAtScale:
@@ -106,8 +107,9 @@ def sweep_at_scale(measured: Measured, futures: float, prices: Prices) -> SweepA
 def car_costs(measured: Measured) -> CarCosts:
     """Return what a car's rounds cost on a core whose neighbours are idle."""
     car = measured.car
-    # Two workers, orchestrator, recorder and the others of that machine: the other core was busy.
-    slowed = 1.0 + measured.contention
+    # Two workers side by side were measured.
+    contention = costs_of(measured).contention
+    slowed = 1.0 + contention
     return CarCosts(
         job_cpu_s=tuple(cpu_s / slowed for cpu_s in car.rounds_cpu_s),
         start_s=car.start_s / slowed,
@@ -115,7 +117,7 @@ def car_costs(measured: Measured) -> CarCosts:
         world_s=measured.worlds.compile_cpu_s / slowed,
         question_bytes=car.question_bytes,
         answer_bytes=car.answer_bytes,
-        contention=measured.contention,
+        contention=contention,
     )
 
 

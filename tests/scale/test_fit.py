@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from tests.scale.fit import fitted_costs, neighbour_busy, predictions
+from tests.scale.fit import fitted_costs, predictions
 from tests.scale.measured import FITTED, HELD_OUT, Car, Dispatched, Measured, Stored, Worlds
 from tests.scale.sweep_model import JobShape, SweepCosts, SweepModel
 from tests.scale.sweep_runs import PARTS, PlayedJob, SweepRun
@@ -57,7 +57,7 @@ def measured(runs: list[SweepRun]) -> Measured:
     )  # fmt: skip
     return Measured(
         day="2026-11-23", processor="drawn", cores=CORES, load=(0.0, 0.0),
-        contention=COSTS.contention, runs=tuple(runs),
+        runs=tuple(runs),
         shapes={str(size): shapes(size) for size in (16, 32, 64)},
         dispatched=(Dispatched(2, 1e-5), Dispatched(256, 1e-5)),
         worlds=Worlds(0.1, 0.3, 0.01, 4e4), stored=Stored(6400.0, 700.0, 3.0, 2e4, 1e5), car=car,
@@ -78,7 +78,9 @@ def test_nothing_that_is_held_out_is_fitted() -> None:
 def test_costs_are_found_again() -> None:
     told = measured(all_runs(slower=2.0))
     found = fitted_costs(told, [run for pair in FITTED for run in told.runs_of(*pair)])
-    for name in ("job_s", "future_s", "first_s", "parent_job_s", "parent_future_s"):
+    for name in (
+        "job_s", "future_s", "first_s", "parent_job_s", "parent_future_s", "contention",
+    ):  # fmt: skip
         assert getattr(found, name) == pytest.approx(getattr(COSTS, name), rel=0.01), name
 
 
@@ -101,11 +103,9 @@ def test_a_model_of_two_workers_knows_their_contention() -> None:
     )
 
 
-def test_a_core_has_a_busy_neighbour_where_others_are_at_work() -> None:
-    run = sweep(1, 16)
-    assert neighbour_busy(run) == 0.0
-    assert neighbour_busy(msgspec.structs.replace(run, others_cores=0.4)) == pytest.approx(0.4)
-    assert neighbour_busy(msgspec.structs.replace(run, workers=2, others_cores=1.5)) == 1.0
+def test_two_workers_that_take_less_than_one_have_no_contention() -> None:
+    told = measured([sweep(1, 16), sweep(1, 64), sweep(2, 16, slower=0.5)])
+    assert fitted_costs(told, told.runs).contention == 0.0
 
 
 def test_time_without_a_processor_is_no_work_and_no_idleness() -> None:
