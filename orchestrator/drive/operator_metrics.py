@@ -68,6 +68,8 @@ METRICS: dict[str, MetricRow] = {
     "lost_total": MetricRow("counter", "Items that a full queue or a disk lost, by which."),
     "worker_state": MetricRow("gauge", "1 for the state in which a worker is, 0 for the others."),
     "worker_speed_ratio": MetricRow("gauge", "Simulated seconds for one of its processor's."),
+    "worker_link_seconds": MetricRow("gauge", "There and back to a worker on another computer."),
+    "worker_clock_offset_seconds": MetricRow("gauge", "How far its computer's clock is ahead."),
     "process_cpu_seconds_total": MetricRow("counter", "Processor time by process, all its lives."),
     "process_memory_bytes": MetricRow("gauge", "Memory of its own, by process."),
     "process_starts_total": MetricRow("counter", "How often a process was started."),
@@ -200,3 +202,10 @@ def _of_worker(status: WorkerStatus) -> Iterator[MetricSample]:
         yield MetricSample("worker_state", status.state == state, (worker, ("state", state)))
     if status.rtf is not None:
         yield MetricSample("worker_speed_ratio", status.rtf, (worker,))
+    links = {
+        "worker_link_seconds": status.link_ms,
+        "worker_clock_offset_seconds": status.clock_offset_ms,
+    }
+    for name, milliseconds in links.items():
+        if milliseconds is not None:
+            yield MetricSample(name, milliseconds / 1e3, (worker,))

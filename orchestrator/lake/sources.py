@@ -96,6 +96,8 @@ def source_of(folder: Path) -> RunSource:
 
 def _sweep(folder: Path) -> RunSource:
     record = _json(folder / SUMMARY)
+    if shard := record.get("shard"):
+        raise UserError(f"{folder}: shard {shard} of a sweep: `foretwin sweep --merge` them first")
     if not record.get("complete"):
         raise UserError(f"{folder}: the sweep has not come to its end: `foretwin sweep` goes on")
     files = {

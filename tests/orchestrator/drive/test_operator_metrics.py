@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.cpu_use import CpuMeter
+from foretwin.contracts.simulation import WorkerStatus
+from foretwin.orchestrator.drive import operator_metrics
 from foretwin.orchestrator.drive.operator_metrics import (
     METRICS,
     PREFIX,
@@ -84,6 +86,22 @@ def test_the_age_of_results_begins_with_the_first_one(house: House) -> None:
     counts.look(13.0)
 
     assert told(counts.samples(15.0))["result_age_seconds"] == 3.0
+
+
+def test_workers_on_other_computers_are_told_with_their_link(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far = WorkerStatus(
+        stamp_ns=0, worker_id="box-1", state="sick", link_ms=12.0, clock_offset_ms=-3.0
+    )
+    monkeypatch.setattr(operator_metrics, "worker_statuses", lambda *_: [far])
+
+    page = told(DriveCounts(house.conductor).samples(1.0))
+
+    assert page['worker_state{worker="box-1",state="sick"}'] == 1
+    assert page['worker_link_seconds{worker="box-1"}'] == 0.012
+    assert page['worker_clock_offset_seconds{worker="box-1"}'] == -0.003
+    assert not any("speed_ratio" in name for name in page)
 
 
 def test_whatever_a_name_holds_is_told_as_one_line() -> None:

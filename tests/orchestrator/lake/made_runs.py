@@ -50,7 +50,7 @@ def made_run(
     return folder
 
 
-def made_sweep(folder: Path, *, jobs: int = 3, complete: bool = True) -> Path:
+def made_sweep(folder: Path, *, jobs: int = 3, complete: bool = True, **more: Any) -> Path:
     """Write a sweep of so many jobs with two futures each."""
     for at in SWEPT_TABLES.values():
         (folder / at).mkdir(parents=True)
@@ -61,7 +61,7 @@ def made_sweep(folder: Path, *, jobs: int = 3, complete: bool = True) -> Path:
               JOB_TABLES["jobs"], TOLD)  # fmt: skip
     write(folder / METRICS_FILE, [{"name": "ttc", "unit": "s"}], JOB_TABLES["metrics"], TOLD)
     summary = {"fingerprint": "0cdb5ed7a3db79d9ff", "rows_sha256": "7f", "complete": complete,
-               "spec": {"worlds": "there"}}  # fmt: skip
+               "spec": {"worlds": "there"}, **more}  # fmt: skip
     (folder / "sweep.json").write_text(json.dumps(summary))
     return folder
 
