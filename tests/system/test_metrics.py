@@ -35,15 +35,16 @@ def test_a_drive_tells_how_it_goes_before_and_after_its_orchestrator_died(tmp_pa
         run = run_folder(tmp_path / "runs")
         assert run is not None
         before = page(port)
-        os.kill(orchestrator_pid(run), signal.SIGKILL)
+        died = orchestrator_pid(run)
+        os.kill(died, signal.SIGKILL)
         wait_for(lambda: rounds_run(port) > before['rounds_ended_total{how="run"}'], "a round more")
         after = page(port)
+        assert orchestrator_pid(run) != died
         process.send_signal(signal.SIGINT)
         wait_for(partial(process_ended, process), "the end")
 
     assert before['worker_speed_ratio{worker="w0"}'] > 0.0
     assert 0.0 <= after["telemetry_age_seconds"] < 5.0
-    assert after['process_starts_total{process="orchestrator"}'] == 2
     assert after['rounds_ended_total{how="missed"}'] >= before['rounds_ended_total{how="missed"}']
     assert page(port) == {}
 
