@@ -22,6 +22,7 @@ from foretwin.contracts import (
     simulation,
     towards_vehicle,
     tuning,
+    world_building,
 )
 from foretwin.contracts.bounds import MOST_BYTES, MOST_SAMPLE_BYTES
 
@@ -140,6 +141,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
         "job": Channel(runner.JobRequest, 2, "simulate futures", runner.JobAnswer),
         "place": Channel(
             placement.PlaceRequest, None, "find places for scenarios", placement.WorldPlaces
+        ),
+        "build_world": Channel(
+            world_building.WantedWorld, None, "build a World of a sweep", world_building.BuiltWorld
         ),
         "prepare": Channel(
             simulation.PrepareRequest, None, "load a World", simulation.PrepareReply

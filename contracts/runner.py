@@ -15,6 +15,7 @@ from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes
 from foretwin.contracts.parts import FinishedPart, JobCells
 from foretwin.contracts.placement import PlaceRequest
+from foretwin.contracts.world_building import WantedWorld
 
 AHEAD = 256
 """Tasks that a runner holds at once: enough for any machine's workers, and their jobs fit in
@@ -114,6 +115,11 @@ def job_task(job: Job, named: JobBytes, *, cells: JobCells | None = None) -> Tas
 def place_task(request: PlaceRequest) -> Task:
     """Return the task of finding places in a World."""
     return Task(f"places in {request.world_id}", "place", request.world_id, request)
+
+
+def world_task(request: WantedWorld) -> Task:
+    """Return the task of building the World of a junction."""
+    return Task(f"World of {request.junction_id}", "build_world", request.junction_id, request)
 
 
 def _never(_: Answer) -> str:

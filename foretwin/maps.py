@@ -12,12 +12,12 @@ from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.worlds.choice import junction_by_id, nearest_junction
 from foretwin.orchestrator.worlds.heights import heights_for
-from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.orchestrator.worlds.opening import open_map as read_whole
 from foretwin.world_gen.build import DEFAULT_RADIUS_M, build_world
 from foretwin.world_gen.elevation.dem import DemSet
 from foretwin.world_gen.export.formats import FORMATS, ExportOptions, formats_by_suffix
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+from foretwin.world_gen.opening import OpenMap
 
 
 class Map:

@@ -27,9 +27,9 @@ from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import StandinPath
-from foretwin.orchestrator.worlds.opening import Clip
 from foretwin.telemetry.ros2.mapping import MappingFile
 from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.opening import Clip
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 

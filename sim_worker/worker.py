@@ -7,7 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 import numpy as np
@@ -28,6 +28,7 @@ from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.contracts.trace import came, since, span
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world_building import BuiltWorld, WantedWorld
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
@@ -37,6 +38,9 @@ from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.planners.stack import StackPlanner
 from foretwin.sim_worker.world_file import WorldFolder, WorldSource
+
+if TYPE_CHECKING:
+    from foretwin.sim_worker.world_building import WorldBuilder
 
 _IDLE_S = 0.2
 
@@ -112,6 +116,7 @@ class FuturesWorker:
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
         self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
+        self._builder: WorldBuilder | None = None
         self.stacks = {
             name: StackPlanner(
                 name,
@@ -126,6 +131,7 @@ class FuturesWorker:
             "use_vehicle": self._use_vehicle,
             "job": self._job,
             "place": self._place,
+            "build_world": self._build_world,
         }
 
     def _cache(self, setup: WorkerSetup, vehicle: VehicleParameters) -> SimulationCache:
@@ -154,6 +160,8 @@ class FuturesWorker:
 
     def answer(self, channel: str, question: msgspec.Struct) -> msgspec.Struct:
         """Return the answer to a question; raises whatever keeps it from being answered."""
+        if channel != "build_world":
+            self._builder = None  # A map takes much memory, and no more of it is wanted.
         return self._answers[channel](question)
 
     def _prepare(self, question: msgspec.Struct) -> PrepareReply:
@@ -217,6 +225,15 @@ class FuturesWorker:
         world = self._worlds.world(question.world_id)
         return places_in(world, question, self._vehicles[question.vehicle])
 
+    def _build_world(self, question: msgspec.Struct) -> BuiltWorld:
+        assert isinstance(question, WantedWorld)
+        if self._builder is None:
+            # A drive's workers read no map.
+            from foretwin.sim_worker.world_building import WorldBuilder
+
+            self._builder = WorldBuilder()
+        return self._builder.build(question)
+
 
 def warm_up(stage: BatchSimulation) -> None:
     """Do once, before it counts, what a first job does first: project and step."""
@@ -246,7 +263,7 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     worker = FuturesWorker(setup, refusals=life.refusals)
     mailbox = Mailbox(64)
     ids = {"run": setup.run_id, "process": setup.process_id}
-    for channel in ("prepare", "use_vehicle", "job", "place"):
+    for channel in ("prepare", "use_vehicle", "job", "place", "build_world"):
         bus.serve(channel, mailbox, **ids)
     connect_planners(setup, bus)
     life.ready()

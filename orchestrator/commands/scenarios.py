@@ -15,7 +15,6 @@ from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.output import print_json, print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.worlds.choice import choose_junctions
-from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
 from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.scene import SceneMaker
@@ -26,6 +25,7 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.opening import OpenMap
 
 RADIUS_M = 150.0
 

@@ -142,7 +142,7 @@ def _find_places(
         and all(are_kept(at, world_id) for world_id in kept.worlds)
     ):
         return kept
-    worlds = chosen()(folder.worlds_dir, progress_bar)
+    worlds = chosen()(folder.worlds_dir, runner, progress_bar)
     failures = dict(worlds.failures)
     left = [world_id for world_id in worlds.ids if not are_kept(at, world_id)]
     tasks = [place_task(place_request(loaded, world_id)) for world_id in left]

@@ -14,7 +14,7 @@ from foretwin.orchestrator.commands.world_files import write_each, write_report
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
-from foretwin.orchestrator.worlds.opening import OpenMap, open_map, region_on_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.world_gen.build import build_region, build_world
 from foretwin.world_gen.export.choices import (
@@ -33,6 +33,7 @@ from foretwin.world_gen.export.formats import (
 )
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+from foretwin.world_gen.opening import OpenMap, region_on_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 DEFAULT_VEHICLES = "twin:twin,shadow:shadow,ghost:ghost"

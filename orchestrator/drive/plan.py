@@ -32,12 +32,13 @@ from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import standin_path
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
 from foretwin.orchestrator.worlds.heights import profiles_of, slopes_in
-from foretwin.orchestrator.worlds.opening import Clip, open_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
 from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.world_gen.opening import Clip
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from foretwin.world_gen.roads.service_roads import open_service_roads
 

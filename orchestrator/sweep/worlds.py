@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from foretwin.contracts.codec import SchemaMismatch
-from foretwin.contracts.errors import UserError
-from foretwin.contracts.world_identity import with_id
+from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.runner import Answer, Runner, answers, world_task
+from foretwin.contracts.world import World
+from foretwin.contracts.world_building import BuiltWorld, MapPart, WantedWorld
+from foretwin.contracts.world_identity import checked_world, with_id
 from foretwin.orchestrator.record.recorded_jobs import kept_world
 from foretwin.orchestrator.sweep.play import Progress
 from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
 from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
-from foretwin.orchestrator.worlds.opening import NodeClip, open_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.sim_worker.world_file import load_world
 from foretwin.world_gen.elevation.read_dem import dem_digest
 from foretwin.world_gen.junctions.intersections import Junction
-from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.opening import NodeClip
 from foretwin.world_gen.osm.osm_map import LatLonBounds
-from foretwin.world_gen.world_store import WorldStore, cached_build
+from foretwin.world_gen.world_store import WorldStore
+
+if TYPE_CHECKING:
+    from foretwin.sim_worker.world_building import WorldBuilder
 
 _Choice = TypeVar("_Choice")
 SUFFIX = ".world"
@@ -36,8 +43,8 @@ class SweepWorlds(NamedTuple):
     failures: dict[str, str]
 
 
-Building = Callable[[Path, Progress], SweepWorlds]
-"""Puts chosen Worlds into a folder."""
+Building = Callable[[Path, Runner, Progress], SweepWorlds]
+"""Has chosen Worlds built by a runner, into a folder."""
 
 
 def source_digest(spec: SweepSpec) -> str:
@@ -98,24 +105,102 @@ def choose_worlds(spec: SweepSpec) -> Building:
         where = "" if bounds is None else f" in bbox {spec.bbox}"
         raise UserError(f"{spec.map}: no junction{where}")
 
-    dem = heights_for(opened, None if spec.dem is None else Path(spec.dem))
+    # What does not fit is told before anything is written.
+    heights_for(opened, None if spec.dem is None else Path(spec.dem))
+    part = _part(spec, opened.osm.sha256)
+    names = [junction.summary.id for junction in chosen]
 
-    def build(folder: Path, progress: Progress) -> SweepWorlds:
-        index = index_map(opened.osm, opened.graph, opened.junctions, dem=dem)
-        store = WorldStore(folder)
-        ids, failures = [], {}
-        with progress(len(chosen), "Worlds") as (advance, _):
-            for junction in chosen:
-                name = junction.summary.id
-                try:
-                    built = cached_build(store, index, junction, radius_m=spec.radius_m)
-                    ids.append(built.world.id)
-                except Exception as error:  # one bad junction never stops the rest
-                    failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
-                advance(name)
-        return SweepWorlds(tuple(ids), failures)
+    def build(folder: Path, runner: Runner, progress: Progress) -> SweepWorlds:
+        return _built(part, names, spec.radius_m, WorldStore(folder), runner, progress)
 
     return build
+
+
+def _part(spec: SweepSpec, sha256: str) -> MapPart:
+    """Return what of its map a sweep needs, for whoever builds the Worlds."""
+    clip = _clip(spec)
+    return MapPart(
+        map=str(Path(str(spec.map)).resolve()),
+        sha256=sha256,
+        bounds=(clip.south, clip.west, clip.north, clip.east)
+        if isinstance(clip, LatLonBounds)
+        else None,
+        node=clip.node if isinstance(clip, NodeClip) else None,
+        margin_m=clip.margin_m if isinstance(clip, NodeClip) else 0.0,
+        service_roads=spec.service_roads,
+        dem=None if spec.dem is None else str(Path(spec.dem).resolve()),
+    )
+
+
+def _built(
+    part: MapPart,
+    names: Sequence[str],
+    radius_m: float,
+    store: WorldStore,
+    runner: Runner,
+    progress: Progress,
+) -> SweepWorlds:
+    """Have the Worlds of junctions built that are not there yet."""
+    ids, failures = dict[str, str](), dict[str, str]()
+    for name in names:
+        if (known := store.find(part.sha256, name, radius_m)) is not None:
+            ids[name] = known.id
+    left = [name for name in names if name not in ids]
+    wanted = {n: WantedWorld(of=part, junction_id=n, radius_m=radius_m) for n in left}
+    worlds: dict[str, World] = {}
+
+    def fault_in(answer: Answer) -> str:
+        """Return why what came back is no World, "" where it is one or says why there is none."""
+        built: BuiltWorld = answer.message
+        try:
+            if not built.failure:
+                where = f"worker {answer.worker_id}"
+                worlds[answer.task.world_id] = checked_world(
+                    built.data, built.world_id, where=where
+                )
+        except SchemaMismatch as error:
+            return str(error)
+        return ""
+
+    with progress(len(names), "Worlds") as (advance, _):
+        for name in ids:
+            advance(name)
+        for answer in answers(runner, map(world_task, wanted.values()), fault_in=fault_in):
+            name, failure = answer.task.world_id, answer.failure
+            if answer.message is not None:
+                failure = answer.message.failure
+                if answer.message.no_map:
+                    failure = _build_here(wanted[name], worlds)
+                elif answer.message.of_input:
+                    raise UserError(failure)
+            try:
+                if not failure:
+                    store.remember(worlds[name], part.sha256)
+                    ids[name] = worlds.pop(name).id
+            except OSError as error:
+                failure = one_line(error)
+            if failure:
+                failures[name] = failure
+            advance(name)
+    return SweepWorlds(tuple(ids[name] for name in names if name in ids), failures)
+
+
+def _build_here(wanted: WantedWorld, worlds: dict[str, World]) -> str:
+    """Build a World that a worker could not, since it has no map; returns why it failed, or ""."""
+    built = _here().build(wanted)
+    if built.of_input:
+        raise UserError(built.failure)
+    if not built.failure:
+        worlds[wanted.junction_id] = checked_world(built.data, built.world_id, where="here")
+    return built.failure
+
+
+@functools.cache
+def _here() -> WorldBuilder:
+    """Return who builds where no worker has the map."""
+    from foretwin.sim_worker.world_building import WorldBuilder
+
+    return WorldBuilder()
 
 
 def _clip(spec: SweepSpec) -> NodeClip | LatLonBounds | None:
@@ -171,7 +256,7 @@ def _choose_given(spec: SweepSpec, folder: Path) -> Building:
         raise UserError(f"worlds {folder}: no junction in bbox {spec.bbox}")
     chosen = _sampled(sorted(found), spec)
 
-    def copy(target: Path, _: Progress) -> SweepWorlds:
+    def copy(target: Path, runner: Runner, progress: Progress) -> SweepWorlds:
         store = WorldStore(target)
         for one in chosen:
             store.save(with_id(load_world(folder, found[one].stem)))

@@ -16,9 +16,10 @@ from foretwin.contracts.setup import BuilderSetup
 from foretwin.contracts.simulation import BuildReply
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 from foretwin.orchestrator.worlds.heights import heights_for
-from foretwin.orchestrator.worlds.opening import Clip, open_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.opening import Clip
 from foretwin.world_gen.world_store import WorldStore, cached_build
 
 log = logging.getLogger("builder")

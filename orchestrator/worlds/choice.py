@@ -11,8 +11,9 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, local_from_geo
-from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.opening import Clip, NodeClip, OpenMap
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 _JUNCTION_ID = re.compile(r"n-?\d{1,18}", re.ASCII)

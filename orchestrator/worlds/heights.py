@@ -10,9 +10,9 @@ from foretwin.contracts.elevation import RoadSlopes
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
 from foretwin.geometry.polyline import length, stretches
 from foretwin.geometry.slopes import SPACING_M
-from foretwin.orchestrator.worlds.opening import OpenMap
 from foretwin.world_gen.elevation.dem import DemSet
 from foretwin.world_gen.elevation.profiles import RoadProfiles
+from foretwin.world_gen.opening import OpenMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
 

@@ -1,7 +1,8 @@
 """`python -m tests.benchmarks.growing_sweep CELLS OUT` sweeps so many cells with seats that compute
 nothing, and says what the command that holds the sweep takes: memory, and CPU time a job.
 
-Ended before its end, the same command goes on where it stopped.
+Ended before its end, the same command goes on where it stopped. `--workers 0` walks the plan and
+makes every job, and has none played.
 """
 
 from __future__ import annotations
@@ -15,13 +16,21 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.one_heap import share_one_heap
 from foretwin.contracts.owned_folder import temporary_folder
+from foretwin.contracts.placement import PlacedHere, WorldPlaces
 from foretwin.contracts.runner import Answer
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
+from foretwin.orchestrator.sweep.jobs import JobMaker
+from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
 from tests.orchestrator.sweeps import small_sweep
@@ -121,6 +130,33 @@ def measured(cells: int, folder: Path, *, workers: int) -> dict[str, float | str
     }
 
 
+def walked(cells: int, folder: Path) -> dict[str, float | str]:
+    """Make all jobs of a sweep one after the other, and return what it took of this process."""
+    loaded = load_spec(spec_of(cells, folder))
+    worlds = [path.stem for path in (folder / "drawn").glob("*.world")]
+    placed = tuple(
+        WorldPlaces(
+            world_id=world_id,
+            frame=LocalFrame(GeoPoint(52.5, 13.4)),
+            placed=(PlacedHere(scenario_id="ccftap", junction_id="n0", place="a/b", ego="a"),),
+            unplaced=(),
+            ways={"a": PathAhead(xy_m=np.zeros((300, 2)), speed_limit_mps=np.zeros(300))},
+        )
+        for world_id in worlds
+    )
+    before_mb, begun_s = memory_mb("VmRSS"), time.process_time()
+    plan, maker = SweepPlan(loaded, placed), JobMaker(loaded)
+    names = sum(len(job_bytes(maker.job(planned)).sha256) for planned in plan.planned()) // 64
+    cpu_s = time.process_time() - begun_s
+    return {
+        "cells": plan.cells,
+        "jobs": names,
+        "before_mb": round(before_mb, 1),
+        "most_mb": round(memory_mb("VmHWM"), 1),
+        "cpu_ms_a_job": round(1e3 * cpu_s / names, 3),
+    }
+
+
 def main(arguments: Sequence[str]) -> int:
     """Sweep and print what it took as JSON."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.growing_sweep")
@@ -128,7 +164,11 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--workers", type=int, default=1)
     asked = parser.parse_args(arguments)
-    print(json.dumps(measured(asked.cells, asked.out, workers=asked.workers), indent=2))
+    if asked.workers:
+        told = measured(asked.cells, asked.out, workers=asked.workers)
+    else:
+        told = walked(asked.cells, asked.out)
+    print(json.dumps(told, indent=2))
     return 0
 
 

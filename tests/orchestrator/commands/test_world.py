@@ -17,10 +17,11 @@ from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.world_files import FAILURES_FILE, write_each
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 from foretwin.orchestrator.worlds.choice import node_of_id
-from foretwin.orchestrator.worlds.opening import Clip, NodeClip, open_map, region_on_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.export.formats import FORMATS
 from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.opening import Clip, NodeClip, region_on_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 from tests.world_gen.sketch import Sketch
 
@@ -28,6 +29,7 @@ COVERS = (
     "foretwin.orchestrator.commands.world_files",
     "foretwin.orchestrator.worlds.choice",
     "foretwin.orchestrator.worlds.opening",
+    "foretwin.world_gen.opening",
 )
 
 MAP = str(MAP_FILE)
