@@ -18,6 +18,7 @@ from foretwin.contracts import (
     numbering,
     parts,
     placement,
+    planner_link,
     process_setup,
     roles,
     runner,
@@ -64,7 +65,9 @@ LISTED: dict[str, dict[str, Any]] = {
     },
     "MirrorSample": {"role": "all"},
     "Parameter": {"source": "default"},
+    "PlannedMotions": {"link": 1},
     "PlannerJoined": {"link": 1},
+    "PlannerScene": {"link": 1},
     "PlannerTiming": {"rate_hz": 10.0},
     "ProcessSetup": {"grace_s": 30.0},
     "ReplaySetup": {"speed": 1.0},
@@ -89,8 +92,8 @@ LISTED: dict[str, dict[str, Any]] = {
 """Of faults those that are neutral are listed in the table of numbers."""
 FILES = (campaign, credentials, process_setup, roles, scenario, segments, setup, vehicle)
 MESSAGES = (
-    drive, futures, gap, numbering, parts, placement, runner, simulation, tally, towards_vehicle,
-    tuning, world,
+    drive, futures, gap, numbering, parts, placement, planner_link, runner, simulation, tally,
+    towards_vehicle, tuning, world,
 )  # fmt: skip
 KINDS = sorted(
     {
