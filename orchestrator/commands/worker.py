@@ -128,7 +128,10 @@ def _drive_at(setup: BusSetup, ended: Interruption) -> str | None:
     try:
         bus = ZenohBus(setup)
     except BusUnreachable as error:
-        raise UserError(f"--connect {setup.endpoint}: {error}") from None
+        # What Zenoh says of it names files of its own.
+        why = str(error).removeprefix(f"no Zenoh router at {setup.endpoint}: ")
+        why = "nobody answers there: is the drive running?" if "Unable to connect" in why else why
+        raise UserError(f"--connect {setup.endpoint}: {why}") from None
     with bus:
         seen = Mailbox(16)
         bus.watch_alive(alive_key(run="*", process="orchestrator"), seen)

@@ -44,7 +44,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (("tcp/127.0.0.1:1", "--insecure", "--name", "My Car"), "--name 'My Car': small letters"),
         (("tcp/127.0.0.1:1", "--insecure", "--workers", "0"), "--workers 0: 1 to "),
         (("tcp/127.0.0.1:1", "--insecure", "--cache", "/proc/x"), "--cache /proc/x: "),
-        (("tcp/127.0.0.1:1", "--insecure"), "--connect tcp/127.0.0.1:1: no Zenoh router at"),
+        (("tcp/127.0.0.1:1", "--insecure"), "--connect tcp/127.0.0.1:1: nobody answers there"),
     ],
 )
 def test_what_cannot_be_used_is_one_line(
