@@ -294,3 +294,20 @@ def test_who_is_there_is_told_on_the_line_and_to_the_viewer(
     assert (far_status.worker_id, far_status.state) == (FAR, "idle")
     assert 0.0 <= far_status.link_ms < 1e3
     assert abs(far_status.clock_offset_ms) < 500.0
+
+
+def test_one_that_does_not_tell_the_time_gets_nothing_until_it_does(house: House) -> None:
+    far = FarAway(house)
+    settle(house, far)
+    playing = house.conductor.rounds.dispatcher.dispatch.far
+    house.conductor.fleet.look(time.monotonic() + 100.0)
+    for box in far._boxes:
+        while box.take() is not None:
+            pass  # forgotten: nobody answers
+    house.settle()
+    assert playing.is_silent(FAR)
+    assert house.conductor.start_round()
+    house.work()
+    assert (house.conductor.rounds.tally.run, far.take()) == (1, [])
+    settle(house, far, rounds=130)
+    assert not playing.is_silent(FAR)

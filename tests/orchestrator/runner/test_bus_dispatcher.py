@@ -119,3 +119,28 @@ def test_what_a_task_that_killed_its_workers_comes_to_is_an_answer(bench: Bench)
     bench.question()
     (lost,) = bench.dispatcher.worker_down("w0", how="signal 9")
     assert lost == Answer(A, None, "3 workers died of it, the last by signal 9")
+
+
+def test_a_far_worker_that_answers_nothing_at_once_is_asked_once_until_it_is_heard(
+    bench: Bench,
+) -> None:
+    """What zenoh#2767 does to a queryable whose link came back: no loop, and others go on."""
+    dispatcher, far = bench.dispatcher, bench.dispatcher.dispatch.far
+    dispatcher.worker_down("w0")
+    dispatcher.expect(["w-a-0", "w1"])
+    dispatcher.worker_up("w-a-0")
+    far.join("w-a-0", work_s=0.0, link_s=0.0)
+    far.has_world("w-a-0", "w")
+    dispatcher.submit(A)
+    asked = 0
+    for _ in range(100):
+        bench.now_s += 0.01
+        dispatcher.give_out()
+        while isinstance(reply := bench.mailbox.take(), Reply):
+            assert reply.error == NO_ANSWER
+            asked += 1
+            assert dispatcher.reply(reply) == []
+    assert asked == 1
+    far.heard("w-a-0", 0.001)
+    dispatcher.give_out()
+    assert isinstance(bench.mailbox.take(), Reply)
