@@ -25,6 +25,8 @@ class MachineInfo(msgspec.Struct, frozen=True, kw_only=True):
     cpu: str
     """Its processor, and what of it is switched off."""
     versions: dict[str, str]
+    arithmetic: dict[str, str]
+    """What numpy's functions come to there, see foretwin.contracts.arithmetic."""
 
 
 class EnlistRequest(msgspec.Struct, frozen=True, kw_only=True):

@@ -7,8 +7,10 @@ from typing import Any, Literal, NamedTuple
 
 from foretwin.contracts.fleet import MOST_CLOCK_OFFSET_S, Enlisted, MachineInfo, machine_of
 from foretwin.orchestrator.drive.far_clock import FarClock
-from foretwin.orchestrator.record.machine import differences
+from foretwin.orchestrator.record.machine import differences, other_arithmetic
 
+_NAMED = 4
+"""So many functions are named."""
 Stage = Literal["asked", "clock", "waiting", "probing", "playing", "refused", "gone"]
 """In the order in which a worker goes through them; it waits for a World to be tried in."""
 
@@ -69,6 +71,18 @@ class FarMember:
             return None
         here = ours.versions["foretwin"]
         return f"{self.machine} runs foretwin {theirs}, this drive {here}: install the same"
+
+    def arithmetic_trouble(self, ours: MachineInfo) -> str | None:
+        """Return which functions come to other bits there, None where none does."""
+        assert self.said is not None
+        found = other_arithmetic(self.said.machine, ours)
+        if not found:
+            return None
+        more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+        return (
+            f"{self.machine} computes other bits than this machine ({', '.join(found[:_NAMED])}"
+            f"{more}): {differences(self.said.machine, ours)}"
+        )
 
     def clock_trouble(self) -> str | None:
         """Return how far its clock is off, None where that is near enough."""

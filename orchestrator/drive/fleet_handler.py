@@ -6,6 +6,7 @@ it is asked is never waited for: Worlds, rounds and parameters go on without it.
 
 from __future__ import annotations
 
+import functools
 import logging
 import time
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from foretwin.contracts.fleet import (
     Admittance,
     ClockQuestion,
     EnlistRequest,
+    MachineInfo,
     WorldBytes,
     is_far,
 )
@@ -67,7 +69,6 @@ class FleetHandler:
         self._reference = ReferenceProbe(config, rounds)
         rounds.on_other = self._reference.take
         self._told: set[str] = set()
-        self._ours = this_machine()
         self._on_reply: dict[str, Callable[[FarMember, Reply], None]] = {
             "enlist": self._enlisted,
             "clock": self._clock,
@@ -75,6 +76,10 @@ class FleetHandler:
             "job": self._probed,
             "admit": lambda member, reply: None,
         }
+
+    @functools.cached_property
+    def _ours(self) -> MachineInfo:
+        return this_machine()
 
     def takes(self, process_id: str) -> bool:
         """Whether a process that says it is there is one of these."""
@@ -147,8 +152,6 @@ class FleetHandler:
         """Those that are given work."""
         return tuple(one for one in self._members.values() if one.stage == "playing")
 
-    # Questions.
-
     def _ask(
         self,
         member: FarMember,
@@ -178,15 +181,14 @@ class FleetHandler:
             member.clock_asked = True
             self._ask(member, "clock", ClockQuestion(), CLOCK_S)
 
-    # Answers.
-
     def _enlisted(self, member: FarMember, reply: Reply) -> None:
         if reply.message is None:
             if reply.refused is not None or not self._again(member, reply):
                 self._refuse(member, f"{member.machine} does not join: {reply.error}")
             return
         member.said = reply.message
-        if trouble := member.version_trouble(self._ours):
+        ours = self._ours
+        if trouble := member.version_trouble(ours) or member.arithmetic_trouble(ours):
             self._refuse(member, trouble)
         elif member.instance in self._proved:
             self._play(member)
@@ -253,8 +255,6 @@ class FleetHandler:
             member.measured(took_s, futures=len(reply.message.result.future_indices))
             self._proved.add(member.instance)
             self._play(member)
-
-    # What follows.
 
     def _play(self, member: FarMember) -> None:
         member.stage = "playing"

@@ -6,6 +6,7 @@ import os
 import platform
 from pathlib import Path
 
+from foretwin.contracts.arithmetic import fingerprints
 from foretwin.contracts.fleet import MachineInfo
 from foretwin.contracts.versions import versions
 from foretwin.orchestrator.processors import processors
@@ -16,7 +17,21 @@ _SWITCHES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES"
 
 def this_machine(cpuinfo: Path = Path("/proc/cpuinfo")) -> MachineInfo:
     """Return what this machine is."""
-    return MachineInfo(cores=processors(), cpu=_cpu(cpuinfo), versions=versions())
+    return MachineInfo(
+        cores=processors(),
+        cpu=_cpu(cpuinfo),
+        versions=versions(),
+        arithmetic=dict(fingerprints()),
+    )
+
+
+def other_arithmetic(theirs: MachineInfo, ours: MachineInfo) -> tuple[str, ...]:
+    """Return the functions of numpy that come to other bits on two machines, by their names."""
+    return tuple(
+        sorted(
+            name for name, found in ours.arithmetic.items() if theirs.arithmetic.get(name) != found
+        )
+    )
 
 
 def differences(theirs: MachineInfo, ours: MachineInfo) -> str:

@@ -152,6 +152,17 @@ def test_who_comes_to_other_bits_is_refused_with_both_named(house: House) -> Non
     assert f"{row['refused']}; it gets no work" in events(house)
 
 
+def test_other_arithmetic_is_refused_though_a_probe_might_not_show_it(house: House) -> None:
+    here = this_machine()
+    far = FarAway(house, cpu="Old", arithmetic={**here.arithmetic, "arctan2 float64": "x"})
+    settle(house, far)
+    assert far.jobs == 0
+    assert far.admitted == [
+        "laptop computes other bits than this machine (arctan2 float64): "
+        f"Old there, {here.cpu} here"
+    ]
+
+
 def test_another_version_of_the_program_is_refused_before_anything_is_played(house: House) -> None:
     far = FarAway(house, versions={**this_machine().versions, "foretwin": "0.0.1"})
     settle(house, far)

@@ -8,9 +8,11 @@ import msgspec
 import pytest
 
 from foretwin.contracts.fleet import MachineInfo
-from foretwin.orchestrator.record.machine import differences, this_machine
+from foretwin.orchestrator.record.machine import differences, other_arithmetic, this_machine
 
-OURS = MachineInfo(cores=2, cpu="AMD EPYC", versions={"numpy": "2.3.5", "numba": "0.62"})
+OURS = MachineInfo(
+    cores=2, cpu="AMD EPYC", versions={"numpy": "2.3.5", "numba": "0.62"}, arithmetic={"sin": "a"}
+)
 
 
 def test_this_machine_is_the_same_as_itself() -> None:
@@ -42,3 +44,9 @@ def test_a_processor_is_told_by_its_model_and_what_is_switched_off(
 )
 def test_differences_name_both(theirs: dict[str, object], text: str) -> None:
     assert differences(msgspec.structs.replace(OURS, **theirs), OURS) == text
+
+
+def test_functions_that_come_to_other_bits_are_named() -> None:
+    assert other_arithmetic(OURS, OURS) == ()
+    for theirs in ({"sin": "b"}, {}):
+        assert other_arithmetic(msgspec.structs.replace(OURS, arithmetic=theirs), OURS) == ("sin",)

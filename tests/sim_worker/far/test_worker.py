@@ -57,7 +57,7 @@ class Served:
         self.setup = FarWorkerSetup(
             run_id="r1", process_id="w-laptop-0", vehicle_id="far", bus=BusSetup(endpoint=""),
             log_file=str(folder / "log.jsonl"), cache_dir=str(folder),
-            machine=MachineInfo(cores=4, cpu="any", versions={}),
+            machine=MachineInfo(cores=4, cpu="any", versions={}, arithmetic={}),
         )  # fmt: skip
         self.bus.serve("world_file", AtOnce(self._give), run="r1")  # type: ignore[arg-type]
         self.life = ProcessLife(self.setup, self.bus)
