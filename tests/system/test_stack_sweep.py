@@ -132,7 +132,9 @@ def test_under_load_a_slow_stack_comes_to_the_same_rows(sweeps: Sweeps) -> None:
 @contextmanager
 def busy(count: int) -> Iterator[None]:
     """Keep the machine busy with so many processes."""
-    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    words = [sys.executable, "-c", "while True: pass"]
+    # Each in a session of its own: Linux shares processors out among these first (autogroup).
+    loops = [subprocess.Popen(words, start_new_session=True) for _ in range(count)]
     try:
         yield
     finally:
