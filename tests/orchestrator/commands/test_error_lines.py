@@ -18,7 +18,7 @@ from foretwin.orchestrator.embedded import MAP_FILE
         (["drive", "--workers", "abc"], "foretwin drive: --workers abc: must be a valid integer"),
         (["drive", "--rate=x"], "foretwin drive: --rate x: must be a valid number"),
         (["map", "foo"], "foretwin map: No such command 'foo'"),
-        (["sweep"], "foretwin sweep: Missing argument 'spec'"),
+        (["sweep"], "foretwin sweep: Missing argument 'SPEC'"),
         (["doctor", "extra"], "foretwin doctor: Got unexpected extra argument(s) (extra)"),
     ],
 )
