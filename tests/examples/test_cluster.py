@@ -11,7 +11,8 @@ import json
 import os
 import shlex
 import subprocess
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ yaml = pytest.importorskip("yaml")
 FOLDER = REPOSITORY / "examples" / "cluster"
 SCRIPTS = sorted(FOLDER.glob("*.slurm"))
 KUBERAY = FOLDER / "sweep_on_kuberay.yaml"
+SHARDS = 2
 
 
 def manifest(path: Path) -> dict[str, Any]:
@@ -55,7 +57,8 @@ def test_a_script_is_one(script: Path) -> None:
     assert any("--cpus-per-task=" in line for line in asked)
     without = subprocess.run(["bash", str(script)], capture_output=True, text=True, check=False)
     assert without.returncode == 1
-    assert f"usage: sbatch {script.name} SPEC OUT" in without.stderr
+    assert "usage: sbatch " in without.stderr
+    assert f"{script.name} SPEC OUT" in without.stderr
 
 
 def test_the_ray_job_starts_a_command_of_ours_on_nodes_of_one_image() -> None:
@@ -69,6 +72,49 @@ def test_the_ray_job_starts_a_command_of_ours_on_nodes_of_one_image() -> None:
     assert len({one["image"] for one in containers}) == 1
     assert cluster["authOptions"] == {"mode": "token"}
     assert pods[0]["rayStartParams"]["num-cpus"] == "0"
+
+
+def test_the_indexed_job_names_as_many_shards_as_it_has_pods() -> None:
+    spec = manifest(FOLDER / "sweep_in_shards.yaml")["spec"]
+    (container,) = spec["template"]["spec"]["containers"]
+    command = container["command"][-1]
+    assert (spec["completionMode"], container["command"][:2]) == ("Indexed", ["sh", "-c"])
+    assert f'"$JOB_COMPLETION_INDEX/{spec["completions"]}"' in command
+    assert f"--workers {container['resources']['limits']['cpu']}" in command
+
+
+def one_shard_of_a_slurm_array(spec: Path, out: Path) -> tuple[list[str], str]:
+    script = str(FOLDER / "sweep_in_shards.slurm")
+    return ["bash", script, str(spec), str(out), str(SHARDS)], "SLURM_ARRAY_TASK_ID"
+
+
+def one_shard_of_an_indexed_job(spec: Path, out: Path) -> tuple[list[str], str]:
+    pod = manifest(FOLDER / "sweep_in_shards.yaml")["spec"]["template"]["spec"]
+    *shell, command = pod["containers"][0]["command"]
+    command = command.replace("/sweeps/town.toml", str(spec)).replace("/sweeps/town", str(out))
+    return [
+        *shell,
+        command.replace("16", str(SHARDS)).replace("s 8", "s 1"),
+    ], "JOB_COMPLETION_INDEX"
+
+
+@pytest.mark.judge
+@pytest.mark.parametrize("one_shard", [one_shard_of_a_slurm_array, one_shard_of_an_indexed_job])
+def test_shards_of_a_cluster_are_merged_to_the_rows_of_one_sweep(
+    one_shard: Callable[[Path, Path], tuple[list[str], str]],
+    played: tuple[Path, str],
+    tmp_path: Path,
+) -> None:
+    spec, expected = played
+    arguments, number = one_shard(spec, tmp_path / "out")
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    for shard in range(SHARDS):
+        env = os.environ | {"PATH": path, number: str(shard), "SLURM_CPUS_PER_TASK": "1"}
+        ended = subprocess.run(arguments, env=env, capture_output=True, text=True, check=False)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+    shards = [str(one) for one in tmp_path.glob(f"out-*-of-{SHARDS}")]
+    assert run(["sweep", "--merge", *shards, "--out", str(tmp_path / "out")]) == 0
+    assert rows_sha256(tmp_path / "out") == expected
 
 
 @pytest.mark.judge
