@@ -24,6 +24,7 @@ from foretwin.contracts.planner_link import (
     other_link,
 )
 from foretwin.contracts.process_setup import BusSetup
+from foretwin.contracts.terminal import say
 
 LINK_GIVEN = "FORETWIN_PLANNER_LINK"
 """The variable of the environment in which a sweep tells the stack that it starts, as the JSON of
@@ -77,7 +78,7 @@ def serve_planner(
     except KeyboardInterrupt:
         return 0
     except (BusUnreachable, UserError, Refused, msgspec.DecodeError) as error:
-        print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+        say(f"{name}: {' '.join(str(error).split())}", error=True)
     return 2
 
 
@@ -118,7 +119,8 @@ class Answering:
 
     def serve_for_ever(self) -> None:
         """Answer whoever asks."""
-        print("ready", flush=True)
+        say("ready")
+        sys.stdout.flush()
         while True:
             self.take(1.0)
 

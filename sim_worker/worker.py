@@ -99,7 +99,8 @@ class SimulationCache:
 class FuturesWorker:
     """Answers `prepare`, `use_vehicle`, `job`, `place`: in a process of its own, or in any.
 
-    Its Worlds come from `worlds`; without, from the folder that the setup names.
+    Its Worlds come from `worlds`; without, from the folder that the setup names. Once `leaves` says
+    that the process should end, jobs that wait for a driving stack are refused.
     """
 
     def __init__(
@@ -108,6 +109,7 @@ class FuturesWorker:
         *,
         worlds: WorldSource | None = None,
         refusals: Refusals | None = None,
+        leaves: Callable[[], bool] = lambda: False,
     ) -> None:
         self._id = setup.process_id
         self._refusals = Refusals() if refusals is None else refusals
@@ -123,6 +125,7 @@ class FuturesWorker:
                 stack,
                 folder=Path(setup.log_file).parent / STACK_LOGS,
                 owner=setup.process_id,
+                leaves=leaves,
             )
             for name, stack in setup.stacks
         }
@@ -260,7 +263,7 @@ def connect_planners(setup: WorkerSetup, bus: Bus) -> None:
 
 def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Answer until the run is over; alive only once it can take work."""
-    worker = FuturesWorker(setup, refusals=life.refusals)
+    worker = FuturesWorker(setup, refusals=life.refusals, leaves=lambda: life.over)
     mailbox = Mailbox(64)
     ids = {"run": setup.run_id, "process": setup.process_id}
     for channel in ("prepare", "use_vehicle", "job", "place", "build_world"):

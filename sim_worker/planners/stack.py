@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +39,23 @@ log = logging.getLogger("foretwin.sim_worker.planners")
 class StackPlanner:
     """The planner of one name in a sweep's spec."""
 
-    def __init__(self, name: str, setup: StackSetup, *, folder: Path, owner: str) -> None:
-        """What it prints goes to files in `folder`, named after `owner`, the worker."""
+    def __init__(
+        self,
+        name: str,
+        setup: StackSetup,
+        *,
+        folder: Path,
+        owner: str,
+        leaves: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """What it prints goes to files in `folder`, named after `owner`, the worker.
+
+        Once that `leaves`, no answer is waited for.
+        """
         self.name, self.setup = name, setup
-        self.processes = StackProcesses(name, setup, folder=folder, owner=owner, says=setup.says)
+        self.processes = StackProcesses(
+            name, setup, folder=folder, owner=owner, says=setup.says, leaves=leaves
+        )
         self.deaths = self.hung_jobs = 0
         """Of the present job; in a row."""
         self._jobs = itertools.count()

@@ -32,7 +32,7 @@ def main(command: list[str]) -> int:
             command, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=_end_with_keeper
         )
     except OSError as error:
-        print(f"{command[0]}: {(error.strerror or str(error)).lower()}", file=sys.stderr)
+        sys.stderr.write(f"{command[0]}: {(error.strerror or str(error)).lower()}\n")
         return NOT_FOUND
     ended, told = os.pipe()
 

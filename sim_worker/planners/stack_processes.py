@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import secrets
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -62,8 +63,9 @@ class StackProcesses:
     """The processes of one stack, started as they are needed; what they print goes to the files
     `FOLDER/OWNER-NAME-NUMBER.log`.
 
-    `says` is the name and version by which the stack joined before: as another it is refused. Use
-    `close`, or the end of this process, to end all of them.
+    `says` is the name and version by which the stack joined before: as another it is refused. Once
+    `leaves` says so, nothing is waited for any more. Use `close`, or the end of this process, to
+    end all of them.
     """
 
     def __init__(
@@ -74,7 +76,9 @@ class StackProcesses:
         folder: Path,
         owner: str,
         says: PlannerJoined | None = None,
+        leaves: Callable[[], bool] = lambda: False,
     ) -> None:
+        self._leaves = leaves
         self._name, self._setup, self._says = name, setup, says
         self._instances = [
             _Instance(number, folder / f"{owner}-{name}-{number}.log")
@@ -143,6 +147,7 @@ class StackProcesses:
             for one in self._instances
             if not (one.joined or one.unusable or one.number in troubles)
         ]:
+            self._stay()
             if self._hear(_LOOK_S) is not None:
                 continue
             for one in waits:
@@ -168,6 +173,7 @@ class StackProcesses:
         again = time.monotonic() + _REPEAT_S
         outcomes: dict[int, PlannedMotions | Trouble] = {}
         while waits := questions.keys() - outcomes.keys():
+            self._stay()
             heard = self._hear(_LOOK_S)
             if heard is not None:
                 number, said = heard
@@ -187,6 +193,10 @@ class StackProcesses:
                     self._publish(questions[one.number])
             again = max(again, now + _REPEAT_S) if now > again else again
         return outcomes
+
+    def _stay(self) -> None:
+        if self._leaves():
+            raise RuntimeError("the worker leaves; its driving stacks are waited for no more")
 
     def end(self, number: int) -> None:
         """End one of the processes, and whatever it has started; the next one is another life."""

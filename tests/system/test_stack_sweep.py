@@ -114,7 +114,7 @@ def test_a_sweep_that_is_killed_leaves_no_stack(sweeps: Sweeps) -> None:
     finally:
         process.kill()
         process.wait()
-    wait_for(lambda: not commands_running(command), "the end of the stack")
+    wait_for(lambda: not commands_running(command), "the end of the stack", within_s=15.0)
 
 
 @pytest.mark.judge
