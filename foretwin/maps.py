@@ -7,6 +7,7 @@ from pathlib import Path
 
 from foretwin.checks import expect, files_told, number, path_of
 from foretwin.contracts.codec import SchemaMismatch, read_message, write_message
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.orchestrator.embedded import MAP_FILE
@@ -97,7 +98,7 @@ def export_world(world: World, file: Path | str, *, format_name: str | None = No
         raise UserError(f"{file}: its suffix names no one format; give format_name, {wish}")
     name = named[0] if format_name is None else format_name
     if name not in FORMATS:
-        raise UserError(f"format {name!r} is unknown; known: {', '.join(FORMATS)}")
+        raise UserError(f"format {name!r} is unknown; {one_of(name, FORMATS)}")
     with files_told(file):
         FORMATS[name].write(world, file, ExportOptions())
     return file

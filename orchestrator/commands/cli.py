@@ -11,7 +11,9 @@ import typer
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, WholeSentences
 from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
+from foretwin.orchestrator.commands.cli_maps import maps
 from foretwin.orchestrator.commands.cli_options import (
     DemOption,
     DialectOption,
@@ -22,12 +24,12 @@ from foretwin.orchestrator.commands.cli_options import (
     MapAidingOption,
     MapArgument,
     MetricsOption,
-    OutOption,
     ProgressTableOption,
     SecureOption,
     ServiceRoadsOption,
     TracksOption,
     TuningOption,
+    VehicleFileOption,
 )
 from foretwin.orchestrator.commands.cli_progress import learn_progress
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
@@ -52,34 +54,51 @@ PATH_ERRORS = (FileNotFoundError, FileExistsError, *_NO_FOLDER, PermissionError)
 
 app = typer.Typer(
     name="foretwin",
-    help="A low-fidelity digital twin that drives ahead of a real car.",
+    cls=WholeSentences,
     no_args_is_help=True,
-    add_completion=False,
+    rich_markup_mode=None,  # Else [default: 2] is taken for markup, and not shown.
+    context_settings=SETTINGS,
     pretty_exceptions_enable=False,
 )
 
-maps = typer.Typer(name="map", help="Fetch maps and prepare them.", no_args_is_help=True)
 app.add_typer(maps)
 
 app.add_typer(scenarios)
 app.add_typer(tracks_commands, name="tracks")
 
 
+@app.callback()
+def begin(version: VersionOption = False) -> None:
+    """Drive ahead of a real car, in a low-fidelity digital twin.
+
+    Example: foretwin COMMAND --help
+    """
+
+
 @app.command()
 def drive(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
-    map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
+    map_file: Annotated[
+        str | None, typer.Option("--map", help="map of the place [default: a drawn town]")
+    ] = None,
     dem: DemOption = None,
     tracks: TracksOption = None,
     route: Annotated[
-        str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live; default: predicted")
+        str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live [default: predicted]")
     ] = None,
-    log: Annotated[str | None, typer.Option(help="recorded drive to replay")] = None,
+    log: Annotated[
+        str | None, typer.Option(help="recorded drive to replay [default: a stand-in car drives]")
+    ] = None,
     source: Annotated[
-        str | None, typer.Option(help="log, standin, live (a car on the bus), or auto")
+        str | None,
+        typer.Option(help="log, standin, live (a car on the bus), or auto [default: auto]"),
     ] = None,
-    start_s: Annotated[float | None, typer.Option("--start", help="seconds into the log")] = None,
-    end_s: Annotated[float | None, typer.Option("--end", help="seconds into the log")] = None,
+    start_s: Annotated[
+        float | None, typer.Option("--start", help="seconds into the log [default: 0]")
+    ] = None,
+    end_s: Annotated[
+        float | None, typer.Option("--end", help="seconds into the log [default: its end]")
+    ] = None,
     speed: Annotated[
         str | None, typer.Option(help="replay speed, or max for lock step [default: 1]")
     ] = None,
@@ -92,9 +111,11 @@ def drive(
     horizon_s: Annotated[
         float | None, typer.Option("--horizon", help="seconds ahead [default: 8]")
     ] = None,
-    planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
+    planner: Annotated[
+        str | None, typer.Option(help="planner under test [default: pure_pursuit_idm]")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the futures [default: 0]")] = None,
-    vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
+    vehicle: VehicleFileOption = None,
     tuning: TuningOption = None,
     progress_table: ProgressTableOption = None,
     map_aiding: MapAidingOption = None,
@@ -120,7 +141,10 @@ def drive(
         ),
     ] = False,
 ) -> None:
-    """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
+    """Drive ahead of a car: worlds for the coming junctions, futures, live comparison.
+
+    Example: foretwin drive --map MAP.osm --log DRIVE.mcap --route from-log
+    """
     settings = locals()  # named as the fields of DriveConfig, but for two
     settings["map"] = settings.pop("map_file")
     settings["dem"] = None if dem is None else str(dem)
@@ -141,7 +165,10 @@ def intersections(
     service_roads: ServiceRoadsOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
-    """List the junctions of a map, each one as a driver sees it."""
+    """List the junctions of a map, each one as a driver sees it.
+
+    Example: foretwin intersections MAP.osm --route ROUTE.gpx --json
+    """
     from foretwin.orchestrator.commands.intersections import list_intersections
 
     list_intersections(map_file, route=route, as_json=as_json, service_roads=service_roads)
@@ -191,44 +218,21 @@ def world(
             "[default: twin:twin,shadow:shadow,ghost:ghost]"
         ),
     ] = None,
-    vehicle: Annotated[Path | None, typer.Option(help="sdf: vehicle parameters, TOML")] = None,
+    vehicle: Annotated[
+        Path | None, typer.Option(help="sdf: vehicle parameters, TOML [default: bmw_320i]")
+    ] = None,
     report: Annotated[
         bool, typer.Option("--report", help="also say what was tagged and what was guessed")
     ] = False,
 ) -> None:
-    """Write Worlds of a map: models, road networks for other simulators, or pictures."""
+    """Write Worlds of a map: models, road networks for other simulators, or pictures.
+
+    Example: foretwin world MAP.osm --at 52.511,13.390 --out junction.png
+    """
     asked = locals()  # named as the fields of WorldRequest
     from foretwin.orchestrator.commands.world import WorldRequest, write_worlds
 
     raise typer.Exit(write_worlds(WorldRequest(**asked)))
-
-
-@maps.command("get", context_settings={"ignore_unknown_options": True})
-def get_map(
-    area: Annotated[
-        str,
-        typer.Argument(metavar="BBOX|ROUTE", help="W,S,E,N in degrees, or a GPX or GeoJSON file"),
-    ],
-    out: OutOption,
-    config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
-) -> None:
-    """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint."""
-    from foretwin.orchestrator.commands.map_get import get_map as fetch
-
-    fetch(area, out=out, config=config)
-
-
-@maps.command("index")
-def index_map(
-    map_file: MapArgument,
-    folder: Annotated[
-        Path | None, typer.Option(help="folder of indexes [default: the user's cache]")
-    ] = None,
-) -> None:
-    """Read a map of any size into an index on disk, from which places and routes are clipped."""
-    from foretwin.orchestrator.worlds.indexing import index_map_file
-
-    index_map_file(map_file, folder=folder)
 
 
 for command in (sweep, *ABOUT_LOGS, learn_progress, doctor, worker):

@@ -11,23 +11,34 @@ from foretwin.orchestrator.commands.cli_options import (
     DeclarationOption,
     FirstDeclarationOption,
     OtherDeclarationOption,
+    VehicleFileOption,
 )
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="recorded drive")],
+    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="recorded drive")],
     target: Annotated[
-        Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder for a ROS 2 bag")
+        Path,
+        typer.Argument(
+            metavar="TARGET", help=".mcap, .bag (ROS 1), .csv, or a folder for a ROS 2 bag"
+        ),
     ],
     to: Annotated[
-        str | None, typer.Option("--to", help="mcap, ros2, ros1, csv; else the name tells")
+        str | None,
+        typer.Option("--to", help="mcap, ros2, ros1, csv [default: as TARGET is called]"),
     ] = None,
     declaration: Annotated[
         Path | None,
-        typer.Option("--declaration", help="TOML that declares SOURCE; else SOURCE.toml"),
+        typer.Option(
+            "--declaration",
+            help="TOML that declares SOURCE [default: SOURCE.toml, where it is there]",
+        ),
     ] = None,
 ) -> None:
-    """Convert a recorded drive to MCAP, a ROS bag, or CSV."""
+    """Convert a recorded drive to MCAP, a ROS bag, or CSV.
+
+    Example: foretwin convert DRIVE.csv DRIVE.mcap
+    """
     from foretwin.orchestrator.commands.recordings import convert_log
 
     convert_log(source, target, to=to, declaration=declaration)
@@ -43,7 +54,10 @@ def declare(
         typer.Option(help="KEY=VALUE of time, latitude, x, epsg, origin or reference_point"),
     ] = None,
 ) -> None:
-    """Find out what a table's columns are, prove it, and write the declaration it is read by."""
+    """Find out what a table's columns are, prove it, and write the declaration it is read by.
+
+    Example: foretwin declare DRIVE.csv --answer time=millis
+    """
     from foretwin.orchestrator.commands.declare import declare as declare_table
 
     declare_table(table, out=out, answers=tuple(answer or ()))
@@ -56,11 +70,16 @@ def merge(
     second: Annotated[
         Path, typer.Argument(metavar="LOG_B", help="another recording of the same drive")
     ],
-    target: Annotated[Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder")],
+    target: Annotated[
+        Path, typer.Argument(metavar="OUT", help=".mcap, .bag (ROS 1), .csv, or a folder")
+    ],
     declaration: FirstDeclarationOption = None,
     other_declaration: OtherDeclarationOption = None,
 ) -> None:
-    """Put two recordings of one drive on one clock, by how the car moved, and write them as one."""
+    """Put two recordings of one drive on one clock, by how the car moved, and write them as one.
+
+    Example: foretwin merge CAN.csv GNSS.gpx BOTH.mcap
+    """
     asked = locals()
     from foretwin.orchestrator.commands.recordings import merge_logs
 
@@ -68,7 +87,7 @@ def merge(
 
 
 def identify(
-    log: Annotated[Path, typer.Argument(help="recorded drive")],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
     vehicle: Annotated[
         str | None, typer.Option(help="parameters in force, TOML [default: the bundled BMW 320i]")
     ] = None,
@@ -78,7 +97,10 @@ def identify(
     ] = None,
     declaration: DeclarationOption = None,
 ) -> None:
-    """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
+    """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances.
+
+    Example: foretwin identify DRIVE.mcap --out found
+    """
     from foretwin.orchestrator.commands.identify import identify_log
 
     code = identify_log(
@@ -88,7 +110,7 @@ def identify(
 
 
 def judge(
-    run: Annotated[Path, typer.Argument(help="folder of a run")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
     map_file: Annotated[
         Path | None, typer.Option("--map", help="corrected map [default: the run's own]")
     ] = None,
@@ -103,7 +125,10 @@ def judge(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
 ) -> None:
-    """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?"""
+    """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?
+
+    Example: foretwin judge runs/NAME --map FIXED.osm
+    """
     asked = locals()
     from foretwin.orchestrator.commands.judge import judge as judge_run
 
@@ -112,11 +137,16 @@ def judge(
 
 def repeat(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run or sweep")],
-    future: Annotated[str, typer.Argument(help="future_id of the table of futures")],
+    future: Annotated[
+        str, typer.Argument(metavar="FUTURE", help="future_id of the table of futures")
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="both hashes as JSON")] = False,
     view: Annotated[bool, typer.Option("--view", help="also draw it, into RUN/repeated")] = False,
 ) -> None:
-    """Play a recorded future again, bit for bit: exit code 3 where it comes to something else."""
+    """Play a recorded future again, bit for bit: exit code 3 where it comes to something else.
+
+    Example: foretwin repeat runs/NAME FUTURE --view
+    """
     from foretwin.orchestrator.commands.repeat import repeat as repeat_future
 
     raise typer.Exit(repeat_future(folder, future, as_json=as_json, view=view))
@@ -125,7 +155,10 @@ def repeat(
 def recover(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
 ) -> None:
-    """Make readable what a run left that was killed: exit code 3 where something of it is lost."""
+    """Make readable what a run left that was killed: exit code 3 where something of it is lost.
+
+    Example: foretwin recover runs/NAME
+    """
     from foretwin.orchestrator.commands.recover import recover_run
 
     raise typer.Exit(recover_run(run))
@@ -133,9 +166,7 @@ def recover(
 
 def gap(
     recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
-    vehicle: Annotated[
-        str | None, typer.Option(help="vehicle parameters, TOML, or a bundled name")
-    ] = None,
+    vehicle: VehicleFileOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
     declaration: DeclarationOption = None,
@@ -143,7 +174,10 @@ def gap(
         Path | None, typer.Option(help="another drive of this road: how far people differ on it")
     ] = None,
 ) -> None:
-    """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
+    """Measure how far the model leaves a recorded drive, and say which of the two is wrong.
+
+    Example: foretwin gap DRIVE.mcap --vehicle CAR.toml --out plots
+    """
     asked = locals()
     from foretwin.orchestrator.commands.gap import report_gap
 
@@ -160,7 +194,10 @@ def compare(
     declaration: FirstDeclarationOption = None,
     other_declaration: OtherDeclarationOption = None,
 ) -> None:
-    """Compare two drives of one road: how far people differ where nothing is wrong."""
+    """Compare two drives of one road: how far people differ where nothing is wrong.
+
+    Example: foretwin compare MONDAY.mcap TUESDAY.mcap --out pictures
+    """
     asked = locals()
     from foretwin.orchestrator.commands.compare import compare as compare_drives
 
@@ -183,7 +220,10 @@ def collect(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
 ) -> None:
-    """Collect the tables of many runs and sweeps into one lake of partitioned Parquet."""
+    """Collect the tables of many runs and sweeps into one lake of partitioned Parquet.
+
+    Example: foretwin collect runs sweeps --into lake
+    """
     from foretwin.orchestrator.commands.collect import collect_runs
 
     code = collect_runs(
@@ -195,7 +235,10 @@ def collect(
 def view(
     run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
 ) -> None:
-    """Open the recording of a run in the viewer."""
+    """Open the recording of a run in the viewer.
+
+    Example: foretwin view runs/NAME
+    """
     from foretwin.orchestrator.commands.recordings import open_view
 
     raise typer.Exit(open_view(run_folder))

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-MapArgument = Annotated[Path, typer.Argument(help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
+MapArgument = Annotated[
+    Path, typer.Argument(metavar="MAP", help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")
+]
+VehicleFileOption = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        help="vehicle parameters, TOML, or a bundled name such as city_bus [default: bmw_320i]",
+    ),
+]
 ServiceRoadsOption = Annotated[
     bool,
     typer.Option("--service-roads", help="driveways and parking aisles count as roads everywhere"),
@@ -31,14 +40,23 @@ TracksOption = Annotated[
     ),
 ]
 DeclarationOption = Annotated[
-    Path | None, typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml")
+    Path | None,
+    typer.Option(
+        "--declaration", help="TOML that declares LOG [default: LOG.toml, where it is there]"
+    ),
 ]
 FirstDeclarationOption = Annotated[
-    Path | None, typer.Option("--declaration", help="TOML that declares LOG_A; else LOG_A.toml")
+    Path | None,
+    typer.Option(
+        "--declaration", help="TOML that declares LOG_A [default: LOG_A.toml, where it is there]"
+    ),
 ]
 OtherDeclarationOption = Annotated[
     Path | None,
-    typer.Option("--other-declaration", help="TOML that declares LOG_B; else LOG_B.toml"),
+    typer.Option(
+        "--other-declaration",
+        help="TOML that declares LOG_B [default: LOG_B.toml, where it is there]",
+    ),
 ]
 LeastFuturesOption = Annotated[
     int | None,
@@ -48,7 +66,8 @@ LeastFuturesOption = Annotated[
     ),
 ]
 KeepOption = Annotated[
-    str | None, typer.Option(help="the newest of a run that stay, such as 12h or 20GB")
+    str | None,
+    typer.Option(help="the newest of a run that stay, such as 12h or 20GB [default: all]"),
 ]
 MapAidingOption = Annotated[
     str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
@@ -69,7 +88,10 @@ ProgressTableOption = Annotated[
 ]
 EndpointOption = Annotated[
     str | None,
-    typer.Option(help="where the bus listens, such as tls/HOST:7447 with --secure"),
+    typer.Option(
+        help="where the bus listens, such as tls/HOST:7447 with --secure "
+        "[default: a socket of this user's]"
+    ),
 ]
 InsecureOption = Annotated[
     bool, typer.Option("--insecure", help="whoever reaches the endpoint may say anything")
@@ -80,6 +102,8 @@ SecureOption = Annotated[
 ]
 MetricsOption = Annotated[
     str | None,
-    typer.Option(help="tell operators metrics on this port of 127.0.0.1, or on HOST:PORT"),
+    typer.Option(
+        help="tell operators metrics on this port of 127.0.0.1, or on HOST:PORT [default: none]"
+    ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]

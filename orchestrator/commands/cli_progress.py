@@ -27,7 +27,10 @@ def learn_progress(
     ] = "of the drives' owner",
     as_json: Annotated[bool, typer.Option("--json", help="the figures as JSON")] = False,
 ) -> None:
-    """Learn from drives how far a car gets in the next seconds (docs/progress.md)."""
+    """Learn from drives how far a car gets in the next seconds (docs/progress.md).
+
+    Example: foretwin learn-progress DRIVE_1.mcap DRIVE_2.mcap --out OURS.npz
+    """
     from foretwin.orchestrator.commands.learn_progress import learn_progress as learn
 
     learn(logs or [], out=out, check=check or [], table=table, licence=licence, as_json=as_json)

@@ -7,9 +7,12 @@ from typing import Annotated
 
 import typer
 
+from foretwin.orchestrator.commands.cli_help import WholeSentences
 from foretwin.orchestrator.commands.cli_options import MapArgument, ServiceRoadsOption
 
-scenarios = typer.Typer(name="scenarios", help="List, check, place, draw and export scenarios.")
+scenarios = typer.Typer(
+    name="scenarios", cls=WholeSentences, help="List, check, place, draw and export scenarios."
+)
 
 
 @scenarios.callback(invoke_without_command=True)
@@ -27,9 +30,12 @@ def list_scenarios(
 
 @scenarios.command("check")
 def check_scenario(
-    file: Annotated[Path, typer.Argument(help="scenario, TOML")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="scenario, TOML")],
 ) -> None:
-    """Say whether a scenario file is sound, and how many cases it has."""
+    """Say whether a scenario file is sound, and how many cases it has.
+
+    Example: foretwin scenarios check SCENARIO.toml
+    """
     from foretwin.orchestrator.commands.scenarios import check_scenario_file
 
     check_scenario_file(file)
@@ -46,7 +52,10 @@ def place_scenarios(
     service_roads: ServiceRoadsOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
-    """Say which junctions of a map take which scenarios, and why not elsewhere."""
+    """Say which junctions of a map take which scenarios, and why not elsewhere.
+
+    Example: foretwin scenarios place MAP.osm --scenario ccftap
+    """
     from foretwin.orchestrator.commands.scenarios import PlacesAsked
     from foretwin.orchestrator.commands.scenarios import place_scenarios as place_them
 
@@ -58,8 +67,10 @@ MapOption = Annotated[Path, typer.Option("--map", help="map: .osm, .osm.gz, .osm
 IdOption = Annotated[str | None, typer.Option("--id", help="the junction's id")]
 AtOption = Annotated[str | None, typer.Option("--at", help="LAT,LON: the junction nearest to it")]
 CaseOption = Annotated[int, typer.Option("--case", help="which of its cases, from 1")]
-VehicleOption = Annotated[Path | None, typer.Option("--vehicle", help="vehicle parameters, TOML")]
-ScenarioArgument = Annotated[str, typer.Argument(help="id or TOML file")]
+VehicleOption = Annotated[
+    Path | None, typer.Option("--vehicle", help="vehicle parameters, TOML [default: bmw_320i]")
+]
+ScenarioArgument = Annotated[str, typer.Argument(metavar="SCENARIO", help="id or TOML file")]
 
 
 @scenarios.command("export")
@@ -73,7 +84,10 @@ def export_scenario(
     vehicle: VehicleOption = None,
     service_roads: ServiceRoadsOption = False,
 ) -> None:
-    """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE."""
+    """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE.
+
+    Example: foretwin scenarios export ccftap --map MAP.osm --out CASE.xosc
+    """
     from foretwin.orchestrator.commands.scenario_export import CaseRequest
     from foretwin.orchestrator.commands.scenario_export import export_scenario as export
     from foretwin.orchestrator.commands.scenarios import PlacesAsked
@@ -94,7 +108,10 @@ def draw_scenario(
     vehicle: VehicleOption = None,
     service_roads: ServiceRoadsOption = False,
 ) -> None:
-    """Draw one case at one junction from above: as planned, and as a planner drives it."""
+    """Draw one case at one junction from above: as planned, and as a planner drives it.
+
+    Example: foretwin scenarios draw ccftap --map MAP.osm --out CASE.png
+    """
     from foretwin.orchestrator.commands.scenario_export import CaseRequest
     from foretwin.orchestrator.commands.scenario_export import draw_scenario as draw
     from foretwin.orchestrator.commands.scenarios import PlacesAsked

@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from foretwin.orchestrator.commands.cli_help import WholeSentences
+
 secure = typer.Typer(
+    cls=WholeSentences,
     help="Certificates for a bus over a network: who may join, and as what (docs/security.md).",
     no_args_is_help=True,
 )
@@ -28,7 +31,10 @@ def init(
     campaign_days: Annotated[int, typer.Option(help="how long the campaign goes on")] = 30,
     days: Annotated[int, typer.Option(help="how long a role's certificate holds")] = 7,
 ) -> None:
-    """Begin a campaign: an authority of its own, and certificates for a drive's processes."""
+    """Begin a campaign: an authority of its own, and certificates for a drive's processes.
+
+    Example: foretwin secure init --folder CAMPAIGN --host 192.168.7.2
+    """
     from foretwin.orchestrator.commands.secure import begin
 
     raise typer.Exit(begin(folder, hosts=host or (), days=campaign_days, role_days=days))
@@ -37,13 +43,19 @@ def init(
 @secure.command("add")
 def add(
     role: Annotated[
-        str, typer.Argument(help="car, planner, operator, worker-NAME, or any to renew it")
+        str,
+        typer.Argument(
+            metavar="ROLE", help="car, planner, operator, worker-NAME, or any to renew it"
+        ),
     ],
     folder: FolderOption,
     host: HostOption = None,
     days: Annotated[int, typer.Option(help="how long the certificate holds")] = 7,
 ) -> None:
-    """Make or renew a role's certificate; its folder is what its host needs."""
+    """Make or renew a role's certificate; its folder is what its host needs.
+
+    Example: foretwin secure add worker-boot --folder CAMPAIGN
+    """
     from foretwin.orchestrator.commands.secure import add as add_role
 
     raise typer.Exit(add_role(folder, role, hosts=host or (), days=days))
@@ -51,7 +63,10 @@ def add(
 
 @secure.command("show")
 def show(folder: FolderOption) -> None:
-    """Say for how long each certificate holds, and what is wrong with any."""
+    """Say for how long each certificate holds, and what is wrong with any.
+
+    Example: foretwin secure show --folder CAMPAIGN
+    """
     from foretwin.orchestrator.commands.secure import show as show_roles
 
     raise typer.Exit(show_roles(folder))
@@ -66,7 +81,10 @@ def doctor(
     ] = None,
     role: Annotated[str, typer.Option(help="who is not let in")] = "car",
 ) -> None:
-    """Say what this machine has and what is missing, or why a bus lets one of its roles not in."""
+    """Say what this machine has and what is missing, or why a bus lets one of its roles not in.
+
+    Example: foretwin doctor
+    """
     from foretwin.orchestrator.commands.doctor import examine, examine_bus
 
     if endpoint is None and secure is None:

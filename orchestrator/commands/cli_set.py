@@ -28,7 +28,10 @@ def set_value(
         Path | None, typer.Option(help="the operator's certificate, where the drive wants one")
     ] = None,
 ) -> None:
-    """Change a running drive: a vehicle's role, the twins' correction, the car's parameters."""
+    """Change a running drive: a vehicle's role, the twins' correction, the car's parameters.
+
+    Example: foretwin set vehicle.mass_kg=1500
+    """
     from foretwin.orchestrator.commands.set import set_in_drive
 
     say(set_in_drive(assignment, run=run, out=out, secure=secure))

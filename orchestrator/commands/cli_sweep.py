@@ -45,7 +45,10 @@ def sweep(
         bool, typer.Option("--merge", help="put the folders of all shards together into --out")
     ] = False,
 ) -> None:
-    """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
+    """Play scenarios on junctions with planners and parameters, offline, into Parquet.
+
+    Example: foretwin sweep SPEC.toml --workers 4
+    """
     from foretwin.orchestrator.commands.sweep import merge_shards
     from foretwin.orchestrator.commands.sweep import sweep as run_sweep
     from foretwin.orchestrator.sweep.engines import Engine

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
+from foretwin.orchestrator.commands.cli_help import WholeSentences
 from foretwin.orchestrator.commands.cli_options import DeclarationOption
 
 tracks = typer.Typer(
+    cls=WholeSentences,
     help="Where your car drove, to correct lanes by (docs/tracks.md): yours to list and delete.",
     no_args_is_help=True,
 )
@@ -21,7 +23,10 @@ StoreOption = Annotated[
 
 @tracks.command("list")
 def list_(store: StoreOption = None) -> None:
-    """List the tracks: id, length, when added, from what."""
+    """List the tracks: id, length, when added, from what.
+
+    Example: foretwin tracks list
+    """
     from foretwin.orchestrator.commands.tracks import list_tracks
 
     list_tracks(store=store)
@@ -29,7 +34,9 @@ def list_(store: StoreOption = None) -> None:
 
 @tracks.command()
 def add(
-    log: Annotated[Path, typer.Argument(help="recorded drive, such as RUN/drive.mcap")],
+    log: Annotated[
+        Path, typer.Argument(metavar="LOG", help="recorded drive, such as RUN/drive.mcap")
+    ],
     store: StoreOption = None,
     name: Annotated[str | None, typer.Option(help="what it is called [default: the file]")] = None,
     std_m: Annotated[
@@ -42,7 +49,10 @@ def add(
     ] = None,
     declaration: DeclarationOption = None,
 ) -> None:
-    """Keep where a recorded drive went."""
+    """Keep where a recorded drive went.
+
+    Example: foretwin tracks add runs/NAME/drive.mcap
+    """
     from foretwin.orchestrator.commands.tracks import add_track
 
     add_track(log, store=store, name=name, std_m=std_m, declaration=declaration)
@@ -50,11 +60,16 @@ def add(
 
 @tracks.command()
 def delete(
-    ids: Annotated[list[str] | None, typer.Argument(help="ids of tracks")] = None,
+    ids: Annotated[
+        list[str] | None, typer.Argument(metavar="[ID]...", help="ids of tracks")
+    ] = None,
     everything: Annotated[bool, typer.Option("--all", help="all tracks of the store")] = False,
     store: StoreOption = None,
 ) -> None:
-    """Delete tracks."""
+    """Delete tracks.
+
+    Example: foretwin tracks delete --all
+    """
     from foretwin.orchestrator.commands.tracks import delete_tracks
 
     delete_tracks(ids or [], everything=everything, store=store)

@@ -31,7 +31,10 @@ def worker(
         bool, typer.Option("--stay", help="wait for a drive, and after it for the next")
     ] = False,
 ) -> None:
-    """Play futures for a drive on another machine (docs/workers.md)."""
+    """Play futures for a drive on another machine (docs/workers.md).
+
+    Example: foretwin worker --connect tls/192.168.7.2:7447 --secure worker-boot
+    """
     from foretwin.orchestrator.commands.worker import WorkerRequest, work
 
     raise typer.Exit(work(WorkerRequest(connect, secure, insecure, name, workers, cache, stay)))

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
 
@@ -55,7 +56,7 @@ def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> int:
             "doctor needs both --endpoint tls/HOST:PORT and --secure FOLDER, or neither"
         )
     if role not in CAMPAIGN_ROLES and worker_name(role) is None:
-        raise UserError(f"--role {role}: one of {', '.join(CAMPAIGN_ROLES)}")
+        raise UserError(f"--role {role}: {one_of(role, CAMPAIGN_ROLES)}")
     own = not (folder / role).is_dir()
     setup = BusSetup(
         endpoint=endpoint, tls=certificate_in(folder) if own else role_files(folder, role)

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from foretwin.contracts.did_you_mean import meant
 from foretwin.contracts.terminal import say
 
 EXIT_INTERNAL = 1
@@ -16,6 +17,7 @@ NO_PLACE = (
 )  # fmt: skip
 """Errors of a place where nothing can be written; the user may find another."""
 _OF_PYDANTIC = "Input should be "
+_NO_OPTION = "No such option: "
 
 
 def usage_line(error: Any, arguments: Sequence[str]) -> str:
@@ -26,6 +28,10 @@ def usage_line(error: Any, arguments: Sequence[str]) -> str:
     if not text:
         return ""
     command = "foretwin" if error.ctx is None else error.ctx.command_path
+    if text.startswith(_NO_OPTION):
+        given = error.option_name
+        known = [name for one in error.ctx.command.params for name in one.opts]
+        text = f"{_NO_OPTION}{given}; {meant(given, known)}".removesuffix("; ").strip()
     for option in getattr(getattr(error, "param", None), "opts", ()):
         given = _given_for(option, arguments)
         if given is not None and error.message:

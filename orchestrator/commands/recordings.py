@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.segments import first_left
 from foretwin.contracts.terminal import say
@@ -26,7 +27,7 @@ def convert_log(
 
     kind = next((one for one in TARGETS if one == to), None)
     if to is not None and kind is None:
-        raise UserError(f"--to {to}: no kind of target; known: {', '.join(TARGETS)}")
+        raise UserError(f"--to {to}: no kind of target; {one_of(to, TARGETS)}")
     if not source.exists():
         raise FileNotFoundError(f"recorded drive {source}: no such file or folder")
     if not target.parent.is_dir():

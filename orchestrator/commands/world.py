@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.terminal import say
@@ -164,7 +165,7 @@ def _check_place(request: WorldRequest) -> None:
 def _format(name: str | None, file: Path | None) -> Format:
     """Return the format that was named or that the file's suffix says; in a folder, the default."""
     if name is not None and name not in FORMATS:
-        raise UserError(f"--format {name}: one of {', '.join(FORMATS)}")
+        raise UserError(f"--format {name}: {one_of(name, FORMATS)}")
     if file is None:
         return FORMATS[name or DEFAULT_FORMAT]
     said = formats_by_suffix(file.suffix)
@@ -215,7 +216,7 @@ def _one_of(option: str, word: str | None, choices: tuple[_Word, ...]) -> _Word:
     for choice in choices:
         if word in (None, choice):
             return choice
-    raise UserError(f"{option} {word}: one of {', '.join(choices)}")
+    raise UserError(f"{option} {word}: {one_of(word, choices)}")
 
 
 def _vehicles(text: str) -> tuple[tuple[str, VehicleKind], ...]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.log_file import JsonLines, LogFile
 from foretwin.contracts.one_heap import share_one_heap
@@ -37,7 +38,7 @@ class Engine(NamedTuple):
     def check(self) -> None:
         """Raise UserError, in one line, for what cannot be."""
         if self.name not in ENGINES:
-            raise UserError(f"--engine {self.name}: one of {', '.join(ENGINES)}")
+            raise UserError(f"--engine {self.name}: {one_of(self.name, ENGINES)}")
         if self.address is not None:
             if self.name != "ray":
                 raise UserError(f"--address {self.address}: goes with --engine ray alone")

@@ -8,6 +8,7 @@ from typing import Literal
 
 import msgspec
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import RESULT_STEP_S
 from foretwin.contracts.numbers import FUTURE_NUMBERS, MAX_SEED, out_of_range
@@ -200,7 +201,7 @@ def _check_metrics(names: tuple[str, ...]) -> None:
         if name in METRICS and METRICS[name].series:
             raise UserError(f"metrics: {name} is a series; a row holds single numbers")
         if name not in METRICS:
-            raise UserError(f"metrics: unknown {name!r}; known: {', '.join(ROW_METRICS)}")
+            raise UserError(f"metrics: unknown {name!r}; {one_of(name, ROW_METRICS)}")
     if len(set(names)) != len(names):
         raise UserError("metrics: each only once")
 
@@ -208,7 +209,7 @@ def _check_metrics(names: tuple[str, ...]) -> None:
 def _check_parameters(parameters: dict[str, tuple[float, ...]]) -> None:
     for name, values in parameters.items():
         if name not in FUTURE_NUMBERS:
-            raise UserError(f"parameters: unknown {name!r}; known: {', '.join(FUTURE_NUMBERS)}")
+            raise UserError(f"parameters: unknown {name!r}; {one_of(name, FUTURE_NUMBERS)}")
         if not values or len(set(values)) != len(values):
             raise UserError(f"parameters.{name}: at least one value, each only once")
         for value in values:

@@ -12,6 +12,7 @@ import importlib.metadata
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.planner_interface import Planner
 from foretwin.sim_worker.planners.as_planned import AsPlanned
@@ -61,7 +62,7 @@ def _entry_point(name: str) -> EntryPoint:
     for point in entry_points(group=GROUP):
         if point.name == name:
             return point
-    raise UserError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")
+    raise UserError(f"unknown planner {name!r}; {one_of(name, planner_names())}")
 
 
 def check_planner(name: str, *, in_drive: bool = True) -> None:

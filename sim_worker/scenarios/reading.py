@@ -10,6 +10,7 @@ from typing import get_args, get_origin
 
 import msgspec
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED, out_of_range
 from foretwin.contracts.scenario import (
@@ -55,7 +56,7 @@ def find_scenario(name: Path | str) -> Scenario:
         return read_scenario(name)
     known = catalogue()
     if name not in known:
-        raise UserError(f"no scenario {name!r}; known: {', '.join(known)}, or a .toml file")
+        raise UserError(f"no scenario {name!r}; {one_of(name, known)}, or a .toml file")
     return known[name]
 
 

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.drive import Vector3
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
@@ -74,7 +75,9 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             raise ValueError(f"channel {self.channel!r}: {self.type} gives {known[self.type]!r}")
         for name, units in (("angle_unit", ANGLE), ("speed_unit", SPEED)):
             if getattr(self, name) not in units:
-                raise ValueError(f"{name} {getattr(self, name)!r}: one of {', '.join(units)}")
+                raise ValueError(
+                    f"{name} {getattr(self, name)!r}: {one_of(getattr(self, name), units)}"
+                )
         angles = self.angle_unit != "rad" or not self.left_positive
         if angles and self.channel not in ("steering", "control"):
             raise ValueError(f"angle_unit, left_positive: not of channel {self.channel!r}")

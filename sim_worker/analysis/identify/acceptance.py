@@ -8,6 +8,7 @@ from collections.abc import Collection
 
 import msgspec
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.tuning import (
     UNDERSTEER_GRADIENT,
@@ -122,7 +123,7 @@ def in_force(vehicle: VehicleParameters, name: str) -> float:
         return understeer_gradient(vehicle)
     parameter = getattr(vehicle, name, None)
     if not isinstance(parameter, Parameter):
-        raise UserError(f"{name} is no parameter of a vehicle; known: {', '.join(PLAUSIBLE)}")
+        raise UserError(f"{name} is no parameter of a vehicle; {one_of(name, PLAUSIBLE)}")
     return float(parameter.value)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.telemetry.logs.declaration import Declaration, PositionSection, TimeSection
 from foretwin.telemetry.logs.declare.choice import Chosen, CountryOf, OpenQuestion, chosen_place
 from foretwin.telemetry.logs.declare.clock import ClockColumn, clocks_of
@@ -59,7 +60,7 @@ def propose(
     answers = answers or {}
     for key in answers:
         if key not in ANSWERS:
-            raise LogError(f"--answer {key}: no such question; known: {', '.join(ANSWERS)}")
+            raise LogError(f"--answer {key}: no such question; {one_of(key, ANSWERS)}")
     table = read_loose_table(path)
     clock, places = _clock_and_places(table, answers)
     time_s = clock.time_s

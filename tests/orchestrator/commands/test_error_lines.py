@@ -17,6 +17,8 @@ from foretwin.orchestrator.embedded import MAP_FILE
     [
         (["drive", "--workers", "abc"], "foretwin drive: --workers abc: must be a valid integer"),
         (["drive", "--rate=x"], "foretwin drive: --rate x: must be a valid number"),
+        (["drive", "--lgo", "x"], "foretwin drive: No such option: --lgo; did you mean --log?"),
+        (["drive", "-x"], "foretwin drive: No such option: -x"),
         (["map", "foo"], "foretwin map: No such command 'foo'"),
         (["sweep"], "foretwin sweep: Missing argument 'SPEC'"),
         (["doctor", "extra"], "foretwin doctor: Got unexpected extra argument(s) (extra)"),

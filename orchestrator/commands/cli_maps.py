@@ -1,0 +1,49 @@
+"""The command line of maps: fetching and indexing them. The work is imported when run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foretwin.orchestrator.commands.cli_help import WholeSentences
+from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption
+
+maps = typer.Typer(
+    name="map", cls=WholeSentences, help="Fetch maps and prepare them.", no_args_is_help=True
+)
+
+
+@maps.command("get", context_settings={"ignore_unknown_options": True})
+def get_map(
+    area: Annotated[
+        str,
+        typer.Argument(metavar="BBOX|ROUTE", help="W,S,E,N in degrees, or a GPX or GeoJSON file"),
+    ],
+    out: OutOption,
+    config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
+) -> None:
+    """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint.
+
+    Example: foretwin map get ROUTE.gpx --out MAP.osm --config MAPS.toml
+    """
+    from foretwin.orchestrator.commands.map_get import get_map as fetch
+
+    fetch(area, out=out, config=config)
+
+
+@maps.command("index")
+def index_map(
+    map_file: MapArgument,
+    folder: Annotated[
+        Path | None, typer.Option(help="folder of indexes [default: the user's cache]")
+    ] = None,
+) -> None:
+    """Read a map of any size into an index on disk, from which places and routes are clipped.
+
+    Example: foretwin map index GERMANY.osm.pbf
+    """
+    from foretwin.orchestrator.worlds.indexing import index_map_file
+
+    index_map_file(map_file, folder=folder)
