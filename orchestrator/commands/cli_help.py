@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 import typer.core
 
 from foretwin.contracts.terminal import say
-
-if TYPE_CHECKING:
-    Context = typer.Context
-    Formatter = Any
 
 EXAMPLE = "Example: "
 """Begins the paragraph of a command's docstring that shows how it is typed."""
@@ -21,7 +17,7 @@ SETTINGS = {"help_option_names": ["-h", "--help"]}
 class WholeSentences(typer.core.TyperGroup):
     """A group that lists its commands with the whole first paragraph of each."""
 
-    def format_commands(self, ctx: Context, formatter: Formatter) -> None:
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a row for each command, wrapped at the width of the terminal."""
         rows = []
         for name in self.list_commands(ctx):
