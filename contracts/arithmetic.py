@@ -54,3 +54,10 @@ def fingerprints() -> Mapping[str, str]:
             data = np.ascontiguousarray(values).tobytes()
             found[f"{name} {np.dtype(kind).name}"] = hashlib.sha256(data).hexdigest()[:12]
     return found
+
+
+@functools.cache
+def arithmetic_sha256() -> str:
+    """Return one short hash of all fingerprints: where it is the same, numpy's bits are."""
+    whole = "".join(f"{name} {found}\n" for name, found in sorted(fingerprints().items()))
+    return hashlib.sha256(whole.encode()).hexdigest()[:12]

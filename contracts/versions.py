@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import functools
 import importlib.metadata
+import os
 import platform
 from pathlib import Path
 
 _ARITHMETIC = "numpy", "scipy", "shapely", "numba"
+_SWITCHES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES"
+"""What makes numba and numpy take a processor for another one."""
 _PACKAGES = ("foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", *_ARITHMETIC)
 
 
@@ -29,11 +32,13 @@ def _found() -> dict[str, str]:
 
 
 @functools.cache
-def processor() -> str:
-    """Return what this machine computes with, in words."""
+def processor(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
+    """Return what this machine computes with, in words: the model, and what is switched off."""
     try:
-        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        told = cpuinfo.read_text(encoding="utf-8", errors="replace")
     except OSError:
         told = ""
     models = (line.split(":", 1)[1] for line in told.splitlines() if line.startswith("model name"))
-    return f"{platform.machine()} {next(models, platform.processor()).strip()}".strip()
+    named = f"{platform.machine()} {next(models, platform.processor()).strip()}".strip()
+    switched = [f"{name}={os.environ[name]}" for name in _SWITCHES if os.environ.get(name)]
+    return " ".join([named, *switched])

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.codec import decode_content, encode
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.guard import opened
@@ -54,6 +55,7 @@ def made_of(planners: Iterable[str]) -> dict[str, str]:
     """Return what decides results here: versions, and hashes of our files and of planners."""
     found = versions()
     rooms = [Path(__file__).parents[1] / room for room in _DECIDING]
+    found["arithmetic"] = arithmetic_sha256()
     found["foretwin"] += f" ({files_digest(rooms)[:_DIGITS]})"
     for name in planners:
         try:

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import msgspec
 
+from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.setup import STACK_LOGS
@@ -101,6 +102,11 @@ class SweepFolder:
                 f"--out {self.path}: holds a sweep of another spec, map, planner or version; "
                 "--fresh starts anew, another --out keeps both"
             )
+        if said.get("arithmetic", arithmetic_sha256()) != arithmetic_sha256():
+            raise UserError(
+                f"--out {self.path}: holds rows of {said.get('processor')}, where numpy comes to "
+                "other bits than here; another --out keeps both"
+            )
         if shard != self._of_shard().get("shard", ""):
             holds = f"shard {shard}" if shard else "the whole"
             raise UserError(
@@ -122,6 +128,7 @@ class SweepFolder:
             **self._of_shard(),
             "versions": versions(),
             "processor": processor(),
+            "arithmetic": arithmetic_sha256(),
             **what,
         }
         self._write(SUMMARY, msgspec.json.format(msgspec.json.encode(whole), indent=2) + b"\n")

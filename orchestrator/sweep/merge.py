@@ -20,7 +20,16 @@ from foretwin.orchestrator.sweep.spec import SweepSpec
 from foretwin.orchestrator.sweep.summary import summed
 
 _OF_A_SHARD = frozenset(
-    {"shard", "ledger", "jobs_played", "playing_s", "rows_sha256", "scenarios", "processor"}
+    {
+        "shard",
+        "ledger",
+        "jobs_played",
+        "playing_s",
+        "rows_sha256",
+        "scenarios",
+        "processor",
+        "arithmetic",
+    }
 )
 """What a shard's summary says of itself alone."""
 
@@ -101,8 +110,13 @@ def _one_of_each(found: Sequence[SweptShard]) -> list[SweptShard]:
         names = ", ".join(str(Shard(index, first.shard.of)) for index in missing)
         raise UserError(f"--merge: missing shard{'s' * (len(missing) > 1)} {names}")
     shards = [by_index[index] for index in sorted(by_index)]
-    if len(on := sorted({one.summary["processor"] for one in shards})) > 1:
-        say(f"played on {len(on)} processors, whose bits may differ: {'; '.join(on)}", error=True)
+    if len({one.summary["arithmetic"] for one in shards}) > 1:
+        on = sorted({one.summary["processor"] for one in shards})
+        say(
+            "played where numpy comes to other bits: one machine would come to other rows "
+            f"({'; '.join(on)})",
+            error=True,
+        )
     return shards
 
 

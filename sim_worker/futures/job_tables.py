@@ -6,6 +6,7 @@ import json
 
 import pyarrow as pa
 
+from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes
 from foretwin.contracts.versions import processor, versions
@@ -70,6 +71,7 @@ def played_with() -> dict[str, str]:
         "result_schema": str(RESULT_SCHEMA_VERSION),
         "versions": json.dumps(versions()),
         "processor": processor(),
+        "arithmetic": arithmetic_sha256(),
     }
 
 

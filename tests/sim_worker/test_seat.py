@@ -106,7 +106,7 @@ def test_who_is_made_of_something_else_says_of_what_and_answers_nothing() -> Non
 def test_a_changed_file_makes_another_foretwin(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert set(MADE_OF) >= {"python", "mujoco", "numba", "planner pure_pursuit_idm"}
+    assert set(MADE_OF) >= {"python", "mujoco", "numba", "arithmetic", "planner pure_pursuit_idm"}
     copied = tmp_path / "sim_worker" / "seat.py"
     for room in seats._DECIDING:
         shutil.copytree(ROOT / room, tmp_path / room, ignore=shutil.ignore_patterns("__pycache__"))

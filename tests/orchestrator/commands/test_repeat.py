@@ -109,7 +109,8 @@ def test_what_comes_to_something_else_is_3(copied: Path) -> None:
     [
         ("rows", {"result_schema": "0"}, {}, "another foretwin (schema of results 0"),
         ("jobs", {"versions": '{"python": "2.7"}'}, {}, "recorded with python 2.7, here is"),
-        ("rows", {"processor": "abacus"}, {}, "recorded on abacus, this is"),
+        ("rows", {"processor": "abacus", "arithmetic": ""}, {}, "recorded on abacus, this is"),
+        ("rows", {"processor": "abacus", "arithmetic": "x"}, {}, "recorded on abacus, this is"),
         ("rows", {}, {"planner": "remote"}, "driven by 'remote' in another process"),
         ("rows", {}, {"trajectory_sha256": None, "left_out": "no room"}, "not played: no room"),
         ("jobs", {}, {"job": b"other"}, "is damaged"),
@@ -148,6 +149,13 @@ def test_a_column_that_is_gone_is_named(
     said = _said(capsys)
     assert f"{table}/job-0" in said
     assert column in said
+
+
+def test_another_processor_of_the_same_arithmetic_repeats(copied: Path) -> None:
+    future = _rows(copied)[0]["future_id"]
+    for table in ("rows", "jobs"):
+        _rewritten(copied, table, {"processor": "abacus"})
+    assert run(["repeat", str(copied), future]) == 0
 
 
 @pytest.mark.parametrize("key", ["result_schema", "versions", "processor"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import msgspec
 import pytest
 
@@ -20,17 +18,6 @@ def test_this_machine_is_the_same_as_itself() -> None:
     assert here.cores >= 1
     assert here.versions["foretwin"]
     assert "are said to be the same" in differences(here, this_machine())
-
-
-def test_a_processor_is_told_by_its_model_and_what_is_switched_off(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    cpuinfo = tmp_path / "cpuinfo"
-    cpuinfo.write_text("processor\t: 0\nmodel name\t: Ryzen 9\nmodel name\t: Ryzen 9\n")
-    monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", "AVX2")
-    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)
-    assert this_machine(cpuinfo).cpu == "Ryzen 9 NPY_DISABLE_CPU_FEATURES=AVX2"
-    assert this_machine(tmp_path / "none").cpu
 
 
 @pytest.mark.parametrize(

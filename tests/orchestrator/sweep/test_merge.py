@@ -158,13 +158,28 @@ def test_what_does_not_fit_is_told_in_one_line(
     assert merge(found, tmp_path / "whole")["rows_sha256"] == swept[1]["rows_sha256"]
 
 
-def test_other_processors_are_told(
+def test_other_arithmetic_is_told(
     swept: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = copied(swept[0], tmp_path)
-    resaid(found[1], processor="abacus")
+    resaid(found[1], processor="abacus")  # of the same arithmetic, so that nothing is to be told
+    merge(found, tmp_path / "same")
+    assert "abacus" not in capsys.readouterr().err
+    resaid(found[1], arithmetic="other")
     merge(found, tmp_path / "out")
-    assert "played on 2 processors, whose bits may differ: abacus; " in capsys.readouterr().err
+    assert "numpy comes to other bits: one machine would come to other rows (abacus; " in (
+        capsys.readouterr().err
+    )
+
+
+def test_what_was_begun_with_another_arithmetic_is_not_gone_on_with(
+    swept: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    one = copied(swept[0], tmp_path)[1]
+    resaid(one, arithmetic="other")
+    loaded = load_spec(swept[0] / "small.toml")
+    with pytest.raises(UserError, match="where numpy comes to other bits than here"):
+        run_sweep(loaded, one, alone(loaded), shard=Shard(1, 3))
 
 
 def test_missing_shards_are_named_and_nothing_is_written(
