@@ -135,6 +135,7 @@ def test_the_ledger_balances_after_freezes_kills_and_strangers(tmp_path: Path) -
     assert_nothing_left(run)
 
 
+@pytest.mark.judge  # a killed orchestrator in lock step is in the fast suite
 def test_in_lock_step_a_sick_worker_changes_no_bit(tmp_path: Path) -> None:
     whole = foretwin(tmp_path / "whole", *LOCK_STEP)
     out = tmp_path / "torn"

@@ -119,6 +119,7 @@ def test_what_a_full_disk_cost_is_counted_and_said_last(tmp_path: Path) -> None:
     assert last.startswith(f"lost: {ledger['lost']} of {ledger['published']} telemetry samples")
 
 
+@pytest.mark.judge  # chaos kills it too
 def test_a_killed_viewer_shows_the_rest_in_a_file_of_its_own(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "14") as process:

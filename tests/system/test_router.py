@@ -10,6 +10,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from foretwin.contracts.ports import free_endpoint
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
@@ -73,6 +75,7 @@ def test_a_killed_router_is_there_again_within_a_second_and_nobody_else_is_start
     assert_nothing_left(run)
 
 
+@pytest.mark.judge  # one that is killed is replaced in the fast suite
 def test_a_router_that_stands_still_is_replaced(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "16") as process:
@@ -87,6 +90,7 @@ def test_a_router_that_stands_still_is_replaced(tmp_path: Path) -> None:
     assert_nothing_left(run)
 
 
+@pytest.mark.judge  # chaos stops it too
 def test_an_orchestrator_that_stands_still_for_a_while_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, "--end", "14") as process:
