@@ -25,7 +25,6 @@ COVERS = (
     "foretwin.orchestrator.record.run_folder",
     "foretwin.sim_worker.futures.job_tables",
     "foretwin.orchestrator.record.recorded_jobs",
-    "foretwin.contracts.versions",
 )
 
 
