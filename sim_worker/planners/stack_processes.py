@@ -148,7 +148,7 @@ class StackProcesses:
             if not (one.joined or one.unusable or one.number in troubles)
         ]:
             self._stay()
-            if self._hear(_LOOK_S) is not None:
+            if self._hear(_LOOK_S) is not None and time.monotonic() <= end:
                 continue
             for one in waits:
                 assert one.process is not None
@@ -180,8 +180,10 @@ class StackProcesses:
                 if number in waits and _answers(said, questions[number]):
                     self._instances[number].asked = True
                     outcomes[number] = said
-                continue
             now = time.monotonic()
+            if heard is not None and now <= end:
+                continue  # Who talks on and on has no more time than who says nothing.
+            waits = questions.keys() - outcomes.keys()
             for one in [self._instances[number] for number in waits]:
                 assert one.process is not None
                 if one.process.has_ended:

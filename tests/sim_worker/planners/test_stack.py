@@ -142,6 +142,13 @@ def test_one_process_that_hangs_takes_its_own_futures_alone(tmp_path: Path) -> N
         assert played(planner).outcome.lost == (1,)
 
 
+def test_who_talks_on_without_an_answer_has_no_more_time(tmp_path: Path) -> None:
+    with stack(tmp_path, "talks", answer_within_s=1.0) as planner:
+        result = played(planner)
+    assert result.outcome.lost == (0, 1)
+    assert "gave no answer within 1 s of wall time and was ended" in result.outcome.failures[0]
+
+
 def test_who_hangs_in_every_job_is_asked_no_more(tmp_path: Path) -> None:
     with stack(tmp_path, "straight") as planner:
         planner.hung_jobs = MOST_HUNG_JOBS
