@@ -71,6 +71,8 @@ class _AtSeats:
     task: Task
     since_s: float
     futures: list[Future[Ended]] = field(default_factory=list)
+    """Those that have not ended yet."""
+    asked_again: bool = False
 
 
 class _EndOfOne(NamedTuple):
@@ -220,9 +222,12 @@ class RayRunner:
         task = end.of.task
         if self._open.get(task.key) is not end.of:
             return  # It was cancelled, or its other half was sooner.
+        end.of.futures.remove(end.future)
+        answer, trouble = end.future.result()
+        if answer is None and end.of.futures:
+            return  # The other half may be answered yet.
         del self._open[task.key]
         self._leave_world(task)
-        answer, trouble = end.future.result()
         if answer is None:
             self._count.lost += 1
             self._answers.append(_given_up(task, trouble))
@@ -278,9 +283,10 @@ class RayRunner:
             return
         given = (asked for asked in self._open.values() if asked is not None)
         for asked in itertools.islice(given, can_be_in_work):
-            if asked.since_s < lost_s and len(asked.futures) == 1:
+            if asked.since_s < lost_s and not asked.asked_again:
                 with contextlib.suppress(OSError):
                     self._ask(asked)
+                    asked.asked_again = True
 
 
 def _given_up(task: Task, why: str, seat: str = "") -> Answer:

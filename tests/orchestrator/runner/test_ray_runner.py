@@ -188,27 +188,39 @@ def test_after_a_node_is_gone_the_eldest_are_asked_once_more_and_count_once(
     runner.submit(task("d"))  # after that
     for _ in range(2):
         assert runner.take() is None
-        assert [question.world_id for question, *_ in cluster.asked] == [
-            "a",
-            "b",
-            "c",
-            "A",
-            "a",
-            "b",
-        ]
+        assert "".join(question.world_id for question, *_ in cluster.asked) == "abcAab"
     cluster.end(4)
     cluster.end(0)
     answer = runner.take()
     assert answer is not None
     assert answer.task.key == "a"
     assert runner.take() is None  # the other answer to it; c is among the eldest now
-    assert [question.world_id for question, *_ in cluster.asked] == ["b", "c", "A", "b", "c"]
+    assert "".join(question.world_id for question, *_ in cluster.asked) == "bcAbc"
     runner.cancel("b")
     assert cluster.forgotten == 2
     for _ in range(4):
         cluster.end()
     assert len(list(iter(runner.take, None))) == 2
     assert counted(runner) == (4, 3, 0, 1)
+
+
+def test_of_one_that_was_asked_twice_the_loss_of_one_half_is_not_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(ray_runner, "_LOOK_S", 0.0)
+    monkeypatch.setattr(ray_runner, "_AGAIN_S", 0.0)
+    cluster = OneByOne("n1-0")
+    runner = on(cluster)
+    runner.submit(task("a"))
+    cluster.lost_s = time.monotonic()
+    assert runner.take() is None
+    assert len(cluster.asked) == 2
+    cluster.lose("3 workers died of it")
+    assert runner.take() is None
+    assert len(cluster.asked) == 1, "twice is enough"
+    cluster.end()
+    assert [one.failure for one in iter(runner.take, None)] == [""]
+    assert counted(runner) == (1, 1, 0, 0)
 
 
 def test_an_answer_wakes_who_waits_for_it() -> None:
