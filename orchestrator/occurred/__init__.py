@@ -1,0 +1,1 @@
+"""What really occurred in a run's drive, read from its folder."""

@@ -1,0 +1,1 @@
+"""What really occurred in a drive: scenarios recognised, and what they mean to safety."""

@@ -1,0 +1,1 @@
+"""What occurred in runs, from their folders."""

@@ -1,0 +1,73 @@
+"""What occurred in a run, read from the folder that a drive leaves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.orchestrator.occurred.occurred import occurred_in
+from tests.orchestrator.recorded_runs import write_run
+from tests.sim_worker.scenarios.worlds import cross
+
+COVERS = ("foretwin.orchestrator.occurred.drive_read",)
+SPEED_MPS, START_X_M, START_NS = 8.0, -70.0, 1_000_000_000_000
+
+
+def _crosses(name: str, second: float, *, virtual: bool = False) -> RoadUser:
+    """From the right, past the car's nose or tail."""
+    xy = np.array([1.6, -1.5 + 8.0 * (second - 9.9)])
+    lat, lon = geo_from_local(cross().frame, xy)
+    return RoadUser(
+        user_id=name, kind="car", position=GeoPoint(float(lat), float(lon)), yaw_rad=np.pi / 2,
+        speed_mps=8.0, length_m=4.5, width_m=1.8, virtual=virtual,
+    )  # fmt: skip
+
+
+def _run(folder: Path, *names: str, virtual: bool = False) -> Path:
+    tenths = np.arange(180)
+    xy = np.column_stack([START_X_M + SPEED_MPS * tenths / 10.0, np.full(180, -1.5)])
+    objects = [
+        RoadUsers(
+            stamp_ns=START_NS + tenth * 100_000_000,
+            users=tuple(_crosses(name, tenth / 10.0, virtual=virtual) for name in names),
+        )
+        for tenth in tenths.tolist()
+    ]
+    return write_run(
+        folder, cross(), rounds_s=range(1, 18), speed_mps=SPEED_MPS,
+        stamps_ns=(START_NS + tenths * 100_000_000).tolist(),
+        lat_lon_deg=geo_from_local(cross().frame, xy), objects=objects if names else (),
+    )  # fmt: skip
+
+
+def test_a_run_tells_of_its_junction_and_of_whom_the_car_met(tmp_path: Path) -> None:
+    found = occurred_in(_run(tmp_path, "b"))
+
+    assert [(row.kind, row.other_id) for row in found.scenarios] == [
+        ("crossing_from_right", "b"),
+        ("through_straight", ""),
+    ]
+    assert {row.junction_id for row in found.scenarios} == {cross().intersection.id}
+    assert found.sees_others
+
+
+def test_virtual_road_users_are_nobody_that_the_car_met(tmp_path: Path) -> None:
+    found = occurred_in(_run(tmp_path, "b", virtual=True))
+
+    assert [row.kind for row in found.scenarios] == ["through_straight"]
+
+
+def test_a_car_that_tells_of_nobody_is_said_to(tmp_path: Path) -> None:
+    found = occurred_in(_run(tmp_path))
+
+    assert not found.sees_others
+    assert "told of no road users" in found.notes[0]
+
+
+def test_a_folder_of_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"no drive\.mcap"):
+        occurred_in(tmp_path)
