@@ -33,7 +33,7 @@ def test_it_tells_what_was_kept_and_left_out(
 
 def test_an_unknown_kind_of_target_is_named(source: Path, tmp_path: Path) -> None:
     with pytest.raises(
-        UserError, match="--to xml: no kind of target; known: mcap, ros2, ros1, csv"
+        UserError, match="--to xml: no kind of target; one of mcap, ros2, ros1, csv"
     ):
         convert_log(source, tmp_path / "out", to="xml")
     convert_log(source, tmp_path / "out.data", to="csv")

@@ -31,7 +31,7 @@ def test_built_in_planners_are_known_without_installation() -> None:
 
 
 def test_an_unknown_planner_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"unknown planner 'magic'; known: pure_pursuit_idm, con"):
+    with pytest.raises(ValueError, match=r"unknown planner 'magic'; one of pure_pursuit_idm, con"):
         load_planner("magic")
 
 

@@ -115,7 +115,7 @@ def test_unknown_scenarios_are_refused_before_the_map_is_read(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run(["scenarios", "place", "no.osm", "--scenario", "ccftab"]) == 2
-    assert "no scenario 'ccftab'; known: brake_fault" in capsys.readouterr().err
+    assert "no scenario 'ccftab'; did you mean ccftap? one of brake_fault" in capsys.readouterr().err
 
 
 def test_a_case_is_exported_with_its_roads(

@@ -69,5 +69,5 @@ def test_those_of_foretwin_are_told_as_its_own() -> None:
 
 
 def test_an_unknown_name_is_told_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=f"unknown planner 'nobody'; known: {planner_names()[0]}"):
+    with pytest.raises(ValueError, match=f"unknown planner 'nobody'; one of {planner_names()[0]}"):
         planner_origin("nobody")

@@ -64,7 +64,7 @@ def test_a_file_is_found_by_id_or_by_path(tmp_path: Path) -> None:
     assert find_scenario("scp").id == "scp"
     read(GOOD, tmp_path)
     assert find_scenario(str(tmp_path / "mine.toml")).id == "mine"
-    with pytest.raises(UserError, match=r"no scenario 'spc'; known: .*scp"):
+    with pytest.raises(UserError, match=r"no scenario 'spc'; did you mean scp.*one of .*scp"):
         find_scenario("spc")
 
 
