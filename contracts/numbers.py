@@ -33,9 +33,15 @@ class Range(NamedTuple):
     above_low: bool = False
 
     def __str__(self) -> str:
+        low, high = (f"{end}" if isinstance(end, int) else f"{end:g}" for end in self[:2])
         if self.above_low:
-            return f"above {self.low:g}, at most {self.high:g}"
-        return f"{self.low:g} to {self.high:g}"
+            return f"above {low}, at most {high}"
+        return f"at least {low}" if self.high == math.inf else f"{low} to {high}"
+
+    def admits(self, value: float) -> bool:
+        """Whether a number may be this; no number that is none is admitted."""
+        above = self.low < value if self.above_low else self.low <= value
+        return above and value <= self.high
 
 
 MAX_SPEED_MPS = 100.0

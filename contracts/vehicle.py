@@ -9,7 +9,7 @@ from foretwin.contracts.drive import RoadUserKind
 _VAN_M, _LORRY_M = 5.2, 7.0
 
 
-class Parameter(msgspec.Struct, frozen=True):
+class Parameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One number with its uncertainty (one standard deviation, None where unknown) and source."""
 
     value: float

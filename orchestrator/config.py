@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from types import MappingProxyType
+from typing import Literal
 
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.numbers import MAX_SEED
+from foretwin.contracts.numbers import MAX_SEED, Range
 from foretwin.contracts.ports import metrics_place, trouble_with_bus
 from foretwin.contracts.roles import Correction, FollowLimits, Role
 from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.processors import processors, trouble_with_workers
-from foretwin.orchestrator.settings import read_toml, setting_of, settings_from
+from foretwin.orchestrator.settings import flag_of
 from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning
 
 View = Literal["auto", "native", "web", "none"]
@@ -25,6 +26,20 @@ MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
 MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
 """Of a World around its junction."""
+RANGES: Mapping[str, Range] = MappingProxyType(
+    {
+        "futures": Range(1, math.inf),
+        "futures_per_job": Range(1, math.inf),
+        "rate_hz": Range(0.0, 50.0, above_low=True),
+        "horizon_s": Range(1.0, 60.0),
+        "speed": Range(0.0, 1000.0, above_low=True),
+        "seed": Range(0, MAX_SEED),
+        "start_s": Range(0.0, math.inf),
+        "radius_m": Range(MIN_RADIUS_M, MAX_RADIUS_M),
+        "look_ahead_s": Range(5.0, 600.0),
+    }
+)
+"""What the numbers of a drive may be, where that depends on no other setting."""
 
 
 class ConfigError(UserError):
@@ -159,23 +174,14 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         """Yield what must hold, and what is said where it does not."""
         workers = trouble_with_workers(self.workers)
         yield workers is None, f"{workers}"
-        yield self.futures >= 1, f"--futures {self.futures}: at least 1"
+        for name, allowed in RANGES.items():
+            value = getattr(self, name)
+            yield value is None or allowed.admits(value), f"{flag_of(name)} {value}: {allowed}"
         least = self.least_futures
         few = f"--least-futures {least}: 1 to --futures, which is {self.futures}"
         yield least is None or 1 <= least <= self.futures, few
-        yield self.futures_per_job >= 1, f"futures_per_job {self.futures_per_job}: at least 1"
-        yield 0.0 < self.rate_hz <= 50.0, f"--rate {self.rate_hz}: above 0, at most 50"
-        yield 1.0 <= self.horizon_s <= 60.0, f"--horizon {self.horizon_s}: 1 to 60 seconds"
-        # No number, and infinity, is in no range.
-        speed = self.speed is None or 0.0 < self.speed <= 1000.0
-        yield speed, f"--speed {self.speed}: above 0, at most 1000, or max"
-        yield 0 <= self.seed <= MAX_SEED, f"--seed {self.seed}: 0 to {MAX_SEED}"
-        yield self.start_s >= 0.0, f"--start {self.start_s}: not negative"
         end = self.end_s is None or self.end_s > self.start_s
         yield end, f"--end {self.end_s}: after --start {self.start_s}"
-        radius = MIN_RADIUS_M <= self.radius_m <= MAX_RADIUS_M
-        yield radius, f"radius_m {self.radius_m}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"
-        yield 5.0 <= self.look_ahead_s <= 600.0, f"look_ahead_s {self.look_ahead_s}: 5 to 600"
         log, ros2, live = self.log is not None, self.ros2 is not None, self.source == "live"
         yield log or self.source != "log", "--source log needs --log FILE"
         no_log = f"--source {self.source}: takes no --log, which is {self.log}"
@@ -254,42 +260,6 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             return Path(self.cache_dir)
         base = os.environ.get("XDG_CACHE_HOME")
         return (Path(base) if base else Path.home() / ".cache") / "foretwin" / "worlds"
-
-
-def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
-    """Read the TOML file, lay the flags that were given over it, and check the whole.
-
-    `speed` may be a number or `max` in both. Raises FileNotFoundError or ConfigError, one line.
-    """
-    written: dict[str, Any] = {}
-    if path is not None:
-        written = read_toml(path, "configuration", error=ConfigError)
-    if "towards_vehicle" in written:
-        # Else one file could hold both switches.
-        raise ConfigError(f"{path}: towards_vehicle: on the command line alone")
-    flags = {name: value for name, value in overrides.items() if value is not None}
-    try:
-        for values in (written, flags):
-            if "speed" in values:
-                values["speed"] = parse_speed(values["speed"])
-        settings_from(written, DriveConfig, f"{path}:", error=ConfigError)
-        config = settings_from(written | flags, DriveConfig, "flags:", error=ConfigError)
-        return config.validate()
-    except ConfigError as wrong:
-        at_fault = setting_of(str(wrong))
-        if at_fault is None or at_fault.name not in written or at_fault.name in flags:
-            raise
-        raise ConfigError(f"{path}: {at_fault.name}{at_fault.rest}") from wrong
-
-
-def parse_speed(value: object) -> float | None:
-    """Return the replay speed, None for `max`; raises ConfigError."""
-    if value == "max":
-        return None
-    try:
-        return float(str(value))
-    except ValueError:
-        raise ConfigError(f"--speed {value}: a number above 0, or max") from None
 
 
 def has_display() -> bool:

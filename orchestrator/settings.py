@@ -1,75 +1,29 @@
-"""Settings from a TOML file, decoded and checked into frozen structs; errors in one line."""
+"""Settings and the flags that set them: which is which, and what is wrong in one line."""
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
-import msgspec.inspect
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.toml_file import toml_text
+from foretwin.contracts.type_words import in_words
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 
-def read_toml(path: Path, what: str, *, error: type[UserError] = UserError) -> dict[str, Any]:
-    """Return what a TOML file holds; raises FileNotFoundError, calling it `what`, or `error`."""
-    text = toml_text(path, what, error=error)
-    try:
-        values: dict[str, Any] = msgspec.toml.decode(text)
-    except msgspec.DecodeError as wrong:
-        raise error(f"{path}: not TOML: {wrong}") from wrong
-    return values
-
-
-def settings_from(
-    values: Any, kind: type[Settings], where: str, *, error: type[UserError] = UserError
+def settings_of_flags(
+    values: Any, kind: type[Settings], *, error: type[UserError] = UserError
 ) -> Settings:
-    """Return values as settings; raises `error` saying `where`, what is wrong and what is known."""
+    """Return what flags say as settings; raises `error` with the flag at fault."""
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as wrong:
-        raise error(f"{where} {_in_words(str(wrong), kind)}") from wrong
-
-
-_AT = " - at `$"
-_STEP = re.compile(r"\.(\w+)|\[")
-
-
-def _in_words(text: str, kind: type[msgspec.Struct]) -> str:
-    """Return what msgspec found, with the values or settings that there are at that place."""
-    what, _, at = text.partition(_AT)
-    place = at.strip("`.")
-    found = [msgspec.inspect.type_info(kind)]
-    for step in _STEP.finditer(at):
-        found = [one for before in found for one in _inside(before, step[1])]
-    if what.startswith("Invalid enum value "):
-        literals = (one for one in found if isinstance(one, msgspec.inspect.LiteralType))
-        values = ", ".join(str(value) for literal in literals for value in literal.values)
-        return f"{place} {what.removeprefix('Invalid enum value ')}: one of {values}"
-    if "unknown field" in what:
-        structs = (one for one in found if isinstance(one, msgspec.inspect.StructType))
-        names = ", ".join(field.encode_name for struct in structs for field in struct.fields)
-        return f"{text} (known settings: {names})"
-    return text
-
-
-def _inside(around: msgspec.inspect.Type, field: str | None) -> list[msgspec.inspect.Type]:
-    """Return the types that a field of a type may have, or its items, with those of unions."""
-    match around:
-        case msgspec.inspect.StructType() if field is not None:
-            found = [one.type for one in around.fields if one.encode_name == field]
-        case msgspec.inspect.VarTupleType() if field is None:
-            found = [around.item_type]
-        case msgspec.inspect.DictType() if field is None:
-            found = [around.value_type]
-        case _:
-            found = []
-    unions = (one.types if isinstance(one, msgspec.inspect.UnionType) else (one,) for one in found)
-    return [one for types in unions for one in types]
+        place, text = in_words(wrong, kind, values)
+        name = str(place[0]) if place else ""
+        said = text.removeprefix(f"{name} {values.get(name)!r}")
+        raise error(f"{flag_of(name)} {values.get(name)}{said}") from wrong
 
 
 class AtFault(NamedTuple):
@@ -81,6 +35,12 @@ class AtFault(NamedTuple):
 
 _SHORTER = {"rate": "rate_hz", "horizon": "horizon_s", "start": "start_s", "end": "end_s"}
 """Settings whose flag leaves out the unit."""
+
+
+def flag_of(name: str) -> str:
+    """Return the flag of a setting."""
+    short = next((flag for flag, setting in _SHORTER.items() if setting == name), name)
+    return f"--{short.replace('_', '-')}"
 
 
 def setting_of(text: str) -> AtFault | None:

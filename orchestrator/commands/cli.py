@@ -150,7 +150,7 @@ def drive(
     settings["dem"] = None if dem is None else str(dem)
     switches = {"towards_vehicle": towards_vehicle, "trace": trace, "insecure": insecure}
     settings |= {name: given or None for name, given in switches.items()}
-    from foretwin.orchestrator.config import load_config
+    from foretwin.orchestrator.config_file import load_config
     from foretwin.orchestrator.drive.drive import drive as run_drive
 
     raise typer.Exit(run_drive(load_config(settings.pop("config"), settings)))

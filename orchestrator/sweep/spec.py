@@ -15,9 +15,9 @@ from foretwin.contracts.numbers import FUTURE_NUMBERS, MAX_SEED, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.toml_file import load_toml
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
-from foretwin.orchestrator.settings import read_toml, settings_from
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, read_drive
 from foretwin.orchestrator.sweep.stacks import (
     FUTURES_PER_JOB,
@@ -107,13 +107,14 @@ def load_spec(path: Path) -> Loaded:
 
     Raises FileNotFoundError or UserError, in one line that names the file and the field.
     """
-    spec = settings_from(read_toml(path, "sweep"), SweepSpec, f"{path}:")
+    file = load_toml(path, "sweep")
+    spec = file.convert(SweepSpec)
     try:
         return check_spec(spec)
     except FileNotFoundError as error:
         raise FileNotFoundError(f"{path}: {error}") from error
     except ValueError as error:
-        raise UserError(f"{path}: {error}") from error
+        raise file.wrong(error) from error
 
 
 def check_spec(spec: SweepSpec) -> Loaded:

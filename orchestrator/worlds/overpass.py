@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import email.utils
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO
 
 import httpx
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.settings import read_toml, settings_from
+from foretwin.contracts.numbers import Range
+from foretwin.contracts.toml_file import load_toml
 
 BUSY = (429, 502, 503, 504)
 """Answers after which asking again later makes sense."""
@@ -22,6 +24,18 @@ CONNECT_TIMEOUT_S = 15.0
 SPARE_S = 30.0
 """How much longer than its own limit the server is given."""
 TAIL_BYTES = 4096
+
+RANGES: Mapping[str, Range] = MappingProxyType(
+    {
+        "timeout_s": Range(1.0, 3600.0),
+        "max_bytes": Range(1, 1 << 40),
+        "retries": Range(0, 20),
+        "back_off_s": Range(0.0, 600.0),
+        "max_wait_s": Range(0.0, 3600.0),
+        "margin_m": Range(0.0, 10_000.0),
+    }
+)
+"""What its numbers may be."""
 
 
 class OverpassError(UserError):
@@ -58,12 +72,8 @@ class OverpassConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         yield self.endpoint.startswith(("http://", "https://")), "endpoint: an http(s) address"
         yield bool(agent.strip()), "user_agent: a contact, such as a mail address"
         yield agent.isprintable() and agent.isascii(), "user_agent: plain ASCII"
-        yield 1.0 <= self.timeout_s <= 3600.0, "timeout_s: 1 to 3600"
-        yield 1 <= self.max_bytes <= 1 << 40, "max_bytes: 1 or more"
-        yield 0 <= self.retries <= 20, "retries: 0 to 20"
-        yield 0.0 <= self.back_off_s <= 600.0, "back_off_s: 0 to 600"
-        yield 0.0 <= self.max_wait_s <= 3600.0, "max_wait_s: 0 to 3600"
-        yield 0.0 <= self.margin_m <= 10_000.0, "margin_m: 0 to 10000"
+        for name, allowed in RANGES.items():
+            yield allowed.admits(getattr(self, name)), f"{name}: {allowed}"
 
 
 class _BusyError(Exception):
@@ -79,11 +89,14 @@ def load_overpass_config(path: Path | None) -> OverpassConfig:
     wanted = 'a table [overpass] with endpoint = "https://…/api/interpreter" and user_agent = "…"'
     if path is None:
         raise OverpassError(f"no map server is known: name one by --config FILE, {wanted}")
-    body = read_toml(path, "configuration", error=OverpassError)
-    if "overpass" not in body:
+    file = load_toml(path, "configuration", error=OverpassError)
+    if "overpass" not in file.values:
         raise OverpassError(f"{path}: lacks {wanted}")
-    where = f"{path}: [overpass]"
-    return settings_from(body["overpass"], OverpassConfig, where, error=OverpassError).validate()
+    config = file.convert(OverpassConfig, table="overpass")
+    try:
+        return config.validate()
+    except OverpassError as wrong:
+        raise file.wrong(wrong) from wrong
 
 
 def fetch_map(

@@ -6,7 +6,7 @@ import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_args, get_origin
+from typing import get_args
 
 import msgspec
 
@@ -23,7 +23,6 @@ from foretwin.contracts.scenario import (
     Number,
     Relation,
     Scenario,
-    Where,
 )
 from foretwin.contracts.toml_file import read_toml
 
@@ -66,7 +65,7 @@ def read_scenario(path: Path | str) -> Scenario:
     Raises UserError, in one line with the file, the field and what would be right, for anything
     that is no scenario, and MissingFileError for a missing file.
     """
-    return read_toml(Path(path), Scenario, what="scenario", check=check_scenario, words=_words)
+    return read_toml(Path(path), Scenario, what="scenario", check=check_scenario)
 
 
 def numbers(scenario: Scenario) -> Iterator[NamedNumber]:
@@ -177,41 +176,3 @@ def _check_span(name: str, span: Distribution) -> None:
         raise ValueError(
             f"{name} runs from min {span.min:g} to max {span.max:g}; min must be less than max"
         )
-
-
-def _words(message: str) -> str:
-    """Turn msgspec's `… - at `$.ego.speed`` into `ego.speed: …`, with the choices of a name."""
-    what, _, where = message.partition(" - at `$")
-    field = where.rstrip("`").lstrip(".")
-    if what.startswith("Object contains unknown field"):
-        unknown = what.removeprefix("Object contains unknown field ").strip("`")
-        part = field.split("[")[0].split(".")[-1] if field else "scenario"
-        return f"unknown field {unknown!r} in {field or 'the file'}; known: {_known(part)}"
-    if what.startswith("Object missing required field"):
-        missing = what.removeprefix("Object missing required field ").strip("`")
-        return f"{f'{field}: ' if field else ''}the field {missing!r} is missing"
-    if what.startswith("Invalid enum value"):
-        choices = _choices(field.split(".")[-1].split("[")[0])
-        return f"{field}: {what[0].lower()}{what[1:]}; known: {choices}"
-    return f"{field}: {what[0].lower()}{what[1:]}" if field else what
-
-
-def _known(part: str) -> str:
-    kinds: dict[str, type[msgspec.Struct]] = {
-        "scenario": Scenario,
-        "ego": EgoPart,
-        "actors": ActorPart,
-        "faults": FaultPart,
-        "where": Where,
-    }
-    return ", ".join(field.name for field in msgspec.structs.fields(kinds.get(part, Distribution)))
-
-
-def _choices(field: str) -> str:
-    """Return the choices of the field of that name, wherever in a scenario it is."""
-    for kind in (Scenario, EgoPart, ActorPart, Where):
-        for known in msgspec.structs.fields(kind):
-            if known.name == field:
-                listed = get_args(known.type) if get_origin(known.type) is tuple else (known.type,)
-                return ", ".join(get_args(listed[0]))
-    return "see docs"

@@ -75,7 +75,7 @@ def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
     if not sections:
         raise LogError(f"{declaration_path}: declares no section but [time]: nothing to read")
     for channel, section in sections.items():
-        values[channel], usable, broken = _numbers(table, section, declaration_path)
+        values[channel], usable, broken = _numbers(table, section)
         unreadable += broken
         picks[channel] = np.flatnonzero(usable & _is_new(table, section))
     geo = np.zeros((0, 3))
@@ -155,9 +155,7 @@ def _stamp_reader(unit: str, decimal: str) -> Callable[[str], int | None]:
     return read
 
 
-def _numbers(
-    table: Table, section: Section, declaration_path: Path
-) -> tuple[dict[str, Array], Flags, int]:
+def _numbers(table: Table, section: Section) -> tuple[dict[str, Array], Flags, int]:
     """Return the section's columns in our units, which rows are usable, and how many are broken.
 
     A row whose cells are all empty holds no sample; one with some empty or no numbers is broken.
@@ -167,7 +165,7 @@ def _numbers(
     broken, empties = np.zeros(rows, dtype=bool), np.zeros(rows, dtype=int)
     for field, column in columns_of(section).items():
         numbers, empty, no_number = _floats(table.cells[column.column], table.decimal)
-        arrays[field] = numbers * factor_of(declaration_path, field, column)
+        arrays[field] = numbers * factor_of(field, column)
         empties += empty
         broken |= no_number
     all_empty = empties == len(arrays)

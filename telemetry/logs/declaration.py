@@ -27,8 +27,9 @@ from typing import Literal
 
 import msgspec
 
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.drive import TimeBase
-from foretwin.contracts.toml_file import toml_text
+from foretwin.contracts.toml_file import load_toml
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
 from foretwin.telemetry.logs.log import LogError
@@ -165,25 +166,29 @@ UNITS: dict[str, Mapping[str, float]] = {
 
 
 def read_declaration(path: Path) -> Declaration:
-    """Read and check a declaration; raises FileNotFoundError, or LogError naming the field."""
-    text = toml_text(path, "declaration", error=LogError)
+    """Read and check a declaration; raises FileNotFoundError, or LogError naming line and field."""
+    file = load_toml(path, "declaration", error=LogError)
+    declaration = file.convert(Declaration)
     try:
-        declaration = msgspec.toml.decode(text, type=Declaration)
-    except msgspec.DecodeError as error:
-        raise LogError(f"{path}: {error}") from None
-    _known_unit(path, declaration.time, (*units.TIME_NS, units.ISO_TIME))
+        _check(declaration)
+    except ValueError as wrong:
+        raise file.wrong(wrong) from None
+    return declaration
+
+
+def _check(declaration: Declaration) -> None:
+    _known_unit("time", declaration.time, (*units.TIME_NS, units.ISO_TIME))
     if declaration.position is not None:
-        _check_position(path, declaration.position, declaration.heading)
+        _check_position(declaration.position, declaration.heading)
     elif declaration.heading is not None and declaration.heading.north == "grid":
-        raise LogError(f"{path}: [heading] north = 'grid' needs a position in frame 'projected'")
+        raise ValueError("[heading] north = 'grid' needs a position in frame 'projected'")
     if declaration.speed is not None:
         present = set(columns_of(declaration.speed))
         if present not in ({"forward"}, {"east", "north"}):
-            raise LogError(f"{path}: [speed] needs either 'forward' or 'east' and 'north'")
-    for section in sections_of(declaration).values():
+            raise ValueError("[speed] needs either 'forward' or 'east' and 'north'")
+    for name, section in sections_of(declaration).items():
         for field, column in columns_of(section).items():
-            factor_of(path, field, column)
-    return declaration
+            factor_of(field, column, place=f"{CHANNEL_COLUMNS[name].section}.{field}")
 
 
 def sections_of(declaration: Declaration) -> dict[str, Section]:
@@ -201,24 +206,26 @@ def columns_of(section: Section) -> dict[str, Column]:
     }
 
 
-def factor_of(path: Path, field: str, column: Column) -> float:
+def factor_of(field: str, column: Column, *, place: str = "") -> float:
     """Return the factor of a column into the project's unit, its sign included.
 
-    Raises LogError naming the column and the valid units.
+    Raises ValueError naming the column, its `place` in the file and the valid units.
     """
     valid = UNITS[field]
-    unit = _known_unit(path, column, valid)
+    unit = _known_unit(place, column, valid)
     return -valid[unit] if column.negate else valid[unit]
 
 
-def _known_unit(path: Path, given: Column | TimeSection, valid: Collection[str]) -> str:
+def _known_unit(place: str, given: Column | TimeSection, valid: Collection[str]) -> str:
     if given.unit is None or given.unit not in valid:
-        problem = "no unit" if given.unit is None else f"unknown unit {given.unit!r}"
-        raise LogError(f"{path}: column {given.column!r}: {problem}; valid: {', '.join(valid)}")
+        text = f"{place}: column {given.column!r}: ".removeprefix(": ")
+        if given.unit is None:
+            raise ValueError(f"{text}no unit; one of {', '.join(valid)}")
+        raise ValueError(f"{text}unknown unit {given.unit!r}; {one_of(given.unit, valid)}")
     return given.unit
 
 
-def _check_position(path: Path, position: PositionSection, heading: HeadingSection | None) -> None:
+def _check_position(position: PositionSection, heading: HeadingSection | None) -> None:
     needed = {
         "wgs84": ("latitude", "longitude"),
         "ecef": ("x", "y", "z"),
@@ -227,13 +234,13 @@ def _check_position(path: Path, position: PositionSection, heading: HeadingSecti
     }[position.frame]
     present = set(columns_of(position)) - {"std", "altitude"}
     if present != set(needed) or (position.frame == "ecef" and position.altitude is not None):
-        raise LogError(
-            f"{path}: [position] in frame {position.frame!r} needs exactly {', '.join(needed)}"
+        raise ValueError(
+            f"[position] in frame {position.frame!r} needs exactly {', '.join(needed)}"
             f" (and may have altitude, std); it has {', '.join(sorted(present)) or 'none'}"
         )
     if (position.frame == "projected") != (position.epsg is not None):
-        raise LogError(f"{path}: [position] epsg belongs to frame 'projected', and to it alone")
+        raise ValueError("[position] epsg belongs to frame 'projected', and to it alone")
     if (position.frame == "local") != (position.origin is not None):
-        raise LogError(f"{path}: [position] origin belongs to frame 'local', and to it alone")
+        raise ValueError("[position] origin belongs to frame 'local', and to it alone")
     if heading is not None and heading.north == "grid" and position.epsg is None:
-        raise LogError(f"{path}: [heading] north = 'grid' needs a position in frame 'projected'")
+        raise ValueError("[heading] north = 'grid' needs a position in frame 'projected'")

@@ -20,10 +20,10 @@ import msgspec
 
 from foretwin.contracts.drive import Vector3
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.contracts.toml_file import toml_text
+from foretwin.contracts.toml_file import load_toml
 from foretwin.telemetry.logs.log import LogError
 
-_Kind = TypeVar("_Kind")
+_Kind = TypeVar("_Kind", bound=msgspec.Struct)
 
 
 class MapSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -72,11 +72,7 @@ def declaration_beside(path: Path, declaration: Path | None, kind: type[_Kind]) 
     file = declaration or _beside(path)
     if declaration is None and not file.is_file():
         return None
-    text = toml_text(file, "declaration", error=LogError)
-    try:
-        return msgspec.toml.decode(text, type=kind)
-    except msgspec.DecodeError as error:
-        raise LogError(f"{file}: {error}") from None
+    return load_toml(file, "declaration", error=LogError).convert(kind)
 
 
 def _beside(path: Path) -> Path:

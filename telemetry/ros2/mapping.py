@@ -19,7 +19,7 @@ from foretwin.contracts.drive import Vector3
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.ports import trouble_with_endpoint
-from foretwin.contracts.toml_file import toml_text
+from foretwin.contracts.toml_file import parse_toml, toml_text
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
@@ -189,23 +189,19 @@ def read_mapping(path: Path) -> MappingFile:
 
 def parse_mapping(text: str, *, name: str) -> Mapping:
     """Return the mapping of a TOML text; `name` is the file in errors. Raises MappingError."""
-    try:
-        mapping = msgspec.toml.decode(text, type=Mapping)
-    except msgspec.ValidationError as error:
-        raise MappingError(f"{name}: {error}") from error
-    except msgspec.DecodeError as error:
-        raise MappingError(f"{name}: not TOML: {error}") from error
+    file = parse_toml(text, name, error=MappingError)
+    mapping = file.convert(Mapping)
     try:
         mapping.towards_vehicle.validate()
         _check_head(mapping)
         _check_mirrored(mapping)
     except ValueError as error:
-        raise MappingError(f"{name}: {error}") from error
+        raise file.wrong(error) from error
     seen: dict[str, str] = {}
     tables: tuple[tuple[str, tuple[InRow | OutRow | PlacedObject, ...]], ...] = (
-        ("[[in]]", mapping.inwards),
-        ("[[out]]", mapping.outwards),
-        ("[[virtual]]", mapping.placed),
+        ("in", mapping.inwards),
+        ("out", mapping.outwards),
+        ("virtual", mapping.placed),
     )
     for header, rows in tables:
         for index, row in enumerate(rows):
@@ -213,8 +209,7 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
                 row.validate()
                 _check_alone(row, seen, mapping)
             except ValueError as error:
-                line = _line_of(text, header, index)
-                raise MappingError(f"{name}, line {line}, {header}: {error}") from error
+                raise file.at((header, index), f"[[{header}]]: {error}") from error
     return mapping
 
 
@@ -272,8 +267,3 @@ def _check_alone(
         if key in seen:
             raise ValueError(f"{what} stands twice; first: {seen[key]}")
         seen[key] = first
-
-
-def _line_of(text: str, header: str, index: int) -> int:
-    found = [number for number, line in enumerate(text.splitlines(), 1) if line.strip() == header]
-    return found[index] if index < len(found) else 0

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from foretwin.contracts.errors import UserError
-from foretwin.contracts.toml_file import toml_text
+from foretwin.contracts.toml_file import load_toml
 
 DEFAULT_FILE = Path(__file__).with_name("standin.toml")
 
@@ -70,8 +69,4 @@ def read_parameters(path: Path | None = None) -> StandinParameters:
     Raises UserError naming the file and the field at fault, FileNotFoundError without a file.
     """
     file = path or DEFAULT_FILE
-    text = toml_text(file, "stand-in parameters")
-    try:
-        return msgspec.toml.decode(text, type=StandinParameters)
-    except msgspec.DecodeError as problem:
-        raise UserError(f"{file}: {problem}") from problem
+    return load_toml(file, "stand-in parameters").convert(StandinParameters)

@@ -10,7 +10,8 @@ import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.toml_file import read_toml
-from foretwin.orchestrator.settings import read_toml as read_settings
+from foretwin.orchestrator.config_file import load_config
+from foretwin.orchestrator.worlds.overpass import load_overpass_config
 from foretwin.telemetry.logs.declaration import read_declaration
 from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.ros2.mapping import read_mapping
@@ -27,7 +28,7 @@ def check(cake: Cake) -> None:
 
 
 def read(path: Path) -> Cake:
-    return read_toml(path, Cake, what="cake", check=check, words=str.upper)
+    return read_toml(path, Cake, what="cake", check=check)
 
 
 def test_a_file_is_what_it_says(tmp_path: Path) -> None:
@@ -38,9 +39,13 @@ def test_a_file_is_what_it_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (b"layers = 0", "layers is 0; it must be 1 or more"),
-        (b"layers = ", "is no TOML: Invalid value"),
-        (b"layers = 'x'", "EXPECTED `INT`, GOT `STR` - AT `$.LAYERS`"),
+        (b"\nlayers = 0", ": line 2: layers is 0; it must be 1 or more"),
+        (b"\n\nlayers = ", ": line 3: not TOML: Invalid value"),
+        (b"layers = [", ": line 1: not TOML: "),
+        (b"layers = 'x'", ": line 1: layers 'x': must be a whole number"),
+        (b"layers = 1\nlayer = 2", ": line 2: unknown key 'layer'; did you mean layers? one of"),
+        (b"layer = 2", ": line 1: unknown key 'layer'; did you mean layers? one of layers"),
+        (b"", ": the key 'layers' is missing"),
         (b"# cake\nlayers = '\xff'", "line 2 is no UTF-8 text (byte 0xff); save the file as UTF-8"),
     ],
 )
@@ -66,7 +71,8 @@ def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
 
 
 READERS = (
-    lambda path: read_settings(path, "configuration"),
+    lambda path: load_config(path, {}),
+    load_overpass_config,
     read_declaration,
     lambda path: declared_of(path.with_name("drive.mcap"), path),
     read_mapping,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from foretwin.orchestrator import processors
-from foretwin.orchestrator.config import ConfigError, load_config
+from foretwin.orchestrator.config import ConfigError
+from foretwin.orchestrator.config_file import load_config
 from foretwin.orchestrator.processors import most_workers, trouble_with_workers
 
 

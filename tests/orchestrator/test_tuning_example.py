@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.config import DriveConfig, load_config
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.config_file import load_config
 from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters

@@ -85,14 +85,14 @@ def test_empty_cells_hold_no_sample_and_bad_ones_are_counted(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        (', unit = "mph"', "", r"column 'v': no unit; valid: m/s, km/h, mph, kn"),
-        ('"mph"', '"knots"', r"column 'v': unknown unit 'knots'; valid: m/s"),
-        ('unit = "s"', "", r"column 't': no unit; valid: s, ms, us, ns, iso8601"),
+        (', unit = "mph"', "", r"column 'v': no unit; one of m/s, km/h, mph, kn"),
+        ('"mph"', '"knots"', r"column 'v': unknown unit 'knots'; one of m/s"),
+        ('unit = "s"', "", r"column 't': no unit; one of s, ms, us, ns, iso8601"),
         ('column = "v"', 'column = "speed"', r"drive\.csv: line 1: no column 'speed'"),
-        ('frame = "wgs84"', 'frame = "utm"', r"Invalid enum value 'utm'"),
+        ('frame = "wgs84"', 'frame = "utm"', r"position.frame 'utm': one of ecef"),
         ('frame = "wgs84"', 'frame = "ecef"', r"in frame 'ecef' needs exactly x, y, z"),
         ('frame = "wgs84"', 'frame = "wgs84"\nepsg = 32633', r"epsg belongs to frame 'projected'"),
-        ("forward", "backward", r"unknown field `backward`"),
+        ("forward", "backward", r"unknown key 'backward' in speed; "),
         ("[time]", "[time", r"drive\.csv\.toml"),
     ],
 )

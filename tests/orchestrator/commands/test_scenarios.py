@@ -56,7 +56,7 @@ def test_a_bad_file_ends_with_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     assert run(["scenarios", "check", str(bad)]) == 2
     said = capsys.readouterr()
     assert said.err == (
-        f"foretwin: scenario file {bad}: ego.speed_mps runs from min 60 to max 14; "
+        f"foretwin: scenario file {bad}: line 12: ego.speed_mps runs from min 60 to max 14; "
         "min must be less than max\n"
     )
     assert run(["scenarios", "check", str(tmp_path / "none.toml")]) == 2
@@ -115,7 +115,8 @@ def test_unknown_scenarios_are_refused_before_the_map_is_read(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run(["scenarios", "place", "no.osm", "--scenario", "ccftab"]) == 2
-    assert "no scenario 'ccftab'; did you mean ccftap? one of brake_fault" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "no scenario 'ccftab'; did you mean ccftap? one of brake_fault" in said
 
 
 def test_a_case_is_exported_with_its_roads(

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, load_config
+from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig
+from foretwin.orchestrator.config_file import load_config
 from foretwin.orchestrator.drive.plan import read_inputs
 
 

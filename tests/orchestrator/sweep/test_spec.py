@@ -35,7 +35,7 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('maps = "a.osm"', "unknown field `maps`"),
+        ('maps = "a.osm"', "line 1: unknown key 'maps'; did you mean map? one of map"),
         ("", "exactly one of map, worlds and recorded; got none"),
         ('map = "a"\nworlds = "b"', "got map and worlds"),
         ('map = "a"\nsample = 0', "sample 0: at least 1"),

@@ -111,7 +111,11 @@ def test_a_pin_alone_concerns_who_identifies_and_makes_no_new_version() -> None:
             "vehicle.mass_kg=nan: mass_kg nan is implausible; it must be 150 to 60000",
         ),
         ("mass_kg", "rollback", "mass_kg has not changed: there is nothing to roll back to"),
-        ("wheels", "pin", "wheels is no parameter of a vehicle; did you mean wheelbase_m? one of mass_kg"),
+        (
+            "wheels",
+            "pin",
+            "wheels is no parameter of a vehicle; did you mean wheelbase_m? one of",
+        ),
         ("cog_from_rear_axle_m", "2.7", "must be less than wheelbase_m"),
     ],
 )

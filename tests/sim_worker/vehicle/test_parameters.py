@@ -60,7 +60,7 @@ def test_every_value_says_where_it_came_from() -> None:
             "it must be zero or more, and finite",
         ),
         ("[steering_delay_s]\nvalue = 0.1", "[steering_delay_s]\nvalue = 0.9", "delay"),
-        ('name = "bmw_320i"', "name = ", "no TOML"),
+        ('name = "bmw_320i"', "name = ", "not TOML"),
     ],
 )
 def test_wrong_file_is_refused_in_one_line_that_names_file_and_field(

@@ -71,13 +71,13 @@ def test_what_a_vehicle_might_obey_goes_towards_it(
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"/gnss"', '"gnss"', "line 2, .*absolute ROS name"),
-        ('"gnss"', '"imu"', "line 2, .*gives 'gnss'"),
-        ("msg/NavSatFix", "msg/Image", "line 2, .*readable are"),
-        ("nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu", "line 7, .*goes out as nav_msgs"),
+        ('"/gnss"', '"gnss"', "line 2: .*absolute ROS name"),
+        ('"gnss"', '"imu"', "line 2: .*gives 'gnss'"),
+        ("msg/NavSatFix", "msg/Image", "line 2: .*readable are"),
+        ("nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu", "line 7: .*goes out as nav_msgs"),
         ('"twin"', '"ghosts"', r"m\.toml: .*ghosts"),
         ("rmw_zenoh", "rmw_dds", r"m\.toml: .*rmw_dds"),
-        ('channel = "gnss"', 'channel = "gnss"\nangle_unit = "deg"', "line 2, .*angle_unit"),
+        ('channel = "gnss"', 'channel = "gnss"\nangle_unit = "deg"', "line 2: .*angle_unit"),
         ('channel = "gnss"', 'channel = "gnss"\nstamps = 3', r"m\.toml: .*stamps"),
         ('dialect = "rmw_zenoh"', 'dialect = "rmw_zenoh"\ndomain = 999', "domain 999: 0 to 232"),
         ("[[in]]", "[[in]", "not TOML"),
@@ -113,7 +113,7 @@ def test_where_a_head_ends(added: str, said: str | None) -> None:
             added == "domain = 0"
         )
         return
-    with pytest.raises(MappingError, match=f"m.toml: {said}"):
+    with pytest.raises(MappingError, match=f"m.toml: line 2: {said}"):
         parse_mapping(text, name="m.toml")
 
 
@@ -137,7 +137,7 @@ def test_units_and_axes_are_of_some_channels(added: str, fits: set[str], others:
             assert parse_mapping(text, name="m.toml").inwards
             continue
         key = added.split(" ", 1)[0]
-        with pytest.raises(MappingError, match=rf"line 2, .*{key}.*: not of channel '{channel}'"):
+        with pytest.raises(MappingError, match=rf"line 2: .*{key}.*: not of channel '{channel}'"):
             parse_mapping(text, name="m.toml")
 
 
@@ -183,7 +183,7 @@ def test_of_a_vehicle_that_is_listened_to_nothing_goes_out() -> None:
 
 def test_one_stream_comes_from_one_topic() -> None:
     second = '[[in]]\ntopic = "/other"\ntype = "sensor_msgs/msg/NavSatFix"\nchannel = "gnss"\n'
-    with pytest.raises(MappingError, match=r"line 11, .*stream gnss stands twice; first: /gnss"):
+    with pytest.raises(MappingError, match=r"line 11: .*stream gnss stands twice; first: /gnss"):
         parse_mapping(GOOD + second, name="m.toml")
 
 

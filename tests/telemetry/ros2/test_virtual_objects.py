@@ -147,7 +147,7 @@ def test_who_sets_out_does_so_with_the_first_state_and_anew_where_the_clock_goes
         ("speed_mps = 50.0\nway_m = 1000.0", None),
         ("speed_mps = 50.1\nway_m = 1.0", "0 to 50"), ("speed_mps = -0.1\nway_m = 1.0", "0 to 50"),
         ("way_m = 1000.1", "0 to 1000"), ("way_m = -0.1", "0 to 1000"), ("way_m = 5.0", None),
-        ("speed = 5.0", "unknown field"),
+        ("speed = 5.0", "unknown key 'speed'"),
     ],
 )  # fmt: skip
 def test_what_a_mapping_may_place(line: str, said: str | None) -> None:
@@ -197,8 +197,8 @@ def test_the_mapping_places_what_stands() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (VIRTUAL, r"line 2, \[\[virtual\]\]: without an \[\[out\]\]"),
-        (OUT + VIRTUAL + VIRTUAL, r"line 11, .*id 'parked' stands twice"),
+        (VIRTUAL, r"line 2: \[\[virtual\]\]: without an \[\[out\]\]"),
+        (OUT + VIRTUAL + VIRTUAL, r"line 11: .*id 'parked' stands twice"),
         (OUT + VIRTUAL + "speed_mps = 2.0", "way_m"),
         (OUT + VIRTUAL + "width_m = 0.0", "width_m 0.0: above 0"),
         (OUT + VIRTUAL.replace('"car"', '"ufo"'), r"m\.toml: .*ufo"),
