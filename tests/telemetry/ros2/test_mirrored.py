@@ -256,7 +256,10 @@ def test_stamps_of_the_list_never_go_back_with_two_senders() -> None:
             TEXT.format(dialect="ros2dds").replace("/foretwin/objects", "/other/objects"),
             r"own_twin: needs a topic below /foretwin/",
         ),
-        (TEXT.format(dialect="ros2dds").replace("own_twin", "twin"), "line 7: unknown key 'twin' in mirrored; did you mean own_twin"),
+        (
+            TEXT.format(dialect="ros2dds").replace("own_twin", "twin"),
+            "line 7: unknown key 'twin' in mirrored; did you mean own_twin",
+        ),
     ],
 )
 def test_mappings_that_cannot_be_used_say_why(text: str, said: str) -> None:
