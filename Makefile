@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # A drive starts ten processes: where none may keep what is compiled, each compiles 500 files anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup drive test check format bench judge chaos clean lock
+.PHONY: setup drive test check docs format bench judge chaos clean lock
 
 setup: $(VENV)/.installed
 
@@ -28,11 +28,15 @@ lock:
 drive: setup
 	$(BIN)/foretwin drive
 
-check: setup
+check: setup docs
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The pages as a site in build/docs, warnings being errors; nothing is fetched.
+docs: setup
+	$(BIN)/sphinx-build -q -W --keep-going -b html -d build/doctrees docs build/docs
 
 format: setup
 	$(BIN)/ruff format .

@@ -33,6 +33,14 @@ def get_map(
     fetch(area, out=out, config=config)
 
 
+@maps.command("town")
+def write_town(out: OutOption) -> None:
+    """Write the drawn town's map, to try things on, and a route through it beside the map."""
+    from foretwin.orchestrator.commands.map_town import write_town as write
+
+    write(out)
+
+
 @maps.command("index")
 def index_map(
     map_file: MapArgument,

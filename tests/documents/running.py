@@ -1,0 +1,110 @@
+"""Plays the blocks of a page in their order, as a reader would who types them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from tests.documents.blocks import COMMANDS, Block, Page, read_page
+from tests.documents.stage import Installed, names_in, set_stage
+
+BLOCK_S = 240.0
+"""The longest that a block may take, of a machine with other work."""
+
+
+def play_page(name: str, folder: Path, installed: Installed) -> int:
+    """Run all that is to be run of a page; returns how many blocks that were.
+
+    Fails with the place and what was printed where a command ends otherwise than the page says.
+    """
+    page = read_page(name)
+    page = page._replace(here=with_names(page.here, installed.run))
+    set_stage(folder, tuple(page.in_place(item) for item in page.stage), installed)
+    for block in page.blocks:
+        if "file" in block.marks:
+            target = folder / block.marks["file"]
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(page.in_place(block.text) + "\n", encoding="utf-8")
+    return sum(play(block, page, folder, installed) for block in page.blocks)
+
+
+def with_names(here: dict[str, str], run: Path) -> dict[str, str]:
+    """Return placeholders with `{future}`, `{world}` and `{run}` as they are in a run."""
+    names = names_in(run)
+    filled = {}
+    for key, value in here.items():
+        for name, of_the_run in names.items():
+            value = value.replace(name, of_the_run)
+        filled[key] = value
+    return filled
+
+
+def play(block: Block, page: Page, folder: Path, installed: Installed) -> bool:
+    """Run a block; False where there is nothing to run."""
+    if "not run" in block.marks or "file" in block.marks:
+        return False
+    text = page.in_place(block.text)
+    if block.language in COMMANDS:
+        commands = "\n".join(page.in_place(line) for line in block.commands())
+        run_shell(commands, block, folder, installed)
+    elif block.language == "python":
+        (folder / "page.py").write_text(text, encoding="utf-8")
+        run_shell("python page.py", block, folder, installed)
+    elif block.language == "sql":
+        with pytest.MonkeyPatch.context() as elsewhere:
+            elsewhere.chdir(folder)
+            duckdb.connect().execute(text)
+    elif block.language == "toml":
+        tomllib.loads(text)
+        return False
+    else:
+        return False
+    return True
+
+
+def run_shell(commands: str, block: Block, folder: Path, installed: Installed) -> None:
+    """Run lines in one shell that ends at the first that fails."""
+    wanted = int(block.marks.get("exit", "0"))
+    process = subprocess.Popen(
+        ["bash", "-e", "-o", "pipefail", "-c", commands],
+        cwd=folder, env=installed.environment(folder), text=True, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    said: list[str] = []
+    try:
+        if words := block.marks.get("until"):
+            for line in _lines_of(process):
+                said.append(line)
+                if words in line:
+                    break
+            else:
+                pytest.fail(f"{block.place}: never said {words!r}:\n{''.join(said)}")
+            os.killpg(process.pid, signal.SIGINT)
+        rest, _ = process.communicate(timeout=BLOCK_S)
+        said.append(rest)
+    except subprocess.TimeoutExpired:
+        pytest.fail(f"{block.place}: longer than {BLOCK_S} s:\n{commands}\n{''.join(said)}")
+    finally:
+        _end(process)
+    if not words:
+        assert process.returncode == wanted, f"{block.place}:\n{commands}\n{''.join(said)}"
+
+
+def _lines_of(process: subprocess.Popen[str]) -> Iterator[str]:
+    assert process.stdout is not None
+    yield from iter(process.stdout.readline, "")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    if process.stdout is not None:
+        process.stdout.close()
