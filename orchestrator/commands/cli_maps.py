@@ -1,4 +1,4 @@
-"""The command line of maps: fetching and indexing them. The work is imported when run."""
+"""The command line of maps: fetching, writing and indexing them. The work is imported when run."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ def get_map(
 
 @maps.command("town")
 def write_town(out: OutOption) -> None:
-    """Write the drawn town's map, to try things on, and a route through it beside the map."""
+    """Write the drawn town's map, to try things on, and a route through it beside the map.
+
+    Example: foretwin map town --out town.osm
+    """
     from foretwin.orchestrator.commands.map_town import write_town as write
 
     write(out)

@@ -117,7 +117,7 @@ def test_the_version_stands_in_a_line_with_those_of_its_libraries(
     [
         ("foretwin inter", ["intersections"]),
         ("foretwin drive --fut", ["--futures"]),
-        ("foretwin map ", ["get", "index"]),
+        ("foretwin map ", ["get", "town", "index"]),
     ],
 )
 def test_bash_completes_commands_and_options(
