@@ -49,7 +49,8 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     """One round for those who watch: futures (S, M, 2) and the rest in the drive's frame.
 
     `likelihood` (S,) in 0..1: 1 is as likely as any. `criticality` (S,) in 0..1 is that times the
-    risk that somebody dies; `RED_FROM` and more is what one acts upon. `user_xy_m`
+    risk that somebody dies; `RED_FROM` and more is what one acts upon. `names` say what
+    happens in each, for people. `user_xy_m`
     (K, M, 2) are tracks of road users whom the worst futures meet, `touch_xy_m` (C, 2) where cars
     touch one, with the scenario's id in `touch_names`.
     """
@@ -57,6 +58,8 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     round_id: int
     stamp_ns: int
     intersection_id: str
+    place: str = ""
+    """Its name by the streets that meet there; empty where they have none."""
     world_id: str
     xy_m: Array32
     criticality: Array32

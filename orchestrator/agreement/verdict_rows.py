@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from foretwin.orchestrator.record.whereabouts import instant
 from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA
 from foretwin.sim_worker.analysis.agreement.tally import Judged
 
@@ -36,27 +38,49 @@ def judged_row(one: Judged, *, start_stamp_ns: int) -> dict[str, Any]:
     return row
 
 
-def agreement_lines(found: dict[str, Any] | None) -> list[str]:
-    """Return what is said of simulation against reality."""
+def agreement_lines(
+    found: dict[str, Any] | None, intersections: Sequence[dict[str, Any]] = ()
+) -> list[str]:
+    """Return what is said of simulation against reality, with the places of run.json.
+
+    Of the gaps that would turn a verdict the least is told; run.json has those of all directions.
+    """
     if found is None:
         return []
     counts = found["overall"]
-    lines = [
-        f"  simulation against reality in {found['windows']} windows: agree on pass "
-        f"{counts['agree_pass']}, on fail {counts['agree_fail']}; simulation too pessimistic "
-        f"{counts['too_pessimistic']}, too optimistic {counts['too_optimistic']}; not observable "
-        f"{counts['not_observable']}"
+    alike = counts["agree_pass"] + counts["agree_fail"]
+    judged = found["windows"] - counts["not_observable"]
+    line = (
+        f"  simulated and driven, {found['windows']} windows: {judged} can be judged, of which "
+        f"{alike} agree ({counts['agree_pass']} pass, {counts['agree_fail']} fail)"
+    )
+    apart = [
+        f"in {counts[key]} the simulation was too {key.removeprefix('too_')}"
+        for key in ("too_pessimistic", "too_optimistic")
+        if counts[key]
     ]
-    for direction, flip in found["flips"].items():
-        if flip["flipped"]:
-            fails = " and ".join(flip["smallest_factor_fails"]) or "nothing"
-            lines.append(
-                f"  a gap {direction} flips {flip['flipped']}: the least at "
-                f"{flip['smallest_factor']:g} times the measured one "
-                f"({flip['smallest_factor_gap_m']:.2f} m at {flip['smallest_factor_at_s']:.1f} s, "
-                f"{fails} fails then), half below {flip['median_gap_m']:.2f} m"
-            )
+    turned = [(flip, name) for name, flip in found["flips"].items() if flip["flipped"]]
+    lines = ["; ".join([line, *apart])]
+    if turned:
+        lines.append(
+            _turned(*min(turned, key=lambda one: one[0]["smallest_factor"]), intersections)
+        )
     return lines
+
+
+_ALONG = {"along": "along the road", "across": "across it", "both": "along and across together"}
+
+
+def _turned(flip: dict[str, Any], direction: str, intersections: Sequence[dict[str, Any]]) -> str:
+    """Say how large a gap would have turned a verdict, where and when that was least."""
+    fails, factor = " and ".join(flip["smallest_factor_fails"]), flip["smallest_factor"]
+    becomes = f"a fail by {fails.replace('_', ' ')}" if fails else "a pass"
+    when = instant(flip["smallest_factor_at_s"], intersections)
+    gap_m = flip["smallest_factor_gap_m"]
+    return (
+        f"  least room {when}: with a gap of {gap_m:.2f} m {_ALONG[direction]} the verdict would be "
+        f"{becomes}; {gap_m / factor:.2f} m were measured"
+    )
 
 
 def _names(flags: npt.NDArray[np.bool_]) -> str:

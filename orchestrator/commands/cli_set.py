@@ -21,7 +21,7 @@ def set_value(
     ],
     run: Annotated[
         Path | None,
-        typer.Option(help="id or folder of the run [default: the newest one running]"),
+        typer.Option(help="folder or id of the run, or latest [default: the newest one running]"),
     ] = None,
     out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
     secure: Annotated[

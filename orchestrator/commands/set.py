@@ -10,6 +10,7 @@ from foretwin.contracts.joining import RunningDrive, newest_running, running_dri
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.tuning import SetReply, SetRequest
 from foretwin.orchestrator.campaign.joining import own_certificate
+from foretwin.orchestrator.record.which_run import run_folder
 
 ANSWER_S = 120.0
 """A change waits for the drive to begin and for the round in progress; that may take a while."""
@@ -26,7 +27,7 @@ def set_in_drive(
     key, equals, value = assignment.partition("=")
     if not (equals and key.strip() and value.strip()):
         raise UserError(f"{assignment}: must be KEY=VALUE, such as role.ego=shadow")
-    drive = newest_running(out) if run is None else running_drive(_folder(run, out))
+    drive = newest_running(out) if run is None else running_drive(run_folder(run, out))
     request = SetRequest(key=key.strip(), value=value.strip())
     try:
         with ZenohBus(_bus_of(drive, secure)) as bus:
@@ -60,8 +61,3 @@ def ask_drive(bus: Bus, run_id: str, request: SetRequest, *, timeout_s: float = 
     if not reply.done:
         raise UserError(reply.text)
     return reply.text
-
-
-def _folder(run: Path, out: Path) -> Path:
-    """Return the folder meant by `run`: a folder, or the id of one below `out`."""
-    return run if run.is_dir() or len(run.parts) > 1 else out / run

@@ -219,5 +219,9 @@ def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
 
 def unplaced(reference_point: str) -> Notice:
     """Return what is told of a source that does not say where on the car its positions are of."""
-    where = f"where on the car its reference point ({reference_point}) sits"
-    return Notice("warning", f"the source does not say {where}; taken as base_link")
+    return Notice(
+        "warning",
+        f"where on the car the positions are of ({reference_point}) is not told: taken as the "
+        "middle of its rear axle, by which all of them may be off; body_from_antenna_m in a "
+        "declaration, antenna_m in a mapping says it",
+    )

@@ -150,6 +150,11 @@ class Mission:
             return self._current
         return next((a.junction.summary.id for a in self.way.junctions), None)
 
+    def name_of(self, junction_id: str | None) -> str | None:
+        """Return a junction that was ahead by the streets that meet there, else by its id."""
+        visit = None if junction_id is None else self.visits.get(junction_id)
+        return junction_id if visit is None else visit.junction.summary.name or junction_id
+
     @property
     def route_m(self) -> float | None:
         """How far along its route the car is, None off the map."""

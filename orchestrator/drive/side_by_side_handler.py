@@ -107,7 +107,8 @@ class SideBySideHandler:
         for one in found:
             self._context.publish("disagreement", one)
             if not one.over:
-                self._context.tell(Notice("warning", disagreement_text(one)))
+                name = self._mission.name_of(one.junction_id)
+                self._context.tell(Notice("warning", disagreement_text(one, name)))
                 continue
             self._found.append(one)
             self._context.tables.add("disagreements", [disagreement_row(one)])
@@ -116,11 +117,11 @@ class SideBySideHandler:
             self._context.tables.add("driven_segments", [msgspec.to_builtins(s) for s in ended])
 
 
-def disagreement_text(one: Disagreement) -> str:
-    """Return a disagreement in one line, with its place."""
+def disagreement_text(one: Disagreement, junction: str | None) -> str:
+    """Return a disagreement in one line, with its place, at or before a junction of that name."""
     where = f"{one.position.lat_deg:.6f}, {one.position.lon_deg:.6f}"
-    if one.junction_id is not None:
-        where += f", at or before junction {one.junction_id}"
+    if junction is not None:
+        where += f", at or before {junction}"
     if one.route_m is not None:
         where += f", {one.route_m:.0f} m along the route"
     apart = (

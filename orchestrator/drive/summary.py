@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from foretwin.contracts.terminal import plain
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines
+from foretwin.orchestrator.record.whereabouts import junction_name
 from foretwin.orchestrator.tuning.words import summary_lines
 
 DISAGREEMENTS_SHOWN = 12
@@ -19,19 +21,20 @@ def _readiness(junction: dict[str, Any], config: dict[str, Any]) -> str:
     In lock step the drive waits for Worlds, and how long that takes says nothing of the drive.
     """
     if config["speed"] is None:
-        return "world never came" if junction["built_at_s"] is None else "world ready"
+        return "its world never came" if junction["built_at_s"] is None else "its world was ready"
     before_s = junction["world_ready_before_s"]
     if before_s < 0.0:
-        return f"world {-before_s:.1f} s late"
+        return f"its world came {-before_s:.1f} s late"
     if junction["within_radius_at_s"] - config["start_s"] < BEGINNING_S:
-        return "world ready before the drive began"
-    return f"world ready {before_s:.1f} s before the car came near"
+        return "its world was ready before the drive began"
+    return f"its world was ready {before_s:.1f} s before the car came near"
 
 
-def side_by_side_lines(found: Any) -> list[str]:
+def side_by_side_lines(found: Any, junctions: Sequence[dict[str, Any]] = ()) -> list[str]:
     """Return what is said of human and ADS: each segment, and where they disagree."""
     if found is None:
         return []
+    names = {junction["id"]: junction_name(junction) for junction in junctions}
     lines = [
         f"  {one['control_mode']} for {(one['to_stamp_ns'] - one['from_stamp_ns']) / 1e9:.1f} s: "
         f"{one['plans']} plans of the ADS, 95 % within {one['lateral_m']:.1f} m across, "
@@ -40,8 +43,9 @@ def side_by_side_lines(found: Any) -> list[str]:
         if one["plans"]
     ]
     lines += [
-        f"  {one['drive_time_s']:7.1f} s  {one['kind']} for {one['duration_s']:.1f} s at "
-        f"{one['lat_deg']:.6f}, {one['lon_deg']:.6f} ({one['junction_id'] or 'no junction ahead'})"
+        f"  {one['drive_time_s']:7.1f} s  {one['kind'].replace('_', ' ')} for "
+        f"{one['duration_s']:.1f} s at {one['lat_deg']:.6f}, {one['lon_deg']:.6f} "
+        f"({names.get(one['junction_id'], one['junction_id']) or 'no junction ahead'})"
         for one in found["disagreements"][:DISAGREEMENTS_SHOWN]
     ]
     more = len(found["disagreements"]) - DISAGREEMENTS_SHOWN
@@ -56,27 +60,27 @@ def summary_text(record: dict[str, object]) -> str:
     assert isinstance(junctions, list)
     latency = record["state_to_result_ms_p95"]
     lines = [
-        f"{record['exit']}: {len(junctions)} junctions, {futures['count']} futures in "
-        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed)"
-        + ("" if latency is None else f", state to result p95 {latency:.0f} ms")
+        f"{record['exit']}: {_counted(len(junctions), 'junction')} passed, {futures['count']} "
+        f"futures in {_counted(futures['rounds'], 'round')} ({futures['missed_rounds']} missed)"
+        + ("" if latency is None else f", 95 % there {latency / 1e3:.2g} s after the car's state")
     ]
     if futures["smaller_rounds"] or futures["spared_rounds"]:
-        sizes = ", ".join(f"{n} of {size}" for size, n in futures["rounds_by_futures"].items())
+        sizes = [f"{n} had {size}" for size, n in futures["rounds_by_futures"].items()]
         lines.append(
-            f"  machine too slow for {futures['wanted_per_round']} futures in every round: "
-            f"{sizes} futures, {futures['spared_rounds']} rounds spared"
+            f"  the machine was too slow for {futures['wanted_per_round']} futures in every round: "
+            f"{', '.join(sizes)}, {futures['spared_rounds']} were left out"
         )
     config: dict[str, Any] = record["config"]  # type: ignore[assignment]
     lines += [
-        f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
-        f"{junction['name'] or junction['id']}  {_readiness(junction, config)}"
+        f"  {junction['arrived_at_s']:7.1f} s  {junction_name(junction)} ({junction['kind']}): "
+        f"{_readiness(junction, config)}"
         for junction in junctions
     ]
     if "map" in record["telemetry"]["position_from"]:  # type: ignore[index]
-        lines.append("  position from GNSS and the map")
-    lines += side_by_side_lines(record.get("side_by_side"))
-    lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
-    lines += summary_lines(record["tuning"])  # type: ignore[arg-type]
+        lines.append("  the car's position came from GNSS and the map")
+    lines += side_by_side_lines(record.get("side_by_side"), junctions)
+    lines += agreement_lines(record.get("agreement"), junctions)  # type: ignore[arg-type]
+    lines += summary_lines(record["tuning"], junctions)  # type: ignore[arg-type]
     lines += _free_twin_lines(record.get("free_twin"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join(plain(line) for line in (*lines, attribution))
@@ -87,4 +91,8 @@ def _free_twin_lines(free_twin: dict[str, int] | None) -> list[str]:
     if not free_twin or not free_twin["samples"]:
         return []
     share = free_twin["beyond_limits"] / free_twin["samples"]
-    return [f"  free twin: beyond a limit {share:.1%} of the time"]
+    return [f"  the twin, left to itself, was beyond a limit {share:.1%} of the time"]
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'s' if number != 1 else ''}"

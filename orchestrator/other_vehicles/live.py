@@ -54,7 +54,10 @@ class LiveVehicle(OtherVehicleSource):
     def take_info(self, info: VehicleInfo | None) -> None:
         """Take what the vehicle says of itself, None where it does not answer."""
         if info is None or info.body_from_antenna_m is None:
-            text = f"{self._id} does not say where its reference point sits; taken as base_link"
+            text = (
+                f"{self._id} does not say where on it its positions are of: taken as the middle of "
+                "its rear axle; antenna_m in its mapping says it"
+            )
             self._tell(Notice("warning", text))
         elif self._measured is not None:
             self._measured.begin_anew(estimator_of(info, self._vehicle))

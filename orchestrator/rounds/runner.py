@@ -264,7 +264,10 @@ class RoundRunner:
             cruise_speed_mps=seed.intent.cruise_speed_mps,
         )
         self._tables.add("rounds", [row])
-        view = round_view(done, futures, world.frame, self._plan.drive_frame)
+        place = next(
+            (j.summary.name for j in world.junctions if j.summary.id == order.junction_id), ""
+        )
+        view = round_view(done, futures, world.frame, self._plan.drive_frame, place)
         self._context.publish("round", view)
         self._planner.take_worst(order.futures, view.criticality)
         self._news.planners(done)

@@ -12,6 +12,7 @@ from foretwin.contracts.futures import COLLISION_WITH
 from foretwin.contracts.simulation import RoundView
 from foretwin.contracts.trace import traced
 from foretwin.orchestrator.record.result_rows import RoundFutures
+from foretwin.orchestrator.rounds.future_titles import future_title
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
 VIEW_POINTS = 25
@@ -26,8 +27,12 @@ def round_view(
     futures: RoundFutures,
     world_frame: LocalFrame,
     drive_frame: LocalFrame,
+    place: str = "",
 ) -> RoundView:
-    """Return a round for those who watch: fewer points, in the drive's frame, with criticality."""
+    """Return a round for those who watch: fewer points, in the drive's frame, with criticality.
+
+    `place` is the junction's name.
+    """
     count, instants = futures.states.shape[:2]
     kept = np.unique(np.linspace(0, instants - 1, VIEW_POINTS).round().astype(int))
 
@@ -44,6 +49,7 @@ def round_view(
         round_id=done.order.round_id,
         stamp_ns=done.order.stamp_ns,
         intersection_id=done.order.junction_id,
+        place=place,
         world_id=done.order.world_id,
         xy_m=in_drive(futures.states[:, kept, :2]),
         criticality=criticality.astype(np.float32),
@@ -61,10 +67,11 @@ def round_view(
 
 
 def _names(done: RoundDone) -> tuple[str, ...]:
-    """Return the futures' names; one whose scenario is left out says so."""
+    """Return what happens in each future; one whose scenario is left out says so."""
+    titles = {scenario.id: scenario.title for job in done.order.jobs for scenario in job.scenarios}
     left_out = [reason for result in done.results for reason in result.left_out]
     return tuple(
-        f"{future.name} (left out)" if reason else future.name
+        future_title(future, titles) + (" (left out)" if reason else "")
         for future, reason in zip(done.order.futures, left_out, strict=True)
     )
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from foretwin.contracts.gap import GapAlarm, Verdict
 from foretwin.contracts.tuning import ParameterEstimate
+from foretwin.orchestrator.record.whereabouts import instant
 
 _QUANTITIES = {
     "along_m": ("position along", "m", 1.0),
@@ -45,39 +47,44 @@ def found_text(found: ParameterEstimate, counts: float) -> str:
 
 def _why_none(gap: dict[str, Any]) -> str:
     if not gap["independent"]:
-        return "none: who departs from commands that were not recorded cannot be said"
+        return "whether vehicle or model departs cannot be said: no commands were recorded"
     if gap["alarms"]:
-        return "none: the gap was beyond its limits, and nothing shows by whom"
+        return "the gap was beyond its limits, and nothing shows whether by vehicle or model"
     return "nothing shows that vehicle or model departs"
 
 
-def summary_lines(tuning: dict[str, Any]) -> list[str]:
-    """Return what the end of a drive says of gap, verdicts and parameters, from its record."""
+def summary_lines(
+    tuning: dict[str, Any], intersections: Sequence[dict[str, Any]] = ()
+) -> list[str]:
+    """Return what the end of a drive says of gap, verdicts and parameters, from its record.
+
+    `intersections` are those of the record.
+    """
     lines = []
     gap, rms = tuning["gap"], tuning["gap"]["rms"]["all"]
     if rms is not None:
-        told = "commands estimated from the motion: no limits"
+        told = "no limits hold, since commands were estimated from the motion"
         if gap["independent"]:
             told = f"{gap['alarms']} alarm{'s' if gap['alarms'] != 1 else ''}"
             told += f", beyond a limit {gap['beyond_limits']} of {gap['samples']} times"
         lines.append(
-            f"  gap of the model after {gap['horizon_s']:g} s (RMS): {rms['along_m']:.2f} m along, "
-            f"{rms['across_m']:.2f} m across, {math.degrees(rms['yaw_rad']):.1f}°, "
-            f"{rms['speed_mps']:.2f} m/s; {told}"
+            f"  left to itself for {gap['horizon_s']:g} s, the model is off by "
+            f"{rms['along_m']:.2f} m along the road, {rms['across_m']:.2f} m across, "
+            f"{math.degrees(rms['yaw_rad']):.1f}° and {rms['speed_mps']:.2f} m/s (RMS); {told}"
         )
     lines += [
-        f"  verdict at {verdict['drive_time_s']:.1f} s: {_CULPRITS[verdict['culprit']]}, "
-        f"{verdict['cause']}: {verdict['text']}"
+        f"  verdict {instant(verdict['drive_time_s'], intersections)}: "
+        f"{_CULPRITS[verdict['culprit']]}, {verdict['cause']}: {verdict['text']}"
         for verdict in tuning["verdicts"]
     ]
     if rms is not None and not tuning["verdicts"]:
-        lines.append(f"  verdict: {_why_none(gap)}")
+        lines.append(f"  {_why_none(gap)}")
     first: dict[str, float] = {}
     last = {change["name"]: change for change in tuning["changes"]}
     for change in tuning["changes"]:
         first.setdefault(change["name"], change["before"])
     lines += [
-        f"  {name} {first[name]:.5g} -> {change['value']:.5g} ({_HOW[change['origin']]})"
+        f"  {name} is now {change['value']:.5g}, was {first[name]:.5g} ({_HOW[change['origin']]})"
         for name, change in last.items()
     ]
     departs = [one for one in tuning["parameters"] if one["departs"]]

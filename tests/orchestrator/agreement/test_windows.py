@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import numpy as np
 import pytest
@@ -72,8 +74,44 @@ def test_every_second_is_judged_and_recorded() -> None:
     assert all(row["gap_across_m"] < 0.05 and row["gap_along_m"] < 0.05 for row in rows)
     assert "clearance" not in rows[0]["observable"]  # nobody told of road users
     (line, *_) = agreement_lines(record)
-    assert "in 14 windows" in line
+    assert "driven, 14 windows: " in line
     assert agreement_lines(None) == []
+
+
+def turned(factor: float, gap_m: float, at_s: float, *fails: str) -> dict[str, Any]:
+    least = {"gap_m": gap_m, "at_s": at_s, "fails": list(fails)}
+    told = {f"smallest_factor_{name}": value for name, value in least.items()}
+    return {"flipped": 3, "smallest_factor": factor, **told}
+
+
+def test_the_least_gap_that_would_turn_a_verdict_is_told_with_its_place() -> None:
+    record = {
+        "windows": 44,
+        "overall": {
+            "agree_pass": 30,
+            "agree_fail": 1,
+            "too_pessimistic": 2,
+            "too_optimistic": 0,
+            "not_observable": 11,
+        },
+        "flips": {
+            "along": turned(1.25, 5.0, 13.62, "drivable_area"),
+            "across": {"flipped": 0},
+            "both": turned(2.0, 6.0, 50.0),
+        },
+    }
+    reached = {"id": "n4", "name": "Mill Lane \u00d7 High Street", "arrived_at_s": 20.0}
+    assert agreement_lines(record, [reached]) == [
+        "  simulated and driven, 44 windows: 33 can be judged, of which 31 agree (30 pass, 1 fail);"
+        " in 2 the simulation was too pessimistic",
+        "  least room at 13.6 s, before Mill Lane \u00d7 High Street: with a gap of 5.00 m along the "
+        "road the verdict would be a fail by drivable area; 4.00 m were measured",
+    ]
+    record["flips"] = {"both": record["flips"]["both"]}  # type: ignore[index]
+    assert agreement_lines(record, [reached])[-1].startswith(
+        "  least room at 50.0 s, after Mill Lane \u00d7 High Street: with a gap of 6.00 m along and "
+        "across together the verdict would be a pass; 3.00 m"
+    )
 
 
 def test_who_was_seen_and_what_was_heard_counts_for_reality() -> None:

@@ -154,7 +154,7 @@ def test_what_cannot_be_built_is_told_and_passed_over(house: House) -> None:
     house.work()
 
     (error,) = (e for e in house.watched("event") if e.level == "error")
-    assert error.text == "no world for n4: the map is torn there"
+    assert error.text == "no world for Lime Street West \u00d7 Mill Lane: the map is torn there"
     assert house.conductor.start_round()
 
 

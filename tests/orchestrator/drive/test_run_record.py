@@ -155,17 +155,19 @@ def test_the_summary_names_every_junction_and_the_maps_source(house: House) -> N
     house.end()
     text = summary_text(record_of(house))
 
-    assert text.splitlines()[0].startswith("completed: 1 junctions, ")
+    assert text.splitlines()[0].startswith("completed: 1 junction passed, ")
     assert "Mill Lane" in text
     assert text.splitlines()[-1] == house.plan.osm.attribution
 
 
 def test_the_summary_says_how_often_the_free_twin_was_beyond_a_limit(house: House) -> None:
     record = record_of(house)
-    assert "free twin" not in summary_text(record)
+    assert "left to itself" not in summary_text(record)
 
     record["free_twin"] = {"samples": 200, "beyond_limits": 3}
-    assert "\n  free twin: beyond a limit 1.5% of the time\n" in summary_text(record)
+    assert "\n  the twin, left to itself, was beyond a limit 1.5% of the time\n" in summary_text(
+        record
+    )
 
 
 def test_the_summary_says_where_the_map_helped_to_find_the_car(house: House) -> None:
@@ -173,17 +175,17 @@ def test_the_summary_says_where_the_map_helped_to_find_the_car(house: House) -> 
     assert "GNSS" not in summary_text(record)
 
     record["telemetry"]["position_from"] = ["gnss", "map"]
-    assert "\n  position from GNSS and the map\n" in summary_text(record)
+    assert "\n  the car's position came from GNSS and the map\n" in summary_text(record)
 
 
 @pytest.mark.parametrize(
     ("start_s", "before_s", "within_at_s", "said"),
     [
-        (0.0, 0.008, 0.1, "world ready before the drive began"),
-        (60.0, 0.008, 60.1, "world ready before the drive began"),
-        (0.0, 17.82, 20.1, "world ready 17.8 s before the car came near"),
-        (0.0, -2.34, 0.1, "world 2.3 s late"),
-        (0.0, -2.34, 20.1, "world 2.3 s late"),
+        (0.0, 0.008, 0.1, "its world was ready before the drive began"),
+        (60.0, 0.008, 60.1, "its world was ready before the drive began"),
+        (0.0, 17.82, 20.1, "): its world was ready 17.8 s before the car came near"),
+        (0.0, -2.34, 0.1, "its world came 2.3 s late"),
+        (0.0, -2.34, 20.1, "its world came 2.3 s late"),
     ],
 )
 def test_the_summary_says_when_a_world_was_ready(
@@ -206,9 +208,9 @@ def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(house: Hous
     record = record_of(house)
     record["config"]["speed"] = None
     record["intersections"][0]["world_ready_before_s"] = -2.34
-    assert "Mill Lane  world ready\n" in summary_text(record)
+    assert "): its world was ready\n" in summary_text(record)
     record["intersections"][0]["built_at_s"] = None
-    assert "Mill Lane  world never came\n" in summary_text(record)
+    assert "): its world never came\n" in summary_text(record)
 
 
 def test_the_summary_owns_up_to_what_a_slow_machine_left_out(house: House) -> None:
@@ -221,6 +223,6 @@ def test_the_summary_owns_up_to_what_a_slow_machine_left_out(house: House) -> No
     }  # fmt: skip
 
     assert (
-        "too slow for 6 futures in every round: 12 of 3, 2 of 6 futures, 3 rounds spared"
+        "too slow for 6 futures in every round: 12 had 3, 2 had 6, 3 were left out\n"
         in summary_text(record)
     )

@@ -70,7 +70,9 @@ def test_another_lane_of_the_software_is_listed_with_its_place(house: House) -> 
 
     published = [p for p in house.watched("disagreement") if p.kind == one["kind"]]
     assert [p.over for p in published[-2:]] == [False, True]
-    assert "the ADS would have taken another lane" in disagreement_text(published[-1])
+    text = disagreement_text(published[-1], "Mill Lane \u00d7 High Street")
+    assert "the ADS would have taken another lane" in text
+    assert ", at or before Mill Lane \u00d7 High Street" in text
     results = house.plan.folder / "results"
     row = pq.read_table(results / "disagreements.parquet").to_pylist()[-1]
     assert row.items() <= one.items()

@@ -195,7 +195,7 @@ def test_who_does_not_say_where_its_antenna_sits_is_told_of(tmp_path: Path) -> N
     beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
     on_the_bus(beside, from_s=0.0, to_s=0.2)
     beside.take_info("van", None)
-    assert "van does not say where its reference point sits" in TOLD[-1]
+    assert "van does not say where on it its positions are of" in TOLD[-1]
 
 
 def test_stamps_of_another_clock_are_told_once(tmp_path: Path) -> None:

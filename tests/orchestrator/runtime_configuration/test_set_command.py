@@ -56,7 +56,7 @@ def test_the_newest_drive_that_goes_on_is_meant(tmp_path: Path) -> None:
         (["role.ego"], "role.ego: must be KEY=VALUE, such as role.ego=shadow"),
         (["=twin"], "=twin: must be KEY=VALUE, such as role.ego=shadow"),
         (["role.ego=twin", "--run", "over"], "over: the run has ended (completed)"),
-        (["role.ego=twin", "--run", "none"], "no folder of a run (run.json is missing or torn)"),
+        (["role.ego=twin", "--run", "none"], "none: no such folder, and"),
     ],
 )
 def test_what_cannot_be_asked_ends_in_one_line(

@@ -92,8 +92,8 @@ def test_findings_are_kept_told_and_counted(tmp_path: Path) -> None:
 def test_the_end_of_a_drive_tells_it_in_a_few_lines(tmp_path: Path) -> None:
     reply = TuneReply(identifications=(FOUND,), gaps=(gap(0.3),), verdicts=(VERDICT,))
     assert summary_lines(Kept(tmp_path, reply).record) == [
-        "  gap of the model after 2 s (RMS): 0.00 m along, 0.30 m across, 5.7°, 0.00 m/s; "
-        "0 alarms, beyond a limit 0 of 1 times",
+        "  left to itself for 2 s, the model is off by 0.00 m along the road, 0.30 m across, 5.7° "
+        "and 0.00 m/s (RMS); 0 alarms, beyond a limit 0 of 1 times",
         "  verdict at 9.0 s: the model, steering_ratio: the model turns 14 % less",
         "  found, within what the vehicle file leaves open: steering_ratio 15.3",
     ]
@@ -105,11 +105,11 @@ def test_the_end_of_a_drive_tells_it_in_a_few_lines(tmp_path: Path) -> None:
         (TuneReply(gaps=(gap(0.3),)), ["0 alarms, beyond a limit 0 of 1", "nothing shows that"]),
         (
             TuneReply(gaps=(gap(1.3), gap(1.3)), alarms=(ALARM,)),
-            ["1 alarm, beyond a limit 2 of 2", "none: the gap was beyond its limits"],
+            ["1 alarm, beyond a limit 2 of 2", "the gap was beyond its limits, and nothing shows"],
         ),
         (
             TuneReply(gaps=(gap(9.0, independent=False),)),
-            ["estimated from the motion: no limits", "none: who departs from commands that were"],
+            ["no limits hold, since commands were estimated", "no commands were recorded"],
         ),
     ],
     ids=["within", "beyond", "estimated commands"],
