@@ -10,12 +10,25 @@ from typing import NamedTuple
 from foretwin.contracts.errors import UserError
 
 LOOPBACK = "127.0.0.1"
+WEB_PORT = 9090
+"""Of the viewer for browsers, where it is free."""
 _PORTS = range(20_000, 32_000)
 """Below those that systems give to outgoing connections, any of which could take a port between
 its choice and the moment at which it is listened on."""
 _TRIES = 200
 
 _random = random.SystemRandom()
+
+
+def free_or(port: int) -> int:
+    """Return `port` where nobody listens there on this machine, else one that is free."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOOPBACK, port))
+        except OSError:
+            return free_port()
+    return port
 
 
 def free_port() -> int:

@@ -6,7 +6,9 @@ import msgspec
 
 from foretwin.contracts.fleet import MachineInfo
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.layout import Layout
 from foretwin.contracts.planner_link import PlannerJoined
+from foretwin.contracts.ports import WEB_PORT
 from foretwin.contracts.process_setup import BusSetup as BusSetup
 from foretwin.contracts.process_setup import ProcessSetup as ProcessSetup
 from foretwin.contracts.process_setup import read_setup as read_setup
@@ -157,6 +159,12 @@ class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     drive_frame: LocalFrame
     roll: Roll = Roll()
     live: str = "none"
+    page_port: int = WEB_PORT
+    """Of this machine, for browsers."""
+    layout: Layout | None = None
+    """None is that of a drive."""
+    roads: str | None = None
+    """A file of the RoadsShown of the whole map and the route."""
     title: str = "foretwin"
     attribution: str = ATTRIBUTION
     start_stamp_ns: int = 0

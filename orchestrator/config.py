@@ -133,6 +133,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     vehicles: tuple[OtherVehicleConfig, ...] = ()
     """Others in the mirror besides the car, each with a role of its own."""
     view: View = "auto"
+    layout: str = "drive"
+    """Of the viewer: one that comes along (drive, identify, gap, sweep), or a TOML file."""
     out: str = "runs"
     keep: str | None = None
     """How much of the run stays while it goes on: the newest hours (12h) or bytes (20GB)."""

@@ -15,6 +15,7 @@ from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.elevation import RoadSlopes
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.local_bus import LocalBus
+from foretwin.contracts.ports import WEB_PORT
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
@@ -96,6 +97,8 @@ class DrivePlan(DriveInputs):
     bus: BusSetup
     """How the orchestrator joins; without an endpoint until the bus of this host is made."""
     live_view: str
+    page_port: int = WEB_PORT
+    """Of this machine, where browsers find the viewer."""
     local: LocalBus | None = None
     """The bus of this host; None where anybody may join at `endpoint`."""
     order_keys: OrderKeys | None = None
@@ -164,6 +167,11 @@ class DrivePlan(DriveInputs):
     def slopes_file(self) -> Path:
         """How the map's roads climb, where they do."""
         return self.processes_dir / "slopes.msg"
+
+    @property
+    def roads_file(self) -> Path:
+        """The whole map and the route, as the viewer draws them."""
+        return self.processes_dir / "roads.msg"
 
     @property
     def start_stamp_ns(self) -> int:

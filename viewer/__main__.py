@@ -12,11 +12,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, ask
+from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.guard import Refused
+from foretwin.contracts.layout import read_layout
 from foretwin.contracts.owned_folder import make_temporary
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.roads_shown import RoadsShown
 from foretwin.contracts.segments import (
     first_left,
     first_name,
@@ -27,7 +30,7 @@ from foretwin.contracts.segments import (
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
 from foretwin.contracts.trace import span, traced
-from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.blueprint import DEFAULT, drive_blueprint
 from foretwin.viewer.live_viewer import (
     HOST,
     NoViewerError,
@@ -35,6 +38,7 @@ from foretwin.viewer.live_viewer import (
     live_viewer,
     offline_environment,
     rerun_program,
+    serve_recordings,
 )
 from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.recordings import copy_with_blueprint, is_complete
@@ -85,10 +89,10 @@ class Recorder:
         self._reported_window = False
         self._flushed_s = time.monotonic()
         self._setup = setup
-        self._blueprint = drive_blueprint()
+        self._blueprint = drive_blueprint(setup.layout)
         self._monitor = self._new_monitor(find_start)
         self.channels = self._monitor.channels
-        self._live_viewer = live_viewer(setup.live)
+        self._live_viewer = live_viewer(setup.live, page_port=setup.page_port)
         self._live = (
             None
             if self._live_viewer is None
@@ -110,6 +114,7 @@ class Recorder:
             title=setup.title,
             attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
+            roads=_roads(setup),
         )
 
     def _open_part(self) -> None:
@@ -193,6 +198,16 @@ class Recorder:
             self._reported_dropped = dropped
 
 
+def _roads(setup: ViewerSetup) -> RoadsShown | None:
+    if setup.roads is None:
+        return None
+    try:
+        return read_message(Path(setup.roads), RoadsShown)
+    except (OSError, ValueError) as problem:
+        _log.warning("the map around the Worlds is not shown: %s", problem)
+        return None
+
+
 def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     """Record until the run is over."""
     messages = Mailbox(MAILBOX_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
@@ -224,31 +239,37 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     recorder.close(farewell, keep_window=life.run_ended)
 
 
-def show(recording: Path) -> None:
-    """Become the native viewer of `recording`, which holds its layout, and of its later parts."""
+def show(recording: Path, *, layout: str = DEFAULT, view: str = "native") -> None:
+    """Become the native viewer of `recording` and of its later parts, or serve it for a browser.
+
+    Raises FileNotFoundError, NoViewerError or UserError, in one line.
+    """
     if not recording.is_file():
         raise FileNotFoundError(f"no recording {recording}")
-    if not has_display():
+    if view == "native" and not has_display():
         raise NoViewerError(
-            f"no display to show {recording} on; "
-            f"`python -m foretwin.viewer.picture {recording} OUT.png` renders a picture without one"
+            f"no display to show {recording} on; --view web serves it for a browser, "
+            f"`python -m foretwin.viewer.picture {recording} OUT.png` renders a picture"
         )
     program = str(rerun_program())
     first = first_name(recording)
     parts = segments_of(first) if first_left(first) == recording else [recording]
-    parts = [_complete(part) for part in parts]
+    parts = [_laid_out(part, layout) for part in parts]
+    if view == "web":
+        serve_recordings(parts)
+        return
     arguments = [program, "--bind", HOST, "--port", "auto", *map(str, parts)]
     os.execve(program, arguments, offline_environment())
 
 
-def _complete(recording: Path) -> Path:
-    """Return a recording with its layout, in a copy where a killed viewer left it without."""
-    if is_complete(recording):
+def _laid_out(recording: Path, layout: str) -> Path:
+    """Return a recording with this layout: a copy, but where it is complete and has its own."""
+    if layout == DEFAULT and is_complete(recording):
         return recording
     owned = make_temporary("foretwin-shown-")
     owned.keep_over_exec()  # the next one to be shown finds whether this one still is
     copy = owned.path / recording.name
-    copy_with_blueprint(recording, copy, drive_blueprint())
+    copy_with_blueprint(recording, copy, drive_blueprint(read_layout(layout)))
     return copy
 
 
@@ -258,10 +279,12 @@ def main(arguments: list[str] | None = None) -> int:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--setup", type=Path, metavar="FILE", help="a ViewerSetup as JSON")
     what.add_argument("--open", type=Path, metavar="RRD", help="show an existing recording")
+    parser.add_argument("--layout", default=DEFAULT, help="of --open: a name or a TOML file")
+    parser.add_argument("--view", choices=("native", "web"), default="native", help="of --open")
     given = parser.parse_args(arguments)
     try:
         if given.open is not None:
-            show(given.open)
+            show(given.open, layout=given.layout, view=given.view)
         # Leaves through os._exit: Rerun's flush at exit never ends with a frozen viewer.
         run_process(ViewerSetup, serve, ["--setup", str(given.setup)])
     except (OSError, ValueError) as problem:

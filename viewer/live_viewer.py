@@ -9,16 +9,17 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from foretwin.contracts.ends_with_parent import ends_with_parent
-from foretwin.contracts.ports import LOOPBACK, free_port
+from foretwin.contracts.ports import LOOPBACK, WEB_PORT, free_port
+from foretwin.contracts.terminal import say
+from foretwin.viewer.web_page import PageServer
 
 HOST = LOOPBACK
 PORT = 9876
-WEB_PORT = 9090
 START_S = 60.0
 LIVE_CHOICES = ("native", "web", "none")
 
@@ -105,6 +106,14 @@ def start_program(*arguments: str, port: int, outlives: bool = False) -> subproc
     )
 
 
+class WebViewer(NamedTuple):
+    """Rerun as a server for browsers: its process, its page, and the port that takes rows."""
+
+    process: subprocess.Popen[bytes]
+    page: PageServer
+    port: int
+
+
 class LiveViewer(NamedTuple):
     """How a live viewer is reached: `open()` starts it if need be, `end(keep_window)` ends it.
 
@@ -116,8 +125,40 @@ class LiveViewer(NamedTuple):
     end: Callable[[bool], None]
 
 
-def live_viewer(live: str) -> LiveViewer | None:
-    """Return the live viewer for `live`, one of native, web, none, or an address.
+def start_web(*recordings: str, page_port: int = 0) -> WebViewer:
+    """Serve Rerun for browsers of this machine: what is sent to it, or recordings.
+
+    The page is at `page_port`, or at a free port where that is taken or 0. Raises NoViewerError.
+    """
+    port, rerun_port = free_port(), free_port()
+    process = start_program(
+        *recordings, "--serve-web", "--web-viewer-port", str(rerun_port), port=port
+    )
+    wait_until_it_answers(process, port)
+    wait_until_it_answers(process, rerun_port)
+    try:
+        page = PageServer(page_port, rerun_port=rerun_port, grpc_port=port)
+    except OSError:
+        page = PageServer(0, rerun_port=rerun_port, grpc_port=port)
+    return WebViewer(process, page, port)
+
+
+def serve_recordings(recordings: Sequence[Path]) -> None:
+    """Serve recordings for browsers of this machine until Ctrl-C, and say where."""
+    web = start_web(*map(str, recordings), page_port=WEB_PORT)
+    try:
+        say(f"view: {web.page.address} (Ctrl-C ends it)")
+        web.process.wait()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        web.process.terminate()
+        web.process.wait()
+
+
+def live_viewer(live: str, *, page_port: int = WEB_PORT) -> LiveViewer | None:
+    """Return the live viewer for `live`, one of native, web, none, or an address; the page of web
+    is at `page_port`.
 
     Raises NoViewerError for anything else.
     """
@@ -144,14 +185,10 @@ def live_viewer(live: str) -> LiveViewer | None:
         return address(PORT)
 
     def open_web() -> str:
-        port, web_port = free_port(), WEB_PORT if not answers(WEB_PORT) else free_port()
-        process = start_program("--serve-web", "--web-viewer-port", str(web_port), port=port)
-        started.append(process)
-        wait_until_it_answers(process, port)
-        _log.info(
-            "web view: http://%s:%d/?url=rerun%%2Bhttp://%s:%d/proxy", HOST, web_port, HOST, port
-        )
-        return address(port)
+        web = start_web(page_port=page_port)
+        started.append(web.process)
+        _log.info("web view: %s", web.page.address)
+        return address(web.port)
 
     def end(keep_window: bool) -> None:
         if live == "web" or not keep_window:

@@ -146,12 +146,13 @@ def scenario_table(view: RoundView) -> str:
         if view.min_clearance_m is None
         else f"least clearance {view.min_clearance_m:.1f} m"
     )
+    place = in_markdown(view.place or view.intersection_id)
     lines = [
-        f"**{len(view.names)} futures** from {in_markdown(view.intersection_id)} · "
+        f"**{place}** · {len(view.names)} futures · "
         f"{view.collided} collide · {clearance} · {view.latency_ms:.0f} ms",
         "",
-        "| # | future | likelihood | criticality | |",
-        "|--:|:--|--:|--:|:--|",
+        "| what happens | likely | critical | |",
+        "|:--|--:|--:|:--|",
     ]
     criticality = np.nan_to_num(np.asarray(view.criticality, dtype=np.float64), nan=1.0)
     worst = np.argsort(-criticality, kind="stable")[:WORST_SHOWN]
@@ -160,7 +161,7 @@ def scenario_table(view: RoundView) -> str:
         verdict = "grave" if value >= RED_FROM else "watch" if value >= AMBER_FROM else ""
         name = view.names[index] if index < len(view.names) else str(index)
         likely = float(view.likelihood[index])
-        lines.append(f"| {index} | {in_markdown(name)} | {likely:.2g} | {value:.1g} | {verdict} |")
+        lines.append(f"| {in_markdown(name)} | {likely:.2g} | {value:.1g} | {verdict} |")
     return "\n".join(lines)
 
 

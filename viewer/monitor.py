@@ -10,10 +10,13 @@ from typing import Any
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import read_message
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.roads_shown import RoadsShown
 from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
+from foretwin.viewer.legend import legend_rows
 from foretwin.viewer.log_drive import DriveLog
+from foretwin.viewer.log_roads import rows_of_roads
 from foretwin.viewer.log_run import RunLog, rows_of_event
 from foretwin.viewer.log_tuning import TuningLog
 from foretwin.viewer.log_world import rows_of_world, world_centre
@@ -47,12 +50,13 @@ class Monitor:
         title: str,
         attribution: str = ATTRIBUTION,
         load_world: Callable[[str], World],
+        roads: RoadsShown | None = None,
     ) -> None:
         self._frame = drive_frame
         self._find_start = find_start
         self.start_ns: int | None = None
         """The stamp of the drive's start, once it is known."""
-        self._load_world = load_world
+        self._load_world, self._roads = load_world, roads
         self._drive = DriveLog(drive_frame)
         self._run = RunLog(title, attribution)
         self._tuning = TuningLog()
@@ -93,6 +97,8 @@ class Monitor:
             *log_roles.static_rows(),
             *log_scenarios.static_rows(),
             *log_tuning.static_rows(),
+            *legend_rows(),
+            *(() if self._roads is None else rows_of_roads(self._roads)),
             *self._tuning.opening(),
             *self._run.static_rows(),
             self._run.first_status(),

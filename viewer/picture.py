@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from rerun.experimental import ViewerClient
 
+from foretwin.contracts.layout import VIEWS, Layout, read_layout
 from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.ports import free_port
 from foretwin.contracts.terminal import say
-from foretwin.viewer import blueprint
-from foretwin.viewer.blueprint import DetailView, MainView
+from foretwin.viewer.blueprint import DEFAULT, drive_blueprint
 from foretwin.viewer.live_viewer import NoViewerError, address, start_program, wait_until_it_answers
 from foretwin.viewer.recordings import copy_with_blueprint
 from foretwin.viewer.rows import TIMELINE
@@ -50,11 +50,10 @@ def take_picture(
     recording: Path,
     *,
     at_s: float | None = None,
-    main: MainView = "Intersection",
-    detail: DetailView = "Comparison",
+    layout: Layout | None = None,
     size: tuple[int, int] = SIZE,
 ) -> Picture:
-    """Render `recording` at drive time `at_s` (None: its end) with today's layout.
+    """Render `recording` at drive time `at_s` (None: its end) in a layout of today.
 
     Raises FileNotFoundError without the file, NoViewerError where nothing can be rendered.
     """
@@ -65,7 +64,7 @@ def take_picture(
     with temporary_folder("foretwin-picture-") as folder:
         # The viewer renames what it opens, so a layout sent apart would never meet it.
         copy = folder / "recording.rrd"
-        copy_with_blueprint(recording, copy, blueprint.drive_blueprint(main=main, detail=detail))
+        copy_with_blueprint(recording, copy, drive_blueprint(layout))
         port = free_port()
         window = f"{size[0]}x{size[1]}"
         program = start_program(
@@ -132,8 +131,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("recording", type=Path, metavar="RRD")
     parser.add_argument("out", type=Path, metavar="OUT.png")
     parser.add_argument("--at", type=float, metavar="S", help="drive time; default: the end")
-    parser.add_argument("--main", choices=blueprint.MAIN_VIEWS, default="Intersection")
-    parser.add_argument("--detail", choices=blueprint.DETAIL_VIEWS, default="Comparison")
+    parser.add_argument("--layout", default=DEFAULT, help="drive, identify, gap, sweep or a file")
+    parser.add_argument(
+        "--show", action="append", default=[], choices=VIEWS, metavar="VIEW", help="open this tab"
+    )
     parser.add_argument("--size", metavar="WxH", default=f"{SIZE[0]}x{SIZE[1]}")
     given = parser.parse_args(arguments)
     try:
@@ -141,8 +142,7 @@ def main(arguments: list[str] | None = None) -> int:
         picture = take_picture(
             given.recording,
             at_s=given.at,
-            main=given.main,
-            detail=given.detail,
+            layout=read_layout(given.layout).opened_at(*given.show),
             size=(width, height),
         )
         given.out.write_bytes(picture.window)

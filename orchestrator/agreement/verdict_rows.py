@@ -78,8 +78,8 @@ def _turned(flip: dict[str, Any], direction: str, intersections: Sequence[dict[s
     when = instant(flip["smallest_factor_at_s"], intersections)
     gap_m = flip["smallest_factor_gap_m"]
     return (
-        f"  least room {when}: with a gap of {gap_m:.2f} m {_ALONG[direction]} the verdict would be "
-        f"{becomes}; {gap_m / factor:.2f} m were measured"
+        f"  least room {when}: with a gap of {gap_m:.2f} m {_ALONG[direction]} the verdict would "
+        f"be {becomes}; {gap_m / factor:.2f} m were measured"
     )
 
 

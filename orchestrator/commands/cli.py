@@ -38,6 +38,8 @@ from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
 from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
+from foretwin.orchestrator.commands.cli_view import LayoutOption
+from foretwin.orchestrator.commands.cli_view import view as view_run
 from foretwin.orchestrator.commands.cli_worker import worker
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
@@ -122,6 +124,7 @@ def drive(
     view: Annotated[
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
+    layout: LayoutOption = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
     keep: KeepOption = None,
     metrics: MetricsOption = None,
@@ -235,7 +238,7 @@ def world(
     raise typer.Exit(write_worlds(WorldRequest(**asked)))
 
 
-for command in (sweep, *ABOUT_LOGS, learn_progress, doctor, worker):
+for command in (sweep, *ABOUT_LOGS, view_run, learn_progress, doctor, worker):
     app.command()(command)
 
 app.command("set")(set_value)

@@ -232,18 +232,6 @@ def collect(
     raise typer.Exit(code)
 
 
-def view(
-    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
-) -> None:
-    """Open the recording of a run in the viewer.
-
-    Example: foretwin view runs/NAME
-    """
-    from foretwin.orchestrator.commands.recordings import open_view
-
-    raise typer.Exit(open_view(run_folder))
-
-
 ABOUT_LOGS = (
     declare,
     convert,
@@ -255,6 +243,5 @@ ABOUT_LOGS = (
     recover,
     repeat,
     collect,
-    view,
 )
 """In the order in which help lists them."""

@@ -1,15 +1,12 @@
-"""The commands that look at recordings: `convert`, `merge` and `view`."""
+"""The commands that look at recordings: `convert` and `merge`."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.segments import first_left
 from foretwin.contracts.terminal import say
 
 if TYPE_CHECKING:
@@ -74,13 +71,3 @@ def merge_logs(
     say(clock.said(str(second), str(first)))
     say(f"taken from {second}: {', '.join(taken)}")
     _say_written(target, report)
-
-
-def open_view(run_folder: Path) -> int:
-    """Open a run's recording in the native viewer; returns the viewer's exit code."""
-    recording = first_left(run_folder / "monitor.rrd") if run_folder.is_dir() else run_folder
-    if not recording.is_file():
-        raise FileNotFoundError(f"{run_folder}: holds no monitor.rrd")
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "foretwin.viewer", "--open", str(recording)], check=False
-    ).returncode

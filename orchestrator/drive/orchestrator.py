@@ -10,6 +10,7 @@ from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import LOOPBACK
 from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.simulation import RunEnd
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -142,6 +143,8 @@ class Orchestrator:
                 return before.exit_word or "failed"
         else:
             line.say(f"run {plan.folder}")
+            if plan.live_view == "web":
+                line.say(f"view http://{LOOPBACK}:{plan.page_port}/")
             line.say(plan.config.tuning_choice.text)
             if plan.config.resolved_source == "live":
                 line.say(waiting_text(plan))

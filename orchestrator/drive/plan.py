@@ -16,7 +16,9 @@ from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.layout import read_layout
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.ports import WEB_PORT, free_or
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.campaign.joining import check_campaign
@@ -28,6 +30,7 @@ from foretwin.orchestrator.plan import DriveInputs, DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import scenarios_of
 from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.road_index import RoadIndex
+from foretwin.orchestrator.routing.roads_shown import roads_shown
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import standin_path
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
@@ -57,6 +60,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     except ValueError as error:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins
+    read_layout(config.layout)
     cache = "the cache" if config.cache_dir is None else "cache_dir"
     for name, folder in (("--out", Path(config.out)), (cache, config.worlds_cache)):
         if (trouble := trouble_with_folder(folder)) is not None:
@@ -230,12 +234,14 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
             tls=None if config.secure is None else role_files(Path(config.secure), "orchestrator"),
         ),
         live_view=live,
+        page_port=free_or(WEB_PORT),
     )
     try:
         if plan.standin is not None:
             plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
         if plan.slopes is not None:
             write_message(plan.slopes, plan.slopes_file)
+        write_message(roads_shown(plan.graph, plan.routes, plan.drive_frame), plan.roads_file)
     except OSError:
         shutil.rmtree(folder)
         raise

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.keys import BusRole
+from foretwin.contracts.layout import read_layout
 from foretwin.contracts.local_bus import OUTSIDERS, member_of
 from foretwin.contracts.process_setup import RouterSetup
 from foretwin.contracts.roles import CastVehicle, MirrorCast
@@ -171,6 +172,9 @@ def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
         worlds_dir=str(plan.worlds_dir),
         drive_frame=plan.drive_frame,
         live=plan.live_view,
+        page_port=plan.page_port,
+        layout=read_layout(plan.config.layout),
+        roads=str(plan.roads_file),
         title=f"foretwin {plan.run_id}",
         attribution=plan.osm.attribution,
         start_stamp_ns=plan.start_stamp_ns,

@@ -58,11 +58,11 @@ def summary_text(record: dict[str, object]) -> str:
     assert isinstance(futures, dict)
     junctions = record["intersections"]
     assert isinstance(junctions, list)
-    latency = record["state_to_result_ms_p95"]
+    latency_ms: Any = record["state_to_result_ms_p95"]
     lines = [
         f"{record['exit']}: {_counted(len(junctions), 'junction')} passed, {futures['count']} "
         f"futures in {_counted(futures['rounds'], 'round')} ({futures['missed_rounds']} missed)"
-        + ("" if latency is None else f", 95 % there {latency / 1e3:.2g} s after the car's state")
+        + ("" if latency_ms is None else f", 95 % within {latency_ms / 1e3:.2g} s of the state")
     ]
     if futures["smaller_rounds"] or futures["spared_rounds"]:
         sizes = [f"{n} had {size}" for size, n in futures["rounds_by_futures"].items()]

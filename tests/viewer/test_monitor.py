@@ -141,7 +141,7 @@ def test_a_diverged_future_is_left_out() -> None:
 def test_the_table_lists_the_worst_first() -> None:
     view = scene.round_at(3.0)
     rows = [line for line in scenario_table(view).splitlines() if line.startswith("| ")][1:]
-    criticality = [float(row.split("|")[4]) for row in rows]
+    criticality = [float(row.split("|")[3]) for row in rows]
     assert criticality == sorted(criticality, reverse=True)
     assert criticality[0] == pytest.approx(float(view.criticality.max()), rel=0.1)
     assert {row.split("|")[5].strip() for row in rows} == {"grave"}

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
+from foretwin.contracts.layout import read_layout
 from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.monitor import Monitor
 from foretwin.viewer.recordings import copy_with_blueprint, is_complete
@@ -34,7 +35,7 @@ def recording(tmp_path: Path) -> Path:
 
 def test_a_copy_holds_the_same_rows_and_one_layout(recording: Path, tmp_path: Path) -> None:
     copy = tmp_path / "copy.rrd"
-    copy_with_blueprint(recording, copy, drive_blueprint(main="Chase"))
+    copy_with_blueprint(recording, copy, drive_blueprint(read_layout("gap")))
     assert is_complete(copy)
     assert Recorded(copy).paths == Recorded(recording).paths
     assert len(Recorded(copy).times_s("/world/ego/real")) == 20

@@ -104,13 +104,13 @@ def test_the_least_gap_that_would_turn_a_verdict_is_told_with_its_place() -> Non
     assert agreement_lines(record, [reached]) == [
         "  simulated and driven, 44 windows: 33 can be judged, of which 31 agree (30 pass, 1 fail);"
         " in 2 the simulation was too pessimistic",
-        "  least room at 13.6 s, before Mill Lane \u00d7 High Street: with a gap of 5.00 m along the "
-        "road the verdict would be a fail by drivable area; 4.00 m were measured",
+        "  least room at 13.6 s, before Mill Lane \u00d7 High Street: with a gap of 5.00 m along "
+        "the road the verdict would be a fail by drivable area; 4.00 m were measured",
     ]
     record["flips"] = {"both": record["flips"]["both"]}  # type: ignore[index]
     assert agreement_lines(record, [reached])[-1].startswith(
-        "  least room at 50.0 s, after Mill Lane \u00d7 High Street: with a gap of 6.00 m along and "
-        "across together the verdict would be a pass; 3.00 m"
+        "  least room at 50.0 s, after Mill Lane \u00d7 High Street: with a gap of 6.00 m along "
+        "and across together the verdict would be a pass; 3.00 m"
     )
 
 

@@ -1,0 +1,26 @@
+"""`foretwin view`: the recording of a run in a window or a browser."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from foretwin.contracts.layout import read_layout
+from foretwin.contracts.segments import first_left
+from foretwin.orchestrator.record.which_run import run_folder
+
+
+def open_view(run: Path, *, out: Path, layout: str, view: str) -> int:
+    """Show a run, or a recording of Rerun; returns the viewer's exit code.
+
+    Raises UserError or FileNotFoundError, in one line, where there is nothing to be shown.
+    """
+    read_layout(layout)
+    recording = run if run.is_file() else first_left(run_folder(run, out) / "monitor.rrd")
+    if not recording.is_file():
+        raise FileNotFoundError(f"{recording.parent}: holds no monitor.rrd")
+    asked = ["--open", str(recording), "--layout", layout, "--view", view]
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "foretwin.viewer", *asked], check=False
+    ).returncode
