@@ -144,7 +144,7 @@ def test_the_table_lists_the_worst_first() -> None:
     criticality = [float(row.split("|")[3]) for row in rows]
     assert criticality == sorted(criticality, reverse=True)
     assert criticality[0] == pytest.approx(float(view.criticality.max()), rel=0.1)
-    assert {row.split("|")[5].strip() for row in rows} == {"grave"}
+    assert {row.split("|")[4].strip() for row in rows} == {"grave"}
 
 
 def test_colours_follow_the_order_of_magnitude() -> None:
