@@ -239,8 +239,7 @@ class Conductor:
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
 
     def _world_failed(self, junction_id: str, reason: str) -> None:
-        self.tell(Notice("error", f"no world for {self.mission.name_of(junction_id)}: {reason}"))
-        self.mission.on_world_failed(junction_id)
+        self.obey(self.mission.on_world_failed(junction_id, reason))
 
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""

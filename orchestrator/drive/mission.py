@@ -118,9 +118,11 @@ class Mission:
         self.visits.take_world(junction_id, world, Moment(mono_s, self.drive_time_s))
         return self._choose_current()
 
-    def on_world_failed(self, junction_id: str) -> None:
+    def on_world_failed(self, junction_id: str, reason: str) -> list[Instruction]:
         """A junction's World cannot be built; the drive goes on without it."""
         self.visits.fail(junction_id)
+        name = self.visits.name_of(junction_id)
+        return [Notice("error", f"no world for {name}: {reason}")]
 
     def on_round(self, junction_id: str, *, futures: int) -> None:
         """A round for a junction is complete."""
@@ -149,11 +151,6 @@ class Mission:
         if self._current is not None:
             return self._current
         return next((a.junction.summary.id for a in self.way.junctions), None)
-
-    def name_of(self, junction_id: str | None) -> str | None:
-        """Return a junction that was ahead by the streets that meet there, else by its id."""
-        visit = None if junction_id is None else self.visits.get(junction_id)
-        return junction_id if visit is None else visit.junction.summary.name or junction_id
 
     @property
     def route_m(self) -> float | None:

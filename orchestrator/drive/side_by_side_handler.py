@@ -107,7 +107,7 @@ class SideBySideHandler:
         for one in found:
             self._context.publish("disagreement", one)
             if not one.over:
-                name = self._mission.name_of(one.junction_id)
+                name = one.junction_id and self._mission.visits.name_of(one.junction_id)
                 self._context.tell(Notice("warning", disagreement_text(one, name)))
                 continue
             self._found.append(one)

@@ -93,6 +93,11 @@ class VisitBook:
         """Return the latest visit of a junction, None where it was never seen."""
         return self._latest.get(junction_id)
 
+    def name_of(self, junction_id: str) -> str:
+        """Return a junction that was ahead by the streets that meet there, else by its id."""
+        visit = self.get(junction_id)
+        return junction_id if visit is None else visit.junction.summary.name or junction_id
+
     def latest(self, junction_id: str) -> Visit:
         """Return the latest visit of a junction; raises KeyError where it was never seen."""
         return self._latest[junction_id]

@@ -11,6 +11,7 @@ from foretwin.contracts.frames import LocalFrame, target_from_source
 from foretwin.contracts.futures import COLLISION_WITH
 from foretwin.contracts.simulation import RoundView
 from foretwin.contracts.trace import traced
+from foretwin.contracts.world import World
 from foretwin.orchestrator.record.result_rows import RoundFutures
 from foretwin.orchestrator.rounds.future_titles import future_title
 from foretwin.orchestrator.runner.open_rounds import RoundDone
@@ -64,6 +65,12 @@ def round_view(
         touch_names=met.touch_names,
         late=done.late,
     )
+
+
+def place_of(done: RoundDone, world: World) -> str:
+    """Return the streets that meet at a round's junction; empty where its World names none."""
+    wanted = done.order.junction_id
+    return next((j.summary.name for j in world.junctions if j.summary.id == wanted), "")
 
 
 def _names(done: RoundDone) -> tuple[str, ...]:

@@ -137,7 +137,7 @@ class Trip:
         self._asked.add(wanted.junction_id)
         world = self._world_of(wanted.junction_id)
         if world == "failed":
-            self.mission.on_world_failed(wanted.junction_id)
+            self.mission.on_world_failed(wanted.junction_id, "torn")
         elif world is not None:
             self._take(self.mission.on_world(wanted.junction_id, world, mono_s=mono_s), mono_s)
 

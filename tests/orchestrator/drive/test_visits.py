@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
 from foretwin.contracts.running import MOST_LISTED
@@ -125,3 +126,11 @@ def test_more_passages_than_are_listed_are_counted() -> None:
         book.arrive(NAME, Moment(at_s, at_s))
         book.see(JUNCTION, Moment(at_s, at_s), load=True)
     assert (len(book.arrived), book.arrived.left_out) == (MOST_LISTED, 5)
+
+
+def test_a_junction_is_known_by_its_streets_where_they_have_names() -> None:
+    book = seen()
+    assert book.name_of(NAME) == NAME
+    named = msgspec.structs.replace(JUNCTION.summary, id="n99", name="Mill Lane")
+    book.see(JUNCTION._replace(summary=named), Moment(0.0, 0.0), load=True)
+    assert [book.name_of(one) for one in ("n99", "n2")] == ["Mill Lane", "n2"]

@@ -11,8 +11,6 @@ from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
 from foretwin.orchestrator.record.which_run import run_folder, runs_below
 
-COVERS = ("foretwin.orchestrator.record.which_run",)
-
 
 @pytest.fixture
 def runs(tmp_path: Path) -> Path:

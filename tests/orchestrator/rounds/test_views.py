@@ -8,7 +8,7 @@ import pytest
 
 from foretwin.contracts.futures import RoadUserTracks
 from foretwin.orchestrator.record.result_rows import round_futures
-from foretwin.orchestrator.rounds.views import VIEW_POINTS, round_view
+from foretwin.orchestrator.rounds.views import VIEW_POINTS, place_of, round_view
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.futures.likelihood import NEAR_MISS, NEAR_MISS_M
 from foretwin.sim_worker.scenarios.exposure import EXPOSURES
@@ -109,3 +109,13 @@ def test_who_meets_nobody_has_no_clearance() -> None:
     view = round_view(done, round_futures(done).futures, FRAME, FRAME)
     assert view.min_clearance_m is None
     assert view.criticality.tolist() == [0.0]
+
+
+def test_a_round_is_at_the_streets_that_meet_there() -> None:
+    world = town_world("n4")
+    done = meeting((40.0, 2.0))
+    assert done.order.junction_id == "n4"
+    assert place_of(done, world) == world.junctions[0].summary.name != ""
+    assert place_of(done, msgspec.structs.replace(world, junctions=())) == ""
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME, "Mill Lane")
+    assert view.place == "Mill Lane"

@@ -12,6 +12,8 @@ from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import FRAME, grid
 
+COVERS = ("foretwin.contracts.roads_shown",)
+
 HERE = LocalFrame(GeoPoint(FRAME.origin.lat_deg + 1e-3, FRAME.origin.lon_deg))
 
 
