@@ -132,5 +132,5 @@ def test_a_junction_is_known_by_its_streets_where_they_have_names() -> None:
     book = seen()
     assert book.name_of(NAME) == NAME
     named = msgspec.structs.replace(JUNCTION.summary, id="n99", name="Mill Lane")
-    book.see(JUNCTION._replace(summary=named), Moment(0.0, 0.0), load=True)
+    book.see(msgspec.structs.replace(JUNCTION, summary=named), Moment(0.0, 0.0), load=True)
     assert [book.name_of(one) for one in ("n99", "n2")] == ["Mill Lane", "n2"]
