@@ -3,8 +3,9 @@
 Above a block: `<!-- not run: WHY -->`, `<!-- file: NAME -->` (the block is that file of the
 folder), `<!-- until: WORDS -->` (the last command goes on for ever: it is interrupted once it says
 them), `<!-- exit: 3 -->`. Anywhere on a page: `<!-- stage: map:town.osm -->`, what lies in the
-folder before its first command (`tests/documents/stage.py`), and `<!-- here: RUN → trial -->`, what
-a placeholder of the page stands for in the test.
+folder before its first command (`tests/documents/stage.py`); `<!-- here: RUN → trial -->`, what a
+placeholder of the page stands for; `<!-- beside: COMMAND → WORDS -->`, what goes on meanwhile, and
+says these words when it is ready.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ FENCE = re.compile(r"^(?P<indent> *)```(?P<language>[\w{}:-]*)\s*$")
 COMMENT = re.compile(r"^ *<!-- (?P<key>[a-z ]+): (?P<value>.*) -->\s*$")
 COMMANDS = ("sh", "console")
 ABOVE = {"not run", "file", "until", "exit"}
-ON_A_PAGE = {"stage", "here"}
 
 
 class Block(NamedTuple):
@@ -52,6 +52,8 @@ class Page(NamedTuple):
     blocks: list[Block]
     stage: tuple[str, ...]
     here: dict[str, str]
+    beside: tuple[str, str] | None
+    """A command that goes on while the page is played, and what it says when it is ready."""
 
     def in_place(self, text: str) -> str:
         """Return a text with what the placeholders of the page stand for."""
@@ -71,6 +73,7 @@ def read_page(name: str) -> Page:
     """Return a page of the repository in parts."""
     stage: list[str] = []
     here: dict[str, str] = {}
+    beside = None
     blocks = []
     lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
     marks: dict[str, str] = {}
@@ -83,6 +86,9 @@ def read_page(name: str) -> Page:
             elif key == "here":
                 placeholder, _, stands_for = value.partition(" → ")
                 here[placeholder] = stands_for
+            elif key == "beside":
+                command, _, ready = value.partition(" → ")
+                beside = command, ready
             elif key in ABOVE:
                 marks[key] = value
         elif opened := FENCE.match(lines[number]):
@@ -97,7 +103,7 @@ def read_page(name: str) -> Page:
         elif lines[number].strip():
             assert not marks, f"{name}:{number + 1}: no block below {marks}"
         number += 1
-    return Page(name, blocks, tuple(stage), here)
+    return Page(name, blocks, tuple(stage), here, beside)
 
 
 def all_blocks() -> Iterator[Block]:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import duckdb
@@ -15,7 +16,7 @@ import pytest
 from tests.documents.blocks import COMMANDS, Block, Page, read_page
 from tests.documents.stage import Installed, names_in, set_stage
 
-BLOCK_S = 240.0
+BLOCK_S = 600.0
 """The longest that a block may take, of a machine with other work."""
 
 
@@ -32,7 +33,31 @@ def play_page(name: str, folder: Path, installed: Installed) -> int:
             target = folder / block.marks["file"]
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(page.in_place(block.text) + "\n", encoding="utf-8")
-    return sum(play(block, page, folder, installed) for block in page.blocks)
+    with going_on(page, folder, installed):
+        return sum(play(block, page, folder, installed) for block in page.blocks)
+
+
+@contextmanager
+def going_on(page: Page, folder: Path, installed: Installed) -> Iterator[None]:
+    """Have the command of a page that goes on beside it, if it has one, from when it is ready."""
+    if page.beside is None:
+        yield
+        return
+    command, ready = page.beside
+    process = start(command, folder, installed)
+    try:
+        said = []
+        for line in _lines_of(process):
+            said.append(line)
+            if ready in line:
+                break
+        else:
+            pytest.fail(f"{page.name}: {command} never said {ready!r}:\n{''.join(said)}")
+        yield
+        os.killpg(process.pid, signal.SIGINT)
+        process.communicate(timeout=BLOCK_S)
+    finally:
+        _end(process)
 
 
 def with_names(here: dict[str, str], run: Path) -> dict[str, str]:
@@ -69,14 +94,24 @@ def play(block: Block, page: Page, folder: Path, installed: Installed) -> bool:
     return True
 
 
-def run_shell(commands: str, block: Block, folder: Path, installed: Installed) -> None:
-    """Run lines in one shell that ends at the first that fails."""
-    wanted = int(block.marks.get("exit", "0"))
-    process = subprocess.Popen(
+def start(commands: str, folder: Path, installed: Installed) -> subprocess.Popen[str]:
+    """Start lines in one shell that ends at the first that fails."""
+    return subprocess.Popen(
         ["bash", "-e", "-o", "pipefail", "-c", commands],
-        cwd=folder, env=installed.environment(folder), text=True, start_new_session=True,
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    )  # fmt: skip
+        cwd=folder,
+        env=installed.environment(folder),
+        text=True,
+        start_new_session=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+
+
+def run_shell(commands: str, block: Block, folder: Path, installed: Installed) -> None:
+    """Run lines, and fail where they end otherwise than their block says."""
+    wanted = int(block.marks.get("exit", "0"))
+    process = start(commands, folder, installed)
     said: list[str] = []
     try:
         if words := block.marks.get("until"):

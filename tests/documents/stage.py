@@ -23,8 +23,8 @@ from tests.documents.blocks import ROOT
 
 SHORT = {"--end": "6", "--futures": "4", "--rate": "0.5", "--tuning": "off"}
 """Added to every `foretwin drive` that says nothing of these."""
-CROSSING = "n44"
-"""A junction of the drawn town, with lights."""
+CROSSING, RING = "n44", "n10"
+"""Two junctions of the drawn town, one with lights."""
 SHIM = """#!{python}
 import os, sys
 words = sys.argv[1:]
@@ -59,20 +59,36 @@ class Installed(NamedTuple):
         for name in ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV", "FORETWIN_DATA"):
             kept.pop(name, None)
         return kept | {
-            "PATH": f"{self.programs}:{kept['PATH']}", "HOME": str(home),
-            "XDG_CACHE_HOME": str(home / ".cache"), "PIP_NO_INDEX": "1",
-            "PIP_NO_BUILD_ISOLATION": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1",
-            "PIP_ROOT_USER_ACTION": "ignore", "PIP_QUIET": "2", "COLUMNS": "120",
-        }  # fmt: skip
+            "PATH": f"{self.programs}:{kept['PATH']}",
+            "HOME": str(home),
+            "XDG_CACHE_HOME": str(home / ".cache"),
+            "PIP_NO_INDEX": "1",
+            "PIP_NO_BUILD_ISOLATION": "0",
+            "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+            "PIP_ROOT_USER_ACTION": "ignore",
+            "PIP_QUIET": "2",
+            "COLUMNS": "120",
+        }
 
 
 def build_wheel(folder: Path) -> Path:
     """Build the wheel of the working tree, with what is installed."""
     subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation",
-         "--no-index", "-w", folder, ROOT],
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "wheel",
+            "--quiet",
+            "--no-deps",
+            "--no-build-isolation",
+            "--no-index",
+            "-w",
+            folder,
+            ROOT,
+        ],
         check=True,
-    )  # fmt: skip
+    )
     (built,) = folder.glob("foretwin-*.whl")
     return built
 
@@ -107,14 +123,20 @@ def install(folder: Path) -> Installed:
     shutil.copytree(ROOT / "examples" / "tuning", folder / "examples" / "tuning")
     subprocess.run(
         [real, "drive", "--config", "examples/tuning/first_drive.toml"],
-        check=True, env=around, cwd=folder, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+        check=True,
+        env=around,
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+    )
     (run,) = (folder / "runs" / "tuning").iterdir()
     table = folder / "drive.csv"
     subprocess.run(
         [real, "convert", run / "drive.mcap", table],
-        check=True, env=around, cwd=folder, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+        check=True,
+        env=around,
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+    )
     return installed._replace(run=run, table=table)
 
 
@@ -158,13 +180,15 @@ def set_stage(folder: Path, what: tuple[str, ...], installed: Installed) -> None
 
 
 def names_in(run: Path) -> dict[str, str]:
-    """Return what pages may call `{future}`, `{world}` (of the crossing) and `{run}` of a run."""
+    """Return what pages may call `{future}`, `{world}` and `{ring}` (two of its
+    Worlds) and `{run}` of a run."""
     columns = ["future_id", "world_id", "junction_id"]
     futures = pq.read_table(run / "results" / "futures.parquet", columns=columns).to_pylist()
-    crossing = next(row for row in futures if row["junction_id"] == CROSSING)
+    worlds = {row["junction_id"]: row["world_id"] for row in futures}
     record = json.loads((run / "run.json").read_text(encoding="utf-8"))
     return {
         "{future}": futures[0]["future_id"],
-        "{world}": crossing["world_id"],
+        "{world}": worlds[CROSSING],
+        "{ring}": worlds[RING],
         "{run}": record["run_id"],
     }

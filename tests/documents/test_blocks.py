@@ -92,8 +92,12 @@ def test_few_blocks_are_not_run_and_each_says_why() -> None:
 @pytest.mark.parametrize("name", pages())
 def test_commands_and_options_of_a_page_exist(name: str) -> None:
     page = read_page(name)
-    lines = [line for block in page.blocks if block.language in COMMANDS
-             for line in foretwin_lines(block)]  # fmt: skip
+    lines = [
+        line
+        for block in page.blocks
+        if block.language in COMMANDS
+        for line in foretwin_lines(block)
+    ]
     prose = IN_TEXT.findall(" ".join((ROOT / name).read_text(encoding="utf-8").split()))
 
     wrong = {line: found for line in (*lines, *prose) if (found := wrong_in(line))}
@@ -107,13 +111,15 @@ def test_what_does_not_exist_is_seen() -> None:
     assert wrong_in("foretwin map get BBOX --out x.osm") == []
 
 
-@pytest.mark.parametrize("block", [b for b in all_blocks() if b.language == "toml"],
-                         ids=lambda block: block.place)  # fmt: skip
+@pytest.mark.parametrize(
+    "block", [b for b in all_blocks() if b.language == "toml"], ids=lambda block: block.place
+)
 def test_a_block_of_toml_can_be_read(block: Block) -> None:
     assert tomllib.loads(block.text)
 
 
-@pytest.mark.parametrize("block", [b for b in all_blocks() if b.language == "python"],
-                         ids=lambda block: block.place)  # fmt: skip
+@pytest.mark.parametrize(
+    "block", [b for b in all_blocks() if b.language == "python"], ids=lambda block: block.place
+)
 def test_a_block_of_python_compiles(block: Block) -> None:
     compile(block.text, block.place, "exec")
