@@ -38,9 +38,13 @@ class FollowLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """How hard a following twin may be drawn: along and across the road, and in yaw."""
 
     accel_mps2: float = 1.0
+    """Along and across the road."""
     jerk_mps3: float = 2.0
+    """How fast that may change."""
     yaw_accel_radps2: float = 0.3
+    """Of turning."""
     yaw_jerk_radps3: float = 0.6
+    """How fast that may change."""
     reach_m: float = 20.0
     """A twin farther from its vehicle than this is lost, and starts anew."""
 

@@ -44,10 +44,15 @@ class Distribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     `std`, normal and cut to `min` and `max` where these are given."""
 
     values: tuple[float, ...] = ()
+    """One of these, each as often as the others."""
     min: float | None = None
+    """The least."""
     max: float | None = None
+    """The most."""
     mean: float | None = None
+    """Of a normal distribution."""
     std: float | None = None
+    """Its standard deviation, above 0."""
 
 
 Number = float | Distribution
@@ -58,9 +63,13 @@ class EgoPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """What the car under test does when nobody intervenes."""
 
     turn: TrafficTurn = "straight"
+    """Where it goes at the junction."""
     speed_mps: Number = 8.33
+    """At which it drives where nothing slows it down."""
     lateral_shift_m: Number = 0.0
+    """How far to the left of its lane it aims."""
     reverse: bool = False
+    """Whether it goes backwards."""
 
 
 class ActorPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -75,17 +84,29 @@ class ActorPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """
 
     name: str
+    """What its numbers are called after: lower-case letters, digits and _."""
     relation: Relation
+    """Where it comes from, as the ego sees it."""
     kind: RoadUserKind = "car"
+    """What it is, which says how large and heavy it is."""
     turn: TrafficTurn = "straight"
+    """Where it goes at the junction."""
     speed_mps: Number = 8.33
+    """At which it drives where nothing slows it down."""
     conduct: Conduct = "heedless"
+    """Whether it minds others."""
     impact_share: Number = 0.5
+    """Where on the ego's front it touches, from 0 at its near side to 1."""
     arrives_after_s: Number = 0.0
+    """So much later than meant for an impact it comes."""
     gap_m: Number = 20.0
+    """From bumper to bumper along the ego's path."""
     lateral_m: Number = 0.0
+    """To the across side of the ego's path."""
     acts_after_s: Number = 0.0
+    """When it brakes, if it does."""
     decel_mps2: Number = 4.0
+    """With which it brakes."""
     hidden_by: str = ""
     """Name of another actor behind which this one stays unseen until it comes out."""
 
@@ -108,25 +129,37 @@ class Where(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Which places a scenario is for; an empty list admits all."""
 
     setting: Setting = "junction"
+    """What kind of place."""
     kinds: tuple[JunctionKind, ...] = ()
+    """Kinds of junctions; none named admits all."""
     controls: tuple[Control, ...] = ()
+    """How the ego is controlled there; none named admits all."""
 
 
 class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One entry of the catalogue, as its TOML file states it; `source` names who defined it."""
 
     id: str
+    """Lower-case letters, digits and _."""
     title: str
+    """In a few words what it is."""
     shows: str
     """What one sees when it runs, in one sentence."""
     source: str
+    """Who defined it."""
     where: Where = Where()
+    """Which places it is for."""
     ego: EgoPart = EgoPart()
+    """What the car under test does."""
     actors: tuple[ActorPart, ...] = ()
+    """Other road users."""
     faults: FaultPart = FaultPart()
+    """What is wrong with the car or the ground."""
     horizon_s: float = 8.0
+    """How long a case is played, 0.5 to 60."""
     lead_time_s: float = 4.0
     """From the start to the planned impact."""
     seed: int = 0
+    """Of what is drawn."""
     samples: int = 1
     """How many cases to draw for each combination of listed values."""

@@ -13,8 +13,11 @@ class Parameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One number with its uncertainty (one standard deviation, None where unknown) and source."""
 
     value: float
+    """In the unit that ends the name."""
     std: float | None = None
+    """One standard deviation; left out where nobody knows."""
     source: str = "default"
+    """Where the number comes from."""
 
 
 class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -26,22 +29,36 @@ class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     """
 
     name: str
+    """What the vehicle is called."""
     mass_kg: Parameter
+    """With driver and load."""
     yaw_inertia_kgm2: Parameter
+    """About the vertical axis through the centre of gravity."""
     wheelbase_m: Parameter
+    """Between the axles."""
     cog_from_rear_axle_m: Parameter
+    """How far before the rear axle the centre of gravity lies."""
     cog_height_m: Parameter
+    """Of the centre of gravity above the ground."""
     front_cornering_stiffness_npr: Parameter
+    """Side force per slip angle of both front tyres together."""
     rear_cornering_stiffness_npr: Parameter
+    """Side force per slip angle of both rear tyres together."""
     friction: Parameter
+    """Between tyres and a dry road, 1 for gravity."""
     steering_ratio: Parameter
+    """Angle of the steering wheel over that of the tyres."""
     steering_offset_rad: Parameter
     steering_delay_s: Parameter
+    """Dead time from a steering command to the tyres."""
     max_tire_angle_rad: Parameter
+    """As far as the tyres turn to either side."""
     max_tire_rate_radps: Parameter
+    """As fast as they turn."""
     drag_npv2: Parameter
     """Force over speed squared, N/(m/s)²."""
     rolling_resistance_n: Parameter
+    """Force that does not depend on speed."""
     drive_gain: Parameter
     """Achieved over commanded acceleration when driving."""
     brake_gain: Parameter
@@ -55,12 +72,17 @@ class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     steering_lag_s: Parameter = Parameter(0.0)
     """Time constant with which the tyre angle follows its command, after `steering_delay_s`."""
     max_drive_accel_mps2: Parameter
+    """The most that the drive can do."""
     max_brake_decel_mps2: Parameter
+    """The most that the brakes can do on a dry road."""
     wheel_inertia_mass_factor: Parameter
     """Effective over real mass along the road, for the wheels' spin inertia."""
     length_m: Parameter
+    """From bumper to bumper."""
     width_m: Parameter
+    """Without mirrors."""
     height_m: Parameter
+    """Above the ground."""
     rear_overhang_m: Parameter
     """From the rear bumper to the rear axle."""
 

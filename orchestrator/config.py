@@ -54,17 +54,22 @@ class OtherVehicleConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     """
 
     id: str
+    """What it is called, in one word; no two vehicles have one id."""
     role: Role = "shadow"
+    """Of it as the drive begins."""
     vehicle: str | None = None
     """A parameter file or the name of a bundled vehicle; the car's own where left out."""
     log: str | None = None
+    """A recorded drive that it replays."""
     log_offset_s: float | None = None
     """Seconds of the log that have passed as the car's drive begins; None: by UTC, where both logs
     have it, else none."""
     live: bool = False
+    """Whether a vehicle of this id speaks on the bus."""
     ros2: str | None = None
     """A mapping in TOML, or `autoware`: how a live vehicle's own ROS 2 topics are read."""
     seen_as: str | None = None
+    """The id under which the car itself detects it."""
 
     def trouble(self) -> str | None:
         """Return what is wrong with it, None where nothing is."""
@@ -87,6 +92,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """
 
     map: str | None = None
+    """Map of the place (.osm, .osm.gz, .osm.bz2, .osm.pbf); None is a drawn town."""
     dem: str | None = None
     """Heights of the ground (.hgt, .hgt.zip, GeoTIFF, or a folder of these); None is flat."""
     tracks: str | None = None
@@ -95,25 +101,39 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """A GPX or GeoJSON file, `from-log`, or `live`: to the goal that the live car says it has; None
     predicts the route from the road graph."""
     log: str | None = None
+    """A recorded drive to replay, in place of the stand-in car."""
     source: Source = "auto"
+    """Where telemetry comes from; `auto` is `log` where there is one, else `standin`."""
     start_s: float = 0.0
+    """Seconds into the log at which the drive begins."""
     end_s: float | None = None
+    """Seconds into the log, or of the stand-in drive, at which it ends; None is its own."""
     speed: float | None = 1.0
+    """How many times faster than the car a replay goes; `"max"` is lock step."""
     workers: int = 2
+    """Worker processes that play futures."""
     futures: int = 64
+    """Futures of a round."""
     least_futures: int | None = None
     """A live round may run so few where the machine is too slow for all; None is a quarter of them,
     as many as `futures` holds every round at all."""
     futures_per_job: int = 32
+    """So many futures at most are simulated together by one worker."""
     rate_hz: float = 2.0
+    """Rounds per second."""
     horizon_s: float = 8.0
+    """How many seconds ahead each future goes."""
     planner: str = "pure_pursuit_idm"
+    """The planner under test; docs/planners.md."""
     scenarios: tuple[str, ...] | None = None
     """Ids of the catalogue or TOML files that happen in every second future; None is all that take
     place at junctions, none at all is an empty list."""
     seed: int = 0
+    """Of everything that is drawn."""
     vehicle: str | None = None
+    """A parameter file, or the name of a bundled vehicle; None is `bmw_320i`."""
     vehicle_id: str = "ego"
+    """What the car is called on the bus."""
     role: Role = "all"
     """Of the car itself, as the drive begins: all is twin, shadow and ghost at once."""
     correction: Correction = "free"
@@ -133,9 +153,11 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     vehicles: tuple[OtherVehicleConfig, ...] = ()
     """Others in the mirror besides the car, each with a role of its own."""
     view: View = "auto"
+    """Where the drive is shown; `auto` is a window where there is a display."""
     layout: str = "drive"
     """Of the viewer: one that comes along (drive, identify, gap, sweep), or a TOML file."""
     out: str = "runs"
+    """Folder in which each run gets one of its own."""
     keep: str | None = None
     """How much of the run stays while it goes on: the newest hours (12h) or bytes (20GB)."""
     trace: bool = False
@@ -143,10 +165,13 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     metrics: str | None = None
     """Where metrics are told to operators, a port or HOST:PORT; docs/operators.md."""
     radius_m: float = 150.0
+    """How far a World reaches around its junction."""
     service_roads: bool = False
     """Whether driveways and parking aisles make junctions even where no given route uses them."""
     look_ahead_s: float = 60.0
+    """How many seconds before the car arrives a junction is prepared."""
     cache_dir: str | None = None
+    """Folder in which Worlds are kept between runs; None is the user's cache."""
     worlds: str | None = None
     """A folder of Worlds that are used as they are, instead of being built."""
     endpoint: str | None = None
@@ -156,6 +181,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     secure: str | None = None
     """A campaign's folder: the bus is over a network, and each role shows its certificate."""
     standin_plan_shift_m: float = 0.0
+    """How far to the left of its lane the plan of the stand-in car lies."""
     standin_dem: str | None = None
     """What the ground under the stand-in car really is, hidden from the twin; None is `dem`."""
     standin_parameters: str | None = None

@@ -11,6 +11,7 @@ import typer
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.cli_config import config as config_files
 from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, WholeSentences
 from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
 from foretwin.orchestrator.commands.cli_maps import maps
@@ -241,6 +242,7 @@ def world(
 for command in (sweep, *ABOUT_LOGS, view_run, learn_progress, doctor, worker):
     app.command()(command)
 
+app.command("config")(config_files)
 app.command("set")(set_value)
 app.add_typer(secure_commands, name="secure")
 

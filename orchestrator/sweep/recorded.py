@@ -41,7 +41,9 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Start where a real car was: the folder of a run of `foretwin drive`, and how often."""
 
     run: str
+    """Folder of a run of `foretwin drive`."""
     every_s: float = 2.0
+    """A start every so many seconds of it."""
     road_users: RoadUserMode = "replayed"
     """Whether others are where they were recorded, go on as a live round predicts, or are not."""
     road_user_log: str | None = None

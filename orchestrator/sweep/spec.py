@@ -50,17 +50,21 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Everything that decides the rows of a sweep; paths are relative to where it is started."""
 
     map: str | None = None
+    """Map of the place (.osm, .osm.gz, .osm.bz2, .osm.pbf)."""
     worlds: str | None = None
     """A folder of .world files, in place of a map."""
     recorded: Recorded | None = None
     """A recorded drive, in place of both: its Worlds, its states, its ways."""
     junctions: Literal["all"] | tuple[str, ...] = "all"
+    """Ids, as `foretwin intersections MAP` tells them."""
     bbox: str | None = None
     """W,S,E,N in degrees: only junctions in there."""
     sample: int | None = None
     """So many of these junctions, drawn by the seed; None takes all."""
     radius_m: float = 150.0
+    """How far a World reaches around its junction."""
     service_roads: bool = False
+    """Whether driveways and parking aisles make junctions."""
     dem: str | None = None
     """Heights of the ground under the map (.hgt, .hgt.zip, GeoTIFF, or a folder); None is flat."""
     scenarios: tuple[str, ...] | None = None
@@ -73,19 +77,27 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     samples: int | None = None
     """Draws for each combination of listed values; None takes the scenario's own number."""
     planners: tuple[str, ...] = ("pure_pursuit_idm",)
+    """Planners by name, or stacks of `remote`; docs/planners.md."""
     remote: dict[str, RemoteStack] = {}
     """Driving stacks by the names under which `planners` knows them."""
     vehicles: tuple[str, ...] = ("bmw_320i",)
+    """Bundled vehicles by name, or parameter files; the first decides on the places."""
     metrics: tuple[str, ...] = DEFAULT_METRICS
+    """What is measured of each future; docs/metrics.md."""
     parameters: dict[str, tuple[float, ...]] = {}
+    """Lists for numbers of a future, every combination of which is played."""
     horizon_s: float | None = None
     """None takes each scenario's own."""
     control_hz: float = 20.0
+    """Control ticks of the planners."""
     accidents: bool = True
+    """Whether collisions with road users are run on as two bodies."""
     lights_by_plan: bool = True
+    """Whether lights follow the World's plans; else nobody stops for them."""
     job_timeout_s: float = 600.0
     """After so long without an answer, a job of up to 64 futures counts as failed."""
     seed: int = 0
+    """Draws cases and samples."""
 
 
 class Loaded(msgspec.Struct, frozen=True, kw_only=True):
@@ -102,22 +114,22 @@ class Loaded(msgspec.Struct, frozen=True, kw_only=True):
     """Of those `remote` that are among the planners, who they say that they are."""
 
 
-def load_spec(path: Path) -> Loaded:
-    """Read a sweep's TOML file and what it names.
+def load_spec(path: Path, *, start_stacks: bool = True) -> Loaded:
+    """Read a sweep's TOML file and what it names; driving stacks are started once, if they may.
 
     Raises FileNotFoundError or UserError, in one line that names the file and the field.
     """
     file = load_toml(path, "sweep")
     spec = file.convert(SweepSpec)
     try:
-        return check_spec(spec)
+        return check_spec(spec, start_stacks=start_stacks)
     except FileNotFoundError as error:
         raise FileNotFoundError(f"{path}: {error}") from error
     except ValueError as error:
         raise file.wrong(error) from error
 
 
-def check_spec(spec: SweepSpec) -> Loaded:
+def check_spec(spec: SweepSpec, *, start_stacks: bool = True) -> Loaded:
     """Return a spec with what it names; raises ValueError for the first thing that is wrong."""
     for holds, text in _checks(spec):
         if not holds:
@@ -141,6 +153,8 @@ def check_spec(spec: SweepSpec) -> Loaded:
     if spec.recorded is not None:
         starts, users = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
         loaded = msgspec.structs.replace(loaded, starts=starts, road_users=users)
+    if not start_stacks:
+        return loaded
     stacks = {name: one for name, one in spec.remote.items() if name in spec.planners}
     return msgspec.structs.replace(loaded, stacks=introduced(stacks))
 

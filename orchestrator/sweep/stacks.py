@@ -34,9 +34,13 @@ class RemoteStack(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether it remembers from tick to tick: each process drives one future at a time then, from
     its reset to its end. Else one is shown all futures that it shares at once."""
     rate_hz: float = _TIMING.rate_hz
+    """How often it is asked, in simulated time."""
     latency_s: float = _TIMING.latency_s
+    """So long after what they answer its answers count, in simulated time."""
     answer_within_s: float = _STACK.answer_within_s
+    """Of wall time: who takes longer for an answer hangs."""
     start_within_s: float = _STACK.start_within_s
+    """Of wall time: who takes longer to be there is not."""
 
     @property
     def timing(self) -> PlannerTiming:

@@ -50,8 +50,11 @@ class OverpassConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     user_agent: str
     """A contact, such as a mail address, which the endpoint's keepers can reach."""
     timeout_s: float = 180.0
+    """How long the server may take for an answer."""
     max_bytes: int = 512 * 1024 * 1024
+    """A larger answer is refused."""
     retries: int = 4
+    """So often a busy server is asked again."""
     back_off_s: float = 5.0
     """Before the first repetition; doubled before each further one."""
     max_wait_s: float = 300.0
@@ -74,6 +77,13 @@ class OverpassConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         yield agent.isprintable() and agent.isascii(), "user_agent: plain ASCII"
         for name, allowed in RANGES.items():
             yield allowed.admits(getattr(self, name)), f"{name}: {allowed}"
+
+
+class OverpassFile(msgspec.Struct, frozen=True, kw_only=True):
+    """A file of `foretwin map get --config`; other tables in it are not looked at."""
+
+    overpass: OverpassConfig
+    """Whom to ask for maps."""
 
 
 class _BusyError(Exception):

@@ -39,25 +39,33 @@ class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One column and its unit."""
 
     column: str
+    """Its name in the line of names, or c1, c2 and so on."""
     unit: str | None = None
+    """Needed; units are those of the kind of number, such as m/s, km/h, mph or kn of a speed."""
     negate: bool = False
+    """Whether its sign is turned."""
 
 
 class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What every section may hold: which rows are new, and how late its samples are stamped."""
 
     new_when: tuple[str, ...] = ()
+    """Only rows where one of these columns differs from before are samples."""
     again_s: float = 0.0
     """With `new_when`: what has not changed for so long is a sample again; 0: never."""
     late_s: float = 0.0
+    """So much later than measured its samples are stamped."""
 
 
 class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The clock of the rows."""
 
     column: str
+    """The rows' time."""
     base: TimeBase
+    """Whether it counts from 1970, from some start of the clock, or from the log's zero."""
     unit: str | None = None
+    """Needed: s, ms, us, ns, or iso8601 for dates (UTC where they name no zone)."""
 
 
 class PositionSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -67,25 +75,40 @@ class PositionSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     frame: Literal["wgs84", "ecef", "projected", "local"]
+    """Which of the columns below are there."""
     epsg: int | None = None
+    """With projected: code of the system."""
     origin: tuple[float, float] | None = None
+    """With local: latitude and longitude in degrees of the plane's zero."""
     latitude: Column | None = None
+    """With wgs84."""
     longitude: Column | None = None
+    """With wgs84."""
     easting: Column | None = None
+    """With projected."""
     northing: Column | None = None
+    """With projected."""
     x: Column | None = None
+    """With ecef; with local, east."""
     y: Column | None = None
+    """With ecef; with local, north."""
     z: Column | None = None
+    """With ecef."""
     altitude: Column | None = None
+    """Above the ellipsoid; not with ecef."""
     std: Column | None = None
+    """One standard deviation of the position."""
 
 
 class SpeedSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Speed: `forward`, or `east` and `north`."""
 
     forward: Column | None = None
+    """Along the car."""
     east: Column | None = None
+    """Of the velocity, with north."""
     north: Column | None = None
+    """Of the velocity, with east."""
 
 
 class HeadingSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -97,11 +120,17 @@ class HeadingSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=T
     """
 
     yaw: Column
+    """The angle."""
     zero: Literal["north", "east"]
+    """Where it is zero."""
     direction: Literal["clockwise", "counterclockwise"]
+    """Which way it grows, seen from above."""
     north: Literal["true", "grid"] = "true"
+    """True north, or that of the grid of position.epsg."""
     offset_deg: float = 0.0
+    """Added to the column."""
     min_speed_mps: float = 0.0
+    """Slower rows are left out: at a standstill a course means nothing."""
     yaw_rate: Column | None = None
     """Counter-clockwise from above; `negate` where it is not."""
 
@@ -113,45 +142,68 @@ class ImuSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """
 
     axes: Literal["forward-left-up", "forward-right-down"]
+    """Which way x, y and z point."""
     accel_x: Column
+    """Specific force along x."""
     rate_z: Column
+    """About z."""
     accel_y: Column | None = None
+    """Along y."""
     accel_z: Column | None = None
+    """Along z."""
     rate_x: Column | None = None
+    """Rate about x."""
     rate_y: Column | None = None
+    """About y."""
 
 
 class SteeringSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Steering, positive to the left; `negate` where it is not."""
 
     wheel: Column | None = None
+    """Angle of the steering wheel."""
     tire: Column | None = None
+    """Angle of the front tyres."""
 
 
 class ControlSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Commands, positive to the left; `negate` where they are not."""
 
     accel: Column
+    """Acceleration that was commanded."""
     wheel: Column | None = None
+    """Angle of the steering wheel that was."""
     tire: Column | None = None
+    """Angle of the front tyres that was."""
 
 
 class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The declaration of one kind of CSV."""
 
     time: TimeSection
+    """The clock of the rows."""
     reference_point: str
+    """What on the car the positions are of, in words."""
     position: PositionSection | None = None
+    """Columns of positions."""
     body_from_antenna_m: tuple[float, float, float] | None = None
+    """Its place from the rear axle's centre on the ground: forwards, left, up."""
     delimiter: str = ","
+    """Between the cells of a row."""
     decimal: Literal[".", ","] = "."
+    """What stands before the decimals of a number."""
     header: bool = True
     """Without a line of names the columns are called c1, c2 and so on."""
     speed: SpeedSection | None = None
+    """Columns of speed."""
     heading: HeadingSection | None = None
+    """Columns of heading or course."""
     imu: ImuSection | None = None
+    """Columns of an inertial unit."""
     steering: SteeringSection | None = None
+    """Columns of steering."""
     control: ControlSection | None = None
+    """Columns of commands."""
 
 
 UNITS: dict[str, Mapping[str, float]] = {

@@ -30,15 +30,20 @@ class MapSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """The origin of the frame `map`, degrees and metres on WGS84."""
 
     latitude: float
+    """In degrees."""
     longitude: float
+    """In degrees."""
     altitude: float = 0.0
+    """Of z = 0, in metres above the ellipsoid."""
 
 
 class RecordingDeclaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is declared of a recording."""
 
     body_from_antenna_m: Vector3 | None = None
+    """Of the GNSS antenna from base_link, where no static transform tells."""
     map: MapSection | None = None
+    """Origin of the frame `map`, a plane around it."""
 
     def frame(self) -> LocalFrame | None:
         """Return the plane of the frame `map`, None where it is not declared."""

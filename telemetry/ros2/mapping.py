@@ -53,14 +53,19 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """One topic that is listened to."""
 
     topic: str
+    """Absolute name of the ROS topic."""
     type: str
+    """Its ROS type, such as sensor_msgs/msg/NavSatFix."""
     channel: str
+    """What it becomes."""
     stamp: Literal["header", "arrival"] = "header"
+    """By whose clock a sample counts."""
     angle_unit: str = "rad"
     """Of steering and commands."""
     left_positive: bool = True
     """Of steering and commands."""
     speed_unit: str = "m/s"
+    """Of a speed."""
     axes: Literal["forward_left_up", "forward_right_down"] = "forward_left_up"
     """Of an Imu."""
 
@@ -101,8 +106,11 @@ class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """One topic that is published."""
 
     topic: str
+    """Absolute name of the ROS topic."""
     type: str
+    """Its ROS type."""
     source: Source
+    """What is told on it."""
 
     def validate(self) -> None:
         """Raise ValueError naming the key at fault."""
@@ -123,15 +131,20 @@ class MapPlace(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Where the frame `map` lies: a plane east and north at this point."""
 
     lat_deg: float
+    """Of its zero."""
     lon_deg: float
+    """Of its zero."""
     alt_m: float = 0.0
+    """Of its zero, above the ellipsoid."""
 
 
 class TowardsVehicle(CommandLimits, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The configuration's switch and the bounds; the other switch is on the command line."""
 
     enabled: bool = False
+    """The file's switch; the other one is --towards-vehicle."""
     max_objects: int = 64
+    """So many virtual road users at most."""
 
 
 class Mapping(
@@ -144,6 +157,7 @@ class Mapping(
     """The whole file."""
 
     dialect: Dialect
+    """By what the vehicle's ROS 2 reaches Zenoh."""
     endpoint: str | None = None
     """The vehicle's Zenoh router; None is the run's own, to which the vehicle's side connects."""
     domain: int = 0
@@ -153,13 +167,17 @@ class Mapping(
     antenna_m: Vector3 | None = None
     """Of the GNSS antenna from base_link: forward, left, up; else from /tf_static."""
     map_place: MapPlace | None = None
+    """Where the frame `map` lies; needed for virtual objects towards the vehicle."""
     inwards: tuple[InRow, ...] = ()
+    """Topics that are listened to."""
     outwards: tuple[OutRow, ...] = ()
+    """Topics that are published."""
     placed: tuple[PlacedObject, ...] = ()
     """Virtual road users that the gateway itself says."""
     mirrored: Mirrored = Mirrored()
     """Vehicles of the mirror that go out among the virtual objects."""
     towards_vehicle: TowardsVehicle = TowardsVehicle()
+    """What may go to the vehicle, and within which bounds."""
 
     @property
     def map_frame(self) -> LocalFrame | None:

@@ -27,12 +27,19 @@ class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Bounds of a command: values, how fast they may change, and how often one is sent."""
 
     max_speed_mps: float = 8.0
+    """Above it nothing accelerates."""
     max_accel_mps2: float = 1.5
+    """The most that is asked for."""
     max_decel_mps2: float = 4.0
+    """The most that is asked for."""
     max_jerk_mps3: float = 4.0
+    """How fast the acceleration may change."""
     max_tire_angle_rad: float = 0.5
+    """To either side."""
     max_tire_rate_radps: float = 0.3
+    """How fast the tyre angle may change."""
     max_rate_hz: float = 50.0
+    """How often a command is sent at most."""
 
     def validate(self) -> CommandLimits:
         """Return self; raises ValueError naming the first limit that is not positive and finite."""

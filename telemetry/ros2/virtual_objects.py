@@ -30,17 +30,25 @@ class PlacedObject(
     """A virtual road user of the mapping: it stands, or goes to and fro along its yaw."""
 
     user_id: str
+    """Under which others see it."""
     kind: RoadUserKind
+    """What it is."""
     lat_deg: float
+    """Of its centre."""
     lon_deg: float
+    """Of its centre."""
     alt_m: float = 0.0
+    """Above the ellipsoid."""
     yaw_deg: float = 0.0
     """Counter-clockwise from east."""
     speed_mps: float = 0.0
+    """With which it goes to and fro; 0 stands."""
     way_m: float = 0.0
     """From its place to where it turns round."""
     length_m: float = 4.5
+    """Along its yaw."""
     width_m: float = 1.8
+    """Across it."""
 
     def validate(self) -> None:
         """Raise ValueError naming the key at fault."""

@@ -1,0 +1,62 @@
+"""What a field is, is said by its docstring, its type and its default."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from foretwin.contracts.field_words import as_toml, fields_of, summary_of, tables_of
+
+
+class Hub(msgspec.Struct, frozen=True):
+    """What a wheel turns on."""
+
+    bolts: int = 5
+
+
+class Rim(msgspec.Struct, frozen=True, rename={"colour": "paint"}):
+    """Round.
+
+    And more.
+    """
+
+    size_in: float
+    """Across,
+    in inches; None is unknown."""
+    colour: Literal["red", "blue"] = "red"
+    hub: Hub | None = None
+    """None is the usual one."""
+    hubs: tuple[Hub, ...] = ()
+    spokes: dict[str, float] = {}
+
+
+class WideRim(Rim, frozen=True):
+    """A wide one."""
+
+    wide: bool = True
+    """Whether it is."""
+
+
+def test_fields_are_said_as_their_file_calls_them() -> None:
+    by_name = {field.name: field for field in fields_of(WideRim)}
+    assert list(by_name) == ["size_in", "paint", "hub", "hubs", "spokes", "wide"]
+    assert by_name["size_in"].text == "Across, in inches; left out, it is unknown."
+    assert by_name["hub"].text == "Left out, it is the usual one."
+    assert [field.required for field in by_name.values()] == [True, *[False] * 5]
+    assert by_name["paint"].kind == '"blue" or "red"'
+    assert by_name["hubs"].kind == "list of table Hub"
+    assert by_name["spokes"].kind == "table of number"
+    assert by_name["wide"].shown_default == "true"
+    assert by_name["hub"].shown_default == ""
+
+
+def test_a_type_names_the_tables_in_it() -> None:
+    assert tables_of(WideRim) == [WideRim, Hub]
+    assert summary_of(Rim) == "Round. And more."
+
+
+def test_defaults_are_written_as_toml() -> None:
+    assert as_toml(Hub()) == "{ bolts = 5 }"
+    assert as_toml(("a", 1.5, False)) == '["a", 1.5, false]'
+    assert as_toml({"a": 1}) == "{a = 1}"
