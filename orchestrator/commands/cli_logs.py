@@ -135,6 +135,24 @@ def judge(
     raise typer.Exit(judge_run(**asked))
 
 
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="folders of runs or sweeps")],
+    out: Annotated[Path, typer.Option("--out", help="the HTML file to write")],
+    redact: Annotated[
+        str | None,
+        typer.Option(help="coarse: no names, no positions; places: no pictures of them either"),
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="another drive of this road: how far people differ, beside the gap"),
+    ] = None,
+) -> None:
+    """Write what a run or sweep foresaw, and what came, as one HTML file that opens anywhere."""
+    from foretwin.orchestrator.commands.report import report as write
+
+    write(runs, out=out, redact=redact, against=against)
+
+
 def repeat(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run or sweep")],
     future: Annotated[
@@ -242,6 +260,7 @@ ABOUT_LOGS = (
     judge,
     recover,
     repeat,
+    report,
     collect,
 )
 """In the order in which help lists them."""

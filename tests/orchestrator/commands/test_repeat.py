@@ -22,6 +22,7 @@ from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 from tests.sim_worker.scenarios.worlds import cross
 
 COVERS = (
+    "foretwin.orchestrator.record.played_again",
     "foretwin.orchestrator.record.run_folder",
     "foretwin.sim_worker.futures.job_tables",
     "foretwin.orchestrator.record.recorded_jobs",

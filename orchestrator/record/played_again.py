@@ -1,0 +1,51 @@
+"""Recorded jobs played again, as they were played then."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import msgspec
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.orchestrator.record.recorded_jobs import RecordedFuture
+from foretwin.sim_worker.futures.future_rows import future_rows
+from foretwin.sim_worker.futures.run_job import run_alone
+from foretwin.sim_worker.planners.registry import in_another_process
+
+_STANDS_IN = "constant_speed"
+
+
+class PlayedAgain(NamedTuple):
+    """What a job came to now, and the hash of each future's trajectory by its index."""
+
+    result: FuturesResult
+    sha256: dict[int, str | None]
+
+
+def play_again(recorded: RecordedFuture) -> PlayedAgain:
+    """Play the whole job of a recorded future, as it was then.
+
+    Raises UserError where the future was driven by a planner in another process.
+    """
+    known = recorded.row
+    if in_another_process(known.planner):
+        raise UserError(
+            f"{known.future_id}: driven by {known.planner!r} in another process, whose answers are "
+            "not recorded"
+        )
+    job = _without_others(recorded.job)
+    result = run_alone(job, recorded.world, recorded.vehicle)
+    rows = future_rows(job, result, job_sha256=known.job_sha256)
+    return PlayedAgain(result, {row["index"]: row.get("trajectory_sha256") for row in rows})
+
+
+def _without_others(job: Job) -> Job:
+    """Let futures that other processes drove be driven by foretwin: to the rest it is the same."""
+    futures = tuple(
+        msgspec.structs.replace(future, planner=_STANDS_IN)
+        if in_another_process(future.planner)
+        else future
+        for future in job.futures
+    )
+    return msgspec.structs.replace(job, futures=futures)

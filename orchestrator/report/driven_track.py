@@ -1,0 +1,72 @@
+"""Where a car was in a drive, as its state was estimated then, from the run's own recording."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.arrays import Array, Stamps
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.segments import segments_of
+from foretwin.telemetry.logs.log import LogError
+from foretwin.telemetry.logs.mcap_records import BROKEN, read_contents, records
+from foretwin.telemetry.ros_messages.parts import STRING, typestore
+
+_STATES = "/foretwin/state_json"
+_EVERY_NS = 100_000_000
+"""What is drawn and asked for speeds needs no more."""
+
+
+class DrivenTrack(NamedTuple):
+    """Where the car was: stamps (N,) rising, degrees (N, 2), speed (N,), and drive time (N,)."""
+
+    stamp_ns: Stamps
+    lat_lon_deg: Array
+    speed_mps: Array
+    time_s: Array
+
+    def between(self, from_s: float, to_s: float) -> DrivenTrack:
+        """Return the part of a track between two drive times."""
+        some = slice(
+            bisect.bisect_left(self.time_s, from_s), bisect.bisect_right(self.time_s, to_s)
+        )
+        return DrivenTrack(
+            self.stamp_ns[some], self.lat_lon_deg[some], self.speed_mps[some], self.time_s[some]
+        )
+
+
+def driven_track(first: Path, *, start_stamp_ns: int | None) -> DrivenTrack | None:
+    """Return the track in a recording, its first part given; None where it holds no states.
+
+    Drive time begins at `start_stamp_ns`, or with the first state. What cannot be read is passed
+    by.
+    """
+    states = [state for part in segments_of(first) for state in _states(part)]
+    if len(states) < 2:
+        return None
+    stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)
+    order = np.argsort(stamps, kind="stable")
+    start_ns = int(stamps[order[0]]) if start_stamp_ns is None else start_stamp_ns
+    return DrivenTrack(
+        stamps[order],
+        np.array([(s.position.lat_deg, s.position.lon_deg) for s in states])[order],
+        np.array([s.speed_mps for s in states])[order],
+        (stamps[order] - start_ns) / 1e9,
+    )
+
+
+def _states(part: Path) -> Iterator[VehicleState]:
+    decoder, read = msgspec.json.Decoder(VehicleState), typestore().deserialize_cdr
+    last_ns: int | None = None
+    try:
+        for record in records(part, read_contents(part), {_STATES}):
+            if last_ns is None or not 0 <= record.log_time_ns - last_ns < _EVERY_NS:
+                last_ns = record.log_time_ns
+                yield decoder.decode(read(record.data, STRING).data)
+    except (LogError, OSError, msgspec.DecodeError, *BROKEN):
+        return

@@ -1,0 +1,134 @@
+"""What a run left, as far as a report tells it: read once, nothing where it is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.world import World
+from foretwin.orchestrator.record.run_folder import table_at
+from foretwin.orchestrator.record.run_state import check_finished, read_record
+from foretwin.orchestrator.record.table_parts import read_parts
+from foretwin.orchestrator.report.driven_track import DrivenTrack, driven_track
+from foretwin.sim_worker.world_file import load_world
+
+DRIVE, MONITOR = "drive.mcap", "monitor.rrd"
+
+FUTURE_COLUMNS = (
+    "future_id",
+    "job_sha256",
+    "round_id",
+    "index",
+    "name",
+    "world_id",
+    "junction_id",
+    "planner",
+    "scenario",
+    "valid",
+    "failure",
+    "left_out",
+    "collided",
+    "collision_time_s",
+    "collision_with",
+    "likelihood",
+    "criticality",
+    "min_clearance_m",
+    "progress_m",
+    "accident_kind",
+    "trajectory_sha256",
+)
+"""Columns of the table of futures that a report of a drive reads."""
+
+TableRow = dict[str, Any]
+
+
+class RunMaterial:
+    """A run's folder: its record, and its tables and Worlds, read when they are first asked for."""
+
+    def __init__(self, folder: Path, *, called: str = "") -> None:
+        self.folder = folder
+        self.called = called or str(folder)
+        """What commands in the report name it."""
+        check_finished(folder)
+        self.record: dict[str, Any] = read_record(folder)
+        self._tables: dict[str, pa.Table | None] = {}
+        self._worlds: dict[str, World | None] = {}
+
+    def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table | None:
+        """Return a table of the run, None where it is missing, empty or cannot be read."""
+        if name not in self._tables:
+            self._tables[name] = self._read(name, columns)
+        return self._tables[name]
+
+    def _read(self, name: str, columns: Sequence[str] | None) -> pa.Table | None:
+        try:
+            found = read_parts(table_at(self.folder, name), columns=columns)
+        except (OSError, pa.ArrowException):
+            return None
+        return found if found.num_rows else None
+
+    def rows(self, name: str) -> list[TableRow]:
+        """Return the rows of a table, none where there is none."""
+        table = self.table(name)
+        return [] if table is None else table.to_pylist()
+
+    @cached_property
+    def rounds(self) -> list[TableRow]:
+        """Return the complete rounds in their order."""
+        return sorted(self.rows("rounds"), key=lambda row: (row["stamp_ns"], row["round_id"]))
+
+    @cached_property
+    def futures(self) -> pa.Table | None:
+        """Return what a report reads of the table of futures."""
+        return self.table("futures", FUTURE_COLUMNS)
+
+    @property
+    def start_stamp_ns(self) -> int:
+        """Return the stamp at which drive time begins, as the rounds tell it; else 0."""
+        if self.rounds:
+            first = self.rounds[0]
+            start_ns: int = first["stamp_ns"] - round(first["drive_time_s"] * 1e9)
+            return start_ns
+        return 0
+
+    def world(self, world_id: str | None) -> World | None:
+        """Return a World of the run, None where its file is gone or of another foretwin."""
+        if not world_id:
+            return None
+        if world_id not in self._worlds:
+            try:
+                self._worlds[world_id] = load_world(self.folder / "worlds", world_id)
+            except (OSError, SchemaMismatch):
+                self._worlds[world_id] = None
+        return self._worlds[world_id]
+
+    def worlds(self) -> list[World]:
+        """Return the Worlds that rounds were of, those that can be read."""
+        ids = dict.fromkeys(row["world_id"] for row in self.rounds)
+        found = (self.world(world_id) for world_id in ids)
+        return [world for world in found if world is not None]
+
+    @cached_property
+    def track(self) -> DrivenTrack | None:
+        """Return where the car was as it was estimated then, None where nothing is recorded."""
+        return driven_track(self.folder / DRIVE, start_stamp_ns=self.start_stamp_ns or None)
+
+    @property
+    def attribution(self) -> str:
+        """Return whose map it is."""
+        told = self.record.get("map") or {}
+        return str(told.get("attribution") or "")
+
+
+def part_of(record: Any, *path: str) -> Any:
+    """Return what stands in a record below a path of keys, None where any of them is missing."""
+    for key in path:
+        if not isinstance(record, dict):
+            return None
+        record = record.get(key)
+    return record

@@ -1,0 +1,91 @@
+"""Places out of a report: streets become letters, positions and ids of the map are left out."""
+
+from __future__ import annotations
+
+import re
+import string
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from foretwin.contracts.world import World
+from foretwin.orchestrator.report.blocks import Plotted, Report
+
+Redaction = Literal["coarse", "places"]
+"""`coarse` leaves pictures, without names, and a position within some 10 km; `places` neither."""
+
+_LEFT_OUT = "\u2026"
+_IDS = re.compile(
+    r"\b[wnr]-?\d{4,}[\w.>/-]*|(?<=\bway )-?\d+|(?<=\bnode )-?\d+|(?<=\brelation )-?\d+"
+)
+_DEGREES = re.compile(r"-?\b\d{1,3}\.\d{5,}\b")
+_SHORTEST_NAME = 3
+
+
+class PlaceNames:
+    """Replaces what tells a place in words, the same name by the same letter throughout."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        known = sorted({name for name in names if len(name) >= _SHORTEST_NAME})
+        self._letters = dict(zip(known, _letters(), strict=False))
+        longest_first = sorted(known, key=lambda name: (-len(name), name))
+        words = "|".join(re.escape(name) for name in longest_first)
+        self._pattern = re.compile(rf"(?<!\w)(?:{words})(?!\w)") if known else None
+
+    def without(self, text: str) -> str:
+        """Return a text without names, ids of the map, and degrees."""
+        if self._pattern is not None:
+            text = self._pattern.sub(lambda found: f"street {self._letters[found[0]]}", text)
+        return _DEGREES.sub(_LEFT_OUT, _IDS.sub(_LEFT_OUT, text))
+
+
+def _letters() -> Iterator[str]:
+    yield from string.ascii_uppercase
+    for first in string.ascii_uppercase:
+        yield from (first + second for second in string.ascii_uppercase)
+    number = 0
+    while True:
+        number += 1
+        yield f"No. {number}"
+
+
+def names_of(record: Mapping[str, Any], worlds: Iterable[World]) -> set[str]:
+    """Return every name that may tell where a run or sweep was: of streets, junctions and files."""
+    found: set[str] = set()
+    for one in (*(record.get("intersections") or ()), *(record.get("off_road") or ())):
+        found |= _parts(one.get("name"))
+    for world in worlds:
+        called = (world.intersection.name, *(lane.name for lane in world.lanes))
+        for name in (*called, *(road.name for road in world.roads)):
+            found |= _parts(name)
+        for junction in world.junctions:
+            found |= _parts(junction.summary.name)
+            for arm in junction.arms:
+                found |= _parts(arm.name)
+    for settings in (record.get("config") or {}, record.get("spec") or {}, record.get("map") or {}):
+        for name in ("map", "log", "route", "file", "dem"):
+            path = Path(str(settings.get(name) or ""))
+            if path.suffix:
+                found |= {path.name, path.stem}
+    return found
+
+
+def _parts(name: str | None) -> set[str]:
+    return {part.strip() for part in re.split("[\u00d7;/]", name or "") if part.strip()}
+
+
+def redacted(report: Report, names: PlaceNames) -> Report:
+    """Return a report in whose words no place is told; plots hold figures alone."""
+
+    def walked(value: Any) -> Any:
+        if isinstance(value, str):
+            return names.without(value)
+        if isinstance(value, Plotted):
+            return value._replace(caption=names.without(value.caption))
+        if isinstance(value, tuple):
+            inner = (walked(one) for one in value)
+            return type(value)(*inner) if hasattr(value, "_fields") else tuple(inner)
+        return value
+
+    found: Report = walked(report)
+    return found._replace(attribution=report.attribution)
