@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "contracts", "geometry", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer",
 )  # fmt: skip
-DATA_SUFFIXES = (".toml", ".osm", ".geojson", ".xml", ".json", ".msg")
+DATA_SUFFIXES = (".toml", ".osm", ".geojson", ".xml", ".json", ".msg", ".j2", ".css", ".js")
 
 pytestmark = pytest.mark.judge
 

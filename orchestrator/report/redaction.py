@@ -23,11 +23,12 @@ _SHORTEST_NAME = 3
 
 
 class PlaceNames:
-    """Replaces what tells a place in words, the same name by the same letter throughout."""
+    """Replaces what tells a place in words: each name by a letter, in the order of appearance."""
 
     def __init__(self, names: Iterable[str]) -> None:
         known = sorted({name for name in names if len(name) >= _SHORTEST_NAME})
-        self._letters = dict(zip(known, _letters(), strict=False))
+        self._letters: dict[str, str] = {}
+        self._free = _letters()
         longest_first = sorted(known, key=lambda name: (-len(name), name))
         words = "|".join(re.escape(name) for name in longest_first)
         self._pattern = re.compile(rf"(?<!\w)(?:{words})(?!\w)") if known else None
@@ -35,8 +36,13 @@ class PlaceNames:
     def without(self, text: str) -> str:
         """Return a text without names, ids of the map, and degrees."""
         if self._pattern is not None:
-            text = self._pattern.sub(lambda found: f"street {self._letters[found[0]]}", text)
+            text = self._pattern.sub(lambda found: f"street {self._letter(found[0])}", text)
         return _DEGREES.sub(_LEFT_OUT, _IDS.sub(_LEFT_OUT, text))
+
+    def _letter(self, name: str) -> str:
+        if name not in self._letters:
+            self._letters[name] = next(self._free)
+        return self._letters[name]
 
 
 def _letters() -> Iterator[str]:

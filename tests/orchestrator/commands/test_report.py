@@ -1,0 +1,50 @@
+"""`foretwin report`: the file that it writes, and mistakes in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.orchestrator.commands.cli import run
+from tests.orchestrator.report.told_runs import told_run
+
+
+def test_it_writes_the_file_and_says_the_verdict(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new" / "report.html"
+
+    assert run(["report", str(told_run(tmp_path)), "--out", str(out), "--redact", "places"]) == 0
+
+    said = capsys.readouterr().out
+    assert said.startswith("The car passed 1 junction")
+    assert f"wrote {out} (" in said
+    assert out.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--out", "report.pdf"), "a report is an HTML file, such as report.html"),
+        (("--out", "report.html", "--redact", "all"), "--redact all: coarse or places"),
+        (("--out", "run/run.json/report.html"), "is no folder"),
+        (("--out", "report.html", "--against", "nothing.csv"), "nothing.csv: no such file"),
+    ],
+)
+def test_mistakes_are_told_in_one_line_and_leave_nothing(
+    arguments: tuple[str, ...],
+    told: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = told_run(tmp_path)
+
+    assert run(["report", str(folder), *arguments]) == 2
+
+    said = capsys.readouterr().err
+    assert told in said
+    assert said.count("\n") == 1
+    assert not list(tmp_path.glob("report*"))

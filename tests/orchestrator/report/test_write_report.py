@@ -1,0 +1,187 @@
+"""A report of a run as a file: what it says, that it stands alone, and that its commands run."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.repeat import repeat
+from foretwin.orchestrator.report.page import html_of
+from foretwin.orchestrator.report.write_report import report_of_folders, write_report
+from tests.orchestrator.report.told_runs import (
+    NAME,
+    OSM,
+    run_of_nothing,
+    run_without_junctions,
+    told_run,
+)
+
+COVERS = (
+    "foretwin.orchestrator.report.conduct_parts",
+    "foretwin.orchestrator.report.driven_track",
+    "foretwin.orchestrator.report.first_page",
+    "foretwin.orchestrator.report.junction_parts",
+    "foretwin.orchestrator.report.junction_picture",
+    "foretwin.orchestrator.report.material",
+    "foretwin.orchestrator.report.page",
+    "foretwin.orchestrator.report.plots",
+    "foretwin.orchestrator.report.provenance_part",
+    "foretwin.orchestrator.report.reality_parts",
+    "foretwin.orchestrator.report.route_picture",
+    "foretwin.orchestrator.report.run_report",
+    "foretwin.orchestrator.report.vehicle_parts",
+)
+MOST_BYTES = 3_000_000
+
+
+class Read(HTMLParser):
+    """What a browser would look for in a page: anchors, links to them, and what it would load."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.codes: list[str] = []
+        self._in_code = False
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        said = {name: value or "" for name, value in attrs}
+        self._in_code = tag == "code"
+        if "id" in said:
+            self.anchors.add(said["id"])
+        if tag == "a":
+            self.links.append(said["href"])
+        elif tag in ("link", "iframe", "object", "embed", "base"):
+            self.loaded.append(tag)
+        self.loaded += [
+            f"{tag} {name}" for name in ("src", "srcset", "data", "xlink:href") if name in said
+        ]
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in_code = self._in_code and tag != "code"
+
+    def handle_data(self, data: str) -> None:
+        if self._in_code:
+            self.codes.append(data)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return told_run(tmp_path_factory.mktemp("runs"))
+
+
+@pytest.fixture(scope="module")
+def page(run: Path) -> str:
+    out = run.parent / "report.html"
+    write_report([run], out)
+    return out.read_text(encoding="utf-8")
+
+
+def test_it_stands_alone(page: str) -> None:
+    read = Read(page)
+
+    assert read.loaded == []
+    assert read.links
+    assert [link for link in read.links if not link.startswith("#")] == []
+    assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
+    assert not re.search(r"url\(\s*['\"]?(https?:)?//", page)
+    assert len(page.encode()) < MOST_BYTES
+
+
+def test_it_says_what_was_foreseen_and_what_came(page: str) -> None:
+    assert f"1 · {NAME}" in page
+    assert "The car was there at 15.0 s with 29 km/h" in page
+    assert "9 futures of that round, played again to the recorded hash" in page
+    assert "simulation and reality agree in 3 of 4 judged windows" in page
+    assert "too optimistic" in page
+    assert "to be watched: Pedestrian from behind a parked van" in page
+    assert "1 of 2 due" in page
+    assert OSM in page
+
+
+def test_worst_futures_come_with_a_command_that_plays_them_again(run: Path, page: str) -> None:
+    commands = [code.split() for code in Read(page).codes if code.startswith("foretwin repeat")]
+
+    assert len(commands) >= 4
+    assert {command[2] for command in commands} == {str(run)}
+    for command in commands[::3]:
+        assert repeat(run, command[3], as_json=True, view=False) == 0
+
+
+def test_futures_of_another_hash_are_not_drawn(run: Path, page: str, tmp_path: Path) -> None:
+    import shutil
+
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    copied = tmp_path / "run"
+    shutil.copytree(run, copied)
+    file = copied / "results" / "futures.parquet"
+    table = pq.read_table(file)
+    column = table.column_names.index("trajectory_sha256")
+    others = pa.array(["0" * 64, *table["trajectory_sha256"].to_pylist()[1:]])
+    pq.write_table(table.set_column(column, "trajectory_sha256", others), file)
+
+    changed = html_of(report_of_folders([copied]))
+
+    assert "8 futures of that round" in changed
+    assert "1 of them come to another hash here and are not drawn" in changed
+
+
+def test_a_run_without_junctions_says_so(tmp_path: Path) -> None:
+    page = html_of(report_of_folders([run_without_junctions(tmp_path)]))
+
+    assert "The car met no junction in this drive: nothing was foreseen." in page
+    assert "the way driven" in page
+
+
+def test_a_run_of_nothing_is_told_honestly(tmp_path: Path) -> None:
+    page = html_of(report_of_folders([run_of_nothing(tmp_path)]))
+
+    assert "The car met no junction" in page
+    assert "ended: failed" in page
+    assert "record holds no ledger." in page
+    assert "No seconds were both simulated and driven." in page
+
+
+def test_what_is_missing_of_a_recovered_run_makes_the_verdict(tmp_path: Path) -> None:
+    lost = {"lost": ["the last 0.5 s of rounds"], "unknown": ["missed rounds"]}
+    run = told_run(tmp_path, exit="recovered", recovered=lost, ledger={"rounds": None})
+    (run / "drive.mcap").unlink()
+
+    report = report_of_folders([run])
+
+    assert report.tone == "bad"
+    assert report.verdict.endswith("something is missing: the last 0.5 s of rounds.")
+    page = html_of(report)
+    assert "Not known of this recovered run: missed rounds" in page
+    assert "what the car did is not recorded" in page
+
+
+def test_a_run_that_goes_on_or_was_killed_is_refused(tmp_path: Path) -> None:
+    killed = told_run(tmp_path, exit="running")
+
+    with pytest.raises(UserError, match="foretwin recover"):
+        report_of_folders([killed])
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"no run\.json"):
+        report_of_folders([tmp_path])
+
+
+def test_names_of_strangers_are_shown_and_do_nothing(tmp_path: Path) -> None:
+    hostile = "<script>alert(1)</script>\x1b[31m"
+    run = told_run(tmp_path, troubles=[hostile])
+
+    page = html_of(report_of_folders([run]))
+
+    assert "<script>alert(1)" not in page
+    assert "&lt;script&gt;alert(1)" in page
+    assert "\x1b" not in page
