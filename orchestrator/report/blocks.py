@@ -20,7 +20,7 @@ Tone = Literal["", "good", "watch", "bad", "quiet"]
 """How a word is to be taken; red is for what one acts upon."""
 
 
-class Shown(NamedTuple):
+class TableCell(NamedTuple):
     """One cell of a table: its words, what it is sorted by, an anchor in this report."""
 
     text: str
@@ -43,14 +43,14 @@ class Listed(NamedTuple):
 
     title: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[Shown, ...], ...]
+    rows: tuple[tuple[TableCell, ...], ...]
     numeric: frozenset[int] = frozenset()
     note: str = ""
     folded: bool = False
     """Whether it stands closed until somebody opens it; on paper it is open."""
 
 
-class Told(NamedTuple):
+class Facts(NamedTuple):
     """Names and values, one below the other."""
 
     pairs: tuple[tuple[str, str], ...]
@@ -78,10 +78,10 @@ class CommandLine(NamedTuple):
     what: str = ""
 
 
-Block = Prose | Listed | Told | Drawn | Plotted | CommandLine
+Block = Prose | Listed | Facts | Drawn | Plotted | CommandLine
 
 
-class Figure(NamedTuple):
+class KeyFigure(NamedTuple):
     """One of the few numbers on the first page."""
 
     value: str
@@ -90,13 +90,13 @@ class Figure(NamedTuple):
     tone: Tone = ""
 
 
-class Part(NamedTuple):
+class Chapter(NamedTuple):
     """A section of a report, with those inside it; `anchor` is what links inside the file name."""
 
     anchor: str
     title: str
     blocks: tuple[Block, ...]
-    parts: tuple[Part, ...] = ()
+    parts: tuple[Chapter, ...] = ()
 
 
 class Report(NamedTuple):
@@ -106,30 +106,30 @@ class Report(NamedTuple):
     subtitle: str
     verdict: str
     tone: Tone
-    figures: tuple[Figure, ...]
+    figures: tuple[KeyFigure, ...]
     front: tuple[Block, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[Chapter, ...]
     attribution: tuple[str, ...]
 
 
-def row(*cells: Shown | str) -> tuple[Shown, ...]:
+def row(*cells: TableCell | str) -> tuple[TableCell, ...]:
     """Return a row of a table; plain words are cells that are sorted by themselves."""
-    return tuple(Shown(cell) if isinstance(cell, str) else cell for cell in cells)
+    return tuple(TableCell(cell) if isinstance(cell, str) else cell for cell in cells)
 
 
-def number(value: float | None, digits: int = 1, unit: str = "", *, tone: Tone = "") -> Shown:
+def number(value: float | None, digits: int = 1, unit: str = "", *, tone: Tone = "") -> TableCell:
     """Return a number as a cell; UNKNOWN where it is not known."""
     if value is None or value != value:
-        return Shown(UNKNOWN, order=None, tone="quiet")
+        return TableCell(UNKNOWN, order=None, tone="quiet")
     words = f"{value:.{digits}f}" + (f"{_UNBROKEN}{unit}" if unit else "")
-    return Shown(words, order=float(value), tone=tone)
+    return TableCell(words, order=float(value), tone=tone)
 
 
-def scientific(value: float | None, *, tone: Tone = "") -> Shown:
+def scientific(value: float | None, *, tone: Tone = "") -> TableCell:
     """Return a small number as a cell, such as a criticality."""
     if value is None or value != value:
-        return Shown(UNKNOWN, tone="quiet")
-    return Shown(power(value), order=float(value), tone=tone)
+        return TableCell(UNKNOWN, tone="quiet")
+    return TableCell(power(value), order=float(value), tone=tone)
 
 
 def power(value: float, digits: int = 1) -> str:

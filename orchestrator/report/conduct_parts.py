@@ -10,12 +10,12 @@ import numpy as np
 from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
     Block,
+    Chapter,
+    Facts,
     Listed,
-    Part,
     Plotted,
     Prose,
-    Shown,
-    Told,
+    TableCell,
     Tone,
     number,
     plural,
@@ -30,12 +30,12 @@ MOST_LISTED = 200
 _LEVELS: dict[str, Tone] = {"warning": "watch", "error": "bad"}
 
 
-def marks_part(run: RunMaterial) -> Part:
+def marks_part(run: RunMaterial) -> Chapter:
     """Return what somebody in the car marked while driving."""
     marks = run.rows("marks")
     title = "Marked events"
     if not marks:
-        return Part("marks", title, (Prose("Nobody marked an event in this drive."),))
+        return Chapter("marks", title, (Prose("Nobody marked an event in this drive."),))
     rows = tuple(
         row(
             _at(run, one),
@@ -44,21 +44,21 @@ def marks_part(run: RunMaterial) -> Part:
         )
         for one in marks[:MOST_LISTED]
     )
-    return Part(
+    return Chapter(
         "marks",
         title,
         (Listed("Marked while driving", ("at", "note", "by"), rows, frozenset({0})),),
     )
 
 
-def disagreement_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Part:
+def disagreement_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Chapter:
     """Return where the driving software would have driven otherwise, and the takeovers."""
     title = "Human and driving software: disagreements and takeovers"
     told = run.record.get("side_by_side")
     segments, found = run.rows("driven_segments"), run.rows("disagreements")
     if not told and not segments and not found:
         text = "The car sent no plans of a driving software, so nothing of it can be compared."
-        return Part("disagreements", title, (Prose(text),))
+        return Chapter("disagreements", title, (Prose(text),))
     anchors = {str(one.place["id"]): one for one in passed}
     blocks: list[Block] = []
     if segments:
@@ -83,15 +83,15 @@ def disagreement_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Par
         )
     else:
         blocks.append(Prose("Human and driving software did not disagree."))
-    return Part("disagreements", title, tuple(blocks))
+    return Chapter("disagreements", title, tuple(blocks))
 
 
-def _at(run: RunMaterial, one: Mapping[str, Any], name: str = "stamp_ns") -> Shown:
+def _at(run: RunMaterial, one: Mapping[str, Any], name: str = "stamp_ns") -> TableCell:
     stamp = one.get(name)
     return number(None if stamp is None else (stamp - run.start_stamp_ns) / 1e9, 1, "s")
 
 
-def _segment(run: RunMaterial, one: TableRow) -> tuple[Shown, ...]:
+def _segment(run: RunMaterial, one: TableRow) -> tuple[TableCell, ...]:
     return row(
         _at(run, one, "from_stamp_ns"),
         _at(run, one, "to_stamp_ns"),
@@ -106,7 +106,7 @@ def _segment(run: RunMaterial, one: TableRow) -> tuple[Shown, ...]:
 
 def _disagreement(
     run: RunMaterial, one: TableRow, anchors: Mapping[str, JunctionPassed]
-) -> tuple[Shown, ...]:
+) -> tuple[TableCell, ...]:
     at = anchors.get(one["junction_id"] or "")
     return row(
         _at(run, one),
@@ -115,21 +115,21 @@ def _disagreement(
         number(one["lateral_m"], 1, "m"),
         number(one["along_m"], 1, "m"),
         number(one["speed_mps"], 1, "m/s"),
-        Shown(UNKNOWN) if at is None else Shown(at.name, to=at.anchor),
+        TableCell(UNKNOWN) if at is None else TableCell(at.name, to=at.anchor),
     )
 
 
-def events_part(run: RunMaterial) -> Part:
+def events_part(run: RunMaterial) -> Chapter:
     """Return the warnings and errors of a drive, and the news of it."""
     events = run.rows("events")
     title = "What the drive told"
     if not events:
-        return Part("events", title, (Prose("The drive told of nothing unusual."),))
+        return Chapter("events", title, (Prose("The drive told of nothing unusual."),))
     grave = [one for one in events if one["level"] != "info"]
     rows = tuple(
         row(
             _at(run, one),
-            Shown(one["level"], tone=_LEVELS.get(one["level"], "quiet")),
+            TableCell(one["level"], tone=_LEVELS.get(one["level"], "quiet")),
             one["source"],
             one["text"],
         )
@@ -144,10 +144,10 @@ def events_part(run: RunMaterial) -> Part:
         note=left,
         folded=len(events) > 12,
     )
-    return Part("events", title, (table,))
+    return Chapter("events", title, (table,))
 
 
-def losses_part(run: RunMaterial) -> Part:
+def losses_part(run: RunMaterial) -> Chapter:
     """Return what became of all that was to be done: the ledger, and how long rounds took."""
     record = run.record
     blocks: list[Block] = []
@@ -164,7 +164,7 @@ def losses_part(run: RunMaterial) -> Part:
         ("processes started again", str(part_of(record, "workers", "restarted") or 0)),
         ("refused: messages, senders", _refused(record)),
     )
-    blocks.append(Told(pace))
+    blocks.append(Facts(pace))
     if run.rounds:
         columns = ("drive_time_s", "latency_ms", "late")
         time_s, latency, late = (np.array([one[name] for one in run.rounds]) for name in columns)
@@ -186,7 +186,7 @@ def losses_part(run: RunMaterial) -> Part:
         blocks.append(
             Prose(f"Not known of this recovered run: {', '.join(map(str, unknown))}.", "watch")
         )
-    return Part("losses", "Losses and deadlines", tuple(blocks))
+    return Chapter("losses", "Losses and deadlines", tuple(blocks))
 
 
 def _ledger(ledger: Mapping[str, Any]) -> list[Block]:

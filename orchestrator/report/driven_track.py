@@ -22,7 +22,7 @@ _EVERY_NS = 100_000_000
 """What is drawn and asked for speeds needs no more."""
 
 
-class DrivenTrack(NamedTuple):
+class CarTrack(NamedTuple):
     """Where the car was: stamps (N,) rising, degrees (N, 2), speed (N,), and drive time (N,)."""
 
     stamp_ns: Stamps
@@ -30,17 +30,17 @@ class DrivenTrack(NamedTuple):
     speed_mps: Array
     time_s: Array
 
-    def between(self, from_s: float, to_s: float) -> DrivenTrack:
+    def between(self, from_s: float, to_s: float) -> CarTrack:
         """Return the part of a track between two drive times."""
         some = slice(
             bisect.bisect_left(self.time_s, from_s), bisect.bisect_right(self.time_s, to_s)
         )
-        return DrivenTrack(
+        return CarTrack(
             self.stamp_ns[some], self.lat_lon_deg[some], self.speed_mps[some], self.time_s[some]
         )
 
 
-def driven_track(first: Path, *, start_stamp_ns: int | None) -> DrivenTrack | None:
+def driven_track(first: Path, *, start_stamp_ns: int | None) -> CarTrack | None:
     """Return the track in a recording, its first part given; None where it holds no states.
 
     Drive time begins at `start_stamp_ns`, or with the first state. What cannot be read is passed
@@ -52,7 +52,7 @@ def driven_track(first: Path, *, start_stamp_ns: int | None) -> DrivenTrack | No
     stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)
     order = np.argsort(stamps, kind="stable")
     start_ns = int(stamps[order[0]]) if start_stamp_ns is None else start_stamp_ns
-    return DrivenTrack(
+    return CarTrack(
         stamps[order],
         np.array([(s.position.lat_deg, s.position.lon_deg) for s in states])[order],
         np.array([s.speed_mps for s in states])[order],

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
 from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
-    Figure,
+    KeyFigure,
     Tone,
     listed_words,
     plural,
@@ -94,7 +94,7 @@ def rounds_in_time(run: RunMaterial) -> tuple[int, int] | None:
     return told["run"] - late, told["due"] - told["unseeded"]
 
 
-def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[Figure, ...]:
+def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[KeyFigure, ...]:
     """Return the five numbers of the first page."""
     futures = sum(one.futures for one in passed)
     reached = sum(one.arrived_s is not None for one in passed)
@@ -103,18 +103,18 @@ def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[Figu
     base = part_of(run.record, "comparison", "constant_velocity_ade_m", "4")
     agree = part_of(run.record, "agreement", "overall")
     return (
-        Figure(
+        KeyFigure(
             str(reached),
             "junctions passed",
             f"{plural(futures, 'future')} in {plural(len(run.rounds), 'round')}",
         ),
-        Figure(
+        KeyFigure(
             "none" if not gravest else power(gravest, 0),
             "gravest foreseen",
             f"criticality; amber from {power(AMBER_FROM, 0)}, red from {power(RED_FROM, 0)}",
             tone_of(gravest),
         ),
-        Figure(
+        KeyFigure(
             UNKNOWN if error is None else f"{error:.1f} m",
             "off after 4 s",
             "mean of the nominal future"
@@ -125,25 +125,25 @@ def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[Figu
     )
 
 
-def _agreement_figure(overall: dict[str, int] | None) -> Figure:
+def _agreement_figure(overall: dict[str, int] | None) -> KeyFigure:
     name = "simulation agrees"
     if not overall:
-        return Figure(UNKNOWN, name, "no seconds were simulated and driven")
+        return KeyFigure(UNKNOWN, name, "no seconds were simulated and driven")
     agree = overall["agree_pass"] + overall["agree_fail"]
     judged = agree + overall["too_pessimistic"] + overall["too_optimistic"]
     if not judged:
-        return Figure(UNKNOWN, name, f"{overall['not_observable']} windows, none can be judged")
+        return KeyFigure(UNKNOWN, name, f"{overall['not_observable']} windows, none can be judged")
     note = f"{agree} of {judged} judged windows; {overall['not_observable']} cannot be"
-    return Figure(f"{agree / judged:.0%}", name, note, "good" if agree == judged else "watch")
+    return KeyFigure(f"{agree / judged:.0%}", name, note, "good" if agree == judged else "watch")
 
 
-def _pace_figure(run: RunMaterial) -> Figure:
+def _pace_figure(run: RunMaterial) -> KeyFigure:
     name = "rounds in time"
     found = rounds_in_time(run)
     if found is None or not found[1]:
-        return Figure(UNKNOWN, name, "no round was due, or it is not known")
+        return KeyFigure(UNKNOWN, name, "no round was due, or it is not known")
     in_time, due = found
     tone: Tone = "watch" if in_time < (1.0 - _LATE_SHARE) * due else "good"
     p95 = run.record.get("state_to_result_ms_p95")
     took = "" if p95 is None else f"; 95 % within {p95:.0f} ms"
-    return Figure(f"{in_time / due:.0%}", name, f"{in_time} of {due} due{took}", tone)
+    return KeyFigure(f"{in_time / due:.0%}", name, f"{in_time} of {due} due{took}", tone)

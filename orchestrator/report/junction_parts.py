@@ -15,11 +15,11 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
     Block,
+    Chapter,
     Drawn,
     Listed,
-    Part,
     Prose,
-    Shown,
+    TableCell,
     listed_words,
     number,
     plural,
@@ -51,8 +51,8 @@ def junction_table(passed: Sequence[JunctionPassed]) -> Listed:
     """Return all junctions of a run, one a row, each leading to its section."""
     rows = [
         row(
-            Shown(str(one.number), order=one.number),
-            Shown(one.name, to=one.anchor),
+            TableCell(str(one.number), order=one.number),
+            TableCell(one.name, to=one.anchor),
             str(one.place.get("control") or UNKNOWN).replace("_", " "),
             number(one.arrived_s, 1, "s"),
             _ready(one),
@@ -84,7 +84,7 @@ def junction_table(passed: Sequence[JunctionPassed]) -> Listed:
     )
 
 
-def _ready(one: JunctionPassed) -> Shown:
+def _ready(one: JunctionPassed) -> TableCell:
     before_s = one.place.get("world_ready_before_s")
     if before_s is None or one.arrived_s is None:
         return number(None)
@@ -93,14 +93,14 @@ def _ready(one: JunctionPassed) -> Shown:
 
 def junction_parts(
     run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool = True
-) -> tuple[Part, ...]:
+) -> tuple[Chapter, ...]:
     """Return a section for each junction, the first `DRAWN` of them with pictures."""
     return tuple(
         _junction(run, one, drawn=pictures and place < DRAWN) for place, one in enumerate(passed)
     )
 
 
-def _junction(run: RunMaterial, one: JunctionPassed, *, drawn: bool) -> Part:
+def _junction(run: RunMaterial, one: JunctionPassed, *, drawn: bool) -> Chapter:
     came = what_came(run, one)
     blocks: list[Block] = [Prose(_foreseen(one)), Prose(_came(one, came))]
     world = None if one.shown_round is None else run.world(one.shown_round["world_id"])
@@ -117,7 +117,7 @@ def _junction(run: RunMaterial, one: JunctionPassed, *, drawn: bool) -> Part:
             blocks.append(_futures(run, one, title, futures))
     if world is not None:
         blocks += _from_the_map(world, str(one.place["id"]))
-    return Part(one.anchor, f"{one.number} · {one.name}", tuple(blocks))
+    return Chapter(one.anchor, f"{one.number} · {one.name}", tuple(blocks))
 
 
 def _foreseen(one: JunctionPassed) -> str:
@@ -192,7 +192,7 @@ def _futures(
             _end(future),
             number(future["min_clearance_m"], 1, "m"),
             number(at_s.get(future["round_id"]), 1, "s"),
-            Shown(repeat_command(run, future["future_id"]), code=True),
+            TableCell(repeat_command(run, future["future_id"]), code=True),
         )
         for future in futures
     )

@@ -14,7 +14,7 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import table_at
 from foretwin.orchestrator.record.run_state import check_finished, read_record
 from foretwin.orchestrator.record.table_parts import read_parts
-from foretwin.orchestrator.report.driven_track import DrivenTrack, driven_track
+from foretwin.orchestrator.report.driven_track import CarTrack, driven_track
 from foretwin.sim_worker.world_file import load_world
 
 DRIVE, MONITOR = "drive.mcap", "monitor.rrd"
@@ -114,7 +114,7 @@ class RunMaterial:
         return [world for world in found if world is not None]
 
     @cached_property
-    def track(self) -> DrivenTrack | None:
+    def track(self) -> CarTrack | None:
         """Return where the car was as it was estimated then, None where nothing is recorded."""
         return driven_track(self.folder / DRIVE, start_stamp_ns=self.start_stamp_ns or None)
 

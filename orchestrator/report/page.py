@@ -9,7 +9,7 @@ from typing import Any
 import jinja2
 
 from foretwin.contracts.terminal import visible
-from foretwin.orchestrator.report.blocks import Block, Part, Plotted, Report
+from foretwin.orchestrator.report.blocks import Block, Chapter, Plotted, Report
 
 TEMPLATES = Path(__file__).with_name("templates")
 
@@ -54,7 +54,7 @@ def _figures(report: Report) -> Iterator[Any]:
 def all_blocks(report: Report) -> Iterator[Block]:
     """Yield the blocks of a report, those of inner sections too."""
     yield from report.front
-    waiting: list[Part] = list(reversed(report.parts))
+    waiting: list[Chapter] = list(reversed(report.parts))
     while waiting:
         part = waiting.pop()
         yield from part.blocks

@@ -14,13 +14,13 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
 from foretwin.orchestrator.report.blocks import Tone
 from foretwin.orchestrator.report.material import RunMaterial, TableRow
+from foretwin.sim_worker.driver_model import STANDING_MPS
 
 WORST, LIKELIEST = 5, 3
 """So many futures of a junction are told."""
 _PICTURE_BEFORE_S = 4.0
 """Where no future is worse than another, the picture is of so long before the car was there."""
 _NEAR_M = 60.0
-_STANDING_MPS = 0.5
 
 
 class JunctionPassed(NamedTuple):
@@ -244,5 +244,5 @@ def _speeds(run: RunMaterial, passed: JunctionPassed) -> tuple[float | None, flo
     outside = np.flatnonzero(away_m > _NEAR_M)
     near = before.between(before.time_s[outside[-1]] if len(outside) else -np.inf, at_s)
     steps_s = np.diff(near.time_s, append=near.time_s[-1])
-    stood_s = float(steps_s[np.abs(near.speed_mps) < _STANDING_MPS].sum())
+    stood_s = float(steps_s[np.abs(near.speed_mps) < STANDING_MPS].sum())
     return float(before.speed_mps[-1]), float(near.speed_mps.min()), stood_s

@@ -11,7 +11,7 @@ from bokeh.models.tools import HoverTool
 from bokeh.plotting import figure
 
 from foretwin.contracts.arrays import Array, Flags
-from foretwin.orchestrator.report.driven_track import DrivenTrack
+from foretwin.orchestrator.report.driven_track import CarTrack
 from foretwin.orchestrator.report.gap_rows import ALL, GapOf, HumanRow
 
 COLOURS = ("#1f5fd0", "#c2185b", "#00857a", "#b26a00", "#8a3fb0", "#6d4c41", "#4c5560")
@@ -60,7 +60,7 @@ def _thinned(*columns: Array) -> tuple[Array, ...]:
     return tuple(np.asarray(column)[::step] for column in columns)
 
 
-def drive_plot(track: DrivenTrack, arrivals: Sequence[tuple[int, float]]) -> Any:
+def drive_plot(track: CarTrack, arrivals: Sequence[tuple[int, float]]) -> Any:
     """Return the speed over drive time, with a line where the car was at each junction."""
     drawn = plot("drive time, s", "speed, km/h", height=230)
     time_s, speed = _thinned(track.time_s, track.speed_mps * 3.6)

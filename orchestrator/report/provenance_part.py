@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.versions import versions
-from foretwin.orchestrator.report.blocks import Listed, Part, Shown, Told, number, row
+from foretwin.orchestrator.report.blocks import Chapter, Facts, Listed, TableCell, number, row
 
 _HASHED_BYTES = 512 * 2**20
 """Files of a folder are hashed up to so many bytes together: more would take minutes."""
@@ -26,7 +26,7 @@ _FILES = (
 _MOST_FILES = 400
 
 
-def provenance_part(folder: Path, record: Mapping[str, Any], *, places: bool = True) -> Part:
+def provenance_part(folder: Path, record: Mapping[str, Any], *, places: bool = True) -> Chapter:
     """Return what a run or sweep was made with and of, file by file.
 
     Without `places` the map and the log are not named, and neither they nor Worlds are hashed.
@@ -58,10 +58,10 @@ def provenance_part(folder: Path, record: Mapping[str, Any], *, places: bool = T
         ("made with", _versions(record.get("versions") or {})),
         ("report by", f"foretwin {versions()['foretwin']}"),
     ]
-    return Part(
+    return Chapter(
         "provenance",
         "Provenance",
-        (Told(tuple(pairs)), _settings(config, places=places), _files(folder, places=places)),
+        (Facts(tuple(pairs)), _settings(config, places=places), _files(folder, places=places)),
     )
 
 
@@ -89,7 +89,7 @@ _TELL_PLACES = {
 
 def _settings(config: Mapping[str, Any], *, places: bool) -> Listed:
     rows = tuple(
-        row(name, Shown(_short(name, value), code=True))
+        row(name, TableCell(_short(name, value), code=True))
         for name, value in config.items()
         if value not in (None, False, [], {}) and (places or name not in _TELL_PLACES)
     )
@@ -116,7 +116,7 @@ def _files(folder: Path, *, places: bool) -> Listed:
             row(
                 str(path.relative_to(folder)),
                 number(size / 1000.0, 1, "kB"),
-                Shown(digest, code=hashed <= _HASHED_BYTES),
+                TableCell(digest, code=hashed <= _HASHED_BYTES),
             )
         )
     left = f"{len(found) - _MOST_FILES} more files." if len(found) > _MOST_FILES else ""

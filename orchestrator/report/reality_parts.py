@@ -7,11 +7,11 @@ from typing import Any
 
 from foretwin.orchestrator.report.blocks import (
     Block,
+    Chapter,
     Listed,
-    Part,
     Plotted,
     Prose,
-    Shown,
+    TableCell,
     number,
     plural,
     row,
@@ -30,16 +30,16 @@ _WORDS = {
 }
 
 
-def prediction_part(run: RunMaterial) -> Part:
+def prediction_part(run: RunMaterial) -> Chapter:
     """Return how far the nominal future lay from the drive, beside two baselines."""
     told = run.record.get("comparison") or {}
     errors = told.get("ade_m") or {}
     if not errors:
         text = "Nothing was foreseen and then driven long enough to be compared."
-        return Part("prediction", "Foreseen and driven", (Prose(text),))
+        return Chapter("prediction", "Foreseen and driven", (Prose(text),))
     rows = tuple(
         row(
-            Shown(f"{horizon} s", order=float(horizon)),
+            TableCell(f"{horizon} s", order=float(horizon)),
             *(
                 number((told.get(name) or {}).get(horizon), 2, "m")
                 for name in (
@@ -74,10 +74,10 @@ def prediction_part(run: RunMaterial) -> Part:
             "distances of a prediction, not a test of the vehicle model alone."
         )
         blocks.append(Prose(text, "quiet"))
-    return Part("prediction", "Foreseen and driven", tuple(blocks))
+    return Chapter("prediction", "Foreseen and driven", tuple(blocks))
 
 
-def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Part:
+def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Chapter:
     """Return the gap by horizon and manoeuvre; `people` is how far drivers differ, where known."""
     found = gaps_of(run.table("gaps"))
     title = "Gap of the model by horizon and manoeuvre"
@@ -86,7 +86,7 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Part:
             f"The gap was not measured while driving; `foretwin gap {run.called}/{DRIVE}` measures "
             "it from the recording."
         )
-        return Part("gap", title, (Prose(text), *_people(people)))
+        return Chapter("gap", title, (Prose(text), *_people(people)))
     blocks: list[Block] = [
         Listed(
             "Model minus reality after it was left to itself (RMS; 95 % of gaps are below)",
@@ -114,12 +114,12 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Part:
             "a manoeuvre is hidden by a click on its name.",
         ),
     ]
-    return Part("gap", title, (*blocks, *_people(people)))
+    return Chapter("gap", title, (*blocks, *_people(people)))
 
 
-def _gap_row(one: GapOf) -> tuple[Shown, ...]:
+def _gap_row(one: GapOf) -> tuple[TableCell, ...]:
     return row(
-        Shown(f"{one.horizon_s:g} s", order=one.horizon_s),
+        TableCell(f"{one.horizon_s:g} s", order=one.horizon_s),
         one.manoeuvre,
         number(float(one.runs), 0),
         number(one.rms["along_m"], 2, "m"),
@@ -140,7 +140,7 @@ def _people(people: Sequence[HumanRow]) -> list[Block]:
         return [Prose(text, "quiet")]
     rows = tuple(
         row(
-            Shown(f"{one.horizon_s:g} s", order=one.horizon_s),
+            TableCell(f"{one.horizon_s:g} s", order=one.horizon_s),
             number(float(one.places), 0),
             number(one.along_m, 2, "m"),
             number(one.across_m, 2, "m"),
@@ -159,12 +159,12 @@ def _people(people: Sequence[HumanRow]) -> list[Block]:
     ]
 
 
-def agreement_part(run: RunMaterial) -> Part:
+def agreement_part(run: RunMaterial) -> Chapter:
     """Return whether simulation and drive come to the same verdict on the same seconds."""
     told = run.record.get("agreement")
     title = "Simulation against reality: the same seconds judged"
     if not told:
-        return Part("agreement", title, (Prose("No seconds were both simulated and driven."),))
+        return Chapter("agreement", title, (Prose("No seconds were both simulated and driven."),))
     names = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic", "not_observable")
     counts = {"all criteria": told["overall"], **told["by_criterion"]}
     rows = tuple(
@@ -193,10 +193,10 @@ def agreement_part(run: RunMaterial) -> Part:
             if flip["flipped"]
         ),
     ]
-    return Part("agreement", title, tuple(blocks))
+    return Chapter("agreement", title, tuple(blocks))
 
 
-def _outcome(count: dict[str, int], key: str) -> Shown:
+def _outcome(count: dict[str, int], key: str) -> TableCell:
     wrong = key in ("too_pessimistic", "too_optimistic") and count[key]
     return number(float(count[key]), 0, tone="bad" if wrong else "")
 
@@ -211,15 +211,17 @@ def _flip(direction: str, flip: dict[str, Any]) -> str:
     )
 
 
-def calibration_part(run: RunMaterial) -> Part:
+def calibration_part(run: RunMaterial) -> Chapter:
     """Return how the likelihoods of progress compare with what came."""
     told = run.record.get("calibration")
     title = "Calibration: likelihood against what came"
     if not told:
-        return Part("calibration", title, (Prose("No forecast of the car's progress came true."),))
+        return Chapter(
+            "calibration", title, (Prose("No forecast of the car's progress came true."),)
+        )
     rows = tuple(
         row(
-            Shown(f"{horizon} s", order=float(horizon)),
+            TableCell(f"{horizon} s", order=float(horizon)),
             number(100.0 * one["p10_p90_coverage"], 0, "%"),
             number(one["p10_p90_width_m"], 1, "m"),
             number(one["median_error_m"], 2, "m"),
@@ -235,7 +237,7 @@ def calibration_part(run: RunMaterial) -> Part:
         f"score (CRPS, small is good) is {told['crps']:.2f} m, and "
         f"{told['crps_uncalibrated']:.2f} m where all futures count alike."
     )
-    return Part(
+    return Chapter(
         "calibration",
         title,
         (

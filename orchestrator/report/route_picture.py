@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo, target_from_source_m
 from foretwin.contracts.world import World
 from foretwin.orchestrator.report.drawing import UNITS_PER_M, Canvas
-from foretwin.orchestrator.report.driven_track import DrivenTrack
+from foretwin.orchestrator.report.driven_track import CarTrack
 from foretwin.orchestrator.report.passages import JunctionPassed, tone_of
 from foretwin.world_gen.export import picture_style as style
 
@@ -21,7 +21,7 @@ _TONES = {"bad": style.SIGNAL, "watch": style.LINE_COLOUR["give_way"], "": "#1f5
 
 
 def route_svg(
-    track: DrivenTrack | None, worlds: Sequence[World], passed: Sequence[JunctionPassed]
+    track: CarTrack | None, worlds: Sequence[World], passed: Sequence[JunctionPassed]
 ) -> str | None:
     """Return the picture of a drive as SVG; None where neither track nor junctions are known.
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from foretwin.orchestrator.report.blocks import (
     Block,
+    Chapter,
     Drawn,
-    Part,
     Plotted,
     Prose,
     Report,
@@ -105,12 +105,12 @@ def _front(run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool
     return blocks
 
 
-def _junctions(run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool) -> Part:
+def _junctions(run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool) -> Chapter:
     title = "Junction by junction"
     if not passed:
         text = "The car met no junction in this drive: nothing was foreseen."
-        return Part("junctions", title, (Prose(text),))
-    return Part(
+        return Chapter("junctions", title, (Prose(text),))
+    return Chapter(
         "junctions",
         title,
         (junction_table(passed),),

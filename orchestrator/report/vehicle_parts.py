@@ -6,10 +6,10 @@ from typing import Any
 
 from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
+    Chapter,
     Listed,
-    Part,
     Prose,
-    Shown,
+    TableCell,
     number,
     plural,
     row,
@@ -17,13 +17,13 @@ from foretwin.orchestrator.report.blocks import (
 from foretwin.orchestrator.report.material import RunMaterial, part_of
 
 
-def vehicle_part(run: RunMaterial) -> Part:
+def vehicle_part(run: RunMaterial) -> Chapter:
     """Return what the drive says of the vehicle's parameters."""
     title = "Vehicle: identified parameters"
     parameters = part_of(run.record, "tuning", "parameters") or []
     if not parameters:
         text = "Nothing was identified in this drive: tuning was off, or it was too short."
-        return Part("vehicle", title, (Prose(text),))
+        return Chapter("vehicle", title, (Prose(text),))
     rows = tuple(
         row(
             one["name"],
@@ -43,7 +43,7 @@ def vehicle_part(run: RunMaterial) -> Part:
     )
     changes = part_of(run.record, "tuning", "changes") or []
     said = Prose(f"{plural(len(changes), 'change')} of parameters took effect in this drive.")
-    return Part("vehicle", title, (table, said))
+    return Chapter("vehicle", title, (table, said))
 
 
 def _interval(one: dict[str, Any]) -> str:
@@ -52,7 +52,7 @@ def _interval(one: dict[str, Any]) -> str:
     return f"{one['low']:.3g} to {one['high']:.3g}"
 
 
-def verdict_part(run: RunMaterial) -> Part:
+def verdict_part(run: RunMaterial) -> Chapter:
     """Return who departs from the commands, with the evidence."""
     title = "Verdicts: who is wrong, vehicle or model"
     found = part_of(run.record, "tuning", "verdicts") or []
@@ -62,11 +62,11 @@ def verdict_part(run: RunMaterial) -> Part:
             if part_of(run.record, "tuning", "gap", "independent") is False
             else "nothing showed that the vehicle or the model departs"
         )
-        return Part("verdicts", title, (Prose(f"Nobody is accused: {why}."),))
+        return Chapter("verdicts", title, (Prose(f"Nobody is accused: {why}."),))
     rows = tuple(
         row(
             number(one["drive_time_s"], 1, "s"),
-            Shown(one["culprit"], tone="bad"),
+            TableCell(one["culprit"], tone="bad"),
             one["cause"].replace("_", " "),
             one["text"],
             "; ".join(_evidence(shown) for shown in one["evidence"]),
@@ -80,13 +80,13 @@ def verdict_part(run: RunMaterial) -> Part:
         rows,
         frozenset({0, 5}),
     )
-    return Part("verdicts", title, (table,))
+    return Chapter("verdicts", title, (table,))
 
 
-def _fits(one: dict[str, Any]) -> Shown:
+def _fits(one: dict[str, Any]) -> TableCell:
     if one["departs"]:
-        return Shown("departs", tone="watch")
-    return Shown(UNKNOWN if one["identified"] is None else "fits")
+        return TableCell("departs", tone="watch")
+    return TableCell(UNKNOWN if one["identified"] is None else "fits")
 
 
 def _evidence(one: dict[str, Any]) -> str:

@@ -31,6 +31,7 @@ COVERS = (
     "foretwin.orchestrator.report.plots",
     "foretwin.orchestrator.report.provenance_part",
     "foretwin.orchestrator.report.reality_parts",
+    "foretwin.orchestrator.report.replayed",
     "foretwin.orchestrator.report.route_picture",
     "foretwin.orchestrator.report.run_report",
     "foretwin.orchestrator.report.vehicle_parts",
