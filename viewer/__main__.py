@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -15,34 +14,24 @@ from foretwin.contracts.bus import Bus, Mailbox, Received, ask
 from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.guard import Refused
-from foretwin.contracts.layout import read_layout
-from foretwin.contracts.owned_folder import make_temporary
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.roads_shown import RoadsShown
 from foretwin.contracts.segments import (
-    first_left,
-    first_name,
     next_number,
     segment_file,
-    segments_of,
 )
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
 from foretwin.contracts.trace import span, traced
 from foretwin.viewer.blueprint import DEFAULT, drive_blueprint
+from foretwin.viewer.keeping_up import KeepingUp
 from foretwin.viewer.live_viewer import (
-    HOST,
-    NoViewerError,
-    has_display,
     live_viewer,
-    offline_environment,
-    rerun_program,
-    serve_recordings,
 )
 from foretwin.viewer.monitor import Monitor, read_world
-from foretwin.viewer.recordings import copy_with_blueprint, is_complete
 from foretwin.viewer.rows import Row
+from foretwin.viewer.showing import show
 from foretwin.viewer.sinks import FileStream, LiveStream
 
 MAILBOX_DEPTH = 4096
@@ -87,6 +76,7 @@ class Recorder:
         self._reported_dropped = 0
         self._refusals = refusals
         self._reported_window = False
+        self._keeping_up = KeepingUp()
         self._flushed_s = time.monotonic()
         self._setup = setup
         self._blueprint = drive_blueprint(setup.layout)
@@ -115,6 +105,7 @@ class Recorder:
             attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
             roads=_roads(setup),
+            clock=None if setup.live == "none" else lambda: time.strftime("%H:%M:%S"),
         )
 
     def _open_part(self) -> None:
@@ -190,6 +181,10 @@ class Recorder:
         if self._live is not None and self._live.failed and not self._reported_window:
             self._reported_window = True
             self._write(self._monitor.note("warning", f"no live view: {self._live.failed}"))
+        live = self._live
+        if live is not None and not live.failed and not self._setup.bus.lossless:
+            for said in self._keeping_up.look(behind_s=live.behind_s, dropped=live.dropped):
+                self._write(self._monitor.note(said.level, said.text))
         dropped = self._messages.dropped
         if dropped > self._reported_dropped:
             text = f"{dropped - self._reported_dropped} messages dropped, {dropped} in all"
@@ -237,40 +232,6 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     recorder.drain(farewell)
     messages.close()
     recorder.close(farewell, keep_window=life.run_ended)
-
-
-def show(recording: Path, *, layout: str = DEFAULT, view: str = "native") -> None:
-    """Become the native viewer of `recording` and of its later parts, or serve it for a browser.
-
-    Raises FileNotFoundError, NoViewerError or UserError, in one line.
-    """
-    if not recording.is_file():
-        raise FileNotFoundError(f"no recording {recording}")
-    if view == "native" and not has_display():
-        raise NoViewerError(
-            f"no display to show {recording} on; --view web serves it for a browser, "
-            f"`python -m foretwin.viewer.picture {recording} OUT.png` renders a picture"
-        )
-    program = str(rerun_program())
-    first = first_name(recording)
-    parts = segments_of(first) if first_left(first) == recording else [recording]
-    parts = [_laid_out(part, layout) for part in parts]
-    if view == "web":
-        serve_recordings(parts)
-        return
-    arguments = [program, "--bind", HOST, "--port", "auto", *map(str, parts)]
-    os.execve(program, arguments, offline_environment())
-
-
-def _laid_out(recording: Path, layout: str) -> Path:
-    """Return a recording with this layout: a copy, but where it is complete and has its own."""
-    if layout == DEFAULT and is_complete(recording):
-        return recording
-    owned = make_temporary("foretwin-shown-")
-    owned.keep_over_exec()  # the next one to be shown finds whether this one still is
-    copy = owned.path / recording.name
-    copy_with_blueprint(recording, copy, drive_blueprint(read_layout(layout)))
-    return copy
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import rerun as rr
 
@@ -28,7 +30,14 @@ LEVELS = {
 class RunLog:
     """Turns the run's messages into rows; a worker's colours come with its first status."""
 
-    def __init__(self, title: str, attribution: str = ATTRIBUTION) -> None:
+    def __init__(
+        self,
+        title: str,
+        attribution: str = ATTRIBUTION,
+        clock: Callable[[], str] | None = None,
+    ) -> None:
+        """`clock` tells the time of day where somebody watches: who sees an old one is behind."""
+        self._clock = clock
         self._title = in_markdown(title)
         self._source = f"map: {in_markdown(attribution)}"
         self._states: dict[str, str] = {}
@@ -74,6 +83,7 @@ class RunLog:
         if progress.next_intersection is not None:
             name = in_markdown(progress.next_intersection)
             ahead = f"next **{name}** {progress.arrival_text}"
+        now = "" if self._clock is None else f", now {self._clock()}"
         memory = f" · {progress.memory_mb:.0f} MB" if progress.memory_mb is not None else ""
         short = (
             f"**{in_markdown(progress.too_slow)}** (too slow for all) · "
@@ -82,7 +92,7 @@ class RunLog:
         )
         text = (
             # The map's source early on: where the line is too long, its end is cut off.
-            f"**{progress.drive_time_s:.1f} s** · {self._source} · "
+            f"**{progress.drive_time_s:.1f} s**{now} · {self._source} · "
             f"{in_markdown(progress.mission_state)} · {ahead} · "
             f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped{memory}"
         )

@@ -51,6 +51,7 @@ class Monitor:
         attribution: str = ATTRIBUTION,
         load_world: Callable[[str], World],
         roads: RoadsShown | None = None,
+        clock: Callable[[], str] | None = None,
     ) -> None:
         self._frame = drive_frame
         self._find_start = find_start
@@ -58,7 +59,7 @@ class Monitor:
         """The stamp of the drive's start, once it is known."""
         self._load_world, self._roads = load_world, roads
         self._drive = DriveLog(drive_frame)
-        self._run = RunLog(title, attribution)
+        self._run = RunLog(title, attribution, clock)
         self._tuning = TuningLog()
         self._centres: dict[str, Array] = {}
         self._now_ns = 0

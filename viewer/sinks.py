@@ -14,6 +14,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from foretwin.viewer.columns import send_rows
+from foretwin.viewer.keeping_up import WindowLag
 from foretwin.viewer.rows import APPLICATION_ID, TIMELINE, Row, plain_text
 
 LIVE_ROWS = 256
@@ -146,6 +147,8 @@ class LiveStream:
         self._closing = False
         self._done = threading.Event()
         self.dropped = 0
+        self._newest_ns = self._sent_ns = 0
+        self._lag: WindowLag | None = None
         self.failed: str | None = None
         threading.Thread(target=self._pump, name="live", daemon=True).start()
 
@@ -154,10 +157,17 @@ class LiveStream:
         """How many rows have not been sent yet."""
         return len(self._lasting) + len(self._rows)
 
+    @property
+    def behind_s(self) -> float:
+        """By how much drive time what is shown is older than what was written."""
+        asked_s = 0.0 if self._lag is None else self._lag.behind_s
+        return max((self._newest_ns - self._sent_ns) / 1e9, asked_s)
+
     def write(self, rows: Iterable[Row]) -> None:
         """Queue rows; never waits."""
         with self._changed:
             for row in rows:
+                self._newest_ns = max(self._newest_ns, row.drive_ns or 0)
                 queue, depth = (
                     (self._lasting, LASTING_ROWS) if row.lasting else (self._rows, LIVE_ROWS)
                 )
@@ -190,9 +200,12 @@ class LiveStream:
             stream = recording_stream(
                 self._recording_id, send_properties=False, batch_s=LIVE_BATCH_S
             )
-            stream.connect_grpc(self._open_viewer(), default_blueprint=self._blueprint)
+            address = self._open_viewer()
+            stream.connect_grpc(address, default_blueprint=self._blueprint)
+            self._lag = WindowLag(address, self._recording_id, lambda: self._sent_ns)
             while (row := self._next()) is not None:
                 _emit(stream, row)
+                self._sent_ns = max(self._sent_ns, row.drive_ns or 0)
             stream.flush(timeout_sec=FLUSH_S)
         except Exception as problem:  # the drive goes on without a window
             _log.warning("no live view: %s", problem)

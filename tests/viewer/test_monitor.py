@@ -229,3 +229,19 @@ def test_where_human_and_ads_disagree_a_mark_stays() -> None:
     assert row.path.startswith("world/disagreements/pace_")
     assert row.drive_ns == 2_000_000_000
     assert monitor.handle("disagreement", msgspec.structs.replace(one, over=True)) == []
+
+
+def test_who_watches_sees_when_what_is_shown_was_sent() -> None:
+    progress = next(m.message for m in scene.drive(duration_s=1.0) if m.channel == "progress")
+    told = {}
+    for name, clock in (("live", lambda: "16:02:11"), ("recorded", None)):
+        monitor = Monitor(
+            drive_frame=scene.DRIVE_FRAME,
+            find_start=lambda _first: scene.START_NS,
+            title="t",
+            load_world=lambda _id: scene.junction(),
+            clock=clock,
+        )
+        told[name] = text_of(Shown(monitor.handle("progress", progress))["status"])
+    assert told["live"].startswith("**0.0 s**, now 16:02:11 · map: ")
+    assert "now" not in told["recorded"]

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.viewer import __main__ as viewer
+from foretwin.viewer import showing as viewer
 from foretwin.viewer.__main__ import main
 from foretwin.viewer.live_viewer import offline_environment
+
+COVERS = ("foretwin.viewer.showing",)
 
 
 def test_a_missing_recording_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,3 +53,19 @@ def test_the_viewer_is_kept_from_the_internet(monkeypatch: pytest.MonkeyPatch) -
     for name in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "https_proxy"):
         assert environment[name] == "http://127.0.0.1:9"
     assert "127.0.0.1" in environment["NO_PROXY"]
+
+
+def test_another_layout_is_laid_over_a_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr(viewer, "is_complete", lambda recording: True)
+    monkeypatch.setattr(viewer, "serve_recordings", lambda parts: shown.extend(map(str, parts)))
+    monkeypatch.setattr(viewer, "copy_with_blueprint", lambda source, copy, blueprint: None)
+    recording = tmp_path / "monitor.rrd"
+    recording.write_bytes(b"RRF2")
+    for layout in ("drive", "gap"):
+        viewer.show(recording, layout=layout, view="web")
+    assert shown[0] == str(recording)
+    assert Path(shown[1]).name == recording.name
+    assert Path(shown[1]) != recording
