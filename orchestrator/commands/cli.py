@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.exit_codes import INTERRUPTED, USER
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_config import config as config_files
 from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, WholeSentences
@@ -50,7 +51,7 @@ from foretwin.orchestrator.commands.error_lines import (
     usage_line,
 )
 
-EXIT_USER, EXIT_INTERRUPTED = 2, 130
+EXIT_USER, EXIT_INTERRUPTED = USER, INTERRUPTED
 _NO_FOLDER = IsADirectoryError, NotADirectoryError
 PATH_ERRORS = (FileNotFoundError, FileExistsError, *_NO_FOLDER, PermissionError)
 """What is wrong with a path is the user's to mend."""

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from foretwin.contracts.did_you_mean import meant
+from foretwin.contracts.exit_codes import INTERNAL
 from foretwin.contracts.terminal import say
 
-EXIT_INTERNAL = 1
 NO_PLACE = (
     errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.ELOOP,
 )  # fmt: skip
@@ -65,7 +65,7 @@ def report(error: Exception) -> int:
         f"(traceback in {file.name})",
         error=True,
     )
-    return EXIT_INTERNAL
+    return INTERNAL
 
 
 def drop_output() -> None:

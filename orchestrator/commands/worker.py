@@ -15,6 +15,7 @@ from foretwin.contracts.bus import Alive, BusUnreachable, Mailbox, ZenohBus
 from foretwin.contracts.campaign import certificate_in, role_files, worker_name
 from foretwin.contracts.certificates import UTC, read_certificate, time_trouble
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.exit_codes import USER
 from foretwin.contracts.fleet import far_id
 from foretwin.contracts.keys import alive_key, run_of_alive_key
 from foretwin.contracts.new_folder import trouble_with_folder
@@ -28,7 +29,7 @@ from foretwin.orchestrator.processors import processors, trouble_with_workers
 from foretwin.orchestrator.record.machine import this_machine
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, WhenDead
 
-EXIT_REFUSED = 2
+EXIT_REFUSED = USER
 DRIVE_S = 60.0
 """How long a drive may take to begin."""
 DRAIN_S = 30.0

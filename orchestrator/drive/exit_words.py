@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from foretwin.contracts.exit_codes import DONE, INTERNAL, INTERRUPTED, PARTLY
+
 VEHICLE_ENDED = "vehicle_ended"
 """The vehicle's process died: what came before is kept."""
 IN_ORDER = ("completed", VEHICLE_ENDED)
 """Everybody gets the time to write what there is."""
-EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = 0, 1, 3, 130
+EXIT_DONE, EXIT_FAILED, EXIT_PARTLY, EXIT_INTERRUPTED = DONE, INTERNAL, PARTLY, INTERRUPTED
 _CODES = {
     "completed": EXIT_DONE,
     VEHICLE_ENDED: EXIT_PARTLY,

@@ -1,0 +1,250 @@
+"""What the tables of a run hold: what a row is, and what each column of it says.
+
+Numbers of a future and metrics have their words in tables of their own; the others stand here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.orchestrator.record.future_words import COLUMNS as FUTURE_WORDS
+from foretwin.orchestrator.record.future_words import OF_A_PLACE, each_of
+from foretwin.sim_worker.metrics.table import METRICS
+
+_ROWS = {
+    "rounds": "one round that was run",
+    "futures": "one future: what it was, and what became of it",
+    "road_users": "one road user that all futures of a job share, as it begins",
+    "jobs": "one job, with everything that decides its futures",
+    "metrics": "what a column metric_… of futures means",
+    "comparisons": "the nominal future of a round against what the car did, at one horizon",
+    "forecasts": "what came of a round's forecast of the car's own progress, at one instant",
+    "plan_comparisons": "the car's own plan against the nominal future of a round",
+    "disagreements": "a stretch on which the driving stack planned otherwise than the human drove",
+    "driven_segments": "a stretch between two takeovers",
+    "agreement": "one window that was simulated and then driven, judged",
+    "windows": "one window, with all that judging it needs",
+    "mirror": "the real car, its twin, shadow and ghost at one instant, and the gap between them",
+    "mirrored": "a vehicle beside the car at one instant",
+    "touches": "two who began to touch in the mirror",
+    "changes": "a change that an operator asked for",
+    "parameters": "one parameter of the vehicle that counted from then on",
+    "identifications": "what a stretch of driving says of one parameter",
+    "gaps": "model minus reality after the model ran freely for a while",
+    "verdicts": "who departs from the commands, the model or the vehicle",
+    "junctions": "one passage of a junction",
+    "events": "something worth telling the engineer",
+}
+ROWS: Mapping[str, str] = MappingProxyType(_ROWS)
+"""What one row of each table is."""
+
+_OF_A_PREDICTION = {
+    "ade_m": "mean distance of {0} from the real drive up to the horizon",
+    "fde_m": "distance at the horizon of {0} from the real drive",
+    "lateral_m": "of that the part across the real heading, positive left: {0}",
+    "longitudinal_m": "of that the part along the real heading, positive ahead: {0}",
+    "heading_rad": "heading at the horizon minus the real one, of {0}",
+}
+_CORRECTIONS = {
+    "correction_along_mps2": "acceleration along the road by which a twin that follows is drawn",
+    "correction_across_mps2": "the same across the road",
+    "correction_yaw_radps2": "the same in yaw",
+}
+
+
+_EVERYWHERE = {
+    "round_id": "number of the round",
+    "stamp_ns": "the vehicle's clock",
+    "drive_time_s": "seconds since the drive's first stamp",
+    "world_id": "World in which it was played; its file lies in worlds/",
+    "intersection_id": "junction ahead, as foretwin intersections calls it",
+    "junction_id": "junction, as foretwin intersections calls it",
+    "horizon_s": "how far ahead",
+    "vehicle_id": "whose",
+    "vehicle_version": "version of the vehicle's parameters, from the table parameters",
+    "job_sha256": "hash of the job's bytes",
+    "job_index": "place of the job in its round",
+    "independent": "false where the model was driven by commands that were estimated from the very "
+    "motion it is compared with",
+    "role": "role in the mirror: all, twin, shadow or ghost",
+}
+_COLUMNS: Mapping[str, Mapping[str, str]] = {
+    **FUTURE_WORDS,
+    "comparisons": {
+        **each_of(
+            _OF_A_PREDICTION,
+            {
+                "nominal_": "the nominal future",
+                "constant_velocity_": "driving straight on at the same speed",
+                "constant_turn_rate_": "turning on at the same rate and speed",
+            },
+        ),
+        "weighted_ade_m": "mean distance of the mean of all futures, weighed by their likelihoods",
+    },
+    "forecasts": {
+        "travelled_m": "how far the car came",
+        "p10_m": "10 % quantile of the forecast",
+        "p50_m": "its median",
+        "p90_m": "its 90 % quantile",
+        "share": "the part of the forecast that lay below what came",
+        "crps_m": "CRPS of the forecast",
+        "crps_table_m": "of the same before it was calibrated in this drive",
+        "crps_futures_m": "of the round's futures, all taken as equally likely",
+    },
+    "plan_comparisons": {
+        "plan_stamp_ns": "stamp of the plan",
+        "ade_m": "mean distance of the plan from the nominal future",
+        "fde_m": "distance at the horizon",
+        "lateral_m": "of that the part across, positive where the plan lies to the left",
+        "longitudinal_m": "of that the part along, positive where the plan is ahead",
+        "heading_rad": "heading of the plan minus that of the nominal future, at the horizon",
+        "path_offset_m": "mean distance of the plan's path from the lane's centre, positive left",
+    },
+    "disagreements": {
+        "segment": "which stretch between takeovers, from 0",
+        "aspect": "way or pace",
+        "kind": "how they differ",
+        "stamp_ns": "of the first plan that was departed from",
+        "end_stamp_ns": "of its end",
+        "duration_s": "how long it lasted",
+        "lat_deg": "where the car was as it began",
+        "lon_deg": "where the car was as it began",
+        "junction_id": "junction at which it was, or had before it",
+        "route_m": "how far along its route",
+        "lateral_m": "the greatest distance of the ways, positive where the stack's is left",
+        "along_m": "ahead (positive) or behind, stack minus human, at the same instants",
+        "speed_mps": "speed, stack minus human, at the same instants",
+    },
+    "driven_segments": {
+        "number": "which, from 0",
+        "control_mode": "who drove",
+        "from_stamp_ns": "where it begins",
+        "to_stamp_ns": "where it ends",
+        "plans": "plans in it",
+        "cut": "of these compared only as far as the next takeover",
+        "too_short": "of these not compared at all",
+        "lateral_m": "95th percentile of each plan's greatest distance across",
+        "along_m": "the same along",
+        "speed_mps": "the same of speed",
+        "disagreements": "how many began in it",
+    },
+    "agreement": {
+        "outcome": "how simulation and reality agree on it",
+        "simulated": "verdict of the simulation",
+        "driven": "verdict of the drive",
+        "observable": "criteria that could be seen in the drive",
+        "simulated_fails": "criteria that fail in the simulation",
+        "driven_fails": "criteria that fail in the drive",
+        "not_observable": "criteria that were asked for and could not be seen",
+        "gap_along_m": "gap between both along the road",
+        "gap_across_m": "across it",
+        **{
+            f"flip_{way}_{name}": text.format(what)
+            for way, what in (("along", "along"), ("across", "across"), ("both", "both ways"))
+            for name, text in (
+                ("factor", "so many times the measured gap {0} changes the verdict"),
+                ("m", "that gap {0} in metres"),
+                ("fails", "criteria that fail then, of a gap {0}"),
+            )
+        },
+    },
+    "windows": {
+        "vehicle": "digest of the vehicle's parameters",
+        "window": "all that its verdict needs, as bytes",
+    },
+    "mirror": {
+        **each_of(
+            OF_A_PLACE,
+            {
+                "real_": "the real car",
+                "twin_": "its twin",
+                "shadow_": "its shadow",
+                "ghost_": "its ghost",
+                "free_": "the free twin, where `twin` is corrected or among other vehicles",
+            },
+        ),
+        "gap_m": "distance of the free twin from the real car",
+        "gap_along_m": "of that the part along the real heading, positive ahead",
+        "gap_across_m": "of that the part across it, positive left",
+        "gap_yaw_rad": "yaw of the free twin minus the real one",
+        "gap_speed_mps": "speed of the free twin minus the real one",
+        "since_reset_s": "since the free twin began anew",
+        **_CORRECTIONS,
+    },
+    "mirrored": {
+        **each_of(OF_A_PLACE, {"real_": "where it was measured", "shown_": "it in its role"}),
+        **_CORRECTIONS,
+    },
+    "touches": {"one": "a vehicle's id", "other": "whom it touched; world is what stands"},
+    "changes": {
+        "asked_stamp_ns": "when it was asked for",
+        "key": "what was changed",
+        "before": "what it was",
+        "value": "what it is from stamp_ns on",
+    },
+    "parameters": {
+        "version": "number of the parameters as a whole",
+        "name": "which parameter",
+        "before": "its value before",
+        "value": "its value from stamp_ns on",
+        "std": "its standard deviation, null where nobody knows",
+        "origin": "who gave it: file, identified, rolled_back or set",
+        "pinned": "whether it stays whatever the driving says",
+    },
+    "identifications": {
+        "from_stamp_ns": "where the stretch of driving begins",
+        "name": "which parameter",
+        "value": "what the stretch says; null where it says nothing",
+        "low": "lower end of the 95 % interval",
+        "high": "its upper end",
+        "prior": "value that was in force",
+        "reason": "why nothing is said, or what it would take to narrow the interval",
+        "taken": "whether it counts from then on",
+    },
+    "gaps": {
+        "horizon_s": "how long the model ran freely",
+        "manoeuvre": "what the car did",
+        "along_m": "along the real heading, positive ahead",
+        "across_m": "across it, positive left",
+        "yaw_rad": "in yaw",
+        "yaw_rate_radps": "in yaw rate",
+        "speed_mps": "in speed",
+        "accel_mps2": "in acceleration",
+    },
+    "verdicts": {
+        "since_stamp_ns": "since when",
+        "culprit": "model, vehicle, both, none or undecided",
+        "cause": "a key such as steering_gain; empty where none is known",
+        "text": "the verdict in a sentence",
+        "evidence": "what speaks for it",
+        "confidence": "how sure the culprit is, 0 to 1",
+    },
+    "junctions": {
+        "id": "as foretwin intersections calls it",
+        "kind": "kind of junction",
+        "name": "its streets",
+        "control": "how it is controlled",
+        "lat": "latitude in degrees",
+        "lon": "longitude in degrees",
+        "seen_at_s": "drive time at which it was first ahead",
+        "arrived_at_s": "drive time at which the car arrived",
+        "built_at_s": "drive time at which its World was there",
+        "within_radius_at_s": "drive time at which the car came within its World",
+        "world_ready_before_s": "how long before that its World was ready",
+    },
+    "events": {"level": "info, warning or error", "source": "who says it", "text": "what"},
+}
+
+
+def meaning_of(table: str, column: str) -> str:
+    """Return what a column of a table says; raises KeyError where nobody has written it down."""
+    if column in _COLUMNS[table]:
+        return _COLUMNS[table][column]
+    if column in FUTURE_NUMBERS:
+        return FUTURE_NUMBERS[column].meaning
+    name = column.removeprefix("metric_")
+    if name != column and name in METRICS:
+        return f"metric {name} in {METRICS[name].unit}, {METRICS[name].better} is better"
+    return _EVERYWHERE[column]
