@@ -13,12 +13,10 @@ from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 def write_town(out: Path) -> Path:
     """Write the town's map to `out` and its route to a `.geojson` of that name; returns the latter.
 
-    Raises UserError where `out` is not named as a map, or its folder is missing.
+    Raises UserError where `out` is not named as a map, OSError where it cannot be written.
     """
     if out.suffix != ".osm":
         raise UserError(f"--out {out}: a file named .osm")
-    if not out.parent.is_dir():
-        raise UserError(f"--out {out}: folder {out.parent} does not exist")
     route = out.with_suffix(".geojson")
     for source, target in ((MAP_FILE, out), (ROUTE_FILE, route)):
         shutil.copyfile(source, target)

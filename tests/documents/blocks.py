@@ -71,11 +71,16 @@ def pages() -> list[str]:
 @cache
 def read_page(name: str) -> Page:
     """Return a page of the repository in parts."""
+    return page_of((ROOT / name).read_text(encoding="utf-8"), name)
+
+
+def page_of(text: str, name: str) -> Page:
+    """Return the parts of a page's text."""
     stage: list[str] = []
     here: dict[str, str] = {}
     beside = None
     blocks = []
-    lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
+    lines = text.splitlines()
     marks: dict[str, str] = {}
     number = 0
     while number < len(lines):
@@ -89,7 +94,8 @@ def read_page(name: str) -> Page:
             elif key == "beside":
                 command, _, ready = value.partition(" → ")
                 beside = command, ready
-            elif key in ABOVE:
+            else:
+                assert key in ABOVE, f"{name}:{number + 1}: nothing is called {key!r}"
                 marks[key] = value
         elif opened := FENCE.match(lines[number]):
             end = number + 1

@@ -26,7 +26,11 @@ def play_page(name: str, folder: Path, installed: Installed) -> int:
     Fails with the place and what was printed where a command ends otherwise than the page says.
     """
     page = read_page(name)
-    page = page._replace(here=with_names(page.here, installed.run))
+    return play_blocks(page._replace(here=with_names(page.here, installed.run)), folder, installed)
+
+
+def play_blocks(page: Page, folder: Path, installed: Installed) -> int:
+    """Run all that is to be run of a page whose placeholders are filled in."""
     set_stage(folder, tuple(page.in_place(item) for item in page.stage), installed)
     for block in page.blocks:
         if "file" in block.marks:

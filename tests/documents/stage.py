@@ -50,6 +50,8 @@ class Installed(NamedTuple):
     lent: Path
     run: Path
     """A run of the drawn town, 101 s in lock step."""
+    short: Path
+    """The first 20 s of it, for what plays a run again."""
     table: Path
     """Its recording as CSV, with the declaration beside it."""
 
@@ -103,7 +105,7 @@ def lend_libraries(folder: Path) -> Path:
 
 
 def install(folder: Path) -> Installed:
-    """Build, install, and drive once."""
+    """Build, install, and drive twice."""
     wheel, lent = build_wheel(folder / "wheel"), lend_libraries(folder / "lent")
     home = folder / "environment"
     venv.create(home, with_pip=True)
@@ -115,29 +117,25 @@ def install(folder: Path) -> Installed:
     _write_program(programs / "python3", PYTHON_SHIM.format(python=python, lent=lent))
     for name in ("python", "pip"):  # a link would hide which environment they belong to
         _write_program(programs / name, f'#!/bin/sh\nexec "{home}/bin/{name}" "$@"\n')
-    installed = Installed(wheel, programs, lent, folder, folder)
+    installed = Installed(wheel, programs, lent, folder, folder, folder)
     around = installed.environment(folder)
     subprocess.run([programs / "pip", "install", "--quiet", wheel], check=True, env=around)
     real = str(home / "bin" / "foretwin")
     _write_program(programs / "foretwin", SHIM.format(python=python, short=SHORT, real=real))
     shutil.copytree(ROOT / "examples" / "tuning", folder / "examples" / "tuning")
-    subprocess.run(
-        [real, "drive", "--config", "examples/tuning/first_drive.toml"],
-        check=True,
-        env=around,
-        cwd=folder,
-        stdout=subprocess.DEVNULL,
-    )
-    (run,) = (folder / "runs" / "tuning").iterdir()
+    config = folder / "examples" / "tuning" / "first_drive.toml"
+
+    def foretwin(*words: str | Path) -> None:
+        subprocess.run(
+            [real, *words], check=True, env=around, cwd=folder, stdout=subprocess.DEVNULL
+        )
+
+    foretwin("drive", "--config", config)
+    foretwin("drive", "--config", config, "--end", "20", "--out", "short")
+    (run,), (short,) = (folder / "runs" / "tuning").iterdir(), (folder / "short").iterdir()
     table = folder / "drive.csv"
-    subprocess.run(
-        [real, "convert", run / "drive.mcap", table],
-        check=True,
-        env=around,
-        cwd=folder,
-        stdout=subprocess.DEVNULL,
-    )
-    return installed._replace(run=run, table=table)
+    foretwin("convert", run / "drive.mcap", table)
+    return installed._replace(run=run, short=short, table=table)
 
 
 def _write_program(path: Path, text: str) -> None:
@@ -161,8 +159,8 @@ def set_stage(folder: Path, what: tuple[str, ...], installed: Installed) -> None
             shutil.copy(installed.table, place)
             if kind == "table":
                 shutil.copy(f"{installed.table}.toml", f"{place}.toml")
-        elif kind == "run":
-            shutil.copytree(installed.run, place)
+        elif kind in ("run", "short"):
+            shutil.copytree(installed.run if kind == "run" else installed.short, place)
         elif kind == "worlds":
             shutil.copytree(installed.run / "worlds", place)
         elif kind == "vehicle":
