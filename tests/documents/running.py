@@ -59,7 +59,7 @@ def going_on(page: Page, folder: Path, installed: Installed) -> Iterator[None]:
             pytest.fail(f"{page.name}: {command} never said {ready!r}:\n{''.join(said)}")
         yield
         os.killpg(process.pid, signal.SIGINT)
-        process.communicate(timeout=BLOCK_S)
+        process.wait(timeout=BLOCK_S)
     finally:
         _end(process)
 

@@ -102,7 +102,7 @@ def test_what_goes_on_is_interrupted_once_it_is_ready(tmp_path: Path, bare: Inst
 
 
 def test_what_goes_on_beside_a_page_is_there_and_then_gone(tmp_path: Path, bare: Installed) -> None:
-    beside = "trap 'touch ended; exit' INT; echo $$ > pid; echo ready; sleep 600 & wait"
+    beside = "trap 'touch ended; exit' INT; echo $$ > pid; echo ready; tail -f /dev/null"
     read = page(f"<!-- beside: {beside} → ready -->", *fenced("sh", "kill -0 $(cat pid)"))
 
     assert play_blocks(read, tmp_path, bare) == 1
