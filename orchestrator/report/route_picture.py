@@ -21,11 +21,15 @@ _TONES = {"bad": style.SIGNAL, "watch": style.LINE_COLOUR["give_way"], "": "#1f5
 
 
 def route_svg(
-    track: CarTrack | None, worlds: Sequence[World], passed: Sequence[JunctionPassed]
+    track: CarTrack | None,
+    worlds: Sequence[World],
+    passed: Sequence[JunctionPassed],
+    *,
+    linked: bool = True,
 ) -> str | None:
     """Return the picture of a drive as SVG; None where neither track nor junctions are known.
 
-    Each junction is a link to its section.
+    Each junction is a link to its section, where they are `linked`.
     """
     placed = [one for one in passed if "lat" in one.place and "lon" in one.place]
     degrees = [] if track is None else [track.lat_lon_deg]
@@ -47,7 +51,7 @@ def route_svg(
             way[:1], 0.008 * canvas.width_m, 'fill="#ffffff" stroke="#10151c" stroke-width="20"'
         )
     for one in placed:
-        _junction(canvas, frame, one)
+        _junction(canvas, frame, one, linked=linked)
     canvas.scale_bar()
     return canvas.svg("the way driven, with its junctions by number", style.GROUND)
 
@@ -81,7 +85,7 @@ def _roads(canvas: Canvas, frame: LocalFrame, worlds: Sequence[World]) -> None:
                 canvas.area(rings, f'fill="{colour}" {edge}', tolerance_m=0.4)
 
 
-def _junction(canvas: Canvas, frame: LocalFrame, one: JunctionPassed) -> None:
+def _junction(canvas: Canvas, frame: LocalFrame, one: JunctionPassed, *, linked: bool) -> None:
     place = np.asarray(local_from_geo(frame, float(one.place["lat"]), float(one.place["lon"])))
     colour = _TONES.get(tone_of(one.gravest), _TONES[""])
     if one.arrived_s is None:
@@ -90,4 +94,4 @@ def _junction(canvas: Canvas, frame: LocalFrame, one: JunctionPassed) -> None:
     edge = f'stroke="#ffffff" stroke-width="{round(0.003 * canvas.width_m * UNITS_PER_M)}"'
     canvas.dots(place[None], radius_m, f'fill="{colour}" {edge}')
     look = 'fill="#ffffff" font-weight="700" text-anchor="middle" dominant-baseline="central"'
-    canvas.words(place, str(one.number), 1.25 * radius_m, look, to=one.anchor)
+    canvas.words(place, str(one.number), 1.25 * radius_m, look, to=one.anchor if linked else "")

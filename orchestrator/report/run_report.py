@@ -22,6 +22,7 @@ from foretwin.orchestrator.report.first_page import figures_of, verdict_of
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.junction_parts import junction_parts, junction_table
 from foretwin.orchestrator.report.material import RunMaterial
+from foretwin.orchestrator.report.occurred_part import occurred_part
 from foretwin.orchestrator.report.passages import JunctionPassed, passages
 from foretwin.orchestrator.report.plots import drive_plot
 from foretwin.orchestrator.report.provenance_part import provenance_part
@@ -57,6 +58,7 @@ def run_report(
             gap_part(run, people),
             calibration_part(run),
             agreement_part(run),
+            occurred_part(run, passed),
             verdict_part(run),
             vehicle_part(run),
             disagreement_part(run, passed),

@@ -13,8 +13,11 @@ from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.redaction import PlaceNames, Redaction, names_of, redacted
 from foretwin.orchestrator.report.run_report import run_report
+from foretwin.orchestrator.report.several_runs import several_runs_report
+from foretwin.orchestrator.report.sweep_material import SUMMARY, SweepMaterial
+from foretwin.orchestrator.report.sweep_report import sweep_report
 
-RUN, SWEEP = "run.json", "sweep.json"
+RUN = "run.json"
 _REDACTED_NAME = "RUN"
 
 
@@ -25,7 +28,7 @@ def write_report(
     people: Sequence[HumanRow] = (),
     redaction: Redaction | None = None,
 ) -> Report:
-    """Write the report of a run; returns what it says.
+    """Write the report of a run, of a sweep, or of several runs; returns what it says.
 
     Raises UserError in one line for a folder that holds no run, or one that goes on, and OSError
     where the file cannot be written.
@@ -42,16 +45,33 @@ def report_of_folders(
     people: Sequence[HumanRow] = (),
     redaction: Redaction | None = None,
 ) -> Report:
-    """Return the report of a run; see `write_report`."""
-    for folder in folders:
-        if not (folder / RUN).is_file():
-            raise UserError(f"{folder}: no run of a drive: no {RUN} in it")
-    if len(folders) != 1:
-        raise UserError(f"a report is of one run, not of {len(folders)}")
-    run = RunMaterial(folders[0], called=_REDACTED_NAME if redaction else "")
-    report = run_report(
-        run, people=people, pictures=redaction != "places", places=redaction is None
-    )
+    """Return the report of a run, of a sweep, or of several runs; see `write_report`."""
+    look = {"pictures": redaction != "places", "places": redaction is None}
+    sweeps = [folder for folder in folders if (folder / SUMMARY).is_file()]
+    if sweeps:
+        if len(folders) != 1:
+            raise UserError(
+                "a report is of one sweep, or of runs: not of sweeps and others together"
+            )
+        sweep = SweepMaterial(folders[0], called="SWEEP" if redaction else "")
+        report = sweep_report(sweep, **look)
+        records, worlds = [sweep.record], sweep.worlds()
+    else:
+        runs = [_run(folder, redaction) for folder in folders]
+        report = (
+            run_report(runs[0], people=people, **look)
+            if len(runs) == 1
+            else several_runs_report(runs, **look)
+        )
+        records = [run.record for run in runs]
+        worlds = [world for run in runs for world in run.worlds()]
     if redaction is None:
         return report
-    return redacted(report, PlaceNames(names_of(run.record, run.worlds())))
+    names = set().union(*(names_of(record, ()) for record in records), names_of({}, worlds))
+    return redacted(report, PlaceNames(names))
+
+
+def _run(folder: Path, redaction: Redaction | None) -> RunMaterial:
+    if not (folder / RUN).is_file():
+        raise UserError(f"{folder}: neither a run nor a sweep: no {RUN} and no {SUMMARY} in it")
+    return RunMaterial(folder, called=_REDACTED_NAME if redaction else "")

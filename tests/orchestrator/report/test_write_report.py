@@ -173,7 +173,7 @@ def test_a_run_that_goes_on_or_was_killed_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"no run\.json"):
+    with pytest.raises(UserError, match=r"no run\.json and no sweep\.json"):
         report_of_folders([tmp_path])
 
 

@@ -1,0 +1,135 @@
+"""What a sweep left, as far as a report tells it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.orchestrator.record.run_folder import table_at
+from foretwin.sim_worker.futures.job_tables import JOB_TABLES
+from foretwin.sim_worker.metrics.table import ROW_METRICS
+from foretwin.sim_worker.world_file import load_world
+
+SUMMARY = "sweep.json"
+_COLUMNS = (
+    "future_id",
+    "job_sha256",
+    "index",
+    "name",
+    "world_id",
+    "junction_id",
+    "planner",
+    "scenario",
+    "place",
+    "case",
+    "valid",
+    "failure",
+    "left_out",
+    "collided",
+    "collision_time_s",
+    "collision_with",
+    "likelihood",
+    "criticality",
+    "min_clearance_m",
+    "progress_m",
+    "accident_kind",
+    "accident_ego_delta_v_mps",
+    "trajectory_sha256",
+)
+
+
+class SweepMaterial:
+    """A sweep's folder: its summary, its rows and Worlds."""
+
+    def __init__(self, folder: Path, *, called: str = "") -> None:
+        self.folder, self.called = folder, called or str(folder)
+        try:
+            self.record: dict[str, Any] = json.loads((folder / SUMMARY).read_bytes())
+        except (OSError, ValueError) as error:
+            raise UserError(f"{folder}: no {SUMMARY} to be read: {error}") from error
+        self._worlds: dict[str, World | None] = {}
+
+    @cached_property
+    def futures(self) -> pa.Table:
+        """Return all rows with the columns that a report reads; none where none can be read."""
+        columns = [*_COLUMNS, *(f"metric_{name}" for name in ROW_METRICS)]
+        empty = JOB_TABLES["futures"].empty_table().select(columns)
+        try:
+            return pq.read_table(table_at(self.folder, "futures"), columns=columns)
+        except (OSError, pa.ArrowException):
+            return empty
+
+    @cached_property
+    def played(self) -> pa.Table:
+        """Return the rows that were played to their end."""
+        return self.futures.filter(pc.field("valid"))
+
+    def worst(self, most: int) -> list[Mapping[str, Any]]:
+        """Return the most critical cases, one of each scenario, planner and junction."""
+        critical = self.played.filter(pc.field("criticality") > 0.0)
+        order = [("criticality", "descending"), ("future_id", "ascending")]
+        found: dict[tuple[str, ...], Mapping[str, Any]] = {}
+        for one in critical.sort_by(order).to_pylist():
+            found.setdefault((one["scenario"], one["planner"], one["junction_id"]), one)
+            if len(found) == most:
+                break
+        return list(found.values())
+
+    def metric_means(self) -> dict[str, tuple[str, str]]:
+        """Return unit and better direction of the metrics that the sweep measured."""
+        try:
+            told = pq.read_table(table_at(self.folder, "metrics")).to_pylist()
+        except (OSError, pa.ArrowException):
+            return {}
+        measured = {
+            name
+            for name in self.played.column_names
+            if name.startswith("metric_") and self.played[name].null_count < self.played.num_rows
+        }
+        return {
+            one["name"]: (one["unit"], one["better"])
+            for one in told
+            if f"metric_{one['name']}" in measured
+        }
+
+    def values_of(self, column: str) -> dict[str, Array]:
+        """Return the known values of a column by planner."""
+        found = {}
+        for planner in pc.unique(self.played["planner"]).to_pylist():
+            mine = self.played.filter(pc.field("planner") == planner)[column].drop_null()
+            found[planner] = np.asarray(mine.to_numpy(), dtype=np.float64)
+        return found
+
+    def world(self, world_id: str) -> World | None:
+        """Return a World of the sweep, None where it cannot be read."""
+        if world_id not in self._worlds:
+            try:
+                self._worlds[world_id] = load_world(self.folder / "worlds", world_id)
+            except (OSError, SchemaMismatch):
+                self._worlds[world_id] = None
+        return self._worlds[world_id]
+
+    def worlds(self) -> list[World]:
+        """Return the Worlds of the sweep that can be read."""
+        ids = pc.unique(self.futures["world_id"]).to_pylist()
+        return [world for one in ids if (world := self.world(one)) is not None]
+
+    def junction_name(self, junction_id: str | None) -> str:
+        """Return what a driver calls a junction of the sweep; its id where that is not known."""
+        return self._names.get(junction_id or "", "") or junction_id or "no junction"
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        return {one.intersection.id: one.intersection.name for one in self.worlds()}

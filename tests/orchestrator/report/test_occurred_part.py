@@ -1,0 +1,46 @@
+"""What occurred, as a section: times, places, and what is beyond a threshold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from foretwin.orchestrator.occurred.occurred import Occurred
+from foretwin.orchestrator.report.blocks import Listed, Prose
+from foretwin.orchestrator.report.material import RunMaterial
+from foretwin.orchestrator.report.occurred_part import occurred_part, told_of
+from foretwin.orchestrator.report.passages import passages
+from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
+from tests.orchestrator.report.told_runs import START_NS, run_of_nothing, told_run
+
+
+def test_scenarios_stand_by_time_with_their_junction(tmp_path: Path) -> None:
+    passed = passages(RunMaterial(told_run(tmp_path)))
+    one = OccurredScenario(
+        kind="cut_in",
+        begin_ns=START_NS + 2_000_000_000,
+        end_ns=START_NS + 5_000_000_000,
+        junction_id=str(passed[0].place["id"]),
+        other_id="7",
+        other_kind="car",
+        ttc_s=1.2,
+        beyond=("ttc_s",),
+    )
+
+    chapter = told_of(Occurred(scenarios=(one,), sees_others=True), START_NS, passed)
+
+    said, table = chapter.blocks
+    assert isinstance(said, Prose)
+    assert said.text.startswith("1 scenario recognised")
+    assert isinstance(table, Listed)
+    (cells,) = table.rows
+    assert [cell.text for cell in cells[:4]] == ["2.0\u00a0s", "5.0\u00a0s", "cut in", "car 7"]
+    assert cells[4].to == passed[0].anchor
+    assert cells[8].tone == "watch"
+
+
+def test_a_run_without_a_recording_says_why_nothing_is_told(tmp_path: Path) -> None:
+    chapter = occurred_part(RunMaterial(run_of_nothing(tmp_path)), [])
+
+    (said,) = chapter.blocks
+    assert isinstance(said, Prose)
+    assert said.text.startswith("What occurred cannot be told")

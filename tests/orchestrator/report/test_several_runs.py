@@ -1,0 +1,46 @@
+"""Several runs side by side: what changed from the first to the last."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.report.page import html_of
+from foretwin.orchestrator.report.write_report import report_of_folders
+from tests.orchestrator.report.test_write_report import Read
+from tests.orchestrator.report.told_runs import told_run
+
+
+def test_two_runs_stand_side_by_side(tmp_path: Path) -> None:
+    one = told_run(tmp_path / "one")
+    far = {"ade_m": {"2": 0.3, "4": 1.3}, "count": {"2": 1, "4": 1}}
+    other = told_run(tmp_path / "other", comparison=far, config={"planner": "constant_speed"})
+
+    report = report_of_folders([one, other])
+    page = html_of(report)
+
+    assert report.verdict.startswith("What B foresaw lies 0.50 m farther from what was driven")
+    assert "constant_speed" in page
+    assert "last minus first" in page
+    read = Read(page)
+    assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
+
+
+def test_the_same_run_twice_changes_nothing(tmp_path: Path) -> None:
+    one = told_run(tmp_path)
+
+    page = html_of(report_of_folders([one, one]))
+
+    assert "Settings, versions and map are the same." in page
+    assert page.count("same</td>") > 3
+
+
+def test_runs_and_sweeps_do_not_go_together(tmp_path: Path) -> None:
+    one = told_run(tmp_path)
+    (tmp_path / "sweep").mkdir()
+    (tmp_path / "sweep" / "sweep.json").write_text("{}")
+
+    with pytest.raises(UserError, match="of one sweep, or of runs"):
+        report_of_folders([one, tmp_path / "sweep"])

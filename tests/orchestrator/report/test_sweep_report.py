@@ -1,0 +1,63 @@
+"""A sweep's report: outcomes, worst cases with commands that play them again, what was left out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.commands.repeat import repeat
+from foretwin.orchestrator.report.page import html_of
+from foretwin.orchestrator.report.write_report import report_of_folders
+from tests.orchestrator.report.test_write_report import MOST_BYTES, Read
+from tests.orchestrator.sweeps import small_sweep
+
+COVERS = (
+    "foretwin.orchestrator.report.sweep_details",
+    "foretwin.orchestrator.report.sweep_material",
+)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("swept")
+    out = folder / "out"
+    assert run(["sweep", str(small_sweep(folder)), "--out", str(out), "--workers", "1"]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def page(swept: Path) -> str:
+    return html_of(report_of_folders([swept]))
+
+
+@pytest.mark.judge
+def test_it_tells_outcomes_and_stands_alone(swept: Path, page: str) -> None:
+    read, record = Read(page), json.loads((swept / "sweep.json").read_text())
+
+    assert f"Of {record['placed']} cases that could be played {record['collided']}" in page
+    assert "Outcome by junction, scenario and planner" in page
+    assert "constant_speed" in page
+    assert read.loaded == []
+    assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
+    assert len(page.encode()) < MOST_BYTES
+
+
+@pytest.mark.judge
+def test_worst_cases_play_again_to_the_same_hash(swept: Path, page: str) -> None:
+    commands = [code.split() for code in Read(page).codes if code.startswith("foretwin repeat")]
+
+    assert commands
+    for command in commands[::3]:
+        assert repeat(swept, command[3], as_json=True, view=False) == 0
+
+
+def test_a_sweep_that_played_nothing_says_so(tmp_path: Path) -> None:
+    (tmp_path / "sweep.json").write_text(json.dumps({"complete": False, "spec": {}}))
+
+    page = html_of(report_of_folders([tmp_path]))
+
+    assert "The sweep holds no rows: nothing was played." in page
+    assert "not complete" in page
