@@ -105,6 +105,7 @@ SHAPES: dict[type[msgspec.Struct], dict[str, str]] = {
         "likelihood": "S",
         "names": "S",
         "user_xy_m": "K M 2",
+        "met": "K?",
         "touch_xy_m": "C 2",
         "touch_names": "C",
     },

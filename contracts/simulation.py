@@ -7,7 +7,9 @@ from typing import Literal
 import msgspec
 
 from foretwin.contracts.arrays import Array32
+from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.roles import Role
+from foretwin.contracts.world import Control
 
 
 class PrepareRequest(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,6 +47,25 @@ RED_FROM, AMBER_FROM, GREEN_TO = 1e-4, 1e-6, 1e-8
 would kill one in ten thousand, or comes once in a hundred times and would kill one in a hundred."""
 
 
+class FutureHit(msgspec.Struct, frozen=True, kw_only=True):
+    """A collision in a round: of which future, when, and with what: a kind of road user, or
+    `static`."""
+
+    future: int
+    time_s: float
+    what: RoadUserKind | Literal["static"]
+
+
+class MetRoadUser(msgspec.Struct, frozen=True, kw_only=True):
+    """Whom a future of a round meets, hit or not, and when it is nearest."""
+
+    future: int
+    time_s: float
+    kind: RoadUserKind
+    scenario_id: str = ""
+    """Of the scenario that it belongs to; empty for one that was seen on the road."""
+
+
 class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     """One round for those who watch: futures (S, M, 2) and the rest in the drive's frame.
 
@@ -74,6 +95,12 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     touch_names: tuple[str, ...]
     late: bool = False
     """Complete after the next round was due: nothing here is current any more."""
+    horizon_s: float = 0.0
+    """What the M points of each line span, evenly; 0 where it was not told."""
+    hits: tuple[FutureHit, ...] = ()
+    """The collisions among the futures."""
+    met: tuple[MetRoadUser, ...] = ()
+    """Whose tracks `user_xy_m` (K, M, 2) are."""
 
 
 class HorizonError(msgspec.Struct, frozen=True, kw_only=True):
@@ -247,6 +274,11 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     """Of all processes of the run together."""
     arrival_early_s: float | None = None
     """One of ten arrives before; None where that is not known."""
+    junction_id: str | None = None
+    """Of the next intersection, by which its World is known."""
+    junction_control: Control | None = None
+    junction_m: float | None = None
+    """How far it is along the road."""
     arrival_late_s: float | None = None
     """Nine of ten have arrived; None with `arrival_early_s` known: one of ten may stand before."""
 

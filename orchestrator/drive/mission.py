@@ -141,8 +141,10 @@ class Mission:
     def next_junction(self) -> NextJunction | None:
         """The junction ahead, as it is shown."""
         for ahead in self.way.junctions[:1]:
-            name = ahead.junction.summary.name or ahead.junction.summary.id
-            return NextJunction(name, self.way.countdown_s, ahead.distance_m)
+            summary = ahead.junction.summary
+            name = summary.name or summary.id
+            in_s = self.way.countdown_s
+            return NextJunction(name, in_s, ahead.distance_m, summary.id, summary.control)
         return None
 
     @property

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.frames import LocalFrame, target_from_source
-from foretwin.contracts.futures import COLLISION_WITH
-from foretwin.contracts.simulation import RoundView
+from foretwin.contracts.futures import COLLISION_WITH, RoadUserTracks
+from foretwin.contracts.simulation import FutureHit, MetRoadUser, RoundView
 from foretwin.contracts.trace import traced
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.result_rows import RoundFutures
@@ -19,7 +20,7 @@ from foretwin.orchestrator.runner.open_rounds import RoundDone
 VIEW_POINTS = 25
 _SHOWN = 16
 """Of so many futures, the worst first, one sees the road user that they hit or nearly hit."""
-_ROAD_USER = COLLISION_WITH.index("road_user")
+_ROAD_USER, _STATIC = COLLISION_WITH.index("road_user"), COLLISION_WITH.index("static")
 
 
 @traced("view of a round")
@@ -64,6 +65,9 @@ def round_view(
         touch_xy_m=in_drive(met.touches_m),
         touch_names=met.touch_names,
         late=done.late,
+        horizon_s=float(done.results[0].trajectory.time_s[-1]),
+        hits=met.hits,
+        met=met.road_users,
     )
 
 
@@ -84,35 +88,61 @@ def _names(done: RoundDone) -> tuple[str, ...]:
 
 
 class _Met(NamedTuple):
-    """In the World's frame: tracks (K, M, 2), places of touches (C, 2) and what happened there."""
+    """In the World's frame: tracks (K, M, 2) of road users, places of touches (C, 2) and what
+    happened there; all collisions."""
 
     tracks_m: Array
     touches_m: Array
     touch_names: tuple[str, ...]
+    road_users: tuple[MetRoadUser, ...]
+    hits: tuple[FutureHit, ...]
 
 
 def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Met:
     """Return the nearest road user of each of the worst futures, and where cars touch theirs."""
     tracks, touches, names = [], [], []
+    road_users: list[MetRoadUser] = []
+    hits: list[FutureHit] = []
     worst = {int(i) for i in np.argsort(-criticality, kind="stable")[:_SHOWN]}
-    number = 0
+    number = -1
     for result in done.results:
         poses, states = result.road_users.poses, result.trajectory.states
+        times_s, outcome = result.trajectory.time_s, result.outcome
         for place in range(len(result.future_indices)):
+            number += 1
             shown = number in worst and criticality[number] > 0.0
             future = done.order.futures[number]
-            number += 1
+            hit_s = float(outcome.collision_time_s[place]) if outcome.collided[place] else None
+            if hit_s is not None and outcome.collision_with[place] == _STATIC:
+                hits.append(FutureHit(future=number, time_s=hit_s, what="static"))
             there = np.flatnonzero(np.isfinite(poses[place, 0, :, 0]))
             if not len(there):
                 continue
             away = poses[place][:, there, :2] - states[place, :, None, :2]
-            nearest = there[np.hypot(away[..., 0], away[..., 1]).min(axis=0).argmin()]
+            far_m = np.hypot(away[..., 0], away[..., 1])
+            who = int(far_m.min(axis=0).argmin())
+            nearest = int(there[who])
+            kind = _kind(result.road_users, place, nearest)
             if shown:
                 tracks.append(poses[place, kept, nearest, :2])
-            if result.outcome.collision_with[place] == _ROAD_USER:
-                time_s = float(result.outcome.collision_time_s[place])
-                instant = int(np.searchsorted(result.trajectory.time_s, time_s))
+                nearest_s = float(times_s[int(far_m[:, who].argmin())])
+                road_users.append(
+                    MetRoadUser(
+                        future=number,
+                        time_s=nearest_s if hit_s is None else hit_s,
+                        kind=kind,
+                        scenario_id=future.scenario_id,
+                    )
+                )
+            if hit_s is not None and outcome.collision_with[place] == _ROAD_USER:
+                hits.append(FutureHit(future=number, time_s=hit_s, what=kind))
+                instant = int(np.searchsorted(times_s, hit_s))
                 touches.append(poses[place, min(instant, poses.shape[1] - 1), nearest, :2])
                 names.append(future.scenario_id)
     found = np.array(tracks, dtype=np.float64).reshape(-1, len(kept), 2)
-    return _Met(found, np.array(touches, dtype=np.float64).reshape(-1, 2), tuple(names))
+    touched = np.array(touches, dtype=np.float64).reshape(-1, 2)
+    return _Met(found, touched, tuple(names), tuple(road_users), tuple(hits))
+
+
+def _kind(users: RoadUserTracks, place: int, number: int) -> RoadUserKind:
+    return cast(RoadUserKind, users.kind_names[int(users.kinds[place, number])])

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.world import Control
 from foretwin.orchestrator.routing.going_on import (
     FADING_S,
     LEARN_FASTER_S,
@@ -133,6 +134,8 @@ class NextJunction(NamedTuple):
     name: str
     in_s: float | None
     distance_m: float
+    junction_id: str
+    control: Control
 
 
 class Countdown:

@@ -162,7 +162,9 @@ def test_a_street_named_like_markup_is_shown_as_it_is_named(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name = "[/a] Lane \x1b[2J"
-    monkeypatch.setattr(type(house.mission), "next_junction", NextJunction(name, 5.0, 40.0))
+    monkeypatch.setattr(
+        type(house.mission), "next_junction", NextJunction(name, 5.0, 40.0, "j1", "signals")
+    )
     monkeypatch.setenv("FORCE_COLOR", "1")
     house.drive(5)
     said = io.StringIO()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import RoadUserTracks
+from foretwin.contracts.simulation import FutureHit
 from foretwin.orchestrator.record.result_rows import round_futures
 from foretwin.orchestrator.rounds.views import VIEW_POINTS, place_of, round_view
 from foretwin.orchestrator.runner.open_rounds import RoundDone
@@ -119,3 +120,25 @@ def test_a_round_is_at_the_streets_that_meet_there() -> None:
     assert place_of(done, msgspec.structs.replace(world, junctions=())) == ""
     view = round_view(done, round_futures(done).futures, FRAME, FRAME, "Mill Lane")
     assert view.place == "Mill Lane"
+
+
+def test_it_tells_who_is_met_when_and_what_is_hit() -> None:
+    done = meeting((40.0, 2.0), (30.0, 60.0))
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert view.horizon_s == TIME_S[-1]
+    assert view.hits == (FutureHit(future=2, time_s=4.0, what="car"),)
+    assert [(one.future, one.kind, one.scenario_id) for one in view.met] == [
+        (1, "car", "scp"),
+        (2, "car", "scp"),
+    ]
+    near, hit = view.met
+    assert near.time_s == pytest.approx(4.0, abs=0.11), "40 m at 10 m/s"
+    assert hit.time_s == 4.0
+
+
+def test_a_wall_that_is_hit_is_told_where_nobody_is_about() -> None:
+    done = meeting()
+    done.results[0].outcome.collision_with[2] = 2
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert view.hits == (FutureHit(future=2, time_s=4.0, what="static"),)
+    assert view.met == ()
