@@ -9,9 +9,9 @@ import rerun.blueprint as rrb
 
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
 from foretwin.viewer.log_drive import PLAN, TRAIL
-from foretwin.viewer.log_roles import CORRECTION, GHOST, REAL, SHADOW, TWIN
-from foretwin.viewer.log_scenarios import CRITICAL, NOMINAL, ROAD_USER, SAFE, WATCH
-from foretwin.viewer.meshes import Colour
+from foretwin.viewer.colours import CRITICAL, GHOST, NOMINAL, REAL, ROAD_USER, SAFE
+from foretwin.viewer.colours import SHADOW, TWIN, WATCH, Colour
+from foretwin.viewer.log_roles import CORRECTION
 from foretwin.viewer.rows import Row, static
 
 ROUTE: Colour = (64, 142, 132)

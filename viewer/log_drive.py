@@ -13,8 +13,8 @@ from foretwin.contracts.drive import GnssFix, PlannedTrajectory, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
 from foretwin.contracts.gap import limits_after
 from foretwin.contracts.simulation import MirrorSample, PlaneState
-from foretwin.viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
-from foretwin.viewer.meshes import Colour
+from foretwin.viewer.colours import GHOST, SHADOW, TWIN, Colour
+from foretwin.viewer.log_roles import RolesLog, box_of, pose_of
 from foretwin.viewer.rows import Row, point_at, raised, static
 
 TRAIL: Colour = (126, 132, 144)

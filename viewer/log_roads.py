@@ -7,7 +7,7 @@ import rerun as rr
 
 from foretwin.contracts.roads_shown import RoadsShown
 from foretwin.viewer.legend import ROUTE
-from foretwin.viewer.meshes import Colour
+from foretwin.viewer.colours import Colour
 from foretwin.viewer.rows import Row, plain_text, point_at, raised, static
 
 STREET: Colour = (92, 98, 110)

@@ -7,13 +7,9 @@ import rerun as rr
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
-from foretwin.viewer.meshes import Colour
+from foretwin.viewer.colours import GHOST, REAL, SHADOW, TWIN, Colour
 from foretwin.viewer.rows import Row, path_part, point_at, static
 
-REAL: Colour = (245, 246, 250)
-TWIN: Colour = (0, 200, 255)
-SHADOW: Colour = (178, 132, 255)
-GHOST: Colour = (255, 120, 200)
 FREE: Colour = (0, 92, 120)
 CORRECTION: Colour = (255, 196, 0)
 

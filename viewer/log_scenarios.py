@@ -18,14 +18,10 @@ from foretwin.contracts.simulation import (
     PlanComparison,
     RoundView,
 )
+from foretwin.viewer.colours import CRITICAL, NOMINAL, ROAD_USER, SAFE, TWIN, WATCH, Colour
 from foretwin.viewer.log_drive import PLAN
-from foretwin.viewer.log_roles import TWIN
-from foretwin.viewer.meshes import Colour
 from foretwin.viewer.rows import Row, document, in_markdown, point_at, raised, static
 
-SAFE, WATCH, CRITICAL = (56, 176, 92), (255, 184, 28), (234, 62, 56)
-NOMINAL: Colour = (250, 250, 255)
-ROAD_USER: Colour = (214, 112, 214)
 BASELINES: dict[str, tuple[Colour, str]] = {
     "nominal": (TWIN, "nominal future"),
     "constant_velocity": ((255, 176, 66), "constant velocity"),

@@ -16,9 +16,8 @@ from foretwin.contracts.gap import (
     Verdict,
 )
 from foretwin.contracts.tuning import Identification, ParameterChange, ParameterEstimate
+from foretwin.viewer.colours import REAL, TWIN, Colour
 from foretwin.viewer.log_drive import LIMIT, PLAN
-from foretwin.viewer.log_roles import REAL, TWIN
-from foretwin.viewer.meshes import Colour
 from foretwin.viewer.rows import Row, document, in_markdown, static
 
 _SHOWN_VERDICTS = 20

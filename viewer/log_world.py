@@ -13,7 +13,8 @@ from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_so
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import Area, World
 from foretwin.geometry.polyline import offset
-from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
+from foretwin.viewer.colours import Colour
+from foretwin.viewer.meshes import Mesh, Polygon, flat_mesh, prism_mesh
 from foretwin.viewer.rows import Row, path_part, raised
 
 GROUND: Colour = (25, 28, 35)

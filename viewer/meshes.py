@@ -12,8 +12,7 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.reflex_cuts import polygons_of
 from foretwin.geometry.triangles import Triangles, triangulated
-
-Colour = tuple[int, int, int]
+from foretwin.viewer.colours import Colour
 
 
 class Polygon(NamedTuple):

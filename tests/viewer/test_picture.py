@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.colours import CRITICAL, TWIN
 from foretwin.viewer.log_drive import LIMIT
-from foretwin.viewer.log_roles import TWIN
-from foretwin.viewer.log_scenarios import CRITICAL
 from foretwin.viewer.log_world import ROAD
 from foretwin.viewer.monitor import Monitor
 from foretwin.viewer.picture import Picture, has_vulkan, main, take_picture
