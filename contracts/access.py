@@ -38,6 +38,8 @@ class BusMember(NamedTuple):
     role: BusRole
     process_id: str = "*"
     vehicle_id: str = "*"
+    beside: tuple[str, ...] = ()
+    """Further processes that may join as this one."""
 
 
 def access_control(
@@ -121,7 +123,12 @@ def _allowed(member: BusMember, run_id: str) -> list[tuple[str, tuple[str, ...],
         (
             "is alive",
             ("liveliness_token",),
-            [] if member.role in _HEARS else [ALIVE_KEY.format(**own)],
+            []
+            if member.role in _HEARS
+            else [
+                ALIVE_KEY.format(**own | {"process": one})
+                for one in (member.process_id, *member.beside)
+            ],
         ),
         (
             "sees who is",

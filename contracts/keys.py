@@ -14,6 +14,7 @@ from foretwin.contracts import (
     drive,
     fleet,
     gap,
+    marks,
     placement,
     planner_link,
     roles,
@@ -171,6 +172,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     },
     (_RUN, REQUEST, _OPERATOR): {
         "set": Channel(tuning.SetRequest, None, "change a running drive", tuning.SetReply),
+    },
+    (_RUN, REQUEST, (Writer("viewer"), *_OPERATOR)): {
+        "mark": Channel(marks.MarkRequest, None, "mark an event", marks.MarkReply),
     },
     # What those who watch receive.
     (_RUN, RESULT, _ORCHESTRATOR): {

@@ -30,7 +30,13 @@ from foretwin.contracts.process_setup import Admission, BusSetup
 
 BUS = "bus"
 """The folder of names and passwords where there can be no socket."""
-OUTSIDERS = BusMember("operator", "operator"), BusMember("planner", "planner")
+WATCH = "viewer-watch"
+"""Who looks on from another seat; it needs no token, since nobody waits for it."""
+OUTSIDERS = (
+    BusMember("operator", "operator"),
+    BusMember("planner", "planner"),
+    BusMember(WATCH, "viewer", "watch"),
+)
 """Who may join the bus of a drive without having been started by it."""
 
 

@@ -32,6 +32,8 @@ LOCAL_ROLES: tuple[CampaignRole, ...] = ("router", "orchestrator", "worker", "vi
 """Of the processes that every drive starts itself."""
 _ONE_PROCESS = "orchestrator", "viewer", "recorder"
 """Roles of a single process, named like them: they can hold no other one's token."""
+_BESIDE: dict[CampaignRole, tuple[str, ...]] = {"viewer": ("copilot",)}
+"""But for these: the co-pilot display is a viewer, too."""
 
 
 def check_campaign(
@@ -57,7 +59,12 @@ def admission(run_id: str, campaign: Path | None = None) -> Admission:
     The machines of a `campaign` whose workers join have names: each speaks for its own alone.
     """
     members = [
-        BusMember(role, role, process_id=role if role in _ONE_PROCESS else "*")
+        BusMember(
+            role,
+            role,
+            process_id=role if role in _ONE_PROCESS else "*",
+            beside=_BESIDE.get(role, ()),
+        )
         for role in CAMPAIGN_ROLES
         if role != "router"
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from typing import Literal
 
 from foretwin.contracts import keys
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
@@ -17,21 +18,17 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.far_member import FleetTag
 from foretwin.orchestrator.drive.fleet_handler import FleetHandler
 from foretwin.orchestrator.drive.intake import Intake, unplaced
+from foretwin.orchestrator.drive.mark_handler import MarkHandler
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.drive.processes import (
-    BUILDER,
-    MIRROR,
-    ORCHESTRATOR,
-    VIEWER,
-    expected_ids,
-)
+from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, expected_ids
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
 from foretwin.orchestrator.drive.strangers import Strangers
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
+from foretwin.orchestrator.drive.watcher_setups import WATCHERS
 from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, NotReady, UseWorld
 from foretwin.orchestrator.other_vehicles.vehicles import OtherVehicleFeed
@@ -53,9 +50,8 @@ class Conductor:
     def __init__(self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables) -> None:
         self.plan, self.bus = plan, bus
         self.mission, self.tables = mission, tables
-        self.mailbox = Mailbox(
-            MAILBOX_DEPTH, when_full="block" if plan.config.lock_step else "drop_oldest"
-        )
+        full: Literal["block", "drop_oldest"] = "block" if plan.config.lock_step else "drop_oldest"
+        self.mailbox = Mailbox(MAILBOX_DEPTH, when_full=full)
         self.intake = Intake(plan.vehicle, pace=plan.config.speed)
         self.events = EventHandler(
             bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
@@ -115,6 +111,11 @@ class Conductor:
             **dict.fromkeys(("enlist", "admit", "clock"), self.fleet.reply),
         }
         """What takes the answers to each question that is asked through the mailbox."""
+        self._on_question: dict[str, Callable[[Request], object]] = {
+            "set": lambda item: self.changes.take(item, stamp_ns=self.intake.now_stamp_ns),
+            "mark": MarkHandler(context, self.intake, mission).take,
+            "world_file": self.fleet.give_world,
+        }
 
     def join(self) -> None:
         """Subscribe to everything a drive listens to."""
@@ -126,7 +127,8 @@ class Conductor:
         self.route.join(self.bus, self.mailbox)
         self.context.subscribe("mirror", "event")
         self.tuning.join()
-        self.bus.serve("set", self.mailbox, run=run)
+        for question in ("set", "mark"):
+            self.bus.serve(question, self.mailbox, run=run)
         if self.fleet.open:
             self.bus.serve("world_file", self.mailbox, run=run)
         self.bus.watch_alive(keys.alive_key(run=run, process="*"), self.mailbox)
@@ -157,10 +159,8 @@ class Conductor:
                         self.refusals.take(item.refused)
                     far = isinstance(item.tag, FleetTag)
                     (self.fleet.reply if far else self._on_reply[channel])(item)
-                case Request(channel="set"):
-                    self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
-                case Request(channel="world_file"):
-                    self.fleet.give_world(item)
+                case Request(channel=channel) if channel in self._on_question:
+                    self._on_question[channel](item)
                 case Alive():
                     self._alive(item)
         except Refused as refused:
@@ -276,7 +276,7 @@ class Conductor:
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
-        elif process_id == VIEWER:
+        elif process_id in WATCHERS:
             self.active_world.viewer_up()
 
     def _worker_up(self, process_id: str) -> None:

@@ -15,6 +15,7 @@ import pyarrow as pa
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.gap import GapSample
+from foretwin.contracts.marks import Mark
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.contracts.simulation import (
     Comparison,
@@ -94,6 +95,7 @@ _COLUMNS = {
         "arrived_at_s:float built_at_s:float within_radius_at_s:float world_ready_before_s:float"
     ),
     "events": columns_of(Event),
+    "marks": columns_of(Mark),
 }
 _ROUNDS = columns(
     "round_id:int stamp_ns:int drive_time_s:float intersection_id:str world_id:str futures:int "
@@ -133,9 +135,8 @@ class ResultTables:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         told = {**metadata, **played_with()}
-        self._streams = RunStreams(
-            folder, {name: schema.with_metadata(told) for name, schema in TABLES.items()}
-        )
+        schemas = {name: schema.with_metadata(told) for name, schema in TABLES.items()}
+        self._streams = RunStreams(folder, schemas)
         self._queue: queue.Queue[tuple[str, Rows] | None] = queue.Queue(QUEUE_DEPTH)
         self._lossless, self._roll = lossless, (keep or Keep()).tables
         self._kept = KeptParts(folder.parent, keep or Keep())

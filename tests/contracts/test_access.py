@@ -34,7 +34,7 @@ MEMBERS = (
     BusMember("worker-w0", "worker", "w0"),
     BusMember("worker-w1", "worker", "w1"),
     BusMember("car-vehicle", "car", "vehicle", "ego"),
-    BusMember("viewer", "viewer", "viewer"),
+    BusMember("viewer", "viewer", "viewer", beside=("copilot",)),
     BusMember("recorder", "recorder", "recorder"),
     BusMember("operator", "operator"),
     BusMember("planner", "planner"),
