@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from foretwin.contracts.campaign import TlsFiles
 from foretwin.contracts.fleet import MachineInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.layout import Layout
@@ -168,3 +169,23 @@ class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     title: str = "foretwin"
     attribution: str = ATTRIBUTION
     start_stamp_ns: int = 0
+
+
+class CopilotSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Serves the co-pilot display at `host` and `port`; frames lie in `drive_frame`."""
+
+    drive_frame: LocalFrame
+    port: int
+    host: str = "127.0.0.1"
+    worlds_dir: str | None = None
+    """None: Worlds are asked for over the bus."""
+    start_stamp_ns: int = 0
+    attribution: str = ATTRIBUTION
+    seat: str = "co-pilot"
+    """Who marks events here, where the page does not say it."""
+    operator: BusSetup | None = None
+    """How roles are changed from the page; None: nobody may there."""
+    page_tls: TlsFiles | None = None
+    """The certificate that the page is served with; without one only on the loopback interface."""
+    frames_file: str | None = None
+    """Where what the display showed is kept."""

@@ -21,7 +21,7 @@ from foretwin.orchestrator.processors import processors, trouble_with_workers
 from foretwin.orchestrator.settings import flag_of
 from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning
 
-View = Literal["auto", "native", "web", "none"]
+View = Literal["auto", "native", "web", "copilot", "none"]
 MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
 MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0

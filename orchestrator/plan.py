@@ -103,6 +103,8 @@ class DrivePlan(DriveInputs):
     """The bus of this host; None where anybody may join at `endpoint`."""
     order_keys: OrderKeys | None = None
     """Whose orders towards the vehicle count, while anything may go there."""
+    copilot_port: int | None = None
+    """Where the co-pilot display is served; None where there is none."""
     metrics: socket.socket | None = None
     """Listens for who asks for metrics; None where nobody may."""
 

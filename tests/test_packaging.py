@@ -14,6 +14,7 @@ ROOMS = (
     "contracts", "geometry", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer",
 )  # fmt: skip
 DATA_SUFFIXES = (".toml", ".osm", ".geojson", ".xml", ".json", ".msg", ".j2", ".css", ".js")
+PAGE_SUFFIXES = (".html", ".svg")
 
 pytestmark = pytest.mark.judge
 
@@ -35,7 +36,7 @@ def test_wheel_holds_every_module_and_data_file(wheel: Path) -> None:
         f"foretwin/{path.relative_to(ROOT)}"
         for room in ROOMS
         for path in (ROOT / room).rglob("*")
-        if path.suffix in (*DATA_SUFFIXES, ".py")
+        if path.suffix in (*DATA_SUFFIXES, *PAGE_SUFFIXES, ".py")
     }
 
     assert needed - held == set()

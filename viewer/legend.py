@@ -8,9 +8,19 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
+from foretwin.viewer.colours import (
+    CRITICAL,
+    GHOST,
+    NOMINAL,
+    REAL,
+    ROAD_USER,
+    SAFE,
+    SHADOW,
+    TWIN,
+    WATCH,
+    Colour,
+)
 from foretwin.viewer.log_drive import PLAN, TRAIL
-from foretwin.viewer.colours import CRITICAL, GHOST, NOMINAL, REAL, ROAD_USER, SAFE
-from foretwin.viewer.colours import SHADOW, TWIN, WATCH, Colour
 from foretwin.viewer.log_roles import CORRECTION
 from foretwin.viewer.rows import Row, static
 

@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 
 from foretwin.contracts.roads_shown import RoadsShown
-from foretwin.viewer.legend import ROUTE
 from foretwin.viewer.colours import Colour
+from foretwin.viewer.legend import ROUTE
 from foretwin.viewer.rows import Row, plain_text, point_at, raised, static
 
 STREET: Colour = (92, 98, 110)

@@ -124,7 +124,7 @@ def drive(
     progress_table: ProgressTableOption = None,
     map_aiding: MapAidingOption = None,
     view: Annotated[
-        str | None, typer.Option(help="auto, native, web or none [default: auto]")
+        str | None, typer.Option(help="auto, native, web, copilot or none [default: auto]")
     ] = None,
     layout: LayoutOption = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,

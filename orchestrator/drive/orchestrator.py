@@ -10,7 +10,6 @@ from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.ports import LOOPBACK
 from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.simulation import RunEnd
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -25,7 +24,7 @@ from foretwin.orchestrator.drive.metrics_server import told_metrics
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.drive.operator_metrics import DriveCounts
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
-from foretwin.orchestrator.drive.processes import BUILDER, ORCHESTRATOR, ROUTER
+from foretwin.orchestrator.drive.processes import BUILDER, ORCHESTRATOR, ROUTER, member
 from foretwin.orchestrator.drive.progress import ProgressLine, waiting_text
 from foretwin.orchestrator.drive.record_keeper import RecordKeeper
 from foretwin.orchestrator.drive.router_start import join_bus
@@ -34,6 +33,7 @@ from foretwin.orchestrator.drive.standing import go_on, read_standing
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summary_text
 from foretwin.orchestrator.drive.supervision import CRASH, DriveError, DriveProcesses, Life
+from foretwin.orchestrator.drive.watcher_setups import COPILOT, addresses
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
@@ -143,8 +143,8 @@ class Orchestrator:
                 return before.exit_word or "failed"
         else:
             line.say(f"run {plan.folder}")
-            if plan.live_view == "web":
-                line.say(f"view http://{LOOPBACK}:{plan.page_port}/")
+            for address in addresses(plan, plan.bus_of(member(plan, COPILOT))):
+                line.say(address)
             line.say(plan.config.tuning_choice.text)
             if plan.config.resolved_source == "live":
                 line.say(waiting_text(plan))

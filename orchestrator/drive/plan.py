@@ -18,6 +18,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.layout import read_layout
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.page_address import USUAL_PORT
 from foretwin.contracts.ports import WEB_PORT, free_or
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
@@ -221,7 +222,7 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
     folder = out / run_id
     for sub in ("worlds", "results", "processes"):
         (folder / sub).mkdir(parents=True, exist_ok=sub != "worlds")
-    live = config.view
+    live: str = "none" if config.view == "copilot" else config.view
     if live == "auto":
         live = "native" if has_display() else "none"
     plan = DrivePlan(
@@ -235,6 +236,7 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
         ),
         live_view=live,
         page_port=free_or(WEB_PORT),
+        copilot_port=free_or(USUAL_PORT) if config.view == "copilot" else None,
     )
     try:
         if plan.standin is not None:

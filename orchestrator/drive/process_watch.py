@@ -16,7 +16,8 @@ from foretwin.orchestrator.campaign.ending import CertificateEnd
 from foretwin.orchestrator.campaign.joining import ends
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.plan import starts_a_car
-from foretwin.orchestrator.drive.processes import ORCHESTRATOR, ROUTER, VIEWER
+from foretwin.orchestrator.drive.processes import ORCHESTRATOR, ROUTER
+from foretwin.orchestrator.drive.watcher_setups import VIEWER
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.supervisor import Death, SupervisedRow

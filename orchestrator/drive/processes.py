@@ -7,20 +7,25 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.keys import BusRole
-from foretwin.contracts.layout import read_layout
 from foretwin.contracts.local_bus import OUTSIDERS, member_of
 from foretwin.contracts.process_setup import RouterSetup
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
     BuilderSetup,
     ProcessSetup,
-    RecorderSetup,
     ReplaySetup,
     Ros2Setup,
     StandinSetup,
     TuningSetup,
-    ViewerSetup,
     WorkerSetup,
+)
+from foretwin.orchestrator.drive.watcher_setups import (
+    COPILOT,
+    RECORDER,
+    VIEWER,
+    copilot_setup,
+    recorder_setup,
+    viewer_setup,
 )
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.orchestrator.rounds.jobs import planners_of
@@ -30,7 +35,6 @@ ORCHESTRATOR, SUPERVISOR = "orchestrator", "supervisor"
 ROUTER = "router"
 BUILDER = "builder"
 MIRROR = "mirror"
-RECORDER, VIEWER = "recorder", "viewer"
 TUNING = "tuning"
 VEHICLE = "vehicle"
 ROS2_BESIDE = "ros2-beside"
@@ -40,11 +44,15 @@ _ROLES: dict[str, BusRole] = {
     ORCHESTRATOR: "orchestrator",
     RECORDER: "recorder",
     VIEWER: "viewer",
+    COPILOT: "viewer",
     VEHICLE: "car",
     "ros2": "car",
     ROS2_BESIDE: "car",
 }
 """Roles of processes by name, where it is none of a worker; a gateway speaks for its vehicle."""
+
+
+_MakesSetup = Callable[[DrivePlan, str], ProcessSetup]
 
 
 class ProcessRow(NamedTuple):
@@ -54,7 +62,7 @@ class ProcessRow(NamedTuple):
     name: str
     module: str
     when_dead: WhenDead
-    setup: Callable[[DrivePlan, str], ProcessSetup]
+    setup: _MakesSetup
     nice: int = 0
     """Added to the scheduling niceness: who writes for later gives way to who is waited for."""
     runs: Callable[[DrivePlan], bool] = lambda _: True
@@ -156,29 +164,8 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     )
 
 
-def _recorder(plan: DrivePlan, process_id: str) -> ProcessSetup:
-    return RecorderSetup(
-        **_base(plan, process_id),
-        file=str(plan.recording),
-        roll=plan.keep.recordings,
-    )
-
-
-def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
-    return ViewerSetup(
-        **_base(plan, process_id),
-        file=str(plan.folder / "monitor.rrd"),
-        roll=plan.keep.view,
-        worlds_dir=str(plan.worlds_dir),
-        drive_frame=plan.drive_frame,
-        live=plan.live_view,
-        page_port=plan.page_port,
-        layout=read_layout(plan.config.layout),
-        roads=str(plan.roads_file),
-        title=f"foretwin {plan.run_id}",
-        attribution=plan.osm.attribution,
-        start_stamp_ns=plan.start_stamp_ns,
-    )
+def _watcher(made: Callable[[DrivePlan, dict[str, Any]], ProcessSetup]) -> _MakesSetup:
+    return lambda plan, process_id: made(plan, _base(plan, process_id))
 
 
 def _replay(plan: DrivePlan, process_id: str) -> ProcessSetup:
@@ -247,8 +234,16 @@ PROCESSES = (
     ProcessRow("w", "sim_worker", "restart", _worker, how_many=lambda plan: plan.config.workers),
     ProcessRow(MIRROR, "sim_worker", "restart", _worker),
     ProcessRow(TUNING, "sim_worker.analysis.process", "restart", _tuning, nice=10, runs=_tunes),
-    ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _recorder),
-    ProcessRow(VIEWER, "viewer", "restart", _viewer, nice=10),
+    ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _watcher(recorder_setup)),
+    ProcessRow(VIEWER, "viewer", "restart", _watcher(viewer_setup), nice=10),
+    ProcessRow(
+        COPILOT,
+        "viewer.copilot",
+        "restart",
+        _watcher(copilot_setup),
+        nice=5,
+        runs=lambda plan: plan.copilot_port is not None,
+    ),
     ProcessRow(VEHICLE, _REPLAY, "end_drive", _replay, runs=_source_is("log")),
     ProcessRow(VEHICLE, _STANDIN, "end_drive", _standin, runs=_source_is("standin")),
     # Never started again: what has stopped towards a vehicle must not resume by itself.
@@ -275,7 +270,7 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     """
     if row.name == ROUTER and plan.config.lock_step:
         return row._replace(when_dead="end_drive")
-    if row.name in (TUNING, RECORDER, VIEWER) and plan.config.lock_step:
+    if row.name in (TUNING, RECORDER, VIEWER, COPILOT) and plan.config.lock_step:
         return row._replace(when_dead="report")
     return row
 

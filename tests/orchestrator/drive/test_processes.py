@@ -7,18 +7,25 @@ from pathlib import Path
 
 import msgspec
 
-from foretwin.contracts.setup import WorkerSetup
+from foretwin.contracts.credentials import make_credentials
+from foretwin.contracts.local_bus import LocalBus
+from foretwin.contracts.process_setup import BusSetup
+from foretwin.contracts.setup import CopilotSetup, WorkerSetup
 from foretwin.orchestrator.config import OtherVehicleConfig
 from foretwin.orchestrator.drive.processes import (
     PROCESSES,
     TUNING,
     expected_ids,
+    member,
     process_ids,
     row_of,
 )
+from foretwin.orchestrator.drive.watcher_setups import COPILOT, copilot_address
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
 from tests.orchestrator.trip import town_plan
+
+COVERS = ("foretwin.orchestrator.drive.watcher_setups",)
 
 
 def configured(plan: DrivePlan, **settings: object) -> DrivePlan:
@@ -77,3 +84,25 @@ def test_in_lock_step_tuning_does_not_begin_in_the_middle(tmp_path: Path) -> Non
     (row,) = (row for row in PROCESSES if row.name == TUNING)
     assert row_of(row, configured(plan, speed=1.0)).when_dead == "restart"
     assert row_of(row, configured(plan, speed=None)).when_dead == "report"
+
+
+def test_the_copilot_display_is_a_viewer_whose_page_may_change_roles(tmp_path: Path) -> None:
+    plan = configured(town_plan(tmp_path))
+    assert COPILOT not in ids(plan)
+    assert copilot_address(plan, plan.bus) is None
+    make_credentials(tmp_path, ["viewer-copilot"])
+    local = LocalBus(BusSetup(endpoint="unixsock-stream/x"), tmp_path)
+    plan = replace(plan, copilot_port=8123, local=local)
+    assert COPILOT in ids(plan)
+    assert COPILOT in expected_ids(plan)
+    own = plan.bus_of(member(plan, COPILOT))
+    assert (member(plan, COPILOT).role, member(plan, COPILOT).name) == ("viewer", "viewer-copilot")
+    (row,) = (one for one in PROCESSES if one.name == COPILOT)
+    setup = row.setup(plan, COPILOT)
+    assert isinstance(setup, CopilotSetup)
+    assert (setup.host, setup.port, setup.bus) == ("127.0.0.1", 8123, own)
+    assert setup.operator == local.setup_of("operator")
+    address = copilot_address(plan, own)
+    assert address is not None
+    assert address.startswith("http://127.0.0.1:8123/")
+    assert row.setup(replace(plan, local=None), COPILOT).operator is None
