@@ -22,7 +22,7 @@ class MarkRequest(msgspec.Struct, frozen=True, kw_only=True):
     """None: now."""
 
 
-class Mark(msgspec.Struct, frozen=True, kw_only=True):
+class EventMark(msgspec.Struct, frozen=True, kw_only=True):
     """An event that was marked, as it stands in the table `marks`.
 
     A note that came later is a row of its own with the same `mark_id`, without a place.

@@ -6,7 +6,7 @@ import msgspec
 
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Request
-from foretwin.contracts.marks import MOST_NOTE, Mark, MarkReply, MarkRequest
+from foretwin.contracts.marks import MOST_NOTE, EventMark, MarkReply, MarkRequest
 from foretwin.contracts.terminal import plain
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive.intake import Intake
@@ -39,7 +39,7 @@ class MarkHandler:
         if len(self._stamps) < MOST_IDS:
             self._stamps[asked.mark_id] = stamp_ns
         drive_time_s = max(0.0, (stamp_ns - self._intake.start_stamp_ns) / 1e9)
-        mark = Mark(
+        mark = EventMark(
             mark_id=asked.mark_id,
             stamp_ns=stamp_ns,
             drive_time_s=drive_time_s,

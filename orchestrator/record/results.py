@@ -15,7 +15,7 @@ import pyarrow as pa
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.gap import GapSample
-from foretwin.contracts.marks import Mark
+from foretwin.contracts.marks import EventMark
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.contracts.simulation import (
     Comparison,
@@ -95,7 +95,7 @@ _COLUMNS = {
         "arrived_at_s:float built_at_s:float within_radius_at_s:float world_ready_before_s:float"
     ),
     "events": columns_of(Event),
-    "marks": columns_of(Mark),
+    "marks": columns_of(EventMark),
 }
 _ROUNDS = columns(
     "round_id:int stamp_ns:int drive_time_s:float intersection_id:str world_id:str futures:int "
@@ -185,7 +185,10 @@ class ResultTables:
         with contextlib.suppress(queue.Full):
             self._queue.put(None, timeout=timeout_s)
         self._moved()
-        while self._thread.is_alive() and (left_s := self._moved_s + timeout_s - _now_s()) > 0.0:
+        while (
+            self._thread.is_alive()
+            and (left_s := self._moved_s + timeout_s - time.monotonic()) > 0.0
+        ):
             self._thread.join(left_s)
         if self._thread.is_alive():
             self.troubles.append(
@@ -213,7 +216,7 @@ class ResultTables:
         return f"`foretwin recover {self._folder.parent}` makes it of what was written"
 
     def _moved(self) -> None:
-        self._moved_s = _now_s()
+        self._moved_s = time.monotonic()
 
     def _run(self) -> None:
         try:
@@ -227,26 +230,26 @@ class ResultTables:
     def _write_streams(self) -> None:
         """Append what comes until the end."""
         streams = self._streams
-        write_s = sync_s = _now_s()
+        write_s = sync_s = time.monotonic()
         over = False
         while not over:
             with contextlib.suppress(queue.Empty):
-                item = self._queue.get(timeout=max(0.0, write_s - _now_s()))
+                item = self._queue.get(timeout=max(0.0, write_s - time.monotonic()))
                 if item is None:
                     over = True
                 else:
                     streams.take(*item)
-            if over or _now_s() >= write_s:
+            if over or time.monotonic() >= write_s:
                 # At the end it is the Parquet files that are synced.
-                sync, before = not over and _now_s() >= sync_s, streams.failing
+                sync, before = not over and time.monotonic() >= sync_s, streams.failing
                 with span("write tables", sync=sync):
                     streams.write(sync=sync)
                 self._tell(before, streams.failing)
                 if sync:
                     self._write_so_far()
                     self._keep_small(streams)
-                write_s = _now_s() + WRITE_S
-                sync_s = _now_s() + SYNC_S - WRITE_S if sync else sync_s
+                write_s = time.monotonic() + WRITE_S
+                sync_s = time.monotonic() + SYNC_S - WRITE_S if sync else sync_s
         streams.close()
         self.troubles += [f"{rows} rows are lost: {why}" for why, rows in streams.lost.items()]
 
@@ -258,9 +261,9 @@ class ResultTables:
 
     def _keep_small(self, streams: RunStreams) -> None:
         """Make Parquet of what is large enough, and remove what is more than is kept."""
-        if _now_s() < self._look_s:
+        if time.monotonic() < self._look_s:
             return
-        self._look_s = _now_s() + LOOK_EVERY_S
+        self._look_s = time.monotonic() + LOOK_EVERY_S
         try:
             for ended in streams.put_away(self._roll):
                 if derive(ended).rows is not None:
@@ -295,7 +298,3 @@ class ResultTables:
         if left:
             names, why = ", ".join(left), next(iter(left.values()))
             self.troubles.append(f"not in Parquet: {names}: {why}; {self._how}")
-
-
-def _now_s() -> float:
-    return time.monotonic()

@@ -56,7 +56,7 @@ class SeenFrame(msgspec.Struct, frozen=True, kw_only=True):
     size: list[float]
 
 
-class Frame(msgspec.Struct, frozen=True, kw_only=True):
+class PageFrame(msgspec.Struct, frozen=True, kw_only=True):
     """Lengths in metres and angles in radians of the drive's frame; `pose` is x, y, yaw, speed."""
 
     drive_s: float

@@ -14,7 +14,7 @@ import msgspec
 import zstandard
 
 from foretwin.contracts.errors import UserError
-from foretwin.viewer.copilot.frame import Frame
+from foretwin.viewer.copilot.frame import PageFrame
 
 WRITE_S = 1.0
 
@@ -72,12 +72,12 @@ class KeptFrames:
         """Drive time of the last frame."""
         return self._times_s[-1]
 
-    def at(self, drive_s: float) -> Frame:
+    def at(self, drive_s: float) -> PageFrame:
         """Return the frame that was shown at a drive time; before the first, that one."""
         return self.frames[max(0, bisect_right(self._times_s, drive_s) - 1)]
 
 
-def _frames(data: bytes) -> list[Frame]:
+def _frames(data: bytes) -> list[PageFrame]:
     """Return the frames in order of drive time; a torn end is left out."""
     text = b""
     with zstandard.ZstdDecompressor().stream_reader(
@@ -91,7 +91,7 @@ def _frames(data: bytes) -> list[Frame]:
     frames = []
     for line in text.splitlines():
         try:
-            frames.append(msgspec.json.decode(line, type=Frame))
+            frames.append(msgspec.json.decode(line, type=PageFrame))
         except msgspec.DecodeError:
             break
     return sorted(frames, key=lambda frame: frame.drive_s)

@@ -51,7 +51,7 @@ class JunctionPlan(msgspec.Struct, frozen=True, kw_only=True):
 
 def junction_plan(world: World, drive_frame: LocalFrame) -> JunctionPlan:
     """Return the plan of a World."""
-    move = _Mover(world.frame, drive_frame)
+    move = _PlanMover(world.frame, drive_frame)
     edges = [
         offset(lane.centerline, side * lane.width_m.value / 2.0)
         for lane in world.lanes
@@ -96,7 +96,7 @@ def _nearby(lines: Iterable[Array]) -> list[Array]:
     return [line for line in lines if _near(line)]
 
 
-class _Mover:
+class _PlanMover:
     """Moves points of a World into the drive's frame, rounded."""
 
     def __init__(self, source: LocalFrame, target: LocalFrame) -> None:

@@ -24,7 +24,7 @@ from foretwin.contracts.world import World
 from foretwin.viewer.copilot import words
 from foretwin.viewer.copilot.alerts import Alerts
 from foretwin.viewer.copilot.danger import Danger, SteadyLevel, dangers_of
-from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, Frame, SeenFrame
+from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
 from foretwin.viewer.copilot.right_of_way import RightOfWay, of_junction, right_of_way
 
 ROUND_FOR_S = 3.0
@@ -143,7 +143,7 @@ class DriveNow:
         told = world_id == self._active or world_id in self._worlds.values()
         return self._world(world_id) if told else None
 
-    def frame(self, now_s: float, *, linked: bool = True) -> Frame:
+    def frame(self, now_s: float, *, linked: bool = True) -> PageFrame:
         """Return what the display shows now."""
         if self._round is not None and now_s - self._round[1] > ROUND_FOR_S:
             self._forget_round()
@@ -152,7 +152,7 @@ class DriveNow:
         standing = words.standing_of(self._mirror, self.alerts.accused)
         ahead = self._ahead()
         view = None if self._round is None else self._round[0]
-        return Frame(
+        return PageFrame(
             drive_s=0.0 if self._state is None else self._drive_s(self._state.stamp_ns),
             level=self._level.shown,
             sentence=words.sentence(

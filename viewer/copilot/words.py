@@ -18,7 +18,7 @@ _CULPRITS: dict[Culprit, str] = {
 }
 
 
-class Standing(NamedTuple):
+class TwinStanding(NamedTuple):
     """How the twin stands to the car: in large letters, in small ones, and whether all is well."""
 
     text: str
@@ -72,15 +72,15 @@ def danger_text(danger: Danger | None, *, elapsed_s: float = 0.0) -> str:
     return f"{danger.what}, {near}{percent(danger.likelihood)}, {left}"
 
 
-def standing_of(mirror: MirrorSample | None, verdict: Verdict | None) -> Standing:
+def standing_of(mirror: MirrorSample | None, verdict: Verdict | None) -> TwinStanding:
     """Return how the twin stands to the car; a verdict says more than a gap.
 
     Gaps count by the one table of limits, after as long as the twin has run freely.
     """
     if verdict is not None and (said := _CULPRITS.get(verdict.culprit)) is not None:
-        return Standing(said, plain(verdict.text), False)
+        return TwinStanding(said, plain(verdict.text), False)
     if mirror is None:
-        return Standing("no twin yet", "", True)
+        return TwinStanding("no twin yet", "", True)
     limits = limits_after(mirror.since_reset_s)
     gaps: dict[LimitedQuantity, float] = {
         "along_m": mirror.gap_along_m,
@@ -93,10 +93,10 @@ def standing_of(mirror: MirrorSample | None, verdict: Verdict | None) -> Standin
     if not mirror.independent:
         # It was driven by the very motion that it is compared with: its gap proves nothing.
         text = "twin apart" if beyond else "twin in step"
-        return Standing(text, "commands estimated: no proof", True)
+        return TwinStanding(text, "commands estimated: no proof", True)
     if not beyond:
-        return Standing("twin in step", "", True)
-    return Standing(f"twin {_gap_text(worst, gaps[worst])}", "beyond its limit", False)
+        return TwinStanding("twin in step", "", True)
+    return TwinStanding(f"twin {_gap_text(worst, gaps[worst])}", "beyond its limit", False)
 
 
 def _gap_text(name: LimitedQuantity, value: float) -> str:
@@ -116,7 +116,7 @@ def sentence(
     progress: Progress | None,
     control: str,
     danger: Danger | None,
-    standing: Standing,
+    standing: TwinStanding,
     *,
     known: bool = True,
     elapsed_s: float = 0.0,

@@ -19,7 +19,7 @@ from foretwin.contracts.keys import alive_key
 from foretwin.contracts.page_address import FRAMES_FILE, page_address, page_key
 from foretwin.contracts.ports import LOOPBACK, free_endpoint, free_port
 from foretwin.contracts.setup import BusSetup, CopilotSetup, write_setup
-from foretwin.viewer.copilot.frame import Frame
+from foretwin.viewer.copilot.frame import PageFrame
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 
@@ -80,7 +80,7 @@ class DisplayRun:
         ids = {"vehicle": VEHICLE} if channel in OF_VEHICLE else {"run": RUN}
         self.bus.publish(channel, message, **ids)
 
-    def frames(self) -> Generator[Frame, None, None]:
+    def frames(self) -> Generator[PageFrame, None, None]:
         """Yield frames as a page gets them."""
         connection = HTTPConnection(LOOPBACK, self.port, timeout=DEADLINE_S)
         with contextlib.closing(connection):
@@ -89,9 +89,9 @@ class DisplayRun:
                 assert answer.status == 200
                 while text := answer.fp.readline():
                     if text.startswith(b"data: "):
-                        yield msgspec.json.decode(text[6:], type=Frame)
+                        yield msgspec.json.decode(text[6:], type=PageFrame)
 
-    def frame_where(self, holds: Callable[[Frame], bool]) -> Frame:
+    def frame_where(self, holds: Callable[[PageFrame], bool]) -> PageFrame:
         """Return the first frame for which something holds."""
         deadline_s = time.monotonic() + DEADLINE_S
         with contextlib.closing(self.frames()) as frames:

@@ -12,7 +12,7 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, SignalState
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.simulation import ActiveWorld, RunEnd, WorldNotice
 from foretwin.contracts.world import World
-from foretwin.viewer.copilot.frame import Frame
+from foretwin.viewer.copilot.frame import PageFrame
 from foretwin.viewer.copilot.now import LIGHT_FOR_NS, ROUND_FOR_S, SEEN_FOR_NS, DriveNow
 from tests.viewer import scene
 from tests.viewer.copilot.rounds import line, round_of
@@ -51,7 +51,7 @@ class Drive:
         self.take("mirror", mirror_at(time_s))
         self.take("progress", AHEAD_OF_X1)
 
-    def frame(self) -> Frame:
+    def frame(self) -> PageFrame:
         return self.now.frame(self.now_s)
 
 
@@ -98,7 +98,7 @@ def test_a_drive_towards_a_junction_is_whole_in_one_frame() -> None:
     assert frame.world_id == WORLD_ID
     assert frame.roles == {"car": "all"}
     assert "signals red and amber" in frame.sentence
-    assert msgspec.json.decode(msgspec.json.encode(frame), type=Frame) == frame
+    assert msgspec.json.decode(msgspec.json.encode(frame), type=PageFrame) == frame
     assert len(msgspec.json.encode(frame)) < 6000
 
 

@@ -138,7 +138,7 @@ def test_seconds_left_run_out_at_none() -> None:
 )
 def test_a_twin_beyond_its_limit_says_how(gap: dict[str, float], said: str) -> None:
     standing = words.standing_of(changed(IN_STEP, **gap), None)
-    assert standing == words.Standing(said, "beyond its limit", False)
+    assert standing == words.TwinStanding(said, "beyond its limit", False)
 
 
 def test_the_limit_is_that_of_the_one_table_and_grows_with_time() -> None:
