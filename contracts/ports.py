@@ -12,6 +12,7 @@ from foretwin.contracts.errors import UserError
 LOOPBACK = "127.0.0.1"
 WEB_PORT = 9090
 """Of the viewer for browsers, where it is free."""
+LOOPBACKS = frozenset({LOOPBACK, "::1", "localhost"})
 _PORTS = range(20_000, 32_000)
 """Below those that systems give to outgoing connections, any of which could take a port between
 its choice and the moment at which it is listened on."""
@@ -118,8 +119,19 @@ def trouble_with_bus(endpoint: str | None, *, insecure: bool, secure: str | None
     return None
 
 
+def listen_place(text: str) -> MetricsPlace:
+    """Return the host and port that `--listen` names.
+
+    Raises UserError for what is no place.
+    """
+    named = _HOST_AND_PORT.fullmatch(text)
+    if named is None or not 0 < int(named["port"]) < 65536:
+        raise UserError(f"--listen {text}: must be HOST:PORT with a port of 1 to 65535")
+    return MetricsPlace(text.rpartition(":")[0].strip("[]"), int(named["port"]))
+
+
 class MetricsPlace(NamedTuple):
-    """Where metrics are told."""
+    """Where metrics are told, or pages served."""
 
     host: str
     port: int

@@ -42,6 +42,7 @@ from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
 from foretwin.orchestrator.commands.cli_view import LayoutOption
 from foretwin.orchestrator.commands.cli_view import view as view_run
+from foretwin.orchestrator.commands.cli_watch import watch
 from foretwin.orchestrator.commands.cli_worker import worker
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
@@ -240,7 +241,7 @@ def world(
     raise typer.Exit(write_worlds(WorldRequest(**asked)))
 
 
-for command in (sweep, *ABOUT_LOGS, view_run, learn_progress, doctor, worker):
+for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, worker):
     app.command()(command)
 
 app.command("config")(config_files)

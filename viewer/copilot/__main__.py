@@ -1,4 +1,5 @@
-"""The co-pilot display's process: `python -m foretwin.viewer.copilot --setup FILE`.
+"""The co-pilot display's process: `python -m foretwin.viewer.copilot --setup FILE`; `--replay RUN`
+shows again what a run's display showed.
 
 It listens to the bus, makes a frame five times a second, and hands it to whoever looks. The drive
 never waits for it: what it does not take in time is forgotten, and it may die and be started again.
@@ -6,6 +7,7 @@ never waits for it: what it does not take in time is forgotten, and it may die a
 
 from __future__ import annotations
 
+import argparse
 import logging
 import sys
 import threading
@@ -17,17 +19,21 @@ import msgspec
 
 from foretwin.contracts.bus import Alive, Bus, BusUnreachable, Mailbox, Received, ZenohBus, ask
 from foretwin.contracts.codec import read_message
+from foretwin.contracts.end_signals import on_end_signals
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused, is_identifier
 from foretwin.contracts.keys import alive_key, process_of_alive_key
 from foretwin.contracts.marks import MarkReply, MarkRequest
-from foretwin.contracts.page_address import page_key
+from foretwin.contracts.page_address import USUAL_PORT, page_key
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import CopilotSetup
+from foretwin.contracts.terminal import say
 from foretwin.contracts.tuning import SetReply, SetRequest
 from foretwin.contracts.world import World
 from foretwin.viewer.copilot.frames_file import FramesWriter
 from foretwin.viewer.copilot.junction_plan import junction_plan
 from foretwin.viewer.copilot.now import DriveNow
+from foretwin.viewer.copilot.replayed import replay
 from foretwin.viewer.copilot.server import (
     CannotError,
     ChangeAsked,
@@ -201,7 +207,8 @@ def serve(setup: CopilotSetup, bus: Bus, life: ProcessLife) -> None:
         tls=setup.page_tls,
     )
     server.start()
-    life.ready()
+    if setup.awaited:
+        life.ready()
     while not life.over:
         server.publish(display.turn())
         life.terminated.wait(FRAME_S)
@@ -211,9 +218,26 @@ def serve(setup: CopilotSetup, bus: Bus, life: ProcessLife) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the display; leaves by its own exit code."""
-    run_process(CopilotSetup, serve, arguments)
-    return 1
+    """Run the display; returns only of a replay, or where it cannot, with the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m foretwin.viewer.copilot", description=__doc__)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--setup", type=Path, metavar="FILE", help="a CopilotSetup as JSON")
+    what.add_argument("--replay", type=Path, metavar="RUN", help="the folder of a run")
+    parser.add_argument("--port", type=int, default=USUAL_PORT, help="of a replay")
+    given = parser.parse_args(arguments)
+    if given.replay is None:
+        run_process(CopilotSetup, serve, ["--setup", str(given.setup)])
+        return 1
+    ended = threading.Event()
+    on_end_signals(ended.set)
+    try:
+        replay(given.replay, given.port, ended)
+    except (UserError, OSError) as problem:
+        say(f"foretwin: {problem}", error=True)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
 
 
 if __name__ == "__main__":
