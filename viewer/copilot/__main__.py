@@ -39,7 +39,7 @@ from foretwin.viewer.copilot.server import (
     ChangeAsked,
     MarkAsked,
     PageActions,
-    PageServer,
+    CopilotServer,
     page_app,
 )
 
@@ -200,7 +200,7 @@ def serve(setup: CopilotSetup, bus: Bus, life: ProcessLife) -> None:
         "vehicle": setup.vehicle_id,
         "attribution": setup.attribution,
     }
-    server = PageServer(
+    server = CopilotServer(
         lambda feed: page_app(key, feed, display.actions, about=about),
         host=setup.host,
         port=setup.port,

@@ -18,7 +18,13 @@ from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.viewer.copilot.frames_file import KeptFrames
 from foretwin.viewer.copilot.junction_plan import junction_plan
-from foretwin.viewer.copilot.server import CannotError, MarkAsked, PageActions, PageServer, page_app
+from foretwin.viewer.copilot.server import (
+    CannotError,
+    MarkAsked,
+    PageActions,
+    CopilotServer,
+    page_app,
+)
 
 FRAME_S = 0.1
 AGAIN_S = 3.0
@@ -79,7 +85,7 @@ class ReplayedRun:
 def replay(folder: Path, port: int, ended: threading.Event) -> None:
     """Serve a run's frames on this machine until `ended`; says where."""
     run, key = ReplayedRun(folder), secrets.token_hex(8)
-    server = PageServer(
+    server = CopilotServer(
         lambda feed: page_app(key, feed, run.actions, about=run.about), host=LOOPBACK, port=port
     )
     server.start()

@@ -181,7 +181,7 @@ def _said(status: int, text: str) -> Response:
     return Response(f"{text}\n", status, media_type="text/plain", headers=_HEADERS)
 
 
-class PageServer:
+class CopilotServer:
     """Serves an application from a thread of its own, and ends it in bounded time."""
 
     def __init__(

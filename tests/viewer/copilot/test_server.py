@@ -26,7 +26,7 @@ from foretwin.viewer.copilot.server import (
     ChangeAsked,
     MarkAsked,
     PageActions,
-    PageServer,
+    CopilotServer,
     page_app,
 )
 from tests.contracts.bus_sides import DEADLINE_S
@@ -176,9 +176,9 @@ def test_roles_are_changed_by_who_may(page: Page, actions: Actions) -> None:
 
 
 @pytest.fixture
-def server(actions: Actions) -> Iterator[PageServer]:
+def server(actions: Actions) -> Iterator[CopilotServer]:
     port = free_port()
-    made = PageServer(
+    made = CopilotServer(
         lambda feed: page_app(KEY, feed, actions.all(), about={}), host=LOOPBACK, port=port
     )
     made.port = port
@@ -187,7 +187,7 @@ def server(actions: Actions) -> Iterator[PageServer]:
     made.close(DEADLINE_S)
 
 
-def listen(server: PageServer) -> tuple[HTTPConnection, Iterator[str]]:
+def listen(server: CopilotServer) -> tuple[HTTPConnection, Iterator[str]]:
     connection = HTTPConnection(LOOPBACK, server.port, timeout=DEADLINE_S)
     connection.request("GET", f"/{KEY}/events")
     answer = connection.getresponse()
@@ -201,14 +201,14 @@ def listen(server: PageServer) -> tuple[HTTPConnection, Iterator[str]]:
     return connection, data()
 
 
-def wait_for(server: PageServer, pages: int) -> None:
+def wait_for(server: CopilotServer, pages: int) -> None:
     deadline_s = time.monotonic() + DEADLINE_S
     while server.pages != pages:
         assert time.monotonic() < deadline_s
 
 
 def test_over_a_socket_a_frame_is_there_at_once_and_a_frozen_page_holds_up_nobody(
-    server: PageServer,
+    server: CopilotServer,
 ) -> None:
     frozen = socket.create_connection((LOOPBACK, server.port), timeout=DEADLINE_S)
     frozen.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -226,7 +226,7 @@ def test_over_a_socket_a_frame_is_there_at_once_and_a_frozen_page_holds_up_nobod
     connection.close()
 
 
-def test_the_last_frame_reaches_a_page_before_the_server_is_gone(server: PageServer) -> None:
+def test_the_last_frame_reaches_a_page_before_the_server_is_gone(server: CopilotServer) -> None:
     connection, frames = listen(server)
     wait_for(server, 1)
     server.publish(b'"ended"')
@@ -236,15 +236,15 @@ def test_the_last_frame_reaches_a_page_before_the_server_is_gone(server: PageSer
     server.publish(b'"nobody is there"')
 
 
-def test_a_port_that_is_taken_is_said(server: PageServer, actions: Actions) -> None:
-    another = PageServer(
+def test_a_port_that_is_taken_is_said(server: CopilotServer, actions: Actions) -> None:
+    another = CopilotServer(
         lambda feed: page_app(KEY, feed, actions.all(), about={}), host=LOOPBACK, port=server.port
     )
     with pytest.raises(OSError, match=f"cannot listen at 127.0.0.1:{server.port}"):
         another.start()
 
 
-def test_pages_beyond_all_seats_are_turned_away(server: PageServer) -> None:
+def test_pages_beyond_all_seats_are_turned_away(server: CopilotServer) -> None:
     open_ones = []
     for number in range(MOST_PAGES):
         open_ones.append(listen(server)[0])
