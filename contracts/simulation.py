@@ -275,10 +275,9 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     arrival_early_s: float | None = None
     """One of ten arrives before; None where that is not known."""
     junction_id: str | None = None
-    """Of the next intersection, by which its World is known."""
+    """Of the next intersection, whose World is known by it; `junction_m` is along the road."""
     junction_control: Control | None = None
     junction_m: float | None = None
-    """How far it is along the road."""
     arrival_late_s: float | None = None
     """Nine of ten have arrived; None with `arrival_early_s` known: one of ten may stand before."""
 

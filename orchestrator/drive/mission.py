@@ -205,8 +205,6 @@ class Mission:
         """The intersections that the car reached, in order."""
         return self.visits.arrived
 
-    # Inside.
-
     def _time_to_match(self, state: VehicleState) -> bool:
         last = self._last_match_ns
         if last is not None and 0 <= state.stamp_ns - last < MATCH_PERIOD_NS:
