@@ -37,9 +37,9 @@ from foretwin.viewer.copilot.replayed import replay
 from foretwin.viewer.copilot.server import (
     CannotError,
     ChangeAsked,
+    CopilotServer,
     MarkAsked,
     PageActions,
-    CopilotServer,
     page_app,
 )
 

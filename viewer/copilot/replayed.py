@@ -20,9 +20,9 @@ from foretwin.viewer.copilot.frames_file import KeptFrames
 from foretwin.viewer.copilot.junction_plan import junction_plan
 from foretwin.viewer.copilot.server import (
     CannotError,
+    CopilotServer,
     MarkAsked,
     PageActions,
-    CopilotServer,
     page_app,
 )
 

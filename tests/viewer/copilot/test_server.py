@@ -24,9 +24,9 @@ from foretwin.viewer.copilot.server import (
     MOST_BODY,
     CannotError,
     ChangeAsked,
+    CopilotServer,
     MarkAsked,
     PageActions,
-    CopilotServer,
     page_app,
 )
 from tests.contracts.bus_sides import DEADLINE_S
