@@ -36,6 +36,7 @@ _ROWS = {
     "verdicts": "who departs from the commands, the model or the vehicle",
     "junctions": "one passage of a junction",
     "events": "something worth telling the engineer",
+    "marks": "an event that somebody marked, or a note that was added to it",
 }
 ROWS: Mapping[str, str] = MappingProxyType(_ROWS)
 """What one row of each table is."""
@@ -235,6 +236,17 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "world_ready_before_s": "how long before that its World was ready",
     },
     "events": {"level": "info, warning or error", "source": "who says it", "text": "what"},
+    "marks": {
+        "mark_id": "the same for an event and its notes",
+        "stamp_ns": "the event's, by the vehicle's clock",
+        "drive_time_s": "the event's, in seconds of the drive",
+        "utc_ns": "when it was said, by the clock of who marked",
+        "by": "who marked",
+        "note": "what was said of it; empty where nothing was",
+        "junction_id": "the junction that the car was at, or had before it; null of a note",
+        "lat_deg": "where the car was; null of a note",
+        "lon_deg": "where the car was; null of a note",
+    },
 }
 
 
