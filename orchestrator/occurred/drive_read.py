@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Stamps
 from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import RoadUsers, VehicleInfo, VehicleState
 from foretwin.contracts.errors import UserError
@@ -34,8 +35,8 @@ class DriveRead(NamedTuple):
     states: tuple[VehicleState, ...]
     ego: DrivenMotion
     detected: tuple[Detected, ...]
-    sees_others: bool
-    """Whether the car told of road users at all: else nothing is known of any."""
+    told_ns: Stamps
+    """When the car told of road users; empty where it never did: then nothing is known of any."""
     worlds: tuple[World, ...]
     vehicle: VehicleParameters
 
@@ -54,10 +55,10 @@ def read_run(run: Path) -> DriveRead:
     log = open_log(recording)
     estimator = estimator_of(log.info, vehicle)
     states: list[VehicleState] = []
-    seen, told = [], False
+    seen, told = [], []
     for channel, message in log.samples():
         if isinstance(message, RoadUsers):
-            told = True
+            told.append(message.stamp_ns)
             real = tuple(user for user in message.users if not user.virtual)
             seen.append(detections_of(RoadUsers(stamp_ns=message.stamp_ns, users=real)))
         state = estimator.handle(channel, message)
@@ -73,7 +74,7 @@ def read_run(run: Path) -> DriveRead:
         states=tuple(headed),
         ego=motion_in(frame, headed),
         detected=tuple(_detected(frame, track) for track in log_of_detections(seen).tracks),
-        sees_others=told,
+        told_ns=np.array(sorted(told), dtype=np.int64),
         worlds=tuple(_worlds(run / _WORLDS)),
         vehicle=vehicle,
     )
@@ -84,11 +85,17 @@ def motion_in(frame: LocalFrame, states: Iterable[VehicleState]) -> DrivenMotion
     kept = list(states)
     lat, lon, yaw, speed, accel, rate = np.array(
         [
-            (s.position.lat_deg, s.position.lon_deg, s.yaw_rad, s.speed_mps, s.accel_mps2,
-             s.yaw_rate_radps)
+            (
+                s.position.lat_deg,
+                s.position.lon_deg,
+                s.yaw_rad,
+                s.speed_mps,
+                s.accel_mps2,
+                s.yaw_rate_radps,
+            )
             for s in kept
         ]
-    ).T  # fmt: skip
+    ).T
     stamps = np.array([state.stamp_ns for state in kept], dtype=np.int64)
     fresh = np.concatenate([[True], np.diff(stamps) > 0])
     xy = np.asarray(local_from_geo(frame, lat, lon))

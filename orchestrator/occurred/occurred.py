@@ -7,8 +7,18 @@ from pathlib import Path
 import msgspec
 
 from foretwin.orchestrator.occurred.drive_read import DriveRead, read_run
+from foretwin.orchestrator.occurred.model_validity import ModelGap, model_gaps
+from foretwin.orchestrator.record.kept_rows import kept_rows
+from foretwin.orchestrator.record.run_state import RESULTS
+from foretwin.sim_worker.analysis.occurred.odd import OddExposure, odd_of
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
+from foretwin.sim_worker.analysis.occurred.roads import Roads
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
+from foretwin.sim_worker.analysis.occurred.scene import courses_of
+from foretwin.sim_worker.analysis.occurred.triggering import (
+    TriggeringCondition,
+    triggering_conditions,
+)
 
 
 class Occurred(msgspec.Struct, frozen=True, kw_only=True):
@@ -17,6 +27,10 @@ class Occurred(msgspec.Struct, frozen=True, kw_only=True):
     scenarios: tuple[OccurredScenario, ...]
     sees_others: bool
     """Whether the car told of road users at all: else nothing is known of any."""
+    odd: tuple[OddExposure, ...] = ()
+    triggering: tuple[TriggeringCondition, ...] = ()
+    model: tuple[ModelGap, ...] = ()
+    """Of each scenario's time, in the order of `scenarios`: how far the model was from the car."""
     notes: tuple[str, ...] = ()
     """What could not be looked at, in words."""
 
@@ -27,17 +41,33 @@ def occurred_in(run: Path) -> Occurred:
     Raises FileNotFoundError for a folder that is none of a run, UserError for a run that goes on
     or holds no motion. Some seconds for each minute of a drive: its sensors are estimated again.
     """
-    return occurred_of(read_run(run))
+    return occurred_of(read_run(run), gaps=kept_rows(run / RESULTS, "gaps"))
 
 
-def occurred_of(drive: DriveRead) -> Occurred:
-    """Return what occurred in a drive that was read."""
+def occurred_of(drive: DriveRead, *, gaps: list[dict[str, object]]) -> Occurred:
+    """Return what occurred in a drive that was read; `gaps` are rows of the run's table."""
+    sees_others = bool(len(drive.told_ns))
     found = recognise(
         drive.ego, drive.detected, drive.worlds, frame=drive.frame, vehicle=drive.vehicle
     )
     notes = []
-    if not drive.sees_others:
+    if not sees_others:
         notes.append("the car told of no road users: only its own manoeuvres are known")
     if not drive.worlds:
         notes.append("the run holds no Worlds: junctions and lanes are not known")
-    return Occurred(scenarios=found, sees_others=drive.sees_others, notes=tuple(notes))
+    return Occurred(
+        scenarios=found,
+        sees_others=sees_others,
+        odd=odd_of(
+            drive.ego,
+            courses_of(drive.detected, drive.ego),
+            Roads(drive.worlds, drive.frame),
+            found,
+            where=drive.states[0].position,
+            utc=drive.info.time_base == "utc",
+            sees_others=sees_others,
+        ),
+        triggering=triggering_conditions(drive.states, drive.ego, drive.told_ns),
+        model=model_gaps(found, gaps),
+        notes=tuple(notes),
+    )

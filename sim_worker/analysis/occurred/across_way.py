@@ -25,6 +25,7 @@ _PARTS_SIN = np.sin(np.radians(20.0))
 _LOOKS_BACK_M, _LOOKS_BACK_SLOW_M, _LOOKS_ON_M = 25.0, 8.0, 18.0
 _SIDE_RAD, _ONCOMING_RAD, _TURNED_RAD = np.radians(50.0), np.radians(135.0), np.radians(40.0)
 _GOES_ON_S = 2.0
+_CREEPS_MPS, _ROLLS_MPS = 0.3, 0.8
 _AROUND_S = 20.0
 _JOINED_M, _JOINED_RAD, _JOINED_S = 1.4, np.radians(25.0), 1.0
 _BEFORE_S = 4.0
@@ -82,6 +83,9 @@ def _nearest_crossing(way: DrivenWay, course: OtherCourse) -> _Crossing | None:
         when = (start[..., 0] * step[:, None, 1] - start[..., 1] * step[:, None, 0]) / turn
     hits = (share >= 0.0) & (share < 1.0) & (when >= 0.0) & (when < 1.0)
     hits &= np.abs(turn) >= _PARTS_SIN * long
+    # Where somebody stands, noise alone leads to and fro.
+    slow = _CREEPS_MPS if course.kind == "pedestrian" else _ROLLS_MPS
+    hits &= (np.hypot(*move.T) / STEP_S >= slow)[None]
     found = [
         _Crossing(arc, row, _apart_s(way, course, arc, row))
         for a, b in np.argwhere(hits).tolist()

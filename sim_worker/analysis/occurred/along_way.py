@@ -28,6 +28,7 @@ _EVEN_S = 1.1
 _SLANT_RAD = np.radians(1.0)
 _MOVES_MPS = 2.0
 _STANDS_AHEAD_M, _BESIDE_M = 50.0, 1.2
+_STOOD_S, _STOOD_M = 2.0, 1.5
 _PASSED_WITHIN_M = 5.5
 
 
@@ -54,8 +55,8 @@ def along_way(way: DrivenWay, roads: Roads, courses: Sequence[OtherCourse]) -> l
         np.minimum.at(nearest, course.rows, ahead)
     found: list[Encounter] = []
     for course, on in seen:
+        found += _standing(way, course, on)
         if course.standing.all():
-            found += _standing(way, course, on)
             continue
         first = _leads(way, course, on) & (on.gap_m <= nearest[course.rows] + 1e-6)
         found += _followed(way, course, on, first)
@@ -103,8 +104,13 @@ def _standing(way: DrivenWay, course: OtherCourse, on: OnWay) -> Iterator[Encoun
     clear = np.abs(on.left_m) - way.half_m[1] - course.size_m[1] / 2.0
     ahead = (on.gap_m > 0.0) & (on.gap_m <= _STANDS_AHEAD_M) & (ego > _MOVES_MPS)
     in_way = np.abs(on.left_m) <= _limit_m(way, course)
-    for rows in runs_of(ahead & in_way, least_s=1.0, over_holes_s=1.0):
-        yield _encounter("stationary_ahead", course, rows)
+    for rows in runs_of(ahead & in_way & course.standing, least_s=1.0, over_holes_s=1.0):
+        # Who has just driven there before the car's eyes is somebody who brakes ahead.
+        since = max(rows.start - round(_STOOD_S / STEP_S), 0)
+        if np.hypot(*(course.xy_m[rows.start] - course.xy_m[since])) <= _STOOD_M:
+            yield _encounter("stationary_ahead", course, rows)
+    if not course.standing.all():
+        return
     beside = ~in_way & (clear <= _BESIDE_M)
     passed = beside & (on.gap_m == 0.0) & (ego > _MOVES_MPS)
     for rows in runs_of(passed, over_holes_s=1.0):
@@ -131,7 +137,9 @@ def _cuts(way: DrivenWay, roads: Roads, course: OtherCourse, on: OnWay) -> Itera
             continue
         near = max(_NOTICED_S * ego[last], _NOTICED_M)
         came_from = "left" if moved < 0.0 else "right"
-        if abs(after) <= limit < abs(before) - 0.2 and 0.0 < on.gap_m[last] <= near:
+        # It counts from where it is in the way: who is hit then has cut in as well.
+        enters = rows.start + int(np.argmax(np.abs(on.left_m[rows]) <= limit))
+        if abs(after) <= limit < abs(before) - 0.2 and 0.0 < on.gap_m[enters] <= near:
             yield _encounter("cut_in", course, rows, came_from)
         elif abs(before) <= limit < abs(after) - 0.2 and 0.0 < on.gap_m[rows.start] <= near:
             yield _encounter("cut_out", course, rows, "left" if moved > 0.0 else "right")

@@ -17,7 +17,7 @@ STRAIGHT_RAD, BACK_RAD = np.radians(35.0), np.radians(140.0)
 """Chosen: a turn changes the heading by more, a turn back by more still."""
 _BESIDE_M = 12.0
 """Before and behind a junction's ground the heading counts that one comes and leaves with."""
-_BEND_M = 40.0
+_BEND_M, _LEAST_BEND_M = 40.0, 10.0
 """Away from known junctions, who changes the heading within so short a way turns."""
 _LEAST_MOVED_M, _MOST_MOVED_M = 2.0, 6.0
 _LEAST_RATE, _LONGEST_S = 0.02, 12.0
@@ -80,11 +80,11 @@ def _change(way: DrivenWay, from_arc_m: float, to_arc_m: float) -> float:
 def _bends(way: DrivenWay, passed: list[EgoStretch]) -> Iterator[EgoStretch]:
     """Yield turns where no junction is known."""
     at = np.arange(0.0, way.length_m, 1.0)
-    if len(at) < _BEND_M:
+    if len(at) < _LEAST_BEND_M:
         return
     heading = np.unwrap(way.path.pose_at(at).yaw_rad)
     ahead = np.minimum(np.arange(len(at)) + round(_BEND_M), len(at) - 1)
-    turns = np.abs(heading[ahead] - heading) >= np.radians(60.0)
+    turns = np.abs(heading[ahead] - heading) >= np.radians(45.0)
     for rows in runs_of(turns):
         first, last = rows.start, int(ahead[rows.stop - 1])
         steep = np.abs(np.gradient(heading[first : last + 1])) > np.radians(1.0)

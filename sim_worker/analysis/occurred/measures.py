@@ -50,10 +50,10 @@ def measures_of(way: DrivenWay, met: Encounter, vehicle: VehicleParameters) -> M
         return Measures(None, None, None, None)
     pet = float(post_encroachment_time(whole).values[0])
     return Measures(
-        ttc_s=_finite(float(ttc(near).values[0])),
-        pet_s=_finite(pet),
-        drac_mps2=_finite(float(drac(near).values[0])),
-        time_headway_s=_finite(float(time_headway(near).values[0])),
+        ttc_s=finite(float(ttc(near).values[0])),
+        pet_s=finite(pet),
+        drac_mps2=finite(float(drac(near).values[0])),
+        time_headway_s=finite(float(time_headway(near).values[0])),
     )
 
 
@@ -92,5 +92,6 @@ def _view(
     )
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """Return a value, None where it is infinite or NaN: there was none."""
     return value if np.isfinite(value) else None

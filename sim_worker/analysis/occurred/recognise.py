@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from foretwin.sim_worker.analysis.occurred.across_way import across_way
 from foretwin.sim_worker.analysis.occurred.along_way import Encounter, along_way
 from foretwin.sim_worker.analysis.occurred.driven_way import DrivenWay, runs_of
 from foretwin.sim_worker.analysis.occurred.ego_manoeuvres import EgoStretch, ego_stretches
-from foretwin.sim_worker.analysis.occurred.measures import measures_of
+from foretwin.sim_worker.analysis.occurred.measures import finite, measures_of
+from foretwin.sim_worker.analysis.occurred.preventable import Prevented, prevented
 from foretwin.sim_worker.analysis.occurred.roads import Roads
 from foretwin.sim_worker.analysis.occurred.rows import MEANINGS, USER_TAGS, OccurredScenario
 from foretwin.sim_worker.analysis.occurred.scene import (
@@ -148,8 +150,20 @@ def _met_row(
         drac_mps2=measured.drac_mps2,
         time_headway_s=measured.time_headway_s,
         beyond=measured.beyond,
+        **_drivers(prevented(way, met)),
         tags=tags,
     )
+
+
+def _drivers(found: Prevented | None) -> dict[str, Any]:
+    if found is None:
+        return {}
+    return {
+        "careful_prevents": found.careful,
+        "careful_gap_m": finite(found.careful_least_gap_m),
+        "fuzzy_prevents": found.fuzzy,
+        "fuzzy_gap_m": finite(found.fuzzy_least_gap_m),
+    }
 
 
 def _user_tag(kind: RoadUserKind) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from foretwin.contracts.frames import (
     local_from_geo,
     wrap_angle,
 )
-from foretwin.contracts.world import Connection, IntersectionSummary, Lane, World
+from foretwin.contracts.world import Connection, IntersectionSummary, Lane, Road, World
 from foretwin.geometry.polyline import densified, headings_rad
 
 _EVERY_M = 2.0
@@ -38,7 +38,7 @@ class LanePiece(NamedTuple):
     way: Lane | Connection
     road_class: str
     lanes: int
-    """Of the road, both directions."""
+    """That vehicles drive on, of the road in both directions; 0 where that is not known."""
     in_junction: bool
 
 
@@ -70,7 +70,7 @@ class Roads:
                     LanePiece(
                         way,
                         "" if road is None else road.road_class,
-                        0 if road is None else len(road.lane_ids),
+                        0 if road is None else _driven(road, lanes),
                         inside,
                     )
                 )
@@ -125,6 +125,11 @@ def in_frame(xy_m: Array, given: LocalFrame, wanted: LocalFrame) -> Array:
     """Return points (N, 2) of one frame in another."""
     geo = geo_from_local(given, np.asarray(xy_m))
     return np.asarray(local_from_geo(wanted, geo[:, 0], geo[:, 1]))
+
+
+def _driven(road: Road, lanes: Mapping[str, Lane]) -> int:
+    kinds = (lanes[lane_id].kind for lane_id in road.lane_ids if lane_id in lanes)
+    return sum(kind in ("driving", "bus") for kind in kinds)
 
 
 def _place(

@@ -58,61 +58,81 @@ class KindMeaning(NamedTuple):
 
 _LANE_KEEP, _CHANGE = "main roadway, subject keeps lane, ", "main roadway, subject changes lane"
 MEANINGS: dict[str, KindMeaning] = {
-    "through_straight": KindMeaning("the car goes straight on through a junction", "",
-        ("MotionDrive",)),
+    "through_straight": KindMeaning(
+        "the car goes straight on through a junction", "", ("MotionDrive",)
+    ),
     "turn_left": KindMeaning("the car turns left", "", ("MotionTurnLeft",)),
     "turn_right": KindMeaning("the car turns right", "", ("MotionTurnRight",)),
     "u_turn": KindMeaning("the car turns back", "", ("MotionUTurn",)),
-    "lane_change_left": KindMeaning("the car changes to the lane on its left", _CHANGE,
-        ("MotionLaneChangeLeft",)),
-    "lane_change_right": KindMeaning("the car changes to the lane on its right", _CHANGE,
-        ("MotionLaneChangeRight",)),
+    "lane_change_left": KindMeaning(
+        "the car changes to the lane on its left", _CHANGE, ("MotionLaneChangeLeft",)
+    ),
+    "lane_change_right": KindMeaning(
+        "the car changes to the lane on its right", _CHANGE, ("MotionLaneChangeRight",)
+    ),
     "stop": KindMeaning("the car brakes to a standstill", "", ("MotionStop",)),
     "standstill": KindMeaning("the car stands", "", ("MotionStop",)),
     "following": KindMeaning("the car drives behind another", "", ("MotionDrive",)),
-    "cut_in": KindMeaning("another comes into the car's lane ahead of it", _LANE_KEEP + "cut-in",
-        ("MotionCutIn",)),
-    "cut_out": KindMeaning("the one ahead leaves the car's lane", _LANE_KEEP + "cut-out",
-        ("MotionCutOut",)),
-    "lead_decelerates": KindMeaning("the one ahead brakes", _LANE_KEEP + "deceleration",
-        ("MotionDecelerate",)),
+    "cut_in": KindMeaning(
+        "another comes into the car's lane ahead of it", _LANE_KEEP + "cut-in", ("MotionCutIn",)
+    ),
+    "cut_out": KindMeaning(
+        "the one ahead leaves the car's lane", _LANE_KEEP + "cut-out", ("MotionCutOut",)
+    ),
+    "lead_decelerates": KindMeaning(
+        "the one ahead brakes", _LANE_KEEP + "deceleration", ("MotionDecelerate",)
+    ),
     "stationary_ahead": KindMeaning("somebody stands in the car's way", "", ("MotionStop",)),
-    "parked_beside": KindMeaning("the car passes close by a vehicle that stands", "",
-        ("MotionStop",)),
-    "overtakes_ego": KindMeaning("another passes the car, driving the same way", "",
-        ("MotionOvertake",)),
-    "ego_overtakes": KindMeaning("the car passes another that drives the same way", "",
-        ("MotionOvertake",)),
-    "crossing_from_left": KindMeaning("a vehicle crosses the car's way from its left", "",
-        ("MotionCross",)),
-    "crossing_from_right": KindMeaning("a vehicle crosses the car's way from its right", "",
-        ("MotionCross",)),
-    "oncoming_turns_across": KindMeaning("an oncoming vehicle turns across the car's way", "",
-        ("MotionTurn", "MotionCross")),
-    "ego_turns_across_oncoming": KindMeaning("the car turns across an oncoming vehicle's way", "",
-        ("MotionTowards",)),
+    "parked_beside": KindMeaning(
+        "the car passes close by a vehicle that stands", "", ("MotionStop",)
+    ),
+    "overtakes_ego": KindMeaning(
+        "another passes the car, driving the same way", "", ("MotionOvertake",)
+    ),
+    "ego_overtakes": KindMeaning(
+        "the car passes another that drives the same way", "", ("MotionOvertake",)
+    ),
+    "crossing_from_left": KindMeaning(
+        "a vehicle crosses the car's way from its left", "", ("MotionCross",)
+    ),
+    "crossing_from_right": KindMeaning(
+        "a vehicle crosses the car's way from its right", "", ("MotionCross",)
+    ),
+    "oncoming_turns_across": KindMeaning(
+        "an oncoming vehicle turns across the car's way", "", ("MotionTurn", "MotionCross")
+    ),
+    "ego_turns_across_oncoming": KindMeaning(
+        "the car turns across an oncoming vehicle's way", "", ("MotionTowards",)
+    ),
     "same_direction_turns_across": KindMeaning(
-        "a vehicle that drives beside the car turns across its way", "",
-        ("MotionTurn", "MotionCross")),
+        "a vehicle that drives beside the car turns across its way",
+        "",
+        ("MotionTurn", "MotionCross"),
+    ),
     "ego_turns_across_same_direction": KindMeaning(
-        "the car turns across the way of one that goes on beside it", "", ("MotionDrive",)),
-    "turns_into_path": KindMeaning("a vehicle turns from another road into the car's way ahead",
-        "", ("MotionTurn",)),
-    "ego_turns_into_path": KindMeaning("the car turns into another's way ahead of it", "",
-        ("MotionDrive",)),
-    "pedestrian_crossing": KindMeaning("somebody on foot crosses the car's way", "",
-        ("MotionWalk", "MotionCross")),
-    "cyclist_crossing": KindMeaning("a cyclist crosses the car's way", "",
-        ("MotionDrive", "MotionCross")),
-}  # fmt: skip
+        "the car turns across the way of one that goes on beside it", "", ("MotionDrive",)
+    ),
+    "turns_into_path": KindMeaning(
+        "a vehicle turns from another road into the car's way ahead", "", ("MotionTurn",)
+    ),
+    "ego_turns_into_path": KindMeaning(
+        "the car turns into another's way ahead of it", "", ("MotionDrive",)
+    ),
+    "pedestrian_crossing": KindMeaning(
+        "somebody on foot crosses the car's way", "", ("MotionWalk", "MotionCross")
+    ),
+    "cyclist_crossing": KindMeaning(
+        "a cyclist crosses the car's way", "", ("MotionDrive", "MotionCross")
+    ),
+}
 USER_TAGS: dict[RoadUserKind, str] = {
     "car": "VehicleCar",
     "van": "VehicleVan",
     "lorry": "VehicleTruck",
     "bus": "VehicleBus",
-    "motorcycle": "VehicleMotorbike",
+    "motorcycle": "VehicleMotorcycle",
     "bicycle": "VehicleCycle",
-    "pedestrian": "RoadUserHuman",
+    "pedestrian": "HumanPedestrian",
 }
 """Of OpenLABEL; trams and unknown ones have none."""
 
@@ -127,14 +147,26 @@ class Threshold(NamedTuple):
 
 
 THRESHOLDS: dict[str, Threshold] = {
-    "ttc_s": Threshold(EXPOSED_BELOW_S, "s", "below",
-        "Minderhoud and Bovy (2001), Extended time-to-collision measures, section 5"),
-    "pet_s": Threshold(1.5, "s", "below",
+    "ttc_s": Threshold(
+        EXPOSED_BELOW_S,
+        "s",
+        "below",
+        "Minderhoud and Bovy (2001), Extended time-to-collision measures, section 5",
+    ),
+    "pet_s": Threshold(
+        1.5,
+        "s",
+        "below",
         "chosen: that of the time to collision; of Allen, Shin and Cooper (1978), whose measure "
-        "it is, no threshold was read"),
-    "drac_mps2": Threshold(STOPPING_DECEL_MPS2, "m/s²", "above",
-        "AASHTO (2018), A Policy on Geometric Design, 3.2.2: what most drivers accept"),
-}  # fmt: skip
+        "it is, no threshold was read",
+    ),
+    "drac_mps2": Threshold(
+        STOPPING_DECEL_MPS2,
+        "m/s²",
+        "above",
+        "AASHTO (2018), A Policy on Geometric Design, 3.2.2: what most drivers accept",
+    ),
+}
 """Beyond one of them a scenario is a conflict."""
 
 
@@ -165,6 +197,14 @@ class OccurredScenario(msgspec.Struct, frozen=True, kw_only=True):
     time_headway_s: float | None = None
     beyond: tuple[str, ...] = ()
     """Which of `THRESHOLDS` were passed."""
+    careful_prevents: bool | None = None
+    """Whether the first performance model of UN Regulation No. 157, a competent and careful human
+    driver, would not have touched the other; None for what that regulation does not cover."""
+    careful_gap_m: float | None = None
+    """Least gap that it would have had; None where the other is never in its way."""
+    fuzzy_prevents: bool | None = None
+    fuzzy_gap_m: float | None = None
+    """The same of its second model, the fuzzy safety model."""
     tags: tuple[str, ...] = ()
 
     @property

@@ -30,6 +30,8 @@ _LEAST_S, _LEAST_SEEN = 1.2, 6
 _LEAST_SHARE = 0.35
 _SHAKES_M = 1.2
 """Detections that leave their own smooth course by more (RMS) are clutter."""
+_SPREAD_M = 0.9
+"""Whose detections lie within that (RMS) never moves."""
 _MOST_MPS = 70.0
 _HEADS_MPS = 1.0
 
@@ -163,10 +165,14 @@ def _course(chain: Sequence[Detected], ego: DrivenMotion) -> OtherCourse | None:
     stamp = np.concatenate([piece.stamp_ns for piece in chain])
     xy = np.concatenate([piece.xy_m for piece in chain])
     told = np.concatenate([piece.yaw_rad for piece in chain])
-    first = max(int(np.searchsorted(ego.stamp_ns, stamp[0])), 0)
+    during = (stamp >= ego.stamp_ns[0]) & (stamp <= ego.stamp_ns[-1])
+    stamp, xy, told = stamp[during], xy[during], told[during]
+    if len(stamp) < _LEAST_SEEN:
+        return None
+    first = int(np.searchsorted(ego.stamp_ns, stamp[0]))
     last = int(np.searchsorted(ego.stamp_ns, stamp[-1], side="right"))
     at = ego.stamp_ns[first:last]
-    if len(at) * STEP_S < _LEAST_S or len(stamp) < _LEAST_SEEN:
+    if len(at) * STEP_S < _LEAST_S:
         return None
     typical_s = max(float(np.median(np.diff(stamp))) * 1e-9, STEP_S)
     if len(stamp) * typical_s < _LEAST_SHARE * len(at) * STEP_S:
@@ -179,6 +185,8 @@ def _course(chain: Sequence[Detected], ego: DrivenMotion) -> OtherCourse | None:
     if np.sqrt(np.mean(np.sum(shaken**2, axis=1))) > _SHAKES_M or speed.max() > _MOST_MPS:
         return None
     slow = np.hypot(*_smoothed(even, _SLOW_SMOOTH_S, 1).T)
+    spread = np.sqrt(np.mean(np.sum((xy - np.median(xy, axis=0)) ** 2, axis=1)))
+    stands = np.full(len(at), True) if spread < _SPREAD_M else slow < STANDING_MPS
     kind, size = chain[0].kind, next((p.size_m for p in chain if p.size_m is not None), None)
     box = (KINDS[kind].length_m, KINDS[kind].width_m) if size is None else size
     return OtherCourse(
@@ -190,7 +198,7 @@ def _course(chain: Sequence[Detected], ego: DrivenMotion) -> OtherCourse | None:
         velocity_mps=velocity,
         yaw_rad=_heading(velocity, np.minimum(speed, slow), told),
         speed_mps=speed,
-        standing=slow < STANDING_MPS,
+        standing=stands,
     )
 
 

@@ -22,9 +22,15 @@ def _crosses(name: str, second: float, *, virtual: bool = False) -> RoadUser:
     xy = np.array([1.6, -1.5 + 8.0 * (second - 9.9)])
     lat, lon = geo_from_local(cross().frame, xy)
     return RoadUser(
-        user_id=name, kind="car", position=GeoPoint(float(lat), float(lon)), yaw_rad=np.pi / 2,
-        speed_mps=8.0, length_m=4.5, width_m=1.8, virtual=virtual,
-    )  # fmt: skip
+        user_id=name,
+        kind="car",
+        position=GeoPoint(float(lat), float(lon)),
+        yaw_rad=np.pi / 2,
+        speed_mps=8.0,
+        length_m=4.5,
+        width_m=1.8,
+        virtual=virtual,
+    )
 
 
 def _run(folder: Path, *names: str, virtual: bool = False) -> Path:
@@ -38,10 +44,14 @@ def _run(folder: Path, *names: str, virtual: bool = False) -> Path:
         for tenth in tenths.tolist()
     ]
     return write_run(
-        folder, cross(), rounds_s=range(1, 18), speed_mps=SPEED_MPS,
+        folder,
+        cross(),
+        rounds_s=range(1, 18),
+        speed_mps=SPEED_MPS,
         stamps_ns=(START_NS + tenths * 100_000_000).tolist(),
-        lat_lon_deg=geo_from_local(cross().frame, xy), objects=objects if names else (),
-    )  # fmt: skip
+        lat_lon_deg=geo_from_local(cross().frame, xy),
+        objects=objects if names else (),
+    )
 
 
 def test_a_run_tells_of_its_junction_and_of_whom_the_car_met(tmp_path: Path) -> None:

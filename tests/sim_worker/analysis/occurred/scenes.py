@@ -26,9 +26,12 @@ def ego_along(line: Array, speed_mps: Array) -> DrivenMotion:
     yaw = np.interp(arc, arc_lengths(line), np.unwrap(headings_rad(line)))
     return DrivenMotion(
         stamp_ns=START_NS + np.arange(len(speed_mps), dtype=np.int64) * 100_000_000,
-        xy_m=xy, yaw_rad=yaw, speed_mps=speed_mps,
-        accel_mps2=np.gradient(speed_mps, 0.1), yaw_rate_radps=np.gradient(yaw, 0.1),
-    )  # fmt: skip
+        xy_m=xy,
+        yaw_rad=yaw,
+        speed_mps=speed_mps,
+        accel_mps2=np.gradient(speed_mps, 0.1),
+        yaw_rate_radps=np.gradient(yaw, 0.1),
+    )
 
 
 def ego_eastwards(
@@ -47,9 +50,14 @@ def other(name: str, at: Array, *, kind: RoadUserKind = "car", first_s: float = 
 
 
 def moving(
-    name: str, meets: tuple[float, float], velocity: tuple[float, float], at_s: float,
-    *, kind: RoadUserKind = "car", seconds: float = 18.0,
-) -> Detected:  # fmt: skip
+    name: str,
+    meets: tuple[float, float],
+    velocity: tuple[float, float],
+    at_s: float,
+    *,
+    kind: RoadUserKind = "car",
+    seconds: float = 18.0,
+) -> Detected:
     """Somebody who keeps a velocity and is at a point at a second of the drive."""
     time_s = np.arange(0.0, seconds, 0.1)[:, None]
     return other(name, np.array(meets) + (time_s - at_s) * np.array(velocity), kind=kind)

@@ -1,0 +1,111 @@
+"""Five hundred staged drives of the stand-in: what is recognised, against what was staged."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import NamedTuple
+
+import pytest
+
+from foretwin.orchestrator.occurred.drive_read import motion_in
+from foretwin.sim_worker.analysis.occurred.recognise import recognise
+from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
+from foretwin.sim_worker.analysis.occurred.scene import DrivenMotion
+from foretwin.telemetry.estimator.estimator import estimator_of
+from foretwin.telemetry.standin.source import START_STAMP_NS
+from tests.sim_worker.analysis.occurred.casts import DRIVES, Staged, detections, staged
+from tests.sim_worker.analysis.occurred.scenes import CAR
+from tests.sim_worker.analysis.occurred.staging import EgoPlan, Label, drive, stage_world
+
+LEAST = 0.95
+_NEAR_S = 1.5
+
+
+class Scores(NamedTuple):
+    """Of each kind: how many rows there were, how many of them rightly, how many labels, and how
+    many of these were found."""
+
+    rows: Counter[str]
+    right: Counter[str]
+    labels: Counter[str]
+    found: Counter[str]
+
+    def precision(self, kind: str) -> float:
+        return self.right[kind] / self.rows[kind] if self.rows[kind] else 1.0
+
+    def recall(self, kind: str) -> float:
+        return self.found[kind] / self.labels[kind] if self.labels[kind] else 1.0
+
+    def lines(self) -> list[str]:
+        return [
+            f"{kind:34s} labels {self.labels[kind]:5d} rows {self.rows[kind]:5d} "
+            f"precision {self.precision(kind):6.1%} recall {self.recall(kind):6.1%}"
+            for kind in sorted(self.rows | self.labels)
+        ]
+
+
+@functools.cache
+def motion(plan: EgoPlan) -> DrivenMotion:
+    """The car's motion as foretwin estimates it from the stand-in's sensors."""
+    ego = drive(plan)
+    estimator = estimator_of(ego.info, CAR)
+    states = [s for c, m in ego.samples if (s := estimator.handle(c, m)) is not None]
+    return motion_in(stage_world().frame, [s for s in states if s.yaw_valid])
+
+
+def recognised(number: int, one: Staged) -> tuple[OccurredScenario, ...]:
+    """What is recognised in the record of a staged drive."""
+    ego = motion(one.drive.plan)
+    begin, end = (START_STAMP_NS + round(t * 1e9) for t in (one.begin_s, one.end_s))
+    kept = (ego.stamp_ns >= begin) & (ego.stamp_ns <= end)
+    part = DrivenMotion(*(column[kept] for column in ego))
+    world = stage_world()
+    return recognise(part, detections(one, number), (world,), frame=world.frame, vehicle=CAR)
+
+
+def score(first: int, after: int) -> Scores:
+    """Compare staged drives with what is recognised in them, by kind, with whom and when."""
+    scores = Scores(Counter(), Counter(), Counter(), Counter())
+    for number in range(first, after):
+        one = staged(number)
+        rows = [
+            Label(
+                row.kind,
+                row.other_id.split("#")[0],
+                (row.begin_ns - START_STAMP_NS) * 1e-9,
+                (row.end_ns - START_STAMP_NS) * 1e-9,
+            )
+            for row in recognised(number, one)
+        ]
+        for row in rows:
+            scores.rows[row.kind] += 1
+            scores.right[row.kind] += any(_same(row, label) for label in one.labels)
+            if not any(_same(row, label) for label in one.labels):
+                print(f"drive {number}: recognised and not staged: {row}")
+        for label in one.labels:
+            scores.labels[label.kind] += 1
+            scores.found[label.kind] += any(_same(row, label) for row in rows)
+            if not any(_same(row, label) for row in rows):
+                print(f"drive {number}: staged and not recognised: {label}")
+    return scores
+
+
+def _same(row: Label, label: Label) -> bool:
+    begins, ends = row.begin_s <= label.end_s + _NEAR_S, label.begin_s - _NEAR_S <= row.end_s
+    return row[:2] == label[:2] and begins and ends
+
+
+@pytest.mark.judge
+def test_staged_drives_are_recognised() -> None:
+    """At least 95 % of what is recognised was staged, and of what was staged is recognised."""
+    scores = score(0, DRIVES)
+    print("\n".join(scores.lines()))
+    rows, right, labels, found = (sum(part.values()) for part in scores)
+    print(
+        f"all: labels {labels} rows {rows} precision {right / rows:.1%} recall {found / labels:.1%}"
+    )
+    assert labels > 4 * DRIVES
+    for kind in scores.rows | scores.labels:
+        assert scores.precision(kind) >= LEAST, kind
+        assert scores.recall(kind) >= LEAST, kind
