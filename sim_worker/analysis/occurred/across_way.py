@@ -27,6 +27,7 @@ _SIDE_RAD, _ONCOMING_RAD, _TURNED_RAD = np.radians(50.0), np.radians(135.0), np.
 _GOES_ON_S = 2.0
 _CREEPS_MPS, _ROLLS_MPS = 0.3, 0.8
 _AROUND_S = 20.0
+_BESIDE_S, _BESIDE_M = 6.0, 1.5
 _JOINED_M, _JOINED_RAD, _JOINED_S = 1.4, np.radians(25.0), 1.0
 _BEFORE_S = 4.0
 
@@ -140,9 +141,17 @@ def _crossing_kind(way: DrivenWay, course: OtherCourse, at: _Crossing) -> tuple[
         if same_end and (ego_turns or other_turns):
             return ("ego_turns_into_path" if ego_turns else "turns_into_path"), from_side
         return f"crossing_from_{from_side}", from_side
+    if not _came_beside(way, course, here):
+        return "", ""
     if ego_turns and not other_turns:
         return "ego_turns_across_same_direction", side
     return ("same_direction_turns_across", side) if other_turns and not ego_turns else ("", "")
+
+
+def _came_beside(way: DrivenWay, course: OtherCourse, here: int) -> bool:
+    """Whether somebody was beside the car's way before, not on it, as who is followed is."""
+    before = way.see(course).left_m[max(here - round(_BESIDE_S / STEP_S), 0) : here + 1]
+    return float(np.abs(before).max()) >= _BESIDE_M
 
 
 def _headings(course: OtherCourse, row: float) -> tuple[float, float]:

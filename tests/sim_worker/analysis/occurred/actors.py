@@ -119,8 +119,10 @@ def lead(staged: Drive, random: Random, *, name: str, cut: str = "") -> Actor | 
     left = np.zeros(len(time))
     labels: list[Label] = []
     if cut:
-        cut_s = float(np.interp(staged.entry_m - 75.0, arc, time))
-        takes_s = random.uniform(3.0, 4.5)
+        # Who leaves is followed for long before, who comes for long after.
+        cut_m, most_s = (75.0, 4.5) if cut == "cut_in" else (46.0, 3.4)
+        cut_s = float(np.interp(staged.entry_m - cut_m, arc, time))
+        takes_s = random.uniform(2.8, most_s)
         side = 1.0 if _free_side(staged) == "left" else -1.0
         share = smooth((time - cut_s) / takes_s)
         left = side * LANE_M * ((1.0 - share) if cut == "cut_in" else share)

@@ -106,7 +106,7 @@ def _cast(ego: Drive, random: Random) -> list[Actor]:
     across += ["from_left", "oncoming"] if plan.turn == "left" else []
     across += ["on_foot", "by_bicycle"]
     along = ["lead", "parked", ""]
-    along += ["cut_in", "cut_out", "overtakes_ego", "ego_overtakes"] if two_lanes else []
+    along += [*["cut_in", "cut_out"] * 4, "overtakes_ego", "ego_overtakes"] if two_lanes else []
     along += ["standing", "standing"] if plan.stops else []
     nothing = ["late", "walker", "far", "follower"]
     nothing += ["passing"] if plan.turn != "left" else []

@@ -48,6 +48,16 @@ LABELS = (
     ByHand("013", "2690", (("stop", ""), ("standstill", ""))),
     # Straight over; people walk along beside it.
     ByHand("008", "1120", ()),
+    ByHand("003", "488", ()),
+    # Right behind one who turns right as well; behind the second somebody crosses the street.
+    ByHand("010", "1518", (("turn_right", ""), ("following", "1482"))),
+    ByHand(
+        "004",
+        "517",
+        (("turn_right", ""), ("following", "511"), ("pedestrian_crossing", "8634")),
+    ),
+    # One of a column, in view together with the one ahead for 2 s: too short to be followed.
+    ByHand("013", "2705", ()),
 )
 
 

@@ -101,11 +101,7 @@ def test_staged_drives_are_recognised() -> None:
     """At least 95 % of what is recognised was staged, and of what was staged is recognised."""
     scores = score(0, DRIVES)
     print("\n".join(scores.lines()))
-    rows, right, labels, found = (sum(part.values()) for part in scores)
-    print(
-        f"all: labels {labels} rows {rows} precision {right / rows:.1%} recall {found / labels:.1%}"
-    )
-    assert labels > 4 * DRIVES
+    assert sum(scores.labels.values()) > 2 * DRIVES
     for kind in scores.rows | scores.labels:
         assert scores.precision(kind) >= LEAST, kind
         assert scores.recall(kind) >= LEAST, kind
