@@ -133,9 +133,12 @@ def _crossing_kind(way: DrivenWay, course: OtherCourse, at: _Crossing) -> tuple[
     other_turns = abs(float(wrap_angle(went - came))) > _TURNED_RAD
     same_end = abs(float(wrap_angle(went - own_after))) <= _JOINED_RAD
     if abs(relation) >= _ONCOMING_RAD:
-        if ego_turns:
+        # One of them turns, since ways cross; the record may end before the turn does.
+        own_share = abs(float(wrap_angle(lead - own)))
+        its_share = abs(float(wrap_angle(course.yaw_rad[here] - came)))
+        if ego_turns or own_share > its_share:
             return "ego_turns_across_oncoming", side
-        return ("oncoming_turns_across", side) if other_turns else ("", "")
+        return "oncoming_turns_across", side
     if abs(relation) >= _SIDE_RAD:
         from_side = "right" if relation > 0.0 else "left"
         if same_end and (ego_turns or other_turns):
@@ -194,8 +197,6 @@ def _joins(way: DrivenWay, course: OtherCourse) -> Encounter | None:
         other = abs(float(wrap_angle(course.yaw_rad[rows.start] - came)))
         side = "right" if relation > 0.0 else "left"
         kind = "ego_turns_into_path" if turned > other else "turns_into_path"
-        if kind == "ego_turns_into_path" and on.gap_m[rows.start] > 0.0:
-            continue
         if kind == "turns_into_path" and on.gap_m[rows.start] < 0.0:
             continue
         return _around(way, course, _Crossing(arc, float(row), apart_s), kind, side)

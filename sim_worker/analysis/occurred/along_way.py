@@ -29,6 +29,7 @@ _SLANT_RAD = np.radians(1.0)
 _MOVES_MPS = 2.0
 _STANDS_AHEAD_M, _BESIDE_M = 50.0, 1.2
 _STOOD_S, _STOOD_M = 2.0, 1.5
+_EVER_S = 60.0
 _PASSED_WITHIN_M = 5.5
 
 
@@ -113,7 +114,7 @@ def _standing(way: DrivenWay, course: OtherCourse, on: OnWay) -> Iterator[Encoun
         return
     beside = ~in_way & (clear <= _BESIDE_M)
     passed = beside & (on.gap_m == 0.0) & (ego > _MOVES_MPS)
-    for rows in runs_of(passed, over_holes_s=1.0):
+    for rows in runs_of(passed, over_holes_s=_EVER_S):
         side = "left" if on.left_m[rows.start] > 0.0 else "right"
         yield _encounter("parked_beside", course, rows, side)
 

@@ -115,9 +115,7 @@ MEANINGS: dict[str, KindMeaning] = {
     "turns_into_path": KindMeaning(
         "a vehicle turns from another road into the car's way ahead", "", ("MotionTurn",)
     ),
-    "ego_turns_into_path": KindMeaning(
-        "the car turns into another's way ahead of it", "", ("MotionDrive",)
-    ),
+    "ego_turns_into_path": KindMeaning("the car turns into another's way", "", ("MotionDrive",)),
     "pedestrian_crossing": KindMeaning(
         "somebody on foot crosses the car's way", "", ("MotionWalk", "MotionCross")
     ),
