@@ -19,11 +19,9 @@ COVERS = (
     "foretwin.sim_worker.analysis.occurred.across_way",
     "foretwin.sim_worker.analysis.occurred.along_way",
     "foretwin.sim_worker.analysis.occurred.driven_way",
-    "foretwin.sim_worker.analysis.occurred.ego_manoeuvres",
     "foretwin.sim_worker.analysis.occurred.measures",
     "foretwin.sim_worker.analysis.occurred.roads",
     "foretwin.sim_worker.analysis.occurred.rows",
-    "foretwin.sim_worker.analysis.occurred.scene",
 )
 
 

@@ -97,6 +97,7 @@ def _same(row: Label, label: Label) -> bool:
 
 
 @pytest.mark.judge
+@pytest.mark.timeout(1800)
 def test_staged_drives_are_recognised() -> None:
     """At least 95 % of what is recognised was staged, and of what was staged is recognised."""
     scores = score(0, DRIVES)
