@@ -29,9 +29,8 @@ def bend(sign: float, *, turn_rad: float = math.pi / 2.0, radius_m: float = 8.0)
     arc = np.stack([radius_m * np.sin(angle), sign * radius_m * (1.0 - np.cos(angle))], axis=1)
     way = np.array([math.cos(turn_rad), sign * math.sin(turn_rad)])
     begin = np.array([[-radius_m - 60.0, -1.6]])
-    return np.concatenate(
-        [begin, arc + [-radius_m, -1.6], arc[-1:] + [-radius_m, -1.6] + 50.0 * way]
-    )
+    ends = arc + np.array([-radius_m, -1.6])
+    return np.concatenate([begin, ends, ends[-1:] + 50.0 * way])
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_a_course_goes_on_behind_a_hole_under_another_id() -> None:
 
 def test_who_begins_elsewhere_or_is_of_another_class_is_somebody_else() -> None:
     first, second = cut(line(10.0), 50, 62)
-    assert len(courses(first, second._replace(xy_m=second.xy_m + [9.0, 0.0]))) == 2
+    assert len(courses(first, second._replace(xy_m=second.xy_m + np.array([9.0, 0.0])))) == 2
     assert len(courses(*cut(line(10.0), 50, 62, "pedestrian"))) == 2
 
 
