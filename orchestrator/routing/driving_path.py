@@ -30,6 +30,7 @@ from foretwin.orchestrator.routing.rounding import (
     simplified,
     smoothed,
     turns,
+    with_driven_bends,
     with_driven_turns,
     without_straight,
 )
@@ -94,7 +95,7 @@ def driving_path(
     offset = _held_in_curves(lanes.smooth_at(place), centre)
     xy = drivable(smoothed(centre + offset[:, None] * normals(centre), 0.5 * SMOOTHING_M))
     if onto_lanes is not None:
-        xy, place = evenly_spaced(onto_lanes(xy, place), place)
+        xy, place = evenly_spaced(*with_driven_bends(onto_lanes(xy, place), place))
         xy, place = with_driven_turns(xy, place, radii_m)
         xy = drivable(smoothed(xy, 0.5 * SMOOTHING_M))
     return _resampled(route, xy, place, begin, end)

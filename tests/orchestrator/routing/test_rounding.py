@@ -1,4 +1,4 @@
-"""Turns that are widened to those that cars are driven in."""
+"""Turns and bends become those that cars are driven in."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.rounding import (
     FINE_M,
+    SIMPLIFY_M,
+    STRAIGHT_M,
     TIGHT_M,
     curvature_pm,
+    evenly_spaced,
     smoothed,
+    with_driven_bends,
     with_driven_turns,
 )
 
@@ -80,3 +84,44 @@ def test_a_tight_turn_at_the_very_end_has_no_room_and_stays() -> None:
 
     assert kept == pytest.approx(xy, abs=0.1)
     assert places[[0, -1]] == pytest.approx(s[[0, -1]])
+
+
+def arc(radius_m: float, *, piece_m: float, turned_rad: float = 1.0) -> tuple[Array, Array]:
+    """A bend of the road as a map draws it, spaced as the lines that are worked on."""
+    nodes = np.arange(0.0, turned_rad, piece_m / radius_m)
+    line = radius_m * np.stack([np.sin(nodes), 1.0 - np.cos(nodes)], axis=-1)
+    return evenly_spaced(line, arc_lengths(line))
+
+
+def heading_error_rad(line: Array, radius_m: float) -> float:
+    """How far a line's heading is from that of the circle which it stands for, but for its ends."""
+    heading = np.unwrap(np.arctan2(*np.diff(line, axis=0).T[::-1]))
+    x, y = ((line[1:] + line[:-1]) / 2.0).T
+    off = (heading - np.arctan2(x, radius_m - y))[20:-20]
+    return float(np.sqrt((off**2).mean()))
+
+
+@settings(max_examples=40, deadline=None)
+@given(radius_m=st.floats(150.0, 2000.0), piece_m=st.floats(15.0, 80.0))
+def test_a_bend_drawn_in_straight_pieces_is_driven_in_a_curve(
+    radius_m: float, piece_m: float
+) -> None:
+    if piece_m > 0.3 * radius_m:
+        piece_m = 0.3 * radius_m  # a map maker draws a bend, no polygon
+    drawn, s = arc(radius_m, piece_m=piece_m)
+    driven, place = evenly_spaced(*with_driven_bends(drawn, s))
+    away = np.abs(np.hypot(driven[:, 0], driven[:, 1] - radius_m) - radius_m)
+    assert away.max() < SIMPLIFY_M + piece_m**2 / (4.0 * radius_m)
+    assert (np.diff(place) > 0.0).all()
+    off_rad = [heading_error_rad(line, radius_m) for line in (drawn, driven)]
+    assert off_rad[1] < 0.95 * off_rad[0]
+    if piece_m**2 / radius_m < 2.0:  # else arcs would leave the nodes by more than they may
+        assert off_rad[1] < 0.75 * off_rad[0]
+
+
+def test_a_bend_drawn_finely_and_a_corner_stay_as_they_are() -> None:
+    corner = np.array([[0.0, 0.0], [60.0, 0.0], [110.0, 30.0]])
+    for drawn, s in (arc(40.0, piece_m=2.0), evenly_spaced(corner, arc_lengths(corner))):
+        driven, place = evenly_spaced(*with_driven_bends(drawn, s))
+        near = np.stack([np.interp(s, place, driven[:, i]) for i in (0, 1)], axis=-1)
+        assert np.hypot(*(near - drawn).T).max() < STRAIGHT_M + 0.01
