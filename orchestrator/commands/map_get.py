@@ -30,6 +30,8 @@ def get_map(area: str, *, out: Path, config: Path | None) -> None:
         raise UserError(f"--out {out}: a file named .osm or .osm.gz")
     if not out.parent.is_dir():
         raise UserError(f"--out {out}: folder {out.parent} does not exist")
+    if not _is_route(area):
+        parse_bbox(area)
     settings = load_overpass_config(config)
     query = overpass_query(
         area_filter(area, margin_m=settings.margin_m),
@@ -57,11 +59,15 @@ def get_map(area: str, *, out: Path, config: Path | None) -> None:
 
 def area_filter(area: str, *, margin_m: float) -> str:
     """Return the Overpass filter of a box W,S,E,N, or of the surroundings of a file's line."""
-    if Path(area.rpartition("#")[0] or area).suffix.lower() not in ROUTE_SUFFIXES:
+    if not _is_route(area):
         return box_filter(parse_bbox(area))
     from foretwin.telemetry.logs import read_line
 
     return line_filter(read_line(Path(area)).lat_lon_deg, margin_m)
+
+
+def _is_route(area: str) -> bool:
+    return Path(area.rpartition("#")[0] or area).suffix.lower() in ROUTE_SUFFIXES
 
 
 def _fetch(settings: OverpassConfig, query: str, answer: Path) -> None:
