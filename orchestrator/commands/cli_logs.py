@@ -147,7 +147,10 @@ def report(
         typer.Option(help="another drive of this road: how far people differ, beside the gap"),
     ] = None,
 ) -> None:
-    """Write what a run or sweep foresaw, and what came, as one HTML file that opens anywhere."""
+    """Write what a run or sweep foresaw, and what came, as one HTML file that opens anywhere.
+
+    Example: foretwin report runs/NAME --out REPORT.html
+    """
     from foretwin.orchestrator.commands.report import report as write
 
     write(runs, out=out, redact=redact, against=against)
