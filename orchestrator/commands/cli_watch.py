@@ -29,7 +29,10 @@ def watch(
     ] = False,
     name: Annotated[str, typer.Option(help="who marks events there")] = "watch",
 ) -> None:
-    """Open the co-pilot display of a drive from another seat, or of one that is over."""
+    """Open the co-pilot display of a drive from another seat, or of one that is over.
+
+    Example: foretwin watch latest
+    """
     from foretwin.orchestrator.commands.watch import WatchRequest
     from foretwin.orchestrator.commands.watch import watch as serve
 
