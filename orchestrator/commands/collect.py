@@ -13,8 +13,8 @@ from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.lake.collect import collect, damaged
 from foretwin.orchestrator.lake.manifest import MANIFEST
-from foretwin.orchestrator.lake.sources import folders_of_runs
 from foretwin.orchestrator.lake.store import FolderStore, LakeStore, store_at
+from foretwin.orchestrator.record.folders_of_runs import folders_of_runs
 
 NONE_USABLE, SOME_REFUSED = 2, 3
 

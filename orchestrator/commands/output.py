@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +18,15 @@ if TYPE_CHECKING:
 def print_json(body: object) -> None:
     """Print a message, or what holds messages, as indented JSON."""
     say(msgspec.json.format(msgspec.json.encode(body), indent=1).decode())
+
+
+def print_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Print rows as comma-separated values below the names of their columns; None is empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    say(text.getvalue().removesuffix("\n"))
 
 
 def print_table(

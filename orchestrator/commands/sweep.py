@@ -18,11 +18,10 @@ from foretwin.contracts.runner import Runner, answers, place_task
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.ledger import jobs_ledger
-from foretwin.orchestrator.record.run_folder import keep_vehicles
+from foretwin.orchestrator.record.run_folder import SUMMARY, keep_vehicles
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError
 from foretwin.orchestrator.sweep.engines import LOCAL, Engine, workers_for
 from foretwin.orchestrator.sweep.folder import (
-    SUMMARY,
     FoundPlaces,
     SweepFolder,
     fingerprint_of,

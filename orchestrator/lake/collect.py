@@ -23,7 +23,7 @@ from foretwin.orchestrator.lake.manifest import (
 from foretwin.orchestrator.lake.part_files import UncollectableError, widened, write_parts
 from foretwin.orchestrator.lake.sources import RUNS, RunSource, SourceTables, source_of
 from foretwin.orchestrator.lake.store import LakeStore
-from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
+from foretwin.sim_worker.futures.columns import RESULT_SCHEMA_VERSION
 
 STEP_BYTES = 256 << 20
 """Runs of about so many bytes of tables are taken in one step."""

@@ -16,12 +16,12 @@ import pyarrow as pa
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.lake.manifest import NONE, Partition
-from foretwin.orchestrator.record.recorded_jobs import check_result_schema, opened
+from foretwin.orchestrator.record.folders_of_runs import table_files
+from foretwin.orchestrator.record.result_files import check_result_schema, opened
 from foretwin.orchestrator.record.results import TABLES
-from foretwin.orchestrator.record.run_folder import METRICS_FILE, SWEPT_TABLES
-from foretwin.orchestrator.record.run_state import RECORD, RESULTS, check_finished
-from foretwin.orchestrator.record.table_parts import parts_of_table
-from foretwin.orchestrator.sweep.folder import SUMMARY, WORLDS
+from foretwin.orchestrator.record.run_folder import METRICS_FILE, SUMMARY
+from foretwin.orchestrator.record.run_state import RECORD, check_finished
+from foretwin.orchestrator.sweep.folder import WORLDS
 from foretwin.sim_worker.futures.columns import columns, schema
 from foretwin.sim_worker.world_file import load_world
 
@@ -57,22 +57,6 @@ class RunSource(NamedTuple):
     sha256: str
 
 
-def folders_of_runs(given: Path) -> list[Path]:
-    """Return the folder of a run or sweep itself, or those in it where it is a folder of runs."""
-    if not given.is_dir():
-        raise FileNotFoundError(f"{given}: no such folder")
-    if _is_one(given):
-        return [given]
-    found = sorted(path for path in given.iterdir() if path.is_dir() and _is_one(path))
-    if not found:
-        raise UserError(f"{given}: neither a run nor a sweep, nor a folder of these")
-    return found
-
-
-def _is_one(folder: Path) -> bool:
-    return any((folder / name).exists() for name in (RECORD, SUMMARY, RESULTS))
-
-
 def source_of(folder: Path) -> RunSource:
     """Return what a folder holds; UserError where that is no run or sweep that has come to its
     end."""
@@ -80,9 +64,8 @@ def source_of(folder: Path) -> RunSource:
         return _sweep(folder)
     check_finished(folder)
     record = _json(folder / RECORD)
-    results = folder / RESULTS
-    files = {name: tuple(parts_of_table(results / f"{name}.parquet")) for name in TABLES}
-    files = {name: paths for name, paths in files.items() if paths}
+    there = table_files(folder)
+    files = {name: there[name] for name in TABLES if name in there}
     if not files:
         raise UserError(f"{folder}: holds no tables of results")
     digest = hashlib.sha256()
@@ -100,9 +83,7 @@ def _sweep(folder: Path) -> RunSource:
         raise UserError(f"{folder}: shard {shard} of a sweep: `foretwin sweep --merge` them first")
     if not record.get("complete"):
         raise UserError(f"{folder}: the sweep has not come to its end: `foretwin sweep` goes on")
-    files = {
-        name: tuple(sorted((folder / at).glob("*.parquet"))) for name, at in SWEPT_TABLES.items()
-    }
+    files = table_files(folder)
     files["metrics"] = (folder / METRICS_FILE,)
     fingerprint = str(record["fingerprint"])
     # Its record also says how long this process played, and its parts may be cut in other ways.

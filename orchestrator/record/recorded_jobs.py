@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import msgspec
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.codec import SchemaMismatch, read_message
@@ -21,10 +18,10 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.versions import processor, versions
 from foretwin.contracts.world import World
 from foretwin.contracts.world_identity import with_id
+from foretwin.orchestrator.record.result_files import check_result_schema, opened
 from foretwin.orchestrator.record.run_folder import VEHICLES, table_at
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.record.table_parts import parts_of_table
-from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
 from foretwin.sim_worker.world_file import load_world
 
 _DECIDE = ("python", "foretwin", "mujoco", "numpy", "scipy", "numba")
@@ -119,21 +116,6 @@ def kept_vehicle(folder: Path, digest: str) -> VehicleParameters:
     return vehicle
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[pq.ParquetFile]:
-    """Open a file of a table; all that damage in it can raise is a UserError that names it.
-
-    Raises FileNotFoundError where there is none.
-    """
-    try:
-        with pq.ParquetFile(path) as file:
-            yield file
-    except (UserError, FileNotFoundError):
-        raise
-    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
-
-
 def _file_of(table: Path, column: str, value: str) -> Path:
     """Return which file of a table holds a value; what cannot be read is passed by."""
     files = sorted(table.glob("*.parquet")) if table.is_dir() else parts_of_table(table)
@@ -156,17 +138,6 @@ def _row(path: Path, column: str, value: str, kind: type[_Row]) -> _Row:
             if row[column] == value:
                 return msgspec.convert(row, kind)
     raise UserError(f"{path}: no {column} {value!r}")
-
-
-def check_result_schema(path: Path, schema: pa.Schema) -> dict[str, str]:
-    """Return the metadata of a table; UserError where another foretwin wrote it."""
-    said = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items()}
-    if said.get("result_schema") != str(RESULT_SCHEMA_VERSION):
-        raise UserError(
-            f"{path}: written by another foretwin (schema of results "
-            f"{said.get('result_schema', 'not told')}; this one reads {RESULT_SCHEMA_VERSION})"
-        )
-    return said
 
 
 def _check_same(path: Path, schema: pa.Schema) -> None:

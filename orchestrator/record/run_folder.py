@@ -20,6 +20,8 @@ SWEPT_TABLES = {"road_users": "road_users", "jobs": "jobs", "futures": "rows"}
 last."""
 METRICS_FILE = "metrics.parquet"
 """A sweep's table of what its metrics mean."""
+SUMMARY = "sweep.json"
+"""A sweep's record."""
 
 
 def table_at(folder: Path, table: str) -> Path:

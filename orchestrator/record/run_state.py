@@ -44,6 +44,18 @@ def run_lock(folder: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
+def is_locked(file: Path) -> bool:
+    """Whether a process holds the lock of a file; nothing is written, nor made where it lacks."""
+    try:
+        with file.open("rb") as held:
+            fcntl.flock(held, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def read_record(folder: Path) -> dict[str, Any]:
     """Return what run.json says, nothing where it is missing or torn."""
     try:

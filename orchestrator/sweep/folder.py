@@ -15,7 +15,13 @@ from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.setup import STACK_LOGS
 from foretwin.contracts.versions import processor, versions
-from foretwin.orchestrator.record.run_folder import METRICS_FILE, REPEATED, SWEPT_TABLES, VEHICLES
+from foretwin.orchestrator.record.run_folder import (
+    METRICS_FILE,
+    REPEATED,
+    SUMMARY,
+    SWEPT_TABLES,
+    VEHICLES,
+)
 from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from foretwin.orchestrator.sweep.manifest import MANIFEST
 from foretwin.orchestrator.sweep.places import PLACES
@@ -23,11 +29,11 @@ from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER
 from foretwin.orchestrator.sweep.road_users import digest_of
 from foretwin.orchestrator.sweep.shard import WHOLE, Shard
 from foretwin.orchestrator.sweep.spec import Loaded
-from foretwin.sim_worker.futures.job_tables import RESULT_SCHEMA_VERSION
+from foretwin.sim_worker.futures.columns import RESULT_SCHEMA_VERSION
 from foretwin.sim_worker.planners.registry import planner_origin
 from foretwin.world_gen.build import GENERATOR_VERSION
 
-SUMMARY, PLAN, WORLDS, LOG = "sweep.json", "places.msgpack", "worlds", "log.jsonl"
+PLAN, WORLDS, LOG = "places.msgpack", "worlds", "log.jsonl"
 
 
 class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):

@@ -10,8 +10,8 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.record.run_folder import VEHICLES
-from foretwin.orchestrator.sweep.folder import PLAN, SUMMARY, WORLDS, SweepFolder
+from foretwin.orchestrator.record.run_folder import SUMMARY, VEHICLES
+from foretwin.orchestrator.sweep.folder import PLAN, WORLDS, SweepFolder
 from foretwin.orchestrator.sweep.manifest import Manifest, PartEntry
 from foretwin.orchestrator.sweep.places import PLACES
 from foretwin.orchestrator.sweep.rows import Parts, link_whole, part_file, sha256_of

@@ -12,6 +12,9 @@ from typing import Any, Literal, get_args, get_origin
 import msgspec
 import pyarrow as pa
 
+RESULT_SCHEMA_VERSION = 1
+"""Of the tables of results: raised where a column means something else."""
+
 Columns = dict[str, type]
 
 _ARROW = {

@@ -10,12 +10,9 @@ from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import JobBytes
 from foretwin.contracts.versions import processor, versions
-from foretwin.sim_worker.futures.columns import columns, row_of, schema
+from foretwin.sim_worker.futures.columns import RESULT_SCHEMA_VERSION, columns, row_of, schema
 from foretwin.sim_worker.futures.future_rows import FUTURE_COLUMNS, Row
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
-
-RESULT_SCHEMA_VERSION = 1
-"""Of these tables: raised where a column means something else."""
 
 _PLACE = "kind:str x_m:float y_m:float yaw_rad:float speed_mps:float length_m:float width_m:float"
 JOB_TABLES = {

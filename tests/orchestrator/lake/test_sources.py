@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.lake.sources import SourceTables, folders_of_runs, source_of
+from foretwin.orchestrator.lake.sources import SourceTables, source_of
+from foretwin.orchestrator.record.folders_of_runs import folders_of_runs
 from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.lake.made_runs import CREDIT, made_run, made_sweep
 from tests.sim_worker.scenarios.worlds import cross

@@ -5,8 +5,10 @@ FORETWIN_LAKE_RUN names a finished run to copy; without it one is driven.
 
 from __future__ import annotations
 
+import json
 import os
 import random
+import resource
 import signal
 import subprocess
 import sys
@@ -24,7 +26,7 @@ from tests.orchestrator.lake.made_runs import contents, lake_table, rows_by_run
 from tests.system.foretwin_command import environment, foretwin
 
 pytestmark = [pytest.mark.judge, pytest.mark.timeout(1800)]
-COUNT, KILLS = 1000, 20
+COUNT, KILLS, QUERY_S = 1000, 20, 3.0
 SEED = int(os.environ.get("FORETWIN_KILL_SEED", "0")) or random.SystemRandom().randrange(1, 10**6)
 
 
@@ -92,6 +94,37 @@ def test_a_thousand_runs_collected_twice_are_the_same_lake(copies: Copies, tmp_p
         f"{first_s:.1f} s, again {second_s:.1f} s"
     )
     assert lake_table(lake, "futures").num_rows == COUNT * copies.rows["futures"]
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "SELECT run, count(*) AS n, avg(collided::INT) AS collided FROM futures GROUP BY run",
+        "SELECT vehicle_id, scenario, count(*) AS n, min(min_clearance_m) AS clearance_m "
+        "FROM futures JOIN runs USING (run) GROUP BY ALL",
+        "SELECT run, count(*) AS n, max(latency_ms) AS latency_ms FROM rounds GROUP BY run",
+        "SELECT state, count(*) AS n FROM runs GROUP BY state",
+    ],
+)
+def test_a_thousand_runs_answer_a_question_in_three_seconds(copies: Copies, sql: str) -> None:
+    asked = [sys.executable, "-P", "-m", "foretwin", "query", sql, str(copies.folder), "--json"]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    begun_s = time.monotonic()
+
+    said = subprocess.run(
+        asked, env=environment(copies.folder.parent / "cache"), text=True, check=True,
+        stdout=subprocess.PIPE, timeout=300,
+    ).stdout  # fmt: skip
+
+    took_s = time.monotonic() - begun_s
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # All its threads one after the other: what it takes at most where nobody else runs.
+    cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    print(f"\n{cpu_s:.2f} s of processor time, {took_s:.2f} s: {sql}")
+    wanted = copies.rows["rounds"] if "rounds" in sql else copies.rows["futures"]
+    total = COUNT if "state" in sql else COUNT * wanted
+    assert sum(row["n"] for row in json.loads(said)) == total
+    assert min(cpu_s, took_s) < QUERY_S
 
 
 def test_a_collect_that_is_killed_leaves_a_lake_of_whole_runs(

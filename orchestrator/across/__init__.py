@@ -1,0 +1,1 @@
+"""Many runs, sweeps and lakes at once: listed, asked by SQL, and two of them compared."""

@@ -1,0 +1,188 @@
+"""What changed from one run or sweep to another: by case, by measure and by place."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.across.paired_statistics import (
+    LEVEL,
+    PairedChange,
+    adjusted,
+    mcnemar_p,
+    paired_change,
+)
+from foretwin.orchestrator.across.pairs import ComparedSide, paired
+from foretwin.orchestrator.across.run_rows import DRIVE
+
+_ALWAYS = {"min_clearance_m": ("m", "higher"), "progress_m": ("m", "higher")}
+_METRIC = "metric_"
+_INPUTS = "config", "spec", "planners", "versions", "map"
+"""Of a record: what decides what it came to."""
+_OF_NO_MATTER = frozenset({"out", "view", "workers", "cache_dir", "job_timeout_s"})
+Pair = tuple[dict[str, Any], dict[str, Any]]
+
+
+def changes_between(first: ComparedSide, second: ComparedSide) -> dict[str, Any]:
+    """Return what changed from the first to the second, as an object that JSON holds.
+
+    A case fails where its future collides. `failing` counts cases that were played on both sides,
+    by exact McNemar; `measures` and `places` have p values adjusted for how many of them there are.
+    Raises UserError where both sides have no case in common.
+    """
+    if first.row.kind != second.row.kind:
+        kinds = f"{first.row.folder} is a {first.row.kind}, {second.row.folder} a {second.row.kind}"
+        raise UserError(f"compare: {kinds}: two of a kind are compared")
+    found = paired(first, second)
+    if not found.pairs:
+        raise UserError(
+            f"compare: {first.row.folder} and {second.row.folder} have no case in common: "
+            + (
+                "drives are compared by the instants of one recording at which both began futures"
+                if first.row.kind == DRIVE
+                else "sweeps are compared by junction, scenario, case, numbers and seed"
+            )
+        )
+    played = [pair for pair in found.pairs if all(_played(row) for row in pair)]
+    other = [pair for pair in found.pairs if not all(_played(row) for row in pair)]
+    return {
+        "first": _told(first),
+        "second": _told(second),
+        "inputs": _inputs(first, second),
+        "pairs": len(found.pairs),
+        "only_first": found.only_first,
+        "only_second": found.only_second,
+        "equal": sum(a["trajectory_sha256"] == b["trajectory_sha256"] for a, b in played),
+        "not_played": {
+            "newly": sum(_played(a) for a, _ in other),
+            "no_longer": sum(_played(b) for _, b in other),
+            "neither": sum(not _played(a) and not _played(b) for a, b in other),
+        },
+        "failing": _failing(played),
+        "measures": _measures(played, first, second),
+        "places": _places(played),
+        "newly_failing": [_case(b) for a, b in played if b["collided"] and not a["collided"]],
+        "fixed": [_case(b) for a, b in played if a["collided"] and not b["collided"]],
+    }
+
+
+def is_worse(found: dict[str, Any]) -> bool:
+    """Whether significantly more cases newly fail than were fixed: what `--fail-on-worse` asks."""
+    failing = found["failing"]
+    return bool(failing["newly"] > failing["fixed"] and failing["p_value"] < LEVEL)
+
+
+def _played(row: dict[str, Any]) -> bool:
+    return bool(row["valid"]) and not row["failure"] and not row["left_out"]
+
+
+def _failing(played: Sequence[Pair]) -> dict[str, Any]:
+    counts = _counts(played)
+    if not played:
+        return {**counts, "p_value": 1.0, "change": None}
+    differences = np.array([float(b["collided"]) - float(a["collided"]) for a, b in played])
+    change = paired_change(differences, [a["junction_id"] for a, _ in played])
+    p_value = mcnemar_p(counts["newly"], counts["fixed"])
+    return {**counts, "p_value": p_value, "change": change._asdict()}
+
+
+def _counts(played: Sequence[Pair]) -> dict[str, int]:
+    return {
+        "pairs": len(played),
+        "first": sum(bool(a["collided"]) for a, _ in played),
+        "second": sum(bool(b["collided"]) for _, b in played),
+        "newly": sum(bool(b["collided"]) and not a["collided"] for a, b in played),
+        "fixed": sum(bool(a["collided"]) and not b["collided"] for a, b in played),
+    }
+
+
+def _measures(
+    played: Sequence[Pair], first: ComparedSide, second: ComparedSide
+) -> list[dict[str, Any]]:
+    """Return each measure that both sides have, over the pairs in which both have a value."""
+    rows: list[dict[str, Any]] = []
+    meaning = dict(_ALWAYS)
+    for name in first.units.keys() & second.units.keys():
+        meaning[_METRIC + name] = second.units[name], second.better[name]
+    for name, (unit, better) in sorted(meaning.items()):
+        both = [(a, b) for a, b in played if _number(a.get(name)) and _number(b.get(name))]
+        if not both:
+            continue
+        before, after = (np.array([pair[side][name] for pair in both]) for side in (0, 1))
+        change = paired_change(after - before, [a["junction_id"] for a, _ in both])
+        rows.append(
+            {
+                "measure": name,
+                "unit": unit,
+                "better": better,
+                "pairs": len(both),
+                "first": float(np.mean(before)),
+                "second": float(np.mean(after)),
+                "change": change._asdict(),
+                "word": _word(change, better),
+            }
+        )
+    told = adjusted([row["change"]["p_value"] for row in rows])
+    for row, of_many in zip(rows, told, strict=True):
+        row["p_adjusted"] = of_many
+        if of_many is None or of_many >= LEVEL:
+            row["word"] = "the same" if row["change"]["mean"] == 0.0 else "not significant"
+    return rows
+
+
+def _word(change: PairedChange, better: str) -> str:
+    if better == "neither":
+        return "changed"
+    return "better" if (change.mean > 0.0) == (better == "higher") else "worse"
+
+
+def _number(value: Any) -> bool:
+    return value is not None and bool(np.isfinite(value))
+
+
+def _places(played: Sequence[Pair]) -> list[dict[str, Any]]:
+    """Return each place, those first where most changed for the worse."""
+    at: dict[str, list[Pair]] = defaultdict(list)
+    for pair in played:
+        at[pair[0]["junction_id"]].append(pair)
+    rows: list[dict[str, Any]] = []
+    for junction_id, pairs in at.items():
+        counts = _counts(pairs)
+        p_value = mcnemar_p(counts["newly"], counts["fixed"])
+        rows.append({"junction_id": junction_id, **counts, "p_value": p_value})
+    for row, of_many in zip(rows, adjusted([row["p_value"] for row in rows]), strict=True):
+        row["p_adjusted"] = of_many
+    return sorted(rows, key=lambda row: (row["fixed"] - row["newly"], row["junction_id"]))
+
+
+def _case(row: dict[str, Any]) -> dict[str, Any]:
+    names = "future_id", "junction_id", "scenario", "name", "planner", "case", "stamp_ns"
+    return {name: row.get(name) for name in names}
+
+
+def _told(side: ComparedSide) -> dict[str, Any]:
+    row = side.row
+    planners = side.planners
+    told = {"run": row.run, "folder": row.folder, "kind": row.kind, "foretwin": row.foretwin}
+    return {**told, "futures": len(side.futures), "planners": planners}
+
+
+def _inputs(first: ComparedSide, second: ComparedSide) -> dict[str, Any]:
+    """Return what decides the futures and is another on both sides, by its dotted name."""
+    a, b = (json.loads(side.row.record) for side in (first, second))
+    found: dict[str, Any] = {}
+    for name in _INPUTS:
+        mine, theirs = (one.get(name) or {} for one in (a, b))
+        for key in sorted(mine.keys() | theirs.keys()):
+            if mine.get(key) != theirs.get(key) and key not in _OF_NO_MATTER:
+                found[f"{name}.{key}"] = {"first": mine.get(key), "second": theirs.get(key)}
+    if first.planners != second.planners:
+        found["planner"] = {"first": first.planners, "second": second.planners}
+    if a.get("seed") != b.get("seed"):
+        found["seed"] = {"first": a.get("seed"), "second": b.get("seed")}
+    return found

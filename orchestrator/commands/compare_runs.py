@@ -1,0 +1,145 @@
+"""`foretwin compare` of two runs or two sweeps: what changed, and whether that is chance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.terminal import plain, say
+from foretwin.orchestrator.across.changes import changes_between, is_worse
+from foretwin.orchestrator.across.paired_statistics import LEVEL
+from foretwin.orchestrator.across.pairs import side_of
+from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
+from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.record.folders_of_runs import is_run_folder
+
+WORSE = 3
+_MOST_LISTED = 12
+
+
+def compare_runs(
+    first: Path, second: Path, *, planners: str | None, as_json: bool, fail_on_worse: bool
+) -> int:
+    """Print what changed from one run or sweep to another; returns 0, or where it is asked 3 if
+    significantly more cases newly fail than were fixed.
+
+    `planners` names one for each side, with a comma between. Raises UserError in one line.
+    """
+    of_first, of_second = _planners(planners)
+    if first.resolve() == second.resolve() and of_first == of_second:
+        raise UserError(f"compare: both are {first}: name another, or two of its --planners A,B")
+    found = changes_between(side_of(first, of_first), side_of(second, of_second))
+    judged = _judged(first, second) if found["first"]["kind"] == "drive" else None
+    if as_json:
+        print_json({**found, "judged": judged})
+    else:
+        for line in change_lines(found):
+            say(plain(line))
+        for line in difference_lines(judged)[2:] if judged else ():
+            say(plain(line))
+    return WORSE if fail_on_worse and is_worse(found) else 0
+
+
+def refuse_for_runs(first: Path, second: Path, *, of_drives: tuple[object, ...]) -> None:
+    """Raise UserError where a run is compared with what is none, or with options of drives."""
+    for folder in (first, second):
+        if not folder.exists():
+            raise FileNotFoundError(f"{folder}: no such folder")
+        if not is_run_folder(folder):
+            raise UserError(
+                f"compare: {folder} is neither a run nor a sweep: name two of these, or two "
+                "recorded drives (of a run: RUN/drive.mcap)"
+            )
+    if any(one is not None for one in of_drives):
+        raise UserError(
+            "compare: --out and declarations are for recorded drives, not runs or sweeps"
+        )
+
+
+def _planners(given: str | None) -> tuple[str | None, str | None]:
+    if given is None:
+        return None, None
+    names = [name.strip() for name in given.split(",")]
+    if len(names) != 2 or not all(names):
+        raise UserError(f"--planners {given}: two names, as in --planners mine,yours")
+    return names[0], names[1]
+
+
+def _judged(first: Path, second: Path) -> dict[str, Any] | None:
+    """Return what `foretwin judge` would say of both; None where a run has not what it takes."""
+    if first.resolve() == second.resolve():
+        return None
+    try:
+        return difference_of(read_judged(first), read_judged(second))
+    except (FileNotFoundError, KeyError, TypeError):
+        return None
+
+
+def change_lines(found: dict[str, Any]) -> Iterator[str]:
+    """Yield what changed, as text."""
+    for name, side in (("A", found["first"]), ("B", found["second"])):
+        who = ", ".join(side["planners"])
+        yield f"{name}: {side['folder']} ({side['futures']} futures of {who})"
+    for name, both in found["inputs"].items():
+        yield f"  {name}: {both['first']} → {both['second']}"
+    if not found["inputs"]:
+        yield "  nothing that decides futures differs"
+    failing = found["failing"]
+    alone = f"{found['only_first']} only in A, {found['only_second']} only in B"
+    yield f"{found['pairs']} cases are in both, {alone}; {failing['pairs']} were played in both"
+    not_played = found["not_played"]
+    if not_played["newly"] or not_played["no_longer"]:
+        yield (
+            f"not played: {not_played['newly']} newly, "
+            f"{not_played['no_longer']} no longer, {not_played['neither']} in neither"
+        )
+    yield f"to the same bits: {found['equal']}"
+    yield (
+        f"collided: {failing['first']} → {failing['second']}: {failing['newly']} newly failing, "
+        f"{failing['fixed']} fixed; exact McNemar p = {failing['p_value']:.3g}, "
+        + ("significant" if failing["p_value"] < LEVEL else "not significant")
+    )
+    if failing["change"] is not None:
+        yield f"change of the share: {_interval(failing['change'], 100.0)} %"
+    yield from _measure_lines(found["measures"])
+    yield from _place_lines(found["places"])
+    for name, side in (("newly failing", "second"), ("fixed", "second")):
+        cases = found[name.replace(" ", "_")]
+        for one in cases[:_MOST_LISTED]:
+            where = f"{one['scenario'] or 'nominal'} at {one['junction_id']}: {one['name']}"
+            yield f"{name}: {where}: foretwin repeat {found[side]['folder']} {one['future_id']}"
+        if len(cases) > _MOST_LISTED:
+            yield f"{name}: {len(cases) - _MOST_LISTED} more: --json"
+
+
+def _measure_lines(rows: list[dict[str, Any]]) -> Iterator[str]:
+    changed = [row for row in rows if row["change"]["mean"] != 0.0]
+    if changed:
+        yield f"{'measure':<40}{'A':>10}{'B':>10}  {'B minus A, 95 %':<40}p adjusted"
+    for row in changed:
+        p_value = "" if row["p_adjusted"] is None else f"{row['p_adjusted']:.3g}"
+        name = row["measure"] if row["unit"] == "1" else f"{row['measure']} ({row['unit']})"
+        yield (
+            f"{name:<40}{row['first']:>10.4g}{row['second']:>10.4g}  "
+            f"{_interval(row['change'], 1.0):<40}{p_value:<10}{row['word']}"
+        )
+
+
+def _place_lines(rows: list[dict[str, Any]]) -> Iterator[str]:
+    changed = [row for row in rows if row["newly"] or row["fixed"]]
+    yield f"places where cases changed: {len(changed)} of {len(rows)}"
+    for row in changed[:_MOST_LISTED]:
+        yield (
+            f"  {row['junction_id']}: collided {row['first']} → {row['second']} of {row['pairs']}, "
+            f"{row['newly']} newly, {row['fixed']} fixed, p adjusted {row['p_adjusted']:.3g}"
+        )
+
+
+def _interval(change: dict[str, Any], scale: float) -> str:
+    mean = f"{scale * change['mean']:+.3g}"
+    units = f"{change['units']} {'places' if change['of_places'] else 'pairs'}"
+    if change["low"] is None:
+        return f"{mean} (too few to tell: {units})"
+    return f"{mean} [{scale * change['low']:+.3g}, {scale * change['high']:+.3g}] ({units})"

@@ -1,0 +1,76 @@
+"""`foretwin compare` of runs and sweeps as a user runs it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from foretwin.orchestrator.commands.cli import run as command
+from tests.orchestrator.across.test_changes import case, sweep_of
+
+
+@pytest.fixture
+def sweeps(tmp_path: Path) -> tuple[str, str]:
+    """One, and one in which seven of 28 cases newly fail, at every place."""
+    first = sweep_of(tmp_path / "before", [case(number) for number in range(28)])
+    rows = [case(number, collided=number < 7, min_clearance_m=0.1) for number in range(28)]
+    return str(first), str(sweep_of(tmp_path / "after", rows, seed=4))
+
+
+def test_what_changed_is_said_with_how_sure_it_is_and_how_to_see_it(
+    sweeps: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(["compare", *sweeps]) == 0
+
+    said = capsys.readouterr().out
+    assert (
+        "collided: 0 → 7: 7 newly failing, 0 fixed; exact McNemar p = 0.0156, significant" in said
+    )
+    assert "change of the share: +25 [+25, +25] (7 places) %" in said
+    assert "min_clearance_m (m)" in said
+    assert "worse" in said
+    assert f"newly failing: scp at n0: scp 0: foretwin repeat {sweeps[1]} mine-0" in said
+    assert "places where cases changed: 7 of 7" in said
+    assert "seed: None → 4" in said
+
+
+def test_exit_code_3_is_for_those_who_ask(
+    sweeps: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(["compare", *sweeps, "--fail-on-worse"]) == 3
+    assert command(["compare", *reversed(sweeps), "--fail-on-worse"]) == 0
+    capsys.readouterr()
+    assert command(["compare", *sweeps, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["failing"]["newly"] == 7
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (["A", "A"], "name another, or two of its --planners A,B"),
+        (["A", "A", "--planners", "mine"], "two names, as in --planners mine,yours"),
+        (["A", "A", "--planners", "mine,yours"], "no futures of planner 'yours': has mine"),
+        (["A", "LOG"], "is neither a run nor a sweep"),
+        (["A", "nowhere"], "nowhere: no such folder"),
+        (["A", "B", "--out", "here"], "--out and declarations are for recorded drives"),
+        (["LOG", "LOG", "--fail-on-worse"], "--planners and --fail-on-worse are for runs"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line(
+    sweeps: tuple[str, str],
+    tmp_path: Path,
+    asked: list[str],
+    told: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    log = tmp_path / "drive.csv"
+    log.touch()
+    named = {"A": sweeps[0], "B": sweeps[1], "LOG": str(log)}
+
+    assert command(["compare", *(named.get(word, word) for word in asked)]) == 2
+
+    said = capsys.readouterr().err
+    assert told in said
+    assert said.count("\n") == 1

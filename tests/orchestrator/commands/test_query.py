@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from foretwin.orchestrator.commands.cli import run as command
+from tests.orchestrator.lake.made_runs import made_run
+
+COVERS = ("foretwin.orchestrator.commands.cli_across",)
+
+
+def test_an_answer_is_a_table_json_or_csv(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = made_run(tmp_path / "runs", 3, futures=2)
+    sql = "SELECT run, index, values, end_x_m, NULL AS nothing FROM futures ORDER BY index"
+
+    assert command(["query", sql, str(tmp_path / "runs")]) == 0
+    assert "3.125" in capsys.readouterr().out
+    assert command(["query", sql, str(tmp_path / "runs"), "--json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)
+    assert first == {
+        "run": run.name, "index": 0, "values": {"gap_s": 0.0}, "end_x_m": 3.0, "nothing": None,
+    }  # fmt: skip
+    assert second["end_x_m"] == 3.125
+    assert command(["query", sql, str(tmp_path / "runs"), "--csv"]) == 0
+    header, *rows = csv.reader(capsys.readouterr().out.splitlines())
+    assert header == ["run", "index", "values", "end_x_m", "nothing"]
+    assert rows[1] == [run.name, "1", "{'gap_s': 1.0}", "3.125", ""]
+
+
+def test_what_does_not_fit_a_terminal_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = made_run(tmp_path, futures=250)
+
+    assert command(["query", "FROM futures", str(run)]) == 0
+
+    said = capsys.readouterr()
+    assert "200 of 250 rows; --csv and --json give all" in said.err
+    assert "columns fit here" in said.err
+    assert said.out.count("\n") < 250
+
+
+def test_without_sql_the_views_and_their_columns_are_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made_run(tmp_path / "runs")
+    monkeypatch.chdir(tmp_path)
+
+    assert command(["query", "--json"]) == 0
+
+    told = json.loads(capsys.readouterr().out)
+    assert {"view": "futures", "column": "collided", "type": "BOOLEAN"} in told
+    assert {"view": "runs", "column": "verdict", "type": "VARCHAR"} in told
+
+
+def test_a_wrong_question_is_one_line_and_exit_code_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = made_run(tmp_path)
+
+    assert command(["query", "SELECT colided FROM futures", str(run)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("foretwin: query: no column 'colided' (did you mean collided")
+    assert said.count("\n") == 1
+    assert command(["query", "SELECT 1", str(tmp_path / "nowhere")]) == 2
