@@ -39,7 +39,14 @@ if TYPE_CHECKING:
         read_world,
         save_world,
     )
-    from foretwin.recordings import Recording, open_run, open_sweep
+    from foretwin.plots import (
+        plot_driven,
+        plot_futures,
+        plot_gap,
+        plot_junction,
+        plot_outcomes,
+    )
+    from foretwin.recordings import MotionArrays, Recording, open_run, open_sweep
     from foretwin.sim_worker.gym import JunctionEnv as JunctionEnv
     from foretwin.sim_worker.gym import JunctionVectorEnv as JunctionVectorEnv
     from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView
@@ -52,6 +59,7 @@ if TYPE_CHECKING:
     from foretwin.simulation import Futures, run_futures, state_on, ways_through
 
 _MAPS = "Map", "drawn_town", "export_formats", "export_world", "open_map"
+_PLOTS = "plot_driven", "plot_futures", "plot_gap", "plot_junction", "plot_outcomes"
 _FROM = {
     "foretwin.contracts.drive": ("VehicleState",),
     "foretwin.contracts.errors": ("UserError",),
@@ -60,7 +68,8 @@ _FROM = {
     "foretwin.contracts.vehicle": ("VehicleParameters",),
     "foretwin.contracts.world": ("World",),
     "foretwin.maps": (*_MAPS, "read_world", "save_world"),
-    "foretwin.recordings": ("Recording", "open_run", "open_sweep"),
+    "foretwin.plots": _PLOTS,
+    "foretwin.recordings": ("MotionArrays", "Recording", "open_run", "open_sweep"),
     "foretwin.sim_worker.gym": ("JunctionEnv", "JunctionVectorEnv"),
     "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
     "foretwin.sim_worker.planners.one_at_a_time": ("CarView",),
@@ -74,11 +83,12 @@ _FROM = {
 _MODULE_OF = {name: module for module, names in _FROM.items() for name in names}
 
 # Without the environments: they need an extra, and `import *` would fail where it is missing.
-__all__ = ["CarView", "Future", "Futures", "Map", "Planner"]
+__all__ = ["CarView", "Future", "Futures", "Map", "MotionArrays", "Planner"]
 __all__ += ["PlannerOutput", "PlannerView", "Recording", "Scenario", "UserError"]
 __all__ += ["VehicleParameters", "VehicleState", "Way", "World", "catalogue", "drawn_town"]
 __all__ += ["export_formats", "export_world", "find_scenario", "front_from_base_m", "load_vehicle"]
 __all__ += ["open_map", "open_run", "open_sweep", "planner_names", "pure_pursuit", "read_scenario"]
+__all__ += ["plot_driven", "plot_futures", "plot_gap", "plot_junction", "plot_outcomes"]
 __all__ += ["read_world", "run_futures", "save_world", "state_on", "ways_through"]
 
 

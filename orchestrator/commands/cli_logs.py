@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.commands.cli_across import ACROSS_RUNS
+from foretwin.orchestrator.commands.cli_across import ACROSS_RUNS, compare
 from foretwin.orchestrator.commands.cli_options import (
     DeclarationOption,
     FirstDeclarationOption,
@@ -205,55 +204,6 @@ def gap(
     from foretwin.orchestrator.commands.gap import report_gap
 
     report_gap(**asked)
-
-
-def compare(
-    first: Annotated[Path, typer.Argument(metavar="A", help="run or sweep; or recorded drive")],
-    second: Annotated[
-        Path, typer.Argument(metavar="B", help="another; or a drive of the same road, or A again")
-    ],
-    planners: Annotated[
-        str | None, typer.Option(help="runs, sweeps: A,B: compare one planner with another")
-    ] = None,
-    fail_on_worse: Annotated[
-        bool,
-        typer.Option(
-            "--fail-on-worse",
-            help="runs, sweeps: exit code 3 where more cases newly fail than were fixed, and exact "
-            "McNemar p < 0.05",
-        ),
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="all of it as JSON")] = False,
-    out: Annotated[Path | None, typer.Option(help="drives: folder for a picture")] = None,
-    declaration: FirstDeclarationOption = None,
-    other_declaration: OtherDeclarationOption = None,
-) -> None:
-    """Compare two runs, sweeps or planners: what changed; or two drives of one road, as recorded.
-
-    Example: foretwin compare sweeps/before sweeps/after --fail-on-worse
-    """
-    from foretwin.orchestrator.record.folders_of_runs import is_run_folder
-
-    if is_run_folder(first) or is_run_folder(second):
-        from foretwin.orchestrator.commands.compare_runs import compare_runs, refuse_for_runs
-
-        refuse_for_runs(first, second, of_drives=(out, declaration, other_declaration))
-        code = compare_runs(
-            first, second, planners=planners, as_json=as_json, fail_on_worse=fail_on_worse
-        )
-        raise typer.Exit(code)
-    if planners is not None or fail_on_worse:
-        raise UserError(f"{first}, {second}: --planners and --fail-on-worse are for runs or sweeps")
-    from foretwin.orchestrator.commands.compare import compare as compare_drives
-
-    compare_drives(
-        first,
-        second,
-        as_json=as_json,
-        out=out,
-        declaration=declaration,
-        other_declaration=other_declaration,
-    )
 
 
 def collect(

@@ -59,8 +59,8 @@ def compare_logs(
     Raises UserError where one has no way with a known heading, and where they have none in common.
     """
     same = first.resolve() == second.resolve()
-    states, placed = _states(first, declaration)
-    others, others_placed = (states, True) if same else _states(second, other_declaration)
+    states, placed = estimated_states(first, declaration)
+    others, others_placed = (states, True) if same else estimated_states(second, other_declaration)
     frame = LocalFrame(states[0].position)
     a = _line(first, states, frame)
     b = a if same else _line(second, others, frame)
@@ -128,7 +128,7 @@ def scale_object(found: ComparedDrives) -> dict[str, Any]:
     }
 
 
-def _states(recording: Path, declaration: Path | None) -> tuple[list[VehicleState], bool]:
+def estimated_states(recording: Path, declaration: Path | None) -> tuple[list[VehicleState], bool]:
     """Return a drive's estimated states, and whether it says where its positions are of."""
     log: Log = open_log(recording, declaration=declaration)
     estimator = StateEstimator(log.info)

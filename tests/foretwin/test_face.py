@@ -25,7 +25,6 @@ COVERS = (
     "foretwin.bus",
     "foretwin.checks",
     "foretwin.maps",
-    "foretwin.recordings",
     "foretwin.simulation",
 )
 

@@ -35,6 +35,7 @@ _SAID = {
     "verdicts": "who departs, vehicle or model, and why",
     "junctions": "a passage of a junction",
     "events": "an event of the drive",
+    "marks": "an event that somebody marked, or a note to one ([co-pilot display](copilot.md))",
 }
 
 
