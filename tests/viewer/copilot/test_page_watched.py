@@ -1,0 +1,137 @@
+"""The page in a real browser beside a drive: alarms in time, nothing sent out, a browser frozen.
+
+A judge; what it needs is in `test_page_read.py`.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foretwin.contracts.simulation import RunEnd
+from tests.viewer import scene
+from tests.viewer.copilot.chromium import Browser, judges_python
+from tests.viewer.copilot.display import DisplayRun
+from tests.viewer.copilot.test_alerts import gap, worker
+from tests.viewer.copilot.test_now import AHEAD_OF_X1, a_round
+from tests.viewer.copilot.test_words import verdict
+
+pytestmark = [pytest.mark.judge, pytest.mark.timeout(900)]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    made = Browser()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def live(tmp_path: Path) -> Iterator[DisplayRun]:
+    judges_python()
+    run = DisplayRun(tmp_path)
+    yield run
+    run.close()
+
+
+def go_on(run: DisplayRun, time_s: float) -> None:
+    run.send("progress", AHEAD_OF_X1)
+    run.send("mirror", scene.mirror_at(time_s))
+    run.send("state", scene.state_at(time_s))
+
+
+FORCED = {
+    "ended": lambda run: run.send("run_end", RunEnd(stamp_ns=1)),
+    "telemetry": lambda run: run.send(
+        "state", msgspec.structs.replace(scene.state_at(5.0), stale=("gnss",))
+    ),
+    "verdict": lambda run: run.send("verdict", verdict("vehicle")),
+    "gap": lambda run: run.send("gap_alarm", gap(over=True)),
+    "rounds": lambda run: [run.send("round", a_round(late=True)) for _ in range(2)],
+    "off the map": lambda run: run.send(
+        "progress", msgspec.structs.replace(AHEAD_OF_X1, mission_state="off_map")
+    ),
+    "worker": lambda run: run.send("worker_status", worker("sick")),
+}
+
+
+@pytest.mark.parametrize("kind", FORCED)
+def test_an_alarm_is_on_the_first_screen_within_half_a_second(
+    live: DisplayRun, browser: Browser, kind: str
+) -> None:
+    go_on(live, 4.0)
+    live.send("round", a_round())
+    go_on(live, 4.1)
+    browser.do("open", url=live.address, size=(1024, 600))
+    go_on(live, 4.2)
+    browser.do("wait", selector="#alert[hidden]")
+    begun_s = time.monotonic()
+    FORCED[kind](live)
+    browser.do("wait", selector="#alert:not([hidden])")
+    took_s = time.monotonic() - begun_s
+    inside = browser.do("box", selector="#alert")
+    browser.do("close")
+    assert took_s <= 0.5
+    assert inside["top"] >= 0
+    assert inside["bottom"] <= 600
+
+
+def test_nothing_leaves_the_machine_and_a_frozen_browser_changes_nothing(
+    live: DisplayRun, browser: Browser
+) -> None:
+    browser.do("open", url=live.address, size=(1024, 600))
+    go_on(live, 1.0)
+    browser.do("wait", selector="body[data-ready=yes]")
+    browser.do("press", key=" ")
+    assert browser.do("outside") == []
+    frozen = browser.do("freeze")
+    try:
+        for number in range(50):
+            go_on(live, 1.1 + 0.1 * number)
+            live.frame_where(lambda one, at_s=1.05 + 0.1 * number: one.drive_s > at_s)
+    finally:
+        browser.do("thaw", pids=frozen)
+    browser.do("close")
+    assert live.process.poll() is None
+
+
+def test_the_server_is_small_and_idle(live: DisplayRun, browser: Browser) -> None:
+    """Of one core at most 3 %, with a page open and the car's usual rates, 150 MB at most."""
+    browser.do("open", url=live.address, size=(1024, 600))
+    before_s, begun_s = cpu_s(live.process.pid), time.monotonic()
+    number = 0
+    while time.monotonic() - begun_s < 20.0:
+        time_s = number / 50.0
+        live.send("state", scene.state_at(time_s))
+        if number % 5 == 0:
+            live.send("mirror", scene.mirror_at(time_s))
+        if number % 12 == 0:
+            live.send("progress", AHEAD_OF_X1)
+        if number % 25 == 0:
+            live.send("round", a_round())
+        number += 1
+        while time.monotonic() - begun_s < number / 50.0:
+            time.sleep(0.002)
+    share = (cpu_s(live.process.pid) - before_s) / (time.monotonic() - begun_s)
+    heap_mb = browser.do("heap_mb")
+    browser.do("close")
+    resident_mb = rss_mb(live.process.pid)
+    print(f"share of a core {share:.3f}, resident {resident_mb:.0f} MB, page heap {heap_mb:.1f} MB")
+    assert share <= 0.03
+    assert resident_mb <= 150.0
+    assert heap_mb <= 200.0
+
+
+def cpu_s(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def rss_mb(pid: int) -> float:
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
