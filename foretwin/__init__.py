@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         read_world,
         save_world,
     )
+    from foretwin.orchestrator.occurred.occurred import occurred_in
     from foretwin.plots import (
         plot_driven,
         plot_futures,
@@ -68,6 +69,7 @@ _FROM = {
     "foretwin.contracts.vehicle": ("VehicleParameters",),
     "foretwin.contracts.world": ("World",),
     "foretwin.maps": (*_MAPS, "read_world", "save_world"),
+    "foretwin.orchestrator.occurred.occurred": ("occurred_in",),
     "foretwin.plots": _PLOTS,
     "foretwin.recordings": ("MotionArrays", "Recording", "open_run", "open_sweep"),
     "foretwin.sim_worker.gym": ("JunctionEnv", "JunctionVectorEnv"),
@@ -87,7 +89,15 @@ __all__ = ["CarView", "Future", "Futures", "Map", "MotionArrays", "Planner"]
 __all__ += ["PlannerOutput", "PlannerView", "Recording", "Scenario", "UserError"]
 __all__ += ["VehicleParameters", "VehicleState", "Way", "World", "catalogue", "drawn_town"]
 __all__ += ["export_formats", "export_world", "find_scenario", "front_from_base_m", "load_vehicle"]
-__all__ += ["open_map", "open_run", "open_sweep", "planner_names", "pure_pursuit", "read_scenario"]
+__all__ += [
+    "occurred_in",
+    "open_map",
+    "open_run",
+    "open_sweep",
+    "planner_names",
+    "pure_pursuit",
+    "read_scenario",
+]
 __all__ += ["plot_driven", "plot_futures", "plot_gap", "plot_junction", "plot_outcomes"]
 __all__ += ["read_world", "run_futures", "save_world", "state_on", "ways_through"]
 
