@@ -7,8 +7,9 @@ from typing import Literal, get_args
 
 import msgspec
 
-from foretwin.contracts.did_you_mean import meant, one_of
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import MissingFileError, UserError
+from foretwin.contracts.toml_file import parse_toml, toml_text
 
 LayoutName = Literal["drive", "identify", "gap", "sweep"]
 LAYOUTS: tuple[str, ...] = get_args(LayoutName)
@@ -87,19 +88,7 @@ def read_layout(name: str) -> Layout:
     if not file.is_file():
         known = one_of(name, LAYOUTS)
         raise MissingFileError(f"--layout {name}: no such file; {known}, or a TOML file")
-    try:
-        layout = msgspec.toml.decode(file.read_bytes(), type=Layout)
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"--layout {name}: {_told(str(error))}") from error
+    layout = parse_toml(toml_text(file, "--layout"), f"--layout {name}").convert(Layout)
     if (trouble := layout.trouble()) is not None:
         raise UserError(f"--layout {name}: {trouble}")
     return layout
-
-
-def _told(problem: str) -> str:
-    """Return what msgspec says, with the views that there are where one is unknown."""
-    text = " ".join(problem.split())
-    if "Invalid enum value" not in text:
-        return text
-    given = text.split("'")[1] if "'" in text else ""
-    return f"{text}; {meant(given, VIEWS)}views are {', '.join(VIEWS)}"

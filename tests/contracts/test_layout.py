@@ -49,7 +49,10 @@ def test_ones_own_is_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ('columns = [{rows = [{tabs = ["futurs"]}]}]', "did you mean futures? views are inter"),
+        (
+            'columns = [{rows = [{tabs = ["futurs"]}]}]',
+            "line 1: columns[0].rows[0].tabs[0] 'futurs': did you mean futures? one of",
+        ),
         ("columns = [{rows = [{}]}]", "each row needs either tabs = [...] or beside = [...]"),
         (
             'columns = [{rows = [{tabs = ["map"], beside = ["plan"]}]}]',
@@ -58,8 +61,8 @@ def test_ones_own_is_a_file(tmp_path: Path) -> None:
         ('columns = [{share = 0, rows = [{tabs = ["map"]}]}]', "each share is above 0"),
         ('columns = [{rows = [{share = -1, tabs = ["map"]}]}]', "each share is above 0"),
         ("columns = []", "holds no row of views"),
-        ("rows = 3", "unknown field `rows`"),
-        ("columns = [", "--layout"),
+        ("rows = 3", "line 1: unknown key 'rows'; one of purpose, columns"),
+        ("columns = [", "line 1: not TOML"),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, text: str, told: str) -> None:
