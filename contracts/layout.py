@@ -13,7 +13,8 @@ from foretwin.contracts.toml_file import parse_toml, toml_text
 
 LayoutName = Literal["drive", "identify", "gap", "sweep"]
 LAYOUTS: tuple[str, ...] = get_args(LayoutName)
-"""Those that come along, as files beside this one."""
+"""Those that come along, as files below `LAYOUT_FILES`."""
+LAYOUT_FILES = Path(__file__).parent / "layouts"
 _Space = Literal["intersection", "chase", "map"]
 _Text = Literal["status", "legend", "futures", "verdict", "parameters", "events"]
 _Process = Literal["workers", "worker_speed", "worker_memory", "how_sure"]
@@ -29,28 +30,32 @@ VIEWS: tuple[str, ...] = tuple(get_args(ViewName))
 
 
 class LayoutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Views of one row: behind tabs, the first one open, or `beside` each other.
-
-    `share` is its part of the column's height, among those of the other rows.
-    """
+    """Views of one row: behind tabs, or beside each other."""
 
     share: float = 1.0
+    """Its part of the column's height, among those of the other rows."""
     tabs: tuple[ViewName, ...] = ()
+    """Views of which one is seen; the first one is open."""
     beside: tuple[ViewName, ...] = ()
+    """Views that are seen all, from left to right."""
 
 
 class LayoutColumn(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Rows from top to bottom; `share` is the column's part of the width."""
+    """A column of the window."""
 
     share: float = 1.0
+    """Its part of the width, among those of the other columns."""
     rows: tuple[LayoutRow, ...]
+    """From top to bottom."""
 
 
 class Layout(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Columns from left to right; `purpose` says what one looks at with it."""
+    """A layout of the viewer."""
 
     purpose: str = ""
+    """What one looks at with it."""
     columns: tuple[LayoutColumn, ...]
+    """From left to right."""
 
     def trouble(self) -> str | None:
         """Return what is wrong with it, None where nothing is."""
@@ -84,7 +89,7 @@ def read_layout(name: str) -> Layout:
 
     Raises UserError, in one line, where there is none or where it cannot be used.
     """
-    file = Path(__file__).parent / "layouts" / f"{name}.toml" if name in LAYOUTS else Path(name)
+    file = LAYOUT_FILES / f"{name}.toml" if name in LAYOUTS else Path(name)
     if not file.is_file():
         known = one_of(name, LAYOUTS)
         raise MissingFileError(f"--layout {name}: no such file; {known}, or a TOML file")

@@ -13,6 +13,7 @@ import msgspec
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.field_words import fields_of
+from foretwin.contracts.layout import LAYOUT_FILES, Layout, read_layout
 from foretwin.contracts.numbers import FUTURE_NUMBERS, SCENARIO_NUMBERS, Range
 from foretwin.contracts.scenario import ActorPart, EgoPart, FaultPart, Scenario
 from foretwin.contracts.toml_file import load_toml
@@ -125,6 +126,12 @@ KINDS: Mapping[str, FileKind] = {
         StandinParameters,
         read_parameters,
         shipped=STANDIN_FILE,
+    ),
+    "layout": FileKind(
+        "how the viewer is laid out, for --layout",
+        Layout,
+        lambda path: read_layout(str(path)),
+        shipped=LAYOUT_FILES / "drive.toml",
     ),
     "overpass": FileKind(
         "whom foretwin map get asks for maps",
