@@ -12,7 +12,7 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.report.blocks import Plotted, Report
 
 Redaction = Literal["coarse", "places"]
-"""`coarse` leaves pictures, without names, and a position within some 10 km; `places` neither."""
+"""Both take out names, ids and positions; `places` pictures as well."""
 
 _LEFT_OUT = "\u2026"
 _IDS = re.compile(

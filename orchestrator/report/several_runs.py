@@ -90,7 +90,12 @@ def _verdict(seen: Sequence[_Seen]) -> str:
     said = []
     for other in others:
         a, b = (part_of(one.run.record, "comparison", "ade_m", "4") for one in (first, other))
-        if a is not None and b is not None:
+        if a is not None and b is not None and round(a, 2) == round(b, 2):
+            said.append(
+                f"what {other.name} foresaw lies as far from what was driven as {first.name} did "
+                f"after 4 s ({a:.2f} m)"
+            )
+        elif a is not None and b is not None:
             nearer = "nearer to" if b < a else "farther from"
             said.append(
                 f"what {other.name} foresaw lies {abs(b - a):.2f} m {nearer} what was driven than "

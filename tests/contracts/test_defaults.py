@@ -32,6 +32,7 @@ from foretwin.contracts import (
     vehicle,
     world,
 )
+from foretwin.contracts.ports import WEB_PORT
 
 COVERS = (
     "foretwin.contracts.drive",
@@ -57,6 +58,9 @@ LISTED: dict[str, dict[str, Any]] = {
         "reach_m": 20.0,
     },
     "Future": {"planner": "pure_pursuit_idm"},
+    "CopilotSetup": {
+        "host": "127.0.0.1", "attribution": OSM, "seat": "co-pilot", "awaited": True,
+    },
     "GapAlarm": {"over": True},
     "Job": {"accident_motion": True, "control_hz": 20.0, "engine": "mujoco", "schema_version": 1},
     "Lane": {
@@ -80,7 +84,9 @@ LISTED: dict[str, dict[str, Any]] = {
     "VehicleInfo": {"reference_point": "unknown"},
     "VehicleState": {"yaw_valid": True},
     "VehicleStatus": {"control_mode": "unknown", "gear": "unknown", "indicator": "unknown"},
-    "ViewerSetup": {"live": "none", "title": "foretwin", "attribution": OSM},
+    "ViewerSetup": {
+        "live": "none", "page_port": WEB_PORT, "title": "foretwin", "attribution": OSM,
+    },
     "Where": {"setting": "junction"},
     "WorkerSetup": {
         "simulations": 32, "kept_worlds": 8, "control_hz": 20.0, "mirror_window_s": 8.0,

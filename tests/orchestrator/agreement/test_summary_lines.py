@@ -19,7 +19,7 @@ def test_each_segment_and_each_place_is_a_line_and_many_are_counted() -> None:
     }  # fmt: skip
     lines = side_by_side_lines({"segments": [segment, unplanned], "disagreements": [one] * 15})
     assert lines[0].startswith("  manual for 12.0 s: 40 plans of the ADS, 95 % within 3.4 m across")
-    assert lines[1] == "      6.0 s  ads_stops for 3.0 s at 52.500000, 13.400000 (n4)"
+    assert lines[1] == "      6.0 s  ads stops for 3.0 s at 52.500000, 13.400000 (n4)"
     assert len(lines) == 1 + DISAGREEMENTS_SHOWN + 1
     assert lines[-1] == "  and 3 more in results/disagreements.parquet"
     assert side_by_side_lines(None) == []

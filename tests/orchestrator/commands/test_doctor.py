@@ -92,7 +92,7 @@ def test_it_says_whether_a_drive_watches_its_vehicle_here_and_why() -> None:
     ("words", "code", "said"),
     [
         ((), 3, "cause    nobody listens at localhost:"),
-        (("--role", "cat"), 2, "--role cat: one of router, orchestrator"),
+        (("--role", "cat"), 2, "--role cat: did you mean car? one of router, orchestrator"),
         (("--endpoint", "tcp/localhost:1"), 2, "doctor needs both --endpoint tls/HOST:PORT"),
         (("--role", "viewer"), 3, "expired"),
     ],

@@ -81,9 +81,9 @@ def test_without_an_endpoint_the_bus_is_a_socket_on_which_each_process_has_its_n
     assert len({*shown, plan.bus.credentials}) == len(shown) + 1
     assert all(Path(one).parent == folder for one in shown)
     passwords = [read_credentials(Path(one)).password for one in shown]
-    texts = [file.read_text() for file in plan.folder.rglob("*") if file.is_file()]
-    texts += [str(msgspec.json.encode(setup)) for setup in setups]
-    assert not any(password in text for password in passwords for text in texts)
+    texts = [file.read_bytes() for file in plan.folder.rglob("*") if file.is_file()]
+    texts += [msgspec.json.encode(setup) for setup in setups]
+    assert not any(password.encode() in text for password in passwords for text in texts)
     assert on_local_bus(town_plan(tmp_path)).bus.endpoint == "tcp/127.0.0.1:7447"
 
 
