@@ -71,7 +71,7 @@ def test_a_stack_that_cannot_be_started_is_refused_in_one_line(tmp_path: Path) -
         load_spec(spec)
     said = str(raised.value)
     assert said.startswith(
-        f"{spec}: remote.mine ({sys.executable} {missing}): ended by exit code 2"
+        f"{spec}: line 9: remote.mine ({sys.executable} {missing}): ended by exit code 2"
     )
     assert "No such file" in said
     assert "\n" not in said

@@ -114,7 +114,7 @@ def test_a_pin_alone_concerns_who_identifies_and_makes_no_new_version() -> None:
         (
             "wheels",
             "pin",
-            "wheels is no parameter of a vehicle; did you mean wheelbase_m? one of",
+            r"wheels is no parameter of a vehicle; did you mean wheelbase_m\? one of",
         ),
         ("cog_from_rear_axle_m", "2.7", "must be less than wheelbase_m"),
     ],
