@@ -120,7 +120,7 @@ def _add_view(
         database.register(part, source.rows)
         if source.of_lake:
             others = f'SELECT {RUN_ID} AS {RUN}, * EXCLUDE ({RUN_ID}) FROM "{part}"'
-            again = ", ".join(f"'{run}'" for run in source.without)
+            again = ", ".join(f"""'{run.replace("'", "''")}'""" for run in source.without)
             parts.append(f"{others} WHERE {RUN_ID} NOT IN ({again})" if again else others)
         else:
             parts.append(f'SELECT * FROM "{part}"')
