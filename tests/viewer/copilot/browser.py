@@ -23,7 +23,8 @@ MEASURE = """names => Object.fromEntries(names.map(name => {
   const within = document.querySelector('#now').contains(one);
   return [name, {font_px: parseFloat(getComputedStyle(one).fontSize),
     inside: box.width > 0 && box.left >= 0 && box.right <= innerWidth && box.bottom <= innerHeight
-      && (getComputedStyle(one).display === 'inline' || one.scrollHeight <= one.clientHeight + 6)
+      && (getComputedStyle(one).display === 'inline'
+        || one.scrollHeight <= 1.3 * one.clientHeight + 6)
       && (!within || box.bottom <= outer.bottom)}];
 }))"""
 
