@@ -11,6 +11,9 @@ from pathlib import Path
 
 import msgspec
 
+DRIVE_FILE, MONITOR_FILE = "drive.mcap", "monitor.rrd"
+"""First parts of what a run's car sent, and of what its viewer showed."""
+
 
 class Roll(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """When a part of a recording is ended, and the next one begun."""

@@ -16,15 +16,13 @@ from foretwin.checks import path_of
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.segments import first_left
+from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.folders_of_runs import table_files
-from foretwin.orchestrator.record.run_folder import table_at
-from foretwin.orchestrator.record.run_state import check_finished
+from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
+from foretwin.orchestrator.record.run_state import RECORD, check_finished
 from foretwin.orchestrator.record.table_parts import read_parts
 from foretwin.simulation import Futures
-
-_RUN, _SWEEP, _LOG = "run.json", "sweep.json", "drive.mcap"
 
 
 class MotionArrays(NamedTuple):
@@ -120,9 +118,9 @@ class Recording:
         """
         from foretwin.orchestrator.commands.compare import estimated_states
 
-        file = first_left(self.folder / _LOG)
+        file = first_left(self.folder / DRIVE_FILE)
         if not file.is_file():
-            raise UserError(f"{self.folder}: holds no {_LOG}: no car drove in it")
+            raise UserError(f"{self.folder}: holds no {DRIVE_FILE}: no car drove in it")
         states, _ = estimated_states(file, None)
         stamps = np.array([state.stamp_ns for state in states], np.int64)
         return MotionArrays(
@@ -146,11 +144,11 @@ def _library(name: str) -> Any:
 def open_run(folder: Path | str) -> Recording:
     """Open what `foretwin drive` left; UserError where the folder holds no run, or one that has
     not come to its end."""
-    recording = Recording(path_of("folder", folder), _RUN)
+    recording = Recording(path_of("folder", folder), RECORD)
     check_finished(recording.folder)
     return recording
 
 
 def open_sweep(folder: Path | str) -> Recording:
     """Open what `foretwin sweep` left; UserError where the folder holds no sweep."""
-    return Recording(path_of("folder", folder), _SWEEP)
+    return Recording(path_of("folder", folder), SUMMARY)

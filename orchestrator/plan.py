@@ -16,6 +16,7 @@ from foretwin.contracts.elevation import RoadSlopes
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.local_bus import LocalBus
 from foretwin.contracts.ports import WEB_PORT
+from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
@@ -147,7 +148,7 @@ class DrivePlan(DriveInputs):
     @property
     def recording(self) -> Path:
         """What the vehicle sent; where it has several parts, the first of them."""
-        return self.folder / "drive.mcap"
+        return self.folder / DRIVE_FILE
 
     @property
     def origin(self) -> dict[str, str]:

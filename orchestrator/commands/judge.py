@@ -12,7 +12,7 @@ import msgspec
 
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError, one_line
-from foretwin.contracts.segments import first_left
+from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.terminal import say
 from foretwin.contracts.versions import versions
 from foretwin.contracts.world import World
@@ -26,7 +26,6 @@ from foretwin.orchestrator.record.recovery import RECOVERED
 from foretwin.orchestrator.record.run_state import RECORD, check_finished
 from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
 
-DRIVE = "drive.mcap"
 JUDGED = "judged"
 
 
@@ -93,7 +92,7 @@ def _drive(config: DriveConfig) -> tuple[int, Path]:
 
 def _record(run: Path) -> dict[str, Any]:
     check_finished(run)
-    for part in (run / RECORD, first_left(run / DRIVE)):
+    for part in (run / RECORD, first_left(run / DRIVE_FILE)):
         if not part.is_file():
             raise FileNotFoundError(f"run {run}: no {part.name} in it")
     try:
@@ -125,7 +124,12 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
     if len(kept) < len(was.vehicles):
         gone = ", ".join(one.id for one in was.vehicles if one.live)
         _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
-    inputs = {"log": str(first_left(run / DRIVE)), "source": "log", "map": map_file, "route": route}
+    inputs = {
+        "log": str(first_left(run / DRIVE_FILE)),
+        "source": "log",
+        "map": map_file,
+        "route": route,
+    }
     alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
     workers = {"workers": min(was.workers, most_workers())}  # it may come from a larger machine
     no_bus = {"endpoint": None, "insecure": False, "secure": None}

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from foretwin.contracts.layout import read_layout
-from foretwin.contracts.segments import first_left
+from foretwin.contracts.segments import MONITOR_FILE, first_left
 from foretwin.orchestrator.record.which_run import run_folder
 
 
@@ -17,7 +17,7 @@ def open_view(run: Path, *, out: Path, layout: str, view: str) -> int:
     Raises UserError or FileNotFoundError, in one line, where there is nothing to be shown.
     """
     read_layout(layout)
-    recording = run if run.is_file() else first_left(run_folder(run, out) / "monitor.rrd")
+    recording = run if run.is_file() else first_left(run_folder(run, out) / MONITOR_FILE)
     if not recording.is_file():
         raise FileNotFoundError(f"{recording.parent}: holds no monitor.rrd")
     asked = ["--open", str(recording), "--layout", layout, "--view", view]

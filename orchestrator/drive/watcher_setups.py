@@ -8,6 +8,7 @@ from foretwin.contracts.layout import read_layout
 from foretwin.contracts.page_address import FRAMES_FILE, page_address, page_key
 from foretwin.contracts.ports import LOOPBACK
 from foretwin.contracts.process_setup import BusSetup
+from foretwin.contracts.segments import MONITOR_FILE
 from foretwin.contracts.setup import CopilotSetup, RecorderSetup, ViewerSetup
 from foretwin.orchestrator.plan import DrivePlan
 
@@ -29,7 +30,7 @@ def viewer_setup(plan: DrivePlan, base: dict[str, Any]) -> ViewerSetup:
     """Return how the process is set that writes and shows what Rerun shows."""
     return ViewerSetup(
         **base,
-        file=str(plan.folder / "monitor.rrd"),
+        file=str(plan.folder / MONITOR_FILE),
         roll=plan.keep.view,
         worlds_dir=str(plan.worlds_dir),
         drive_frame=plan.drive_frame,

@@ -13,7 +13,7 @@ from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import RoadUsers, VehicleInfo, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from foretwin.contracts.segments import first_left
+from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import VEHICLES
@@ -24,7 +24,7 @@ from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.road_users import RoadUserTrack, detections_of, log_of_detections
 
-_DRIVE, _WORLDS = "drive.mcap", "worlds"
+_WORLDS = "worlds"
 
 
 class DriveRead(NamedTuple):
@@ -48,7 +48,7 @@ def read_run(run: Path) -> DriveRead:
     or holds no motion.
     """
     check_finished(run)
-    recording = first_left(run / _DRIVE)
+    recording = first_left(run / DRIVE_FILE)
     if not recording.is_file():
         raise FileNotFoundError(f"run {run}: no {recording.name} in it")
     vehicle = _vehicle(run)

@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from foretwin.contracts.segments import segments_of
+from foretwin.contracts.segments import DRIVE_FILE, MONITOR_FILE, segments_of
 from foretwin.orchestrator.keep import Keep
 from foretwin.orchestrator.record.durable import whole_file
 from foretwin.orchestrator.record.table_parts import table_of
 
 log = logging.getLogger("orchestrator")
 
-RECORDINGS = ("drive.mcap", "monitor.rrd")
+RECORDINGS = (DRIVE_FILE, MONITOR_FILE)
 REMOVED = "removed.json"
 """What went so far: outlives an orchestrator."""
 

@@ -11,6 +11,7 @@ import msgspec
 
 from foretwin.contracts.cpu_use import cpu_uses
 from foretwin.contracts.running import RunningMeans
+from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.tally import tally_file
 from foretwin.orchestrator.record.bookkeeping import (
     ComparisonCount,
@@ -30,7 +31,6 @@ from foretwin.orchestrator.record.visited import visited_junctions
 from foretwin.telemetry.processes.tally_left import tally_left
 
 _BASELINES = "nominal", "constant_velocity", "constant_turn_rate"
-RECORDING = "drive.mcap"
 _JOINING = ("endpoint", "credentials")
 """How a drive was spoken to while it went on."""
 _TOLD_WHILE_DRIVING = (
@@ -151,10 +151,10 @@ def _futures(counted: FuturesCount, said: Mapping[str, Any]) -> dict[str, Any]:
 
 def _telemetry(run: Path, heard: Mapping[str, int], *, torn: bool) -> dict[str, Any] | None:
     """Return the ledger of the telemetry; None where nobody recorded anything."""
-    recording = run / RECORDING
+    recording = run / DRIVE_FILE
     if not tally_file(recording).exists():
         return None
-    whole = torn and RECORDING not in read_removed(run)
+    whole = torn and DRIVE_FILE not in read_removed(run)
     return telemetry_ledger(tally_left(recording, no_more_than_held=whole), heard)
 
 

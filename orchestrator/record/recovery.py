@@ -16,11 +16,11 @@ from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.local_bus import BUS
 from foretwin.contracts.process import is_held
-from foretwin.contracts.segments import segments_of
+from foretwin.contracts.segments import DRIVE_FILE, segments_of
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import WRITING, sync_folder
 from foretwin.orchestrator.record.kept_rows import kept_rows
-from foretwin.orchestrator.record.recovered_record import RECORDING, recovered_record
+from foretwin.orchestrator.record.recovered_record import recovered_record
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_state import (
     LOG,
@@ -100,7 +100,7 @@ def recover(
     with run_lock(run):
         record = read_record(run)
         _let_leave(run)
-        torn = [file for file in segments_of(run / RECORDING) if not look_through(file).ended]
+        torn = [file for file in segments_of(run / DRIVE_FILE) if not look_through(file).ended]
         if record and not is_unfinished(run) and not torn:
             parts = tuple(_in_parquet(results))
             healthy = not any(part.lost for part in parts)
@@ -110,7 +110,7 @@ def recover(
             if judged is not None:
                 _keep_verdicts(results, judged.rows)
             streams = streams_in(results)
-            recordings = map(_mended, segments_of(run / RECORDING))
+            recordings = map(_mended, segments_of(run / DRIVE_FILE))
             there = _in_parquet(results, but={stream.stem for stream in streams})
             parts = (*there, *_derived(results), *recordings)
             agreement = None if judged is None else judged.record

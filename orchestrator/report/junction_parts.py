@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.segments import MONITOR_FILE
 from foretwin.contracts.world import World
 from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
@@ -28,7 +29,7 @@ from foretwin.orchestrator.report.blocks import (
     scientific,
 )
 from foretwin.orchestrator.report.junction_picture import junction_svg
-from foretwin.orchestrator.report.material import MONITOR, RunMaterial, TableRow
+from foretwin.orchestrator.report.material import RunMaterial, TableRow
 from foretwin.orchestrator.report.passages import JunctionPassed, WhatCame, tone_of, what_came
 from foretwin.orchestrator.report.replayed import ReplayedRound, replayed
 from foretwin.sim_worker.scenarios.reading import catalogue
@@ -198,7 +199,15 @@ def _futures(
     )
     return Listed(
         title,
-        ("future", "likelihood", "criticality", "ends", "clearance", f"in {MONITOR} at", "again"),
+        (
+            "future",
+            "likelihood",
+            "criticality",
+            "ends",
+            "clearance",
+            f"in {MONITOR_FILE} at",
+            "again",
+        ),
         rows,
         frozenset({1, 2, 4, 5}),
     )

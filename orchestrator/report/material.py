@@ -10,14 +10,13 @@ from typing import Any
 import pyarrow as pa
 
 from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import table_at
 from foretwin.orchestrator.record.run_state import check_finished, read_record
 from foretwin.orchestrator.record.table_parts import read_parts
 from foretwin.orchestrator.report.driven_track import CarTrack, driven_track
 from foretwin.sim_worker.world_file import load_world
-
-DRIVE, MONITOR = "drive.mcap", "monitor.rrd"
 
 FUTURE_COLUMNS = (
     "future_id",
@@ -116,7 +115,7 @@ class RunMaterial:
     @cached_property
     def track(self) -> CarTrack | None:
         """Return where the car was as it was estimated then, None where nothing is recorded."""
-        return driven_track(self.folder / DRIVE, start_stamp_ns=self.start_stamp_ns or None)
+        return driven_track(self.folder / DRIVE_FILE, start_stamp_ns=self.start_stamp_ns or None)
 
     @property
     def attribution(self) -> str:

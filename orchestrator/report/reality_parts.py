@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -17,7 +18,7 @@ from foretwin.orchestrator.report.blocks import (
     row,
 )
 from foretwin.orchestrator.report.gap_rows import GapOf, HumanRow, gaps_of
-from foretwin.orchestrator.report.material import DRIVE, RunMaterial
+from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.plots import calibration_plot, gap_plot, rank_plot
 
 _DEG = 57.29578
@@ -83,8 +84,8 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Chapter:
     title = "Gap of the model by horizon and manoeuvre"
     if not found:
         text = (
-            f"The gap was not measured while driving; `foretwin gap {run.called}/{DRIVE}` measures "
-            "it from the recording."
+            "The gap was not measured while driving; "
+            f"`foretwin gap {run.called}/{DRIVE_FILE}` measures it from the recording."
         )
         return Chapter("gap", title, (Prose(text), *_people(people)))
     blocks: list[Block] = [

@@ -17,12 +17,11 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
-from foretwin.orchestrator.record.run_folder import table_at
+from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.world_file import load_world
 
-SUMMARY = "sweep.json"
 _COLUMNS = (
     "future_id",
     "job_sha256",

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.partial_file import partial_file
+from foretwin.orchestrator.record.run_folder import SUMMARY
 from foretwin.orchestrator.report.blocks import Report
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.material import RunMaterial
@@ -14,7 +15,7 @@ from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.redaction import PlaceNames, Redaction, names_of, redacted
 from foretwin.orchestrator.report.run_report import run_report
 from foretwin.orchestrator.report.several_runs import several_runs_report
-from foretwin.orchestrator.report.sweep_material import SUMMARY, SweepMaterial
+from foretwin.orchestrator.report.sweep_material import SweepMaterial
 from foretwin.orchestrator.report.sweep_report import sweep_report
 
 RUN = "run.json"

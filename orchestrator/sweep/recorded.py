@@ -16,7 +16,7 @@ from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.placement import RecordedStart
-from foretwin.contracts.segments import first_left
+from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import kept_apart, length
 from foretwin.orchestrator.record.run_state import check_finished
@@ -31,7 +31,7 @@ from foretwin.telemetry.logs.road_users import (
 )
 
 WORLDS = "worlds"
-_ROUNDS, _DRIVE = Path("results/rounds.parquet"), "drive.mcap"
+_ROUNDS = Path("results/rounds.parquet")
 _BEFORE_S, _AHEAD_S = 4.0, 30.0
 """The path is what the car drove from so long before a start to so long after it."""
 _STEP_M, _LEAST_M = 1.0, 20.0
@@ -70,7 +70,7 @@ def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedStarts
     """
     run = Path(recorded.run)
     check_finished(run)
-    drive = first_left(run / _DRIVE)
+    drive = first_left(run / DRIVE_FILE)
     for part in (run / _ROUNDS, drive, run / WORLDS):
         if not part.exists():
             raise FileNotFoundError(f"recorded.run {run}: no {part.relative_to(run)} in it")
