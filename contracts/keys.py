@@ -201,6 +201,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
             tuning.Identification, 0.2, "what the driving says of the vehicle"
         ),
     },
+    (_RUN, LIVE, (Writer("worker", "traffic"),)): {
+        "virtual_traffic": Channel(drive.RoadUsers, 20, "road users of one going simulation"),
+    },
     (_RUN, WATCH, _ORCHESTRATOR): {
         "worker_status": Channel(simulation.WorkerStatus, 2, "health of the workers"),
         "progress": Channel(simulation.Progress, 5, "one line"),
