@@ -14,6 +14,7 @@ from foretwin.contracts import (
     drive,
     fleet,
     gap,
+    lights,
     marks,
     placement,
     planner_link,
@@ -212,6 +213,7 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     # bounds it, off unless switched on twice.
     (_RUN, LIVE, _ORCHESTRATOR): {
         "other_vehicles": Channel(roles.OtherVehicles, 50, "states of the vehicles beside the car"),
+        "lights": Channel(lights.ShownLights, 10, "what the lights of the World in force show"),
         "authority": Channel(towards_vehicle.Authority, 20, "the orchestrator is in charge"),
     },
     # Nothing of ours says it; a planner that may, signs it with the run's key.

@@ -63,7 +63,7 @@ def test_how_often_each_is_said() -> None:
         100: {"imu"},
         50: {"speed", "steering", "control", "state", "other_vehicles", "vehicle_command"},
         20: {"authority", "virtual_traffic"},
-        10: {"gnss", "heading", "plan", "status", "objects", "mirror", "virtual_objects"},
+        10: {"gnss", "heading", "plan", "status", "objects", "mirror", "virtual_objects", "lights"},
         8: {"comparison"},
         5: {"progress"},
         4: {"gap"},
