@@ -21,8 +21,10 @@ settings.load_profile("foretwin")
 # (learning a small table took over 300 s on two busy cores, 56 s with one thread).
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# Under nohup it would be ignored by all that tests start, those that must end by it too.
+# Under nohup and behind a shell's `&` they would be ignored by all that tests start, those that
+# must end by them too.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

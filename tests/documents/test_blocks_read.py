@@ -93,7 +93,7 @@ def test_a_command_that_ends_otherwise_fails_the_page(
 
 
 def test_what_goes_on_is_interrupted_once_it_is_ready(tmp_path: Path, bare: Installed) -> None:
-    until = page("<!-- until: ready -->", *fenced("sh", "echo ready; exec cat /dev/zero > out"))
+    until = page("<!-- until: ready -->", *fenced("sh", "echo ready; exec tail -f /dev/null"))
     assert play_blocks(until, tmp_path, bare) == 1
 
     silent = page("<!-- until: ready -->", *fenced("sh", "echo something else"))
