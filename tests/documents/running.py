@@ -106,6 +106,8 @@ def start(commands: str, folder: Path, installed: Installed) -> subprocess.Popen
         env=installed.environment(folder),
         text=True,
         start_new_session=True,
+        # A suite in a shell's background passes on that interrupts are ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
