@@ -75,20 +75,20 @@ def trouble_with_endpoint(endpoint: str) -> str | None:
 _TLS_PLACE = re.compile(r"tls/(?P<host>\[[0-9A-Fa-f:.]+\]|[^\[\]:/?#]+):(?P<port>[0-9]{1,5})")
 
 
-class TlsPlace(NamedTuple):
-    """Where a router listens for TLS."""
+class ListenPlace(NamedTuple):
+    """Where something of ours listens."""
 
     host: str
     port: int
 
 
-def tls_place(endpoint: str) -> TlsPlace | None:
+def tls_place(endpoint: str) -> ListenPlace | None:
     """Return host and port of `tls/HOST:PORT`, None for any other endpoint.
 
     What may stand behind ? or # are settings of the link, which could undo ours.
     """
     found = _TLS_PLACE.fullmatch(endpoint)
-    return None if found is None else TlsPlace(found["host"].strip("[]"), int(found["port"]))
+    return None if found is None else ListenPlace(found["host"].strip("[]"), int(found["port"]))
 
 
 def trouble_with_bus(endpoint: str | None, *, insecure: bool, secure: str | None) -> str | None:
@@ -119,7 +119,7 @@ def trouble_with_bus(endpoint: str | None, *, insecure: bool, secure: str | None
     return None
 
 
-def listen_place(text: str) -> MetricsPlace:
+def listen_place(text: str) -> ListenPlace:
     """Return the host and port that `--listen` names.
 
     Raises UserError for what is no place.
@@ -127,20 +127,13 @@ def listen_place(text: str) -> MetricsPlace:
     named = _HOST_AND_PORT.fullmatch(text)
     if named is None or not 0 < int(named["port"]) < 65536:
         raise UserError(f"--listen {text}: must be HOST:PORT with a port of 1 to 65535")
-    return MetricsPlace(text.rpartition(":")[0].strip("[]"), int(named["port"]))
-
-
-class MetricsPlace(NamedTuple):
-    """Where metrics are told, or pages served."""
-
-    host: str
-    port: int
+    return ListenPlace(text.rpartition(":")[0].strip("[]"), int(named["port"]))
 
 
 _PLACE = re.compile(r"(?:(?P<host>[^:\s]+):)?(?P<port>\d{1,5})")
 
 
-def metrics_place(text: str) -> MetricsPlace:
+def metrics_place(text: str) -> ListenPlace:
     """Return the place that `--metrics` names; of a port alone the loopback interface.
 
     Raises UserError for what is no place.
@@ -148,4 +141,4 @@ def metrics_place(text: str) -> MetricsPlace:
     named = _PLACE.fullmatch(text)
     if named is None or not 0 < int(named["port"]) < 65536:
         raise UserError(f"--metrics {text}: must be a port from 1 to 65535, or HOST:PORT")
-    return MetricsPlace(named["host"] or LOOPBACK, int(named["port"]))
+    return ListenPlace(named["host"] or LOOPBACK, int(named["port"]))

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from foretwin.contracts.campaign import TlsFiles
 from foretwin.contracts.certificates import HOW_TO_SET_CLOCK, UTC, troubles
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.ports import TlsPlace, tls_place
+from foretwin.contracts.ports import ListenPlace, tls_place
 from foretwin.contracts.process_setup import BusSetup
 
 _REACH_S, _ALERT_S = 3.0, 0.5
@@ -58,7 +58,7 @@ def likely_causes(setup: BusSetup, *, now: datetime.datetime | None = None) -> I
         yield line
 
 
-def _answer(tls: TlsFiles, place: TlsPlace) -> str | None:
+def _answer(tls: TlsFiles, place: ListenPlace) -> str | None:
     """Return what the router has against a certificate, None where it takes it."""
     try:
         connection = socket.create_connection(place, timeout=_REACH_S)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.segments import DRIVE_FILE
@@ -46,6 +47,48 @@ FUTURE_COLUMNS = (
 TableRow = dict[str, Any]
 
 
+class KeptWorlds:
+    """The Worlds that a run or a sweep left, each read when it is first asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder / "worlds"
+        self._read: dict[str, World | None] = {}
+
+    def get(self, world_id: str | None) -> World | None:
+        """Return a World, None where its file is gone or of another foretwin."""
+        if not world_id:
+            return None
+        if world_id not in self._read:
+            try:
+                self._read[world_id] = load_world(self._folder, world_id)
+            except (OSError, SchemaMismatch):
+                self._read[world_id] = None
+        return self._read[world_id]
+
+    def those_of(self, world_ids: Iterable[str]) -> list[World]:
+        """Return those that can be read, each once."""
+        found = map(self.get, dict.fromkeys(world_ids))
+        return [world for world in found if world is not None]
+
+
+def most_critical(
+    futures: pa.Table, most: int, *, of: Callable[[TableRow], Hashable]
+) -> tuple[TableRow, ...]:
+    """Return the worst futures, the most critical first, one of each that `of` holds for the same;
+    those in which nothing happens are none of them."""
+    order = [
+        ("criticality", "descending"),
+        ("likelihood", "descending"),
+        ("future_id", "ascending"),
+    ]
+    found: dict[Hashable, TableRow] = {}
+    for row in futures.filter(pc.field("criticality") > 0.0).sort_by(order).to_pylist():
+        found.setdefault(of(row), row)
+        if len(found) == most:
+            break
+    return tuple(found.values())
+
+
 class RunMaterial:
     """A run's folder: its record, and its tables and Worlds, read when they are first asked for."""
 
@@ -56,7 +99,7 @@ class RunMaterial:
         check_finished(folder)
         self.record: dict[str, Any] = read_record(folder)
         self._tables: dict[str, pa.Table | None] = {}
-        self._worlds: dict[str, World | None] = {}
+        self._worlds = KeptWorlds(folder)
 
     def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table | None:
         """Return a table of the run, None where it is missing, empty or cannot be read."""
@@ -97,20 +140,11 @@ class RunMaterial:
 
     def world(self, world_id: str | None) -> World | None:
         """Return a World of the run, None where its file is gone or of another foretwin."""
-        if not world_id:
-            return None
-        if world_id not in self._worlds:
-            try:
-                self._worlds[world_id] = load_world(self.folder / "worlds", world_id)
-            except (OSError, SchemaMismatch):
-                self._worlds[world_id] = None
-        return self._worlds[world_id]
+        return self._worlds.get(world_id)
 
     def worlds(self) -> list[World]:
         """Return the Worlds that rounds were of, those that can be read."""
-        ids = dict.fromkeys(row["world_id"] for row in self.rounds)
-        found = (self.world(world_id) for world_id in ids)
-        return [world for world in found if world is not None]
+        return self._worlds.those_of(row["world_id"] for row in self.rounds)
 
     @cached_property
     def track(self) -> CarTrack | None:

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
 from foretwin.orchestrator.report.blocks import Tone
-from foretwin.orchestrator.report.material import RunMaterial, TableRow
+from foretwin.orchestrator.report.material import RunMaterial, TableRow, most_critical
 from foretwin.sim_worker.driver_model import STANDING_MPS
 
 WORST, LIKELIEST = 5, 3
@@ -185,22 +185,10 @@ def _at_least(futures: pa.Table, limit: float) -> int:
 
 
 def worst_of(futures: pa.Table | None, most: int) -> tuple[TableRow, ...]:
-    """Return the worst futures, the most critical first, one of each scenario; those in which
-    nothing happens are none of them."""
+    """Return the worst futures, one of each scenario; none without a table."""
     if futures is None:
         return ()
-    order = [
-        ("criticality", "descending"),
-        ("likelihood", "descending"),
-        ("future_id", "ascending"),
-    ]
-    grave = futures.filter(pc.greater(futures["criticality"], 0.0)).sort_by(order)
-    found: dict[str, TableRow] = {}
-    for row in grave.to_pylist():
-        found.setdefault(row["scenario"] or row["name"].split(",")[0], row)
-        if len(found) == most:
-            break
-    return tuple(found.values())
+    return most_critical(futures, most, of=lambda row: row["scenario"] or row["name"].split(",")[0])
 
 
 def _shown(

@@ -12,7 +12,8 @@ from bokeh.plotting import figure
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.orchestrator.report.driven_track import CarTrack
-from foretwin.orchestrator.report.gap_rows import ALL, GapOf, HumanRow
+from foretwin.orchestrator.report.gap_rows import HumanRow
+from foretwin.sim_worker.analysis.gap.errors import ALL_MANOEUVRES, GapRow
 
 COLOURS = ("#1f5fd0", "#c2185b", "#00857a", "#b26a00", "#8a3fb0", "#6d4c41", "#4c5560")
 """Of series, told apart by who sees colours differently too, by their lightness."""
@@ -93,18 +94,18 @@ def latency_plot(time_s: Array, latency_ms: Array, late: Flags, period_ms: float
     return _with_legend(drawn)
 
 
-def gap_plot(found: Sequence[GapOf], people: Sequence[HumanRow]) -> Any:
+def gap_plot(found: Sequence[GapRow], people: Sequence[HumanRow]) -> Any:
     """Return the gap of place over the horizon, a line for each manoeuvre, and people beside."""
     drawn = plot("model left to itself, s", "gap of place (RMS), m", height=300)
     for place, name in enumerate(dict.fromkeys(one.manoeuvre for one in found)):
         mine = [one for one in found if one.manoeuvre == name]
         look = {
-            "color": _INK if name == ALL else COLOURS[place % len(COLOURS)],
+            "color": _INK if name == ALL_MANOEUVRES else COLOURS[place % len(COLOURS)],
             "legend_label": name,
         }
         x = [one.horizon_s for one in mine]
         y = [round(one.rms["position_m"], 3) for one in mine]
-        drawn.line(x, y, line_width=3 if name == ALL else 1.6, **look)
+        drawn.line(x, y, line_width=3 if name == ALL_MANOEUVRES else 1.6, **look)
         drawn.scatter(x, y, size=7, **look)
     known = [one for one in people if one.along_m is not None and one.across_m is not None]
     if known:

@@ -17,9 +17,10 @@ from foretwin.orchestrator.report.blocks import (
     plural,
     row,
 )
-from foretwin.orchestrator.report.gap_rows import GapOf, HumanRow, gaps_of
+from foretwin.orchestrator.report.gap_rows import HumanRow, gaps_of
 from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.plots import calibration_plot, gap_plot, rank_plot
+from foretwin.sim_worker.analysis.gap.errors import GapRow
 
 _DEG = 57.29578
 _WORDS = {
@@ -118,7 +119,7 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Chapter:
     return Chapter("gap", title, (*blocks, *_people(people)))
 
 
-def _gap_row(one: GapOf) -> tuple[TableCell, ...]:
+def _gap_row(one: GapRow) -> tuple[TableCell, ...]:
     return row(
         TableCell(f"{one.horizon_s:g} s", order=one.horizon_s),
         one.manoeuvre,
@@ -128,7 +129,7 @@ def _gap_row(one: GapOf) -> tuple[TableCell, ...]:
         number(one.rms["yaw_rad"] * _DEG, 1, "°"),
         number(one.rms["speed_mps"], 2, "m/s"),
         number(one.rms["position_m"], 2, "m"),
-        number(one.position_p95_m, 2, "m"),
+        number(one.p95["position_m"], 2, "m"),
     )
 
 

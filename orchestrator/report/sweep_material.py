@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,12 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
+from foretwin.orchestrator.report.material import KeptWorlds, TableRow, most_critical
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.metrics.table import ROW_METRICS
-from foretwin.sim_worker.world_file import load_world
 
 _COLUMNS = (
     "future_id",
@@ -58,7 +57,7 @@ class SweepMaterial:
             self.record: dict[str, Any] = json.loads((folder / SUMMARY).read_bytes())
         except (OSError, ValueError) as error:
             raise UserError(f"{folder}: no {SUMMARY} to be read: {error}") from error
-        self._worlds: dict[str, World | None] = {}
+        self._worlds = KeptWorlds(folder)
 
     @cached_property
     def futures(self) -> pa.Table:
@@ -75,16 +74,9 @@ class SweepMaterial:
         """Return the rows that were played to their end."""
         return self.futures.filter(pc.field("valid"))
 
-    def worst(self, most: int) -> list[Mapping[str, Any]]:
+    def worst(self, most: int) -> tuple[TableRow, ...]:
         """Return the most critical cases, one of each scenario, planner and junction."""
-        critical = self.played.filter(pc.field("criticality") > 0.0)
-        order = [("criticality", "descending"), ("future_id", "ascending")]
-        found: dict[tuple[str, ...], Mapping[str, Any]] = {}
-        for one in critical.sort_by(order).to_pylist():
-            found.setdefault((one["scenario"], one["planner"], one["junction_id"]), one)
-            if len(found) == most:
-                break
-        return list(found.values())
+        return most_critical(self.played, most, of=itemgetter("scenario", "planner", "junction_id"))
 
     def metric_means(self) -> dict[str, tuple[str, str]]:
         """Return unit and better direction of the metrics that the sweep measured."""
@@ -113,17 +105,11 @@ class SweepMaterial:
 
     def world(self, world_id: str) -> World | None:
         """Return a World of the sweep, None where it cannot be read."""
-        if world_id not in self._worlds:
-            try:
-                self._worlds[world_id] = load_world(self.folder / "worlds", world_id)
-            except (OSError, SchemaMismatch):
-                self._worlds[world_id] = None
-        return self._worlds[world_id]
+        return self._worlds.get(world_id)
 
     def worlds(self) -> list[World]:
         """Return the Worlds of the sweep that can be read."""
-        ids = pc.unique(self.futures["world_id"]).to_pylist()
-        return [world for one in ids if (world := self.world(one)) is not None]
+        return self._worlds.those_of(pc.unique(self.futures["world_id"]).to_pylist())
 
     def junction_name(self, junction_id: str | None) -> str:
         """Return what a driver calls a junction of the sweep; its id where that is not known."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,8 @@ from foretwin.sim_worker.vehicle.lag import without_lags
 _EVERY_S = 1.0
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
 """Of a sample; a row has `position_m` too, how far apart both are."""
-
+ALL_MANOEUVRES: Literal["all"] = "all"
+"""What a row of all manoeuvres together is called."""
 
 _STDS = {
     "along_m": "along_std_m",
@@ -55,7 +56,7 @@ class GapRow(NamedTuple):
     """RMS and 95th percentile of |model - reality| by quantity, for one horizon and manoeuvre."""
 
     horizon_s: float
-    manoeuvre: Manoeuvre
+    manoeuvre: Manoeuvre | Literal["all"]
     runs: int
     independent: bool
     rms: dict[str, float]
@@ -208,13 +209,19 @@ def _open_by_states(
     }
 
 
-def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
-    """Return one row for each horizon and manoeuvre that occurred, shortest horizon first."""
-    groups: dict[tuple[float, Manoeuvre], list[GapSample]] = defaultdict(list)
+def gap_table(samples: Sequence[GapSample], *, also_all: bool = False) -> list[GapRow]:
+    """Return one row for each horizon and manoeuvre that occurred, shortest horizon first.
+
+    `also_all` puts one of all manoeuvres together before those of its horizon.
+    """
+    groups: dict[tuple[float, Manoeuvre | Literal["all"]], list[GapSample]] = defaultdict(list)
     for sample in samples:
         groups[sample.horizon_s, sample.manoeuvre].append(sample)
+        if also_all:
+            groups[sample.horizon_s, ALL_MANOEUVRES].append(sample)
     rows = []
-    for horizon, manoeuvre in sorted(groups, key=lambda key: (key[0], MANOEUVRES.index(key[1]))):
+    order = (ALL_MANOEUVRES, *MANOEUVRES)
+    for horizon, manoeuvre in sorted(groups, key=lambda key: (key[0], order.index(key[1]))):
         group = groups[horizon, manoeuvre]
         values = {name: np.array([getattr(one, name) for one in group]) for name in QUANTITIES}
         values["position_m"] = np.hypot(values["along_m"], values["across_m"])

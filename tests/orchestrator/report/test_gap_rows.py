@@ -29,11 +29,14 @@ def test_each_horizon_stands_as_a_whole_and_by_manoeuvre() -> None:
 
 def gap(horizon_s: float, manoeuvre: str, along_m: float) -> dict[str, object]:
     return {
+        "stamp_ns": 0,
         "horizon_s": horizon_s,
         "manoeuvre": manoeuvre,
         "along_m": along_m,
         "across_m": 4.0,
         "yaw_rad": 0.0,
+        "yaw_rate_radps": 0.0,
         "speed_mps": 0.0,
+        "accel_mps2": 0.0,
         "independent": manoeuvre == "straight",
     }
