@@ -32,7 +32,7 @@ class DangerFrame(msgspec.Struct, frozen=True, kw_only=True):
     """The danger that ranks first: `path` is the car's in that future, `other` whom it meets."""
 
     what: str
-    percent: str
+    odds: str
     in_s: float
     hits: bool
     path: Points

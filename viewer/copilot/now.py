@@ -285,7 +285,7 @@ def _danger(view: RoundView, danger: Danger, age_s: float) -> DangerFrame:
     until = min(max(until, 1), last)
     return DangerFrame(
         what=danger.what,
-        percent=words.percent(danger.likelihood),
+        odds=words.odds(danger.likelihood),
         in_s=round(max(0.0, danger.in_s - age_s), 1),
         hits=danger.hits,
         path=_points(view.xy_m[danger.future, : until + 1]),

@@ -26,14 +26,13 @@ class TwinStanding(NamedTuple):
     well: bool
 
 
-def percent(likelihood: float) -> str:
-    """Return a likelihood in percent of the likeliest future, with one digit that counts."""
-    value = 100.0 * likelihood
-    if value >= 0.995:
-        return f"{value:.0f} %"
-    if value >= 0.001:
-        return f"{value:.1g} %"
-    return "< 0.001 %"
+def odds(likelihood: float) -> str:
+    """Return how likely something is beside the likeliest future, as it is said at a glance."""
+    if likelihood >= 0.00995:
+        return f"{100.0 * likelihood:.0f} %"
+    if likelihood >= 0.001:
+        return f"1 in {float(f'{1.0 / likelihood:.1g}'):.0f}"
+    return "rare"
 
 
 def seconds(value: float) -> str:
@@ -69,7 +68,7 @@ def danger_text(danger: Danger | None, *, elapsed_s: float = 0.0) -> str:
         return "no danger found"
     left = seconds(max(0.0, danger.in_s - elapsed_s))
     near = "" if danger.hits else "near miss, "
-    return f"{danger.what}, {near}{percent(danger.likelihood)}, {left}"
+    return f"{danger.what}, {near}{odds(danger.likelihood)}, {left}"
 
 
 def standing_of(mirror: MirrorSample | None, verdict: Verdict | None) -> TwinStanding:

@@ -90,7 +90,7 @@ def test_a_drive_towards_a_junction_is_whole_in_one_frame() -> None:
     assert frame.ahead.colour == "red and amber"
     assert frame.lights == {"g1": "red and amber"}
     assert frame.danger is not None
-    assert (frame.danger.percent, frame.danger.in_s, frame.danger.hits) == ("12 %", 2.0, True)
+    assert (frame.danger.odds, frame.danger.in_s, frame.danger.hits) == ("12 %", 2.0, True)
     assert frame.danger.what.startswith("car ")
     assert len(frame.danger.path) == len(frame.danger.other) == 7, "as far as they meet"
     assert (frame.level, frame.more) == ("danger", 1)

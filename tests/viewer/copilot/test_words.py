@@ -104,16 +104,23 @@ def test_its_span_stands_beside_it() -> None:
 
 @pytest.mark.parametrize(
     ("likelihood", "said"),
-    [(1.0, "100 %"), (0.124, "12 %"), (0.0099, "1 %"), (0.0004, "0.04 %"), (1e-7, "< 0.001 %")],
+    [
+        (1.0, "100 %"),
+        (0.124, "12 %"),
+        (0.01, "1 %"),
+        (0.0049, "1 in 200"),
+        (0.001, "1 in 1000"),
+        (0.0004, "rare"),
+        (0.0, "rare"),
+    ],
 )
 def test_likelihoods_have_the_digits_that_count(likelihood: float, said: str) -> None:
-    assert words.percent(likelihood) == said
+    assert words.odds(likelihood) == said
 
 
 @given(st.floats(0.0, 1.0))
 def test_a_likelihood_is_never_said_in_more_than_nine_letters(likelihood: float) -> None:
-    assert len(words.percent(likelihood)) <= 9
-    assert words.percent(likelihood).endswith(" %")
+    assert 1 < len(words.odds(likelihood)) <= 9
 
 
 def test_seconds_left_run_out_at_none() -> None:

@@ -40,7 +40,7 @@ function show(frame) {
     put("odds", "");
   } else {
     put("danger", frame.danger ? frame.danger.what : "no danger found");
-    put("odds", frame.danger ? `${frame.danger.percent} · ${frame.danger.in_s.toFixed(1)} s` : "");
+    put("odds", frame.danger ? `${frame.danger.odds} · ${frame.danger.in_s.toFixed(1)} s` : "");
   }
   alertOf(frame.alerts);
   const ahead = frame.ahead;
