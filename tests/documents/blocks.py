@@ -2,10 +2,11 @@
 
 Above a block: `<!-- not run: WHY -->`, `<!-- file: NAME -->` (the block is that file of the
 folder), `<!-- until: WORDS -->` (the last command goes on for ever: it is interrupted once it says
-them), `<!-- exit: 3 -->`. Anywhere on a page: `<!-- stage: map:town.osm -->`, what lies in the
-folder before its first command (`tests/documents/stage.py`); `<!-- here: RUN → trial -->`, what a
-placeholder of the page stands for; `<!-- beside: COMMAND → WORDS -->`, what goes on meanwhile, and
-says these words when it is ready.
+them), `<!-- exit: 3 -->`, `<!-- query: FOLDER -->` (SQL for `foretwin query`). Anywhere on a page:
+`<!-- stage: map:town.osm -->`, what lies in the folder before its first command
+(`tests/documents/stage.py`); `<!-- here: RUN → trial -->`, what a placeholder of the page stands
+for; `<!-- beside: COMMAND → WORDS -->`, what goes on meanwhile, and says these words when it is
+ready.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r"^(?P<indent> *)```(?P<language>[\w{}:-]*)\s*$")
 COMMENT = re.compile(r"^ *<!-- (?P<key>[a-z ]+): (?P<value>.*) -->\s*$")
 COMMANDS = ("sh", "console")
-ABOVE = {"not run", "file", "until", "exit"}
+ABOVE = {"not run", "file", "until", "exit", "query"}
 
 
 class Block(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import tomllib
@@ -86,6 +87,9 @@ def play(block: Block, page: Page, folder: Path, installed: Installed) -> bool:
     elif block.language == "python":
         (folder / "page.py").write_text(text, encoding="utf-8")
         run_shell("python page.py", block, folder, installed)
+    elif runs := block.marks.get("query"):
+        for question in filter(str.strip, text.split(";")):
+            run_shell(shlex.join(["foretwin", "query", question, runs]), block, folder, installed)
     elif block.language == "sql":
         with pytest.MonkeyPatch.context() as elsewhere:
             elsewhere.chdir(folder)
@@ -106,8 +110,6 @@ def start(commands: str, folder: Path, installed: Installed) -> subprocess.Popen
         env=installed.environment(folder),
         text=True,
         start_new_session=True,
-        # A suite in a shell's background passes on that interrupts are ignored.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
