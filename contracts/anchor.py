@@ -9,20 +9,34 @@ the lot's axis.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import (
     GeoPoint,
     GeoPose,
     LocalFrame,
+    geo_from_local,
+    geo_from_local_yaw,
     geo_pose,
+    local_from_geo,
+    local_from_geo_yaw,
     local_pose,
     wrap_angle,
 )
 
 _MOST_SCALE = 100.0
+
+
+class AnchorLine(NamedTuple):
+    """Positions (N,) in degrees and the yaws (N,) there from true east."""
+
+    lat_deg: Array
+    lon_deg: Array
+    yaw_rad: Array
 
 
 class AnchorPose(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -90,6 +104,32 @@ class Anchor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     def lot_from_world(self, position: GeoPoint, yaw_rad: float) -> GeoPose:
         """Return on the lot what is a position and a yaw (true east) in the World."""
         return _moved(self.world, self.lot, 1.0 / self.scale, self.side, position, yaw_rad)
+
+    def world_from_lot_line(self, line: AnchorLine) -> AnchorLine:
+        """Return in the World what is a line on the lot."""
+        return _moved_line(self.lot, self.world, self.scale, self.side, line)
+
+    def lot_from_world_line(self, line: AnchorLine) -> AnchorLine:
+        """Return on the lot what is a line in the World."""
+        return _moved_line(self.world, self.lot, 1.0 / self.scale, self.side, line)
+
+
+def _moved_line(
+    source: AnchorPose, target: AnchorPose, scale: float, side: float, line: AnchorLine
+) -> AnchorLine:
+    lat_deg, lon_deg = np.asarray(line.lat_deg), np.asarray(line.lon_deg)
+    yaw_rad = local_from_geo_yaw(source.frame, line.yaw_rad, lat_deg, lon_deg)
+    along_left = local_from_geo(source.frame, lat_deg, lon_deg) @ _turn(source.yaw_rad)
+    xy_m = (along_left * (scale, scale * side)) @ _turn(target.yaw_rad).T
+    lat_lon_deg = geo_from_local(target.frame, xy_m)
+    turned_rad = target.yaw_rad + side * wrap_angle(yaw_rad - source.yaw_rad)
+    there_rad = geo_from_local_yaw(target.frame, turned_rad, xy_m)
+    return AnchorLine(lat_lon_deg[:, 0], lat_lon_deg[:, 1], there_rad)
+
+
+def _turn(yaw_rad: float) -> Array:
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([[cos, -sin], [sin, cos]])
 
 
 def _moved(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.campaign import TlsFiles
 from foretwin.contracts.fleet import MachineInfo
 from foretwin.contracts.frames import LocalFrame
@@ -28,6 +29,8 @@ class ReplaySetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     start_s: float = 0.0
     end_s: float | None = None
     speed: float | None = 1.0
+    anchor: Anchor | None = None
+    """Of a drive that was recorded on a lot."""
 
 
 class StandinSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -40,6 +43,8 @@ class StandinSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     seed: int = 0
     plan_shift_m: float = 0.0
     """Moves the published plan to the left: a known error, for tests of the plan comparison."""
+    anchor: Anchor | None = None
+    """It drives on that lot; the path is one of the World."""
 
 
 class RecorderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -64,6 +69,8 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Whose orders towards the vehicle count; None: nobody's."""
     vehicle: VehicleParameters | None = None
     """Of the car: the size of its twin."""
+    anchor: Anchor | None = None
+    """Of a car on a lot: its topics live there, the run in the World."""
     listens_only: bool = False
     """Of a vehicle beside the car: nothing goes out to it, whatever the mapping says."""
 

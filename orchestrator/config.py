@@ -180,6 +180,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether whoever reaches `endpoint` may say anything."""
     secure: str | None = None
     """A campaign's folder: the bus is over a network, and each role shows its certificate."""
+    anchor: str | None = None
+    """A TOML file that says which place of the World the car's lot is; docs/mixed-reality.md."""
     standin_plan_shift_m: float = 0.0
     """How far to the left of its lane the plan of the stand-in car lies."""
     standin_dem: str | None = None
@@ -220,10 +222,11 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         yield log or self.route != "from-log", "--route from-log needs --log FILE"
         goal = "--route live needs --source live: a car that says where it drives to"
         yield live or self.route != "live", goal
-        topics = "--ros2 MAPPING needs --source live: its topics are the car's telemetry"
-        yield live or not ros2, topics
+        yield live or not ros2, "--ros2 MAPPING needs --source live: its topics are the telemetry"
         max_speed = "--speed max: not of --source live, whose car nobody can hold up"
         yield not live or not self.lock_step, max_speed
+        speaks = "--anchor needs --ros2 MAPPING with --source live"
+        yield not (self.anchor and live) or ros2, speaks
         yield ros2 or not self.towards_vehicle, "--towards-vehicle needs --ros2 MAPPING"
         embedded = "--log needs --map FILE: the embedded map holds no real drive"
         yield self.map is not None or not log, embedded

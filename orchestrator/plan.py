@@ -10,6 +10,8 @@ from typing import NamedTuple
 import msgspec
 
 from foretwin.contracts.access import BusMember
+from foretwin.contracts.anchor import Anchor
+from foretwin.contracts.anchor_file import AnchorFile
 from foretwin.contracts.campaign import role_files
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.elevation import RoadSlopes
@@ -70,12 +72,19 @@ class DriveInputs:
     log_file: Path | None
     info: VehicleInfo | None
     standin: StandinPath | None
+    anchor: AnchorFile | None = None
+    """Where the car really is; None: where the World is."""
     ros2: MappingFile | None = None
     """How the live car's ROS 2 topics are read, and what goes back."""
     progress: ProgressModel | None = None
     """What forecasts how far the car will get; None where nobody wants to know."""
     tracks: tuple[DrivenTrack, ...] = ()
     """Of earlier drives near the map, where the user asks for them."""
+
+    @property
+    def lot(self) -> Anchor | None:
+        """How the car's lot lies in the World; None where it drives in the World."""
+        return None if self.anchor is None else self.anchor.anchor
 
     @property
     def towards_vehicle(self) -> bool:

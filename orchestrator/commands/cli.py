@@ -17,6 +17,7 @@ from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, Who
 from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
 from foretwin.orchestrator.commands.cli_maps import maps
 from foretwin.orchestrator.commands.cli_options import (
+    AnchorOption,
     DemOption,
     DialectOption,
     EndpointOption,
@@ -140,6 +141,7 @@ def drive(
     ros2: Annotated[
         str | None, typer.Option(help="mapping of the live car's ROS 2 topics, TOML, or autoware")
     ] = None,
+    anchor: AnchorOption = None,
     towards_vehicle: Annotated[
         bool,
         typer.Option(

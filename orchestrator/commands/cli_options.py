@@ -106,4 +106,8 @@ MetricsOption = Annotated[
         help="tell operators metrics on this port of 127.0.0.1, or on HOST:PORT [default: none]"
     ),
 ]
+AnchorOption = Annotated[
+    str | None,
+    typer.Option(help="TOML file: which place of the World the car's lot is [default: the same]"),
+]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from foretwin.contracts.anchor_file import AnchorFile, read_anchor
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.field_words import fields_of
@@ -126,6 +127,12 @@ KINDS: Mapping[str, FileKind] = {
         StandinParameters,
         read_parameters,
         shipped=STANDIN_FILE,
+    ),
+    "anchor": FileKind(
+        "which place of the World a car's lot is, for --anchor",
+        AnchorFile,
+        read_anchor,
+        told_in="foretwin.contracts.anchor_file",
     ),
     "layout": FileKind(
         "how the viewer is laid out, for --layout",

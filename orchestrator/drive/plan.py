@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from foretwin.contracts.anchor import Anchor, AnchorLine
+from foretwin.contracts.anchor_file import read_anchor
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.campaign import role_files
 from foretwin.contracts.codec import write_message
@@ -70,6 +72,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
     progress = progress_of(config.progress_table)
+    anchor = None if config.anchor is None else read_anchor(Path(config.anchor))
     ros2 = read_ros2(config)
     if config.secure is not None and config.endpoint is not None:
         check_campaign(Path(config.secure), config.endpoint, car=starts_a_car(config))
@@ -78,7 +81,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     info, positions, log_file = None, None, None
     if source == "log":
         log_file = Path(config.log or "")
-        info, positions = _read_log(config, log_file)
+        lot = None if anchor is None else anchor.anchor
+        info, positions = _read_log(config, log_file, lot)
     given = _given_line(config, positions)
     near = positions if positions is not None else given
     clip = None if near is None else Clip(near, CORRIDOR_M)
@@ -131,6 +135,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         log_file=log_file,
         info=info,
         standin=standin,
+        anchor=anchor,
         ros2=ros2,
         progress=progress,
         tracks=() if earlier is None else earlier.tracks,
@@ -143,8 +148,11 @@ def starts_a_car(config: DriveConfig) -> bool:
     return config.resolved_source != "live" or any(one is not None for one in gateways)
 
 
-def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
-    """Return what the log says of itself and its positions (N, 2) between start and end."""
+def _read_log(
+    config: DriveConfig, log_file: Path, anchor: Anchor | None
+) -> tuple[VehicleInfo, Array]:
+    """Return what the log says of itself and where in the World it was (N, 2) between start and
+    end."""
     if not log_file.exists():
         raise FileNotFoundError(f"recorded drive {log_file}: no such file or folder")
     log = open_log(log_file)
@@ -153,7 +161,11 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
     except LogError as error:
         end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
         raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
-    return log.info, line.lat_lon_deg
+    if anchor is None:
+        return log.info, line.lat_lon_deg
+    lat_deg, lon_deg = line.lat_lon_deg.T
+    there = anchor.world_from_lot_line(AnchorLine(lat_deg, lon_deg, np.zeros(len(lat_deg))))
+    return log.info, np.stack([there.lat_deg, there.lon_deg], axis=1)
 
 
 def _read_beside(

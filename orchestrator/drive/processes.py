@@ -175,6 +175,7 @@ def _replay(plan: DrivePlan, process_id: str) -> ProcessSetup:
         start_s=plan.config.start_s,
         end_s=plan.config.end_s,
         speed=plan.config.speed,
+        anchor=plan.lot,
     )
 
 
@@ -187,6 +188,7 @@ def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
         seed=plan.config.seed,
         plan_shift_m=plan.config.standin_plan_shift_m,
         parameters_file=plan.config.standin_parameters,
+        anchor=plan.lot,
     )
 
 
@@ -200,6 +202,7 @@ def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
         towards_vehicle=plan.config.towards_vehicle,
         order_keys=plan.order_keys,
         vehicle=plan.vehicle,
+        anchor=plan.lot,
     )
 
 

@@ -129,6 +129,7 @@ def _known_at_start(plan: DrivePlan, exit_word: str) -> dict[str, Any]:
         },
         "seed": plan.config.seed,
         "route_source": plan.route_source,
+        "anchor": msgspec.to_builtins(plan.anchor),
         "config": msgspec.to_builtins(plan.config),
     }
 

@@ -86,7 +86,9 @@ def serve(setup: ReplaySetup, bus: Bus, life: ProcessLife) -> None:
         start_s=setup.start_s,
         end_s=setup.end_s,
     )
-    serve_vehicle(source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed)
+    serve_vehicle(
+        source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed, anchor=setup.anchor
+    )
 
 
 if __name__ == "__main__":

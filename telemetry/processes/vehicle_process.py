@@ -13,11 +13,13 @@ from typing import Any, Protocol
 
 import msgspec
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.trace import traced
+from foretwin.telemetry.anchored import world_from_lot_info, world_from_lot_message
 
 _TICK_S = 0.005
 """Between two looks at the clock: what a sample may be late."""
@@ -56,7 +58,8 @@ class VehicleProcess:
     """Publishes a source, paced by the monotonic clock or in lock step, and answers questions.
 
     `speed` is drive seconds per wall second; None is lock step: samples follow `advance` requests
-    alone. `step` does what is due and returns whether to go on.
+    alone. Where there is an `anchor`, the source is on a lot, and what is published in the World.
+    `step` does what is due and returns whether to go on.
     """
 
     def __init__(
@@ -67,6 +70,7 @@ class VehicleProcess:
         life: ProcessLife,
         vehicle_id: str,
         speed: float | None,
+        anchor: Anchor | None = None,
         mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
         """Raises ValueError for a speed that is not positive."""
@@ -75,7 +79,7 @@ class VehicleProcess:
         self._source = source
         self._bus, self._life = bus, life
         self._vehicle_id = vehicle_id
-        self._speed = speed
+        self._speed, self._anchor = speed, anchor
         self._mono_s = mono_s
         self._mailbox = Mailbox(256)
         self._published: Counter[str] = Counter()
@@ -123,7 +127,7 @@ class VehicleProcess:
     def _answer(self, item: Any) -> None:
         match item:
             case Request(channel="info"):
-                item.reply(self._source.info)
+                item.reply(world_from_lot_info(self._anchor, self._source.info))
             case Request(channel="advance"):
                 try:
                     until_ns = item.message().until_stamp_ns
@@ -136,7 +140,8 @@ class VehicleProcess:
     @traced("samples that are due")
     def _publish_until(self, until_stamp_ns: int) -> None:
         for channel, message in self._source.advance(until_stamp_ns):
-            self._bus.publish(channel, message, vehicle=self._vehicle_id)
+            there = world_from_lot_message(self._anchor, message)
+            self._bus.publish(channel, there, vehicle=self._vehicle_id)
             self._published[channel] += 1
             self._last_stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         self._given_until_ns = max(self._given_until_ns, until_stamp_ns)
@@ -152,9 +157,17 @@ class VehicleProcess:
 
 
 def serve_vehicle(
-    source: VehicleSource, bus: Bus, life: ProcessLife, *, vehicle_id: str, speed: float | None
+    source: VehicleSource,
+    bus: Bus,
+    life: ProcessLife,
+    *,
+    vehicle_id: str,
+    speed: float | None,
+    anchor: Anchor | None = None,
 ) -> None:
     """Put `source` on the bus until the run is over; blocks."""
-    process = VehicleProcess(source, bus=bus, life=life, vehicle_id=vehicle_id, speed=speed)
+    process = VehicleProcess(
+        source, bus=bus, life=life, vehicle_id=vehicle_id, speed=speed, anchor=anchor
+    )
     while process.step():
         pass

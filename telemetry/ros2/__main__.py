@@ -35,6 +35,7 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
             flag_on=setup.towards_vehicle,
             order_keys=setup.order_keys,
             car=setup.vehicle,
+            anchor=setup.anchor,
             refusals=life.refusals,
         )
         life.ready()

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from foretwin.contracts import drive, gap
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request
 from foretwin.contracts.foreign_bus import ForeignBus
 from foretwin.contracts.frames import LocalFrame
@@ -60,6 +61,7 @@ class Gateway:
         flag_on: bool,
         order_keys: OrderKeys | None = None,
         car: VehicleParameters | None = None,
+        anchor: Anchor | None = None,
         refusals: Refusals | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
@@ -67,13 +69,14 @@ class Gateway:
         """Subscribe to what the mapping names; `flag_on` is the command line's switch.
 
         `order_keys` say whose orders count: without them none does, and nothing goes towards the
-        vehicle. `car` gives the size of the car's own twin, where that goes out.
+        vehicle. `car` gives the size of the car's own twin, where that goes out. With an `anchor`
+        the car's topics live on its lot, and all that is said on `bus` in the World.
         """
         self._mapping, self._bus, self._foreign = mapping, bus, foreign
         self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
-        self.inwards = Inwards(mapping)
+        self.inwards = Inwards(mapping, anchor)
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
-        self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id)
+        self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id, anchor=anchor)
         self.gate = VehicleGate(
             mapping.towards_vehicle,
             config_on=mapping.towards_vehicle.enabled,
@@ -92,7 +95,7 @@ class Gateway:
             mapping.mirrored,
             car=car,
             drive_frame=drive_frame,
-            alt_m=(mapping.map_frame or drive_frame).origin.alt_m,
+            alt_m=self._out.ground_alt_m,
         )
         self._diagnostics = DiagnosticLevels()
         self._inbox, self._views = Mailbox(2048), Mailbox(256)
@@ -192,7 +195,7 @@ class Gateway:
         measured_ago_ns = now_ns - self.inwards.tire_angle_mono_ns
         known = measured_ago_ns <= _MEASURED_WITHIN_NS
         admitted = self.gate.admit(
-            message,
+            self._out.on_lot(message),
             now_ns=now_ns,
             link_up=self._foreign.connected,
             tire_angle_rad=self.inwards.tire_angle_rad if known else None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from foretwin.contracts.bus import Request
 from foretwin.contracts.drive import VehicleInfo
+from foretwin.telemetry.anchored import world_from_lot_info
 from foretwin.telemetry.logs.foreign_ros import time_base_of
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.mapping import Mapping
@@ -23,7 +24,7 @@ class Introduction:
         first_ns = self._inwards.first_stamp_ns
         if first_ns is None:
             return None
-        return VehicleInfo(
+        info = VehicleInfo(
             vehicle_id=self._vehicle_id,
             time_base=time_base_of(first_ns),
             start_stamp_ns=first_ns,
@@ -32,6 +33,7 @@ class Introduction:
             body_from_antenna_m=self._inwards.antenna_m,
             sends=self._inwards.channels,
         )
+        return world_from_lot_info(self._inwards.anchor, info)
 
     def take(self, request: Request, *, now_ns: int) -> None:
         """Take a request for the vehicle's info."""

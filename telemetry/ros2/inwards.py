@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 import msgspec
 
 from foretwin.contracts import drive
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.guard import Refused, admit
 from foretwin.contracts.numbering import Numberings
+from foretwin.telemetry.anchored import world_from_lot_message
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
 from foretwin.telemetry.ros2.mapping import InRow, Mapping
@@ -32,13 +34,13 @@ class Wanted(NamedTuple):
 
 
 class Inwards:
-    """Turns what arrives into samples.
+    """Turns what arrives into samples; with an `anchor`, from the car's lot into the World.
 
     `counts` holds samples by channel, `unused` what was left out by topic and reason.
     """
 
-    def __init__(self, mapping: Mapping) -> None:
-        self._mapping = mapping
+    def __init__(self, mapping: Mapping, anchor: Anchor | None = None) -> None:
+        self._mapping, self.anchor = mapping, anchor
         self._rows = {row.topic: row for row in mapping.inwards}
         self._by_bridge_key = {
             bridge_key(row.topic, namespace=mapping.namespace): row for row in mapping.inwards
@@ -139,7 +141,8 @@ class Inwards:
         if row.type == CLOCK:
             return []
         if row.type == LANELET_ROUTE:
-            self.route = route_from_lanelets(ros, self._mapping.map_frame)
+            route = route_from_lanelets(ros, self._mapping.map_frame)
+            self.route = world_from_lot_message(self.anchor, route)
             return [("route", self.route)]
         how = FOREIGN[row.type]
         stamp_ns = arrived.received_wall_ns
@@ -157,7 +160,7 @@ class Inwards:
                 self.unused[f"{row.topic}: road users that cannot be"] += left_out
             self._note(message, arrived)
             channel = channel_of(message)
-            samples.append((channel, message))
+            samples.append((channel, world_from_lot_message(self.anchor, message)))
             self.counts[channel] += 1
         return samples
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from foretwin.contracts import drive
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
+from foretwin.telemetry.anchored import Message, lot_from_world_message
 from foretwin.telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
 from foretwin.telemetry.ros_messages import parts
 from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
@@ -30,13 +32,27 @@ class Level(NamedTuple):
 
 
 class Outwards:
-    """Turns messages of a run into CDR bytes for the rows that carry them."""
+    """Turns messages of a run into CDR bytes for the rows that carry them.
 
-    def __init__(self, mapping: Mapping, *, drive_frame: LocalFrame, vehicle_id: str) -> None:
+    With an `anchor` states, twins and objects, which are in the World, go out on the car's lot.
+    """
+
+    def __init__(
+        self,
+        mapping: Mapping,
+        *,
+        drive_frame: LocalFrame,
+        vehicle_id: str,
+        anchor: Anchor | None = None,
+    ) -> None:
         self._rows = mapping.outwards
         self._map = mapping.map_frame
-        self._drive_frame = drive_frame
+        self._drive_frame, self._anchor = drive_frame, anchor
+        self._car_frame = drive_frame if anchor is None else anchor.lot.frame
         self._vehicle_id = vehicle_id
+        ground = self._map or drive_frame if anchor is None else anchor.world.frame
+        self.ground_alt_m = ground.origin.alt_m
+        """Of the World, where nothing says more."""
 
     def rows(self, source: Source) -> list[OutRow]:
         """Return the rows that carry a source."""
@@ -47,16 +63,19 @@ class Outwards:
         for row in self._rows:
             _cdr(ros_message(row.type), row.type)
 
+    def on_lot(self, message: Message) -> Message:
+        """Return where the car is what is said in the World."""
+        return lot_from_world_message(self._anchor, message)
+
     def state(self, message: drive.VehicleState) -> bytes:
         """Return the Odometry of a state."""
-        frame = self._map or self._drive_frame
-        return _cdr(self._framed(odometry_from_state(message, frame)), parts.ODOMETRY)
+        ros = odometry_from_state(self.on_lot(message), self._map or self._car_frame)
+        return _cdr(self._framed(ros), parts.ODOMETRY)
 
     def twin(self, message: MirrorSample) -> bytes:
         """Return the Odometry of the twin."""
         twin, frame = message.twin, self._drive_frame
-        alt_m = (self._map or frame).origin.alt_m
-        at = geo_pose(frame, twin.x_m, twin.y_m, twin.yaw_rad, alt_m=alt_m)
+        at = geo_pose(frame, twin.x_m, twin.y_m, twin.yaw_rad, alt_m=self.ground_alt_m)
         return self.state(
             drive.VehicleState(
                 vehicle_id=self._vehicle_id,
@@ -73,7 +92,7 @@ class Outwards:
     def objects(self, message: drive.RoadUsers, kind: str) -> bytes:
         """Return DetectedObjects or PredictedObjects."""
         convert = detected_from_users if kind == parts.DETECTED_OBJECTS else predicted_from_users
-        return _cdr(self._framed(convert(message, self._map or self._drive_frame)), kind)
+        return _cdr(self._framed(convert(self.on_lot(message), self._map or self._car_frame)), kind)
 
     def clock(self, stamp_ns: int) -> bytes:
         """Return a Clock."""

@@ -18,14 +18,16 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
     file = None if setup.parameters_file is None else Path(setup.parameters_file)
     parameters = read_parameters(file)
     source = StandinSource(
-        read_path(Path(setup.path_file), driver=parameters.driver),
+        read_path(Path(setup.path_file), driver=parameters.driver, anchor=setup.anchor),
         parameters,
         vehicle_id=setup.vehicle_id,
         seed=setup.seed,
         end_s=setup.end_s,
         plan_shift_m=setup.plan_shift_m,
     )
-    serve_vehicle(source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed)
+    serve_vehicle(
+        source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed, anchor=setup.anchor
+    )
 
 
 if __name__ == "__main__":

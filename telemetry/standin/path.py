@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.anchor import Anchor, AnchorLine
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
@@ -139,8 +140,10 @@ def _smoothed(xy_m: Array, sigma: float) -> Array:
     return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in (0, 1)], axis=1)
 
 
-def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
+def read_path(file: Path, *, driver: DriverParameters, anchor: Anchor | None = None) -> DrivenPath:
     """Read a JSON object with lists lat_deg, lon_deg, speed_mps, and altitude_m on a hilly road.
+
+    With an `anchor` the path is one of the World, and driven on the lot, which is flat.
 
     Raises UserError naming the file and what is wrong, FileNotFoundError without a file.
     """
@@ -152,6 +155,9 @@ def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
         )
         height = given.get("altitude_m")
         altitude_m = None if height is None else np.asarray(height, dtype=np.float64)
+        if anchor is not None:
+            line = anchor.lot_from_world_line(AnchorLine(lat, lon, np.zeros(len(lat))))
+            lat, lon, speed, altitude_m = line.lat_deg, line.lon_deg, speed / anchor.scale, None
         return DrivenPath(lat, lon, speed, driver=driver, altitude_m=altitude_m)
     except KeyError as missing:
         raise UserError(f"{file}: no list {missing}; lat_deg, lon_deg, speed_mps needed") from None

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from foretwin.contracts.anchor import Anchor, AnchorLine, AnchorPose
 from foretwin.contracts.credentials import read_credentials
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_from_local, local_from_geo
@@ -219,3 +220,33 @@ def _way_through_badhersfeld(folder: Path) -> Path:
     path = folder / "through.geojson"
     path.write_text(json.dumps({"type": "LineString", "coordinates": line}), encoding="utf-8")
     return path
+
+
+def test_a_car_on_a_lot_drives_where_its_anchor_says(tmp_path: Path) -> None:
+    """The log lies where the anchor's lot is; the route is matched where that is in the World."""
+    line = town_line()[::20]
+    frame = town().graph.frame
+    anchor = Anchor(
+        lot=AnchorPose(lat_deg=52.4739, lon_deg=13.395, yaw_deg=30.0),
+        world=AnchorPose(lat_deg=frame.origin.lat_deg, lon_deg=frame.origin.lon_deg, yaw_deg=-20.0),
+    )
+    geo = geo_from_local(frame, line)
+    there = AnchorLine(geo[:, 0], geo[:, 1], np.zeros(len(geo)))
+    on_lot = anchor.lot_from_world_line(there)
+    log, file = tmp_path / "lot.gpx", tmp_path / "lot.toml"
+    points = "".join(
+        f'<trkpt lat="{lat:.9f}" lon="{lon:.9f}"><time>2026-01-01T00:{n // 60:02d}:{n % 60:02d}Z'
+        "</time></trkpt>"
+        for n, (lat, lon) in enumerate(zip(on_lot.lat_deg, on_lot.lon_deg, strict=True))
+    )
+    log.write_text(f'<gpx version="1.1"><trk><trkseg>{points}</trkseg></trk></gpx>')
+    pose = "lat_deg = {0.lat_deg}\nlon_deg = {0.lon_deg}\nyaw_deg = {0.yaw_deg}\n"
+    file.write_text(f"[lot]\n{pose.format(anchor.lot)}[world]\n{pose.format(anchor.world)}")
+    settings = {"map": str(MAP_FILE), "log": str(log), "route": "from-log"}
+    inputs = inputs_for(tmp_path, anchor=str(file), **settings)
+    assert inputs.lot == anchor  # type: ignore[attr-defined]
+    origin = inputs.drive_frame.origin  # type: ignore[attr-defined]
+    begin = local_from_geo(frame, origin.lat_deg, origin.lon_deg)
+    assert begin == pytest.approx(line[0], abs=0.01)
+    with pytest.raises(UserError, match="holds no position"):
+        inputs_for(tmp_path, **settings)

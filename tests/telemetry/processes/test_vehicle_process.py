@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.bus import Mailbox, Received, Reply
 from foretwin.contracts.drive import (
     AdvanceReply,
@@ -19,6 +20,7 @@ from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.processes.replay import ReplaySource
 from foretwin.telemetry.processes.vehicle_process import VehicleProcess
 from tests.contracts.memory_bus import MemoryBus
+from tests.contracts.test_anchor import LOT, WORLD
 from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, recorded_minute
 
 ORCHESTRATOR = alive_key(run="r", process="orchestrator")
@@ -32,7 +34,9 @@ SETUP = ProcessSetup(
 class Rig:
     """A process on a bus in memory, with a clock that only we move."""
 
-    def __init__(self, *, speed: float | None, end_s: float = 3.0) -> None:
+    def __init__(
+        self, *, speed: float | None, end_s: float = 3.0, anchor: Anchor | None = None
+    ) -> None:
         self.now_s = 100.0
         self.bus = MemoryBus()
         self.inbox = Mailbox(1000)
@@ -45,6 +49,7 @@ class Rig:
             life=ProcessLife(SETUP, self.bus, mono_s=lambda: self.now_s),
             vehicle_id="car",
             speed=speed,
+            anchor=anchor,
             mono_s=lambda: self.now_s,
         )
 
@@ -155,3 +160,14 @@ def test_it_leaves_when_the_orchestrator_stays_away() -> None:
 def test_a_speed_must_be_positive() -> None:
     with pytest.raises(ValueError, match="positive"):
         Rig(speed=0.0)
+
+
+def test_a_drive_on_a_lot_is_published_in_the_world() -> None:
+    lot, there = (Rig(speed=None, anchor=one) for one in (None, Anchor(lot=LOT, world=WORLD)))
+    fixes = []
+    for rig in (lot, there):
+        rig.advance(1.0)
+        fixes.append([item.message() for item in rig.received() if item.channel == "gnss"])
+    assert len(fixes[0]) == len(fixes[1]) > 0
+    moved = [Anchor(lot=LOT, world=WORLD).world_from_lot(one.position, 0.0) for one in fixes[0]]
+    assert [one.position for one in fixes[1]] == [one.position for one in moved]

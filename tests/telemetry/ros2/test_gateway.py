@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
 from foretwin.contracts.frames import GeoPoint
@@ -54,7 +55,15 @@ def state(stamp_ns: int) -> VehicleState:
 class Ground:
     """A gateway with a clock in the test's hand."""
 
-    def __init__(self, *, enabled: bool, flag: bool, keys: bool = True, **mapped: str) -> None:
+    def __init__(
+        self,
+        *,
+        enabled: bool,
+        flag: bool,
+        keys: bool = True,
+        anchor: Anchor | None = None,
+        **mapped: str,
+    ) -> None:
         self.now_ns = S
         self.bus, self.foreign = MemoryBus(), RecordingForeign()
         self.inbox = Mailbox(100)
@@ -70,6 +79,7 @@ class Ground:
             drive_frame=FRAME,
             flag_on=flag,
             order_keys=self.orders.keys if keys else None,
+            anchor=anchor,
             mono_ns=lambda: self.now_ns,
             wall_ns=lambda: 10**18 + self.now_ns,
         )
