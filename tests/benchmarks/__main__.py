@@ -43,6 +43,7 @@ BENCHMARKS = (
     "tuning_cost",
     "ray_overhead",
     "help_startup",
+    "lidar_turn",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""
 

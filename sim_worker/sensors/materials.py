@@ -1,0 +1,43 @@
+"""How much light of a lidar comes back from what stands in a World."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUserKind
+
+_CONCRETE, _ASPHALT, _TREE, _WOOD, _HEDGE, _METAL = 0.24, 0.17, 0.60, 0.25, 0.30, 0.40
+"""Shares at 900 nm as RIEGL's data sheets (such as of the LD90-3) list them: smooth concrete,
+asphalt with pebbles, deciduous trees, clean rough wood, conifers; painted metal is chosen."""
+REFLECTIVITY: dict[str, float] = {
+    "ground": _ASPHALT, "building": _CONCRETE, "roofs": _CONCRETE, "tree": _TREE, "lamp": _METAL,
+    "pole": _METAL, "bollard": _METAL, "block": _CONCRETE, "wall": _CONCRETE, "fence": _WOOD,
+    "hedge": _HEDGE, "guard_rail": _METAL, "shelter": _METAL,
+}  # fmt: skip
+"""By how a geom of a World is called."""
+OTHER_REFLECTIVITY = _CONCRETE
+"""Of islands and what else there is."""
+OF_ROAD_USERS: dict[RoadUserKind, float] = {"pedestrian": 0.3, "bicycle": 0.3}
+"""Of clothes: chosen; other road users are painted metal."""
+_ROUGHNESS_RAD = math.radians(30.0)
+"""Of all surfaces, chosen. With it pavement is seen to a quarter of the range of cars; a smooth one
+(0) would be seen to an eighth, and data sheets say two fifths (HDL-64E: 50 against 120 m)."""
+
+
+def reflectivity_of(kind: RoadUserKind) -> float:
+    """Return the share of light that a road user gives back where it is struck squarely."""
+    return OF_ROAD_USERS.get(kind, _METAL)
+
+
+def back_scatter(cos_incidence: Array) -> Array:
+    """Return (…) how bright surfaces look to who lights them, 1 where they are struck squarely.
+
+    Oren and Nayar (1994), Generalization of Lambert's Reflectance Model, equation 30 with the
+    viewer at the light: A cos + B sin², over its value at 0.
+    """
+    squared = _ROUGHNESS_RAD**2
+    a, b = 1.0 - 0.5 * squared / (squared + 0.33), 0.45 * squared / (squared + 0.09)
+    return np.asarray(cos_incidence + b / a * (1.0 - cos_incidence**2))

@@ -1,0 +1,72 @@
+"""Sensor files: those that come along are the sensors that they are called after."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.errors import MissingFileError, UserError
+from foretwin.sim_worker.sensors.sensor_file import (
+    DEFAULT_FILE,
+    bundled_sensors,
+    load_sensor,
+    sensor_of,
+    sensor_text,
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "rings", "lowest_deg", "highest_deg", "points_per_s"),
+    [
+        ("vlp_16", 16, -15.0, 15.0, 300_000),
+        ("hdl_32e", 32, -30.67, 10.67, 700_000),
+        ("vlp_32c", 32, -25.0, 15.0, 600_000),
+        ("os1_64", 64, -16.6, 16.6, 655_360),
+    ],
+)
+def test_a_bundled_sensor_is_what_its_data_sheet_says(
+    name: str, rings: int, lowest_deg: float, highest_deg: float, points_per_s: float
+) -> None:
+    sensor = load_sensor(name)
+    lidar = sensor.lidar
+
+    assert (sensor.name, len(lidar.elevation_deg)) == (name, rings)
+    assert (lidar.elevation_deg[0], lidar.elevation_deg[-1]) == (lowest_deg, highest_deg)
+    assert rings * lidar.azimuths * lidar.rate_hz == pytest.approx(points_per_s, rel=0.05)
+    assert len(sensor.source) > 40
+
+
+def test_the_bundled_ones_are_known_by_name() -> None:
+    assert bundled_sensors() == ("hdl_32e", "os1_64", "vlp_16", "vlp_32c")
+    assert load_sensor(DEFAULT_FILE) == load_sensor("vlp_16")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[-15, -13,", "[-13, -15,", "line 9: lidar.elevation_deg: from the lowest ring"),
+        ("[-15, -13,", "[-95, -13,", "line 9: lidar.elevation_deg: one or more angles"),
+        ("azimuths = 1808", "azimuths = 0", "line 10: lidar.azimuths 0: 1 to 262144 rays"),
+        ("azimuths = 1808", "azimuths = 20000", "lidar.azimuths 20000: 1 to 262144 rays"),
+        ("dropout = 0.005", "dropout = 1.5", "lidar.dropout 1.5: 0 to 1"),
+        ("range_std_m = 0.03", "range_std_m = -1.0", "lidar.range_std_m -1: 0 to 10"),
+        ("min_range_m = 0.5", "min_range_m = 200.0", "lidar.min_range_m 200: 0 to 100"),
+        ("up_m = 1.9", "up_m = nan", "mount.up_m nan: a finite number"),
+        ("up_m = 1.9", "up = 1.9", "up"),
+        ('"clockwise"', '"left"', "lidar.turns"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(old: str, new: str, said: str) -> None:
+    text, _ = sensor_text("vlp_16")
+    assert old in text
+
+    with pytest.raises(UserError) as raised:
+        sensor_of(text.replace(old, new, 1), "mine.toml")
+    assert said in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_missing_file_is_told_with_the_names_that_there_are(tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match=r"nowhere.*hdl_32e, os1_64, vlp_16, vlp_32c"):
+        load_sensor(tmp_path / "nowhere.toml")
