@@ -19,6 +19,7 @@ from foretwin.contracts.simulation import (
     RoundView,
 )
 from foretwin.viewer.colours import CRITICAL, NOMINAL, ROAD_USER, SAFE, TWIN, WATCH, Colour
+from foretwin.viewer.danger import dangers_of, instant_of
 from foretwin.viewer.log_drive import PLAN
 from foretwin.viewer.rows import Row, document, in_markdown, point_at, raised, static
 
@@ -29,6 +30,8 @@ BASELINES: dict[str, tuple[Colour, str]] = {
 }
 """Colour and name of each prediction that is compared with the real drive."""
 
+THREATS_SHOWN = 3
+"""Threats with a label; more would hide the junction."""
 FUTURE_POINTS = 33
 """Points drawn of each future; more only makes the file larger."""
 WORST_SHOWN = 12
@@ -132,7 +135,21 @@ def _road_users(view: RoundView, drive_ns: int) -> list[Row]:
     return [
         Row("world/futures/road_users", drive_ns, users),
         Row("world/futures/touches", drive_ns, touches),
+        Row("world/futures/threats", drive_ns, _threats(view)),
     ]
+
+
+def _threats(view: RoundView) -> rr.Points3D:
+    """Return where the gravest dangers are met: who comes from where, how likely, in how long."""
+    shown = [one for one in dangers_of(view) if one.level != "calm"][:THREATS_SHOWN]
+    places = [view.xy_m[one.future, instant_of(view, one.in_s)] for one in shown]
+    return rr.Points3D(
+        raised(np.array(places, dtype=np.float64).reshape(-1, 2), 1.2),
+        colors=criticality_colours(np.array([one.criticality for one in shown])),
+        radii=[0.5],
+        labels=[f"{one.what} · {one.odds} · {one.in_s:.1f} s" for one in shown],
+        show_labels=True,
+    )
 
 
 def scenario_table(view: RoundView) -> str:

@@ -27,11 +27,13 @@ from foretwin.viewer.log_scenarios import (
     SAFE,
     WATCH,
     criticality_colours,
+    rows_of_round,
     scenario_table,
 )
 from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.rows import plain_text
 from tests.viewer import scene
+from tests.viewer.copilot.rounds import line, round_of
 from tests.viewer.shown import Shown, monitor_of, text_of
 
 COVERS = (
@@ -245,3 +247,21 @@ def test_who_watches_sees_when_what_is_shown_was_sent() -> None:
         told[name] = text_of(Shown(monitor.handle("progress", progress))["status"])
     assert told["live"].startswith("**0.0 s**, now 16:02:11 · map: ")
     assert "now" not in told["recorded"]
+
+
+def test_threats_say_who_comes_from_where_how_likely_and_when() -> None:
+    view = round_of(
+        ("car", line((20.0, -20.0), (0.0, 10.0)), 1e-2),
+        ("bicycle", line((20.0, 20.0), (0.0, -10.0)), 1e-5),
+        ("pedestrian", line((20.0, 0.0), (0.0, 0.0)), 1e-7),
+        likelihood=0.004,
+    )
+    shown = Shown(rows_of_round(view, 0))["world/futures/threats"]
+    assert shown.labels.as_arrow_array().to_pylist() == [
+        "car from the right · 1 in 200 · 2.0 s",
+        "bicycle from the left · 1 in 200 · 2.0 s",
+    ]
+    np.testing.assert_allclose(
+        shown.positions.as_arrow_array().to_pylist(), [[20.0, 0.0, 1.2]] * 2, atol=1e-5
+    )
+    assert not len(Shown(rows_of_round(round_of(), 0))["world/futures/threats"].labels)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import msgspec
 
 from foretwin.viewer.copilot.alerts import Kind
-from foretwin.viewer.copilot.danger import Level
 from foretwin.viewer.copilot.right_of_way import Sign
+from foretwin.viewer.danger import Level
 
 Points = list[list[float]]
 

@@ -23,9 +23,9 @@ from foretwin.contracts.terminal import plain
 from foretwin.contracts.world import World
 from foretwin.viewer.copilot import words
 from foretwin.viewer.copilot.alerts import Alerts
-from foretwin.viewer.copilot.danger import Danger, SteadyLevel, dangers_of
 from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
 from foretwin.viewer.copilot.right_of_way import RightOfWay, of_junction, right_of_way
+from foretwin.viewer.danger import Danger, SteadyLevel, dangers_of, instant_of
 
 ROUND_FOR_S = 3.0
 """So long a round is shown; the slowest pace is one in two seconds."""
@@ -280,12 +280,10 @@ def _points(line_m: Array | Array32) -> list[list[float]]:
 def _danger(view: RoundView, danger: Danger, age_s: float) -> DangerFrame:
     met = {one.future: number for number, one in enumerate(view.met)}
     number = met.get(danger.future)
-    last = view.xy_m.shape[1] - 1
-    until = last if view.horizon_s <= 0.0 else round(danger.in_s / view.horizon_s * last)
-    until = min(max(until, 1), last)
+    until = instant_of(view, danger.in_s)
     return DangerFrame(
         what=danger.what,
-        odds=words.odds(danger.likelihood),
+        odds=danger.odds,
         in_s=round(max(0.0, danger.in_s - age_s), 1),
         hits=danger.hits,
         path=_points(view.xy_m[danger.future, : until + 1]),

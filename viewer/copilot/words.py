@@ -7,7 +7,7 @@ from typing import NamedTuple
 from foretwin.contracts.gap import Culprit, LimitedQuantity, Verdict, limits_after
 from foretwin.contracts.simulation import MirrorSample, Progress
 from foretwin.contracts.terminal import plain
-from foretwin.viewer.copilot.danger import Danger
+from foretwin.viewer.danger import Danger
 
 FAR_S = 99.0
 """From so many seconds on minutes say more."""
@@ -24,15 +24,6 @@ class TwinStanding(NamedTuple):
     text: str
     detail: str
     well: bool
-
-
-def odds(likelihood: float) -> str:
-    """Return how likely something is beside the likeliest future, as it is said at a glance."""
-    if likelihood >= 0.00995:
-        return f"{100.0 * likelihood:.0f} %"
-    if likelihood >= 0.001:
-        return f"1 in {float(f'{1.0 / likelihood:.1g}'):.0f}"
-    return "rare"
 
 
 def seconds(value: float) -> str:
@@ -68,7 +59,7 @@ def danger_text(danger: Danger | None, *, elapsed_s: float = 0.0) -> str:
         return "no danger found"
     left = seconds(max(0.0, danger.in_s - elapsed_s))
     near = "" if danger.hits else "near miss, "
-    return f"{danger.what}, {near}{odds(danger.likelihood)}, {left}"
+    return f"{danger.what}, {near}{danger.odds}, {left}"
 
 
 def standing_of(mirror: MirrorSample | None, verdict: Verdict | None) -> TwinStanding:

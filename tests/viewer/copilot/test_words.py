@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from foretwin.contracts.gap import Culprit, Verdict, limits_after
 from foretwin.contracts.simulation import MirrorSample, PlaneState, Progress
 from foretwin.viewer.copilot import words
-from foretwin.viewer.copilot.danger import Danger
+from foretwin.viewer.danger import Danger
 
 NAME = "Charlottenstraße × Kronenstraße"  # noqa: RUF001
 PLACE = PlaneState(0.0, 0.0, 0.0, 8.0)
@@ -100,27 +98,6 @@ def test_its_span_stands_beside_it() -> None:
     assert words.arrival_span(changed(AHEAD, arrival_late_s=None)) == "3 s or later"
     assert words.arrival_span(changed(AHEAD, arrival_early_s=None)) == ""
     assert words.arrival_span(changed(AHEAD, arrival_in_s=None)) == ""
-
-
-@pytest.mark.parametrize(
-    ("likelihood", "said"),
-    [
-        (1.0, "100 %"),
-        (0.124, "12 %"),
-        (0.01, "1 %"),
-        (0.0049, "1 in 200"),
-        (0.001, "1 in 1000"),
-        (0.0004, "rare"),
-        (0.0, "rare"),
-    ],
-)
-def test_likelihoods_have_the_digits_that_count(likelihood: float, said: str) -> None:
-    assert words.odds(likelihood) == said
-
-
-@given(st.floats(0.0, 1.0))
-def test_a_likelihood_is_never_said_in_more_than_nine_letters(likelihood: float) -> None:
-    assert 1 < len(words.odds(likelihood)) <= 9
 
 
 def test_seconds_left_run_out_at_none() -> None:

@@ -36,6 +36,15 @@ class Danger(NamedTuple):
     hits: bool
     level: Level
 
+    @property
+    def odds(self) -> str:
+        """How likely it is beside the likeliest future, as it is said at a glance."""
+        if self.likelihood >= 0.00995:
+            return f"{100.0 * self.likelihood:.0f} %"
+        if self.likelihood >= 0.001:
+            return f"1 in {float(f'{1.0 / self.likelihood:.1g}'):.0f}"
+        return "rare"
+
 
 def level_of(criticality: float) -> Level:
     """Return the level of a criticality by the limits that every view of foretwin has."""
@@ -100,12 +109,17 @@ class SteadyLevel:
         self.shown, self._below = "none", []
 
 
+def instant_of(view: RoundView, time_s: float) -> int:
+    """Return which point of the round's lines is nearest to so many seconds; never the first."""
+    last = int(view.xy_m.shape[1]) - 1
+    at = last if view.horizon_s <= 0.0 else round(time_s / view.horizon_s * last)
+    return min(max(at, 1), last)
+
+
 def _side(view: RoundView, future: int, track_m: Array, at_s: float) -> str:
     """Return from where a road user on `track_m` (M, 2) comes, as the car will then see it."""
     own_m = np.asarray(view.xy_m[future], dtype=np.float64)
-    last = len(own_m) - 1
-    at = 0 if view.horizon_s <= 0.0 else round(at_s / view.horizon_s * last)
-    at = min(max(at, 1), last)
+    at = instant_of(view, at_s)
     own_rad = _heading(own_m, at)
     track_m = np.asarray(track_m, dtype=np.float64)
     came_m = track_m[at] - track_m[0]

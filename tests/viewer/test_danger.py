@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.simulation import AMBER_FROM, GREEN_TO, RED_FROM
-from foretwin.viewer.copilot.danger import SteadyLevel, dangers_of, level_of
+from foretwin.viewer.danger import Danger, SteadyLevel, dangers_of, level_of
 from tests.viewer.copilot.rounds import HORIZON_S, POINTS, TIMES_S, line, round_of
 
 
@@ -83,3 +85,28 @@ def test_a_level_rises_at_once_and_falls_when_it_stays_down() -> None:
     level.forget()
     assert level.shown == "none"
     assert level.take("calm") == "calm"
+
+
+@pytest.mark.parametrize(
+    ("likelihood", "said"),
+    [
+        (1.0, "100 %"),
+        (0.124, "12 %"),
+        (0.01, "1 %"),
+        (0.0049, "1 in 200"),
+        (0.001, "1 in 1000"),
+        (0.0004, "rare"),
+        (0.0, "rare"),
+    ],
+)
+def test_likelihoods_have_the_digits_that_count(likelihood: float, said: str) -> None:
+    assert with_likelihood(likelihood).odds == said
+
+
+@given(st.floats(0.0, 1.0))
+def test_a_likelihood_is_never_said_in_more_than_nine_letters(likelihood: float) -> None:
+    assert 1 < len(with_likelihood(likelihood).odds) <= 9
+
+
+def with_likelihood(likelihood: float) -> Danger:
+    return Danger(0, "car from the right", likelihood, 1e-3, 2.1, True, "danger")
