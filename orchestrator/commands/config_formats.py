@@ -24,6 +24,9 @@ from foretwin.orchestrator.config_file import load_config
 from foretwin.orchestrator.sweep.spec import SweepSpec, load_spec
 from foretwin.orchestrator.worlds import overpass
 from foretwin.sim_worker.scenarios.reading import CATALOGUE, read_scenario
+from foretwin.sim_worker.sensors.sensor_file import DEFAULT_FILE as SENSOR_FILE
+from foretwin.sim_worker.sensors.sensor_file import RANGES as LIDAR_RANGES
+from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile, load_sensor
 from foretwin.sim_worker.vehicle.parameters import DEFAULT_FILE as VEHICLE_FILE
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
@@ -39,6 +42,7 @@ _BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
 RANGES: Mapping[tuple[type, str], Range] = {
     **{(config.DriveConfig, name): one for name, one in config.RANGES.items()},
     **{(overpass.OverpassConfig, name): one for name, one in overpass.RANGES.items()},
+    **{(Lidar, name): one for name, one in LIDAR_RANGES.items()},
     **{(VehicleParameters, name): Range(*ends) for name, ends in PLAUSIBLE.items()},
     **{
         (part, name): row.range
@@ -103,6 +107,12 @@ KINDS: Mapping[str, FileKind] = {
         VehicleParameters,
         load_vehicle,
         shipped=VEHICLE_FILE,
+    ),
+    "sensor": FileKind(
+        "a sensor that does not exist, docs/sensors.md",
+        SensorFile,
+        load_sensor,
+        shipped=SENSOR_FILE,
     ),
     "declaration": FileKind(
         "what the columns of a table are, NAME.csv.toml beside NAME.csv",

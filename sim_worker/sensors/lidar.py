@@ -11,13 +11,11 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32, Indices
 from foretwin.contracts.frames import LocalPose
+from foretwin.contracts.point_cloud import POINT_COLUMNS
 from foretwin.sim_worker.sensors.materials import back_scatter
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayHits, RayWorld
 from foretwin.sim_worker.sensors.sensor_file import Lidar, Mount, SensorFile
 
-POINT_COLUMNS = ("x", "y", "z", "intensity", "ring", "time")
-"""Of a cloud (N, 6): metres in base_link when the point was measured, percent of the light, the
-ring from the lowest on, and seconds since the turn began."""
 _STEP_M = 0.02
 """Rays of one instant begin at one point: sensor and road users have moved by at most half of this
 from there, less than lidars measure."""

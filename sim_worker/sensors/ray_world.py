@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.drive import RoadUser
-from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.materials import (
     OTHER_REFLECTIVITY,
@@ -38,15 +38,15 @@ class MovingBoxes(NamedTuple):
     reflectivity: Array
 
 
-def bodies_of(world: World, users: Sequence[RoadUser]) -> MovingBoxes:
-    """Return road users as boxes in a World's frame; heights are those of their kinds."""
+def boxes_of(frame: LocalFrame, users: Sequence[RoadUser]) -> MovingBoxes:
+    """Return road users as boxes in a frame; heights are those of their kinds."""
     lat_deg = np.array([user.position.lat_deg for user in users])
     lon_deg = np.array([user.position.lon_deg for user in users])
     yaw_rad = np.array([user.yaw_rad for user in users])
     sizes = [(user.length_m, user.width_m, KINDS[user.kind].height_m) for user in users]
     return MovingBoxes(
-        xy_m=local_from_geo(world.frame, lat_deg, lon_deg).reshape(-1, 2),
-        yaw_rad=local_from_geo_yaw(world.frame, yaw_rad, lat_deg, lon_deg).reshape(-1),
+        xy_m=local_from_geo(frame, lat_deg, lon_deg).reshape(-1, 2),
+        yaw_rad=local_from_geo_yaw(frame, yaw_rad, lat_deg, lon_deg).reshape(-1),
         size_m=np.array(sizes, dtype=np.float64).reshape(-1, 3),
         speed_mps=np.array([user.speed_mps for user in users]),
         reflectivity=np.array([reflectivity_of(user.kind) for user in users]),

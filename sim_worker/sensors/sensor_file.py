@@ -4,18 +4,34 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import msgspec
 
 from foretwin.contracts.errors import MissingFileError
+from foretwin.contracts.numbers import Range
 from foretwin.contracts.toml_file import parse_toml, toml_text
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "vlp_16.toml"
 MOST_RAYS = 262_144
 """Of one turn: twice the largest of the market, 128 rings of 1,024 azimuths."""
+RANGES: Mapping[str, Range] = MappingProxyType(
+    {
+        "azimuths": Range(1, MOST_RAYS),
+        "rate_hz": Range(0.1, 100.0),
+        "min_range_m": Range(0.0, 2000.0),
+        "max_range_m": Range(0.1, 2000.0),
+        "seen_to_m": Range(0.1, 2000.0),
+        "seen_reflectivity": Range(0.001, 1.0),
+        "range_std_m": Range(0.0, 10.0),
+        "dropout": Range(0.0, 1.0),
+    }
+)
+"""What the numbers of a lidar may be."""
 
 
 class Mount(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -122,12 +138,10 @@ def check_sensor(sensor: SensorFile) -> None:
         raise ValueError("lidar.elevation_deg: one or more angles between -90 and 90")
     if any(b <= a for a, b in itertools.pairwise(elevations)):
         raise ValueError("lidar.elevation_deg: from the lowest ring to the highest")
-    if not 1 <= lidar.azimuths * len(elevations) <= MOST_RAYS:
-        raise ValueError(f"lidar.azimuths {lidar.azimuths}: 1 to {MOST_RAYS} rays in a turn")
-    for key, low, high in (
-        ("rate_hz", 0.1, 100.0), ("seen_to_m", 0.1, 2000.0), ("seen_reflectivity", 0.001, 1.0),
-        ("max_range_m", 0.1, 2000.0), ("min_range_m", 0.0, lidar.max_range_m),
-        ("range_std_m", 0.0, 10.0), ("dropout", 0.0, 1.0),
-    ):  # fmt: skip
-        if not low <= getattr(lidar, key) <= high:
-            raise ValueError(f"lidar.{key} {getattr(lidar, key):g}: {low:g} to {high:g}")
+    if lidar.azimuths * len(elevations) > MOST_RAYS:
+        raise ValueError(f"lidar.azimuths {lidar.azimuths}: at most {MOST_RAYS} rays in a turn")
+    for key, allowed in RANGES.items():
+        if not allowed.admits(getattr(lidar, key)):
+            raise ValueError(f"lidar.{key} {getattr(lidar, key):g}: {allowed}")
+    if lidar.min_range_m >= lidar.max_range_m:
+        raise ValueError(f"lidar.min_range_m {lidar.min_range_m:g}: below lidar.max_range_m")

@@ -38,6 +38,7 @@ LANELET_ROUTE = "autoware_planning_msgs/msg/LaneletRoute"
 DETECTED_OBJECTS = "autoware_perception_msgs/msg/DetectedObjects"
 PREDICTED_OBJECTS = "autoware_perception_msgs/msg/PredictedObjects"
 TRAFFIC_LIGHTS = "autoware_perception_msgs/msg/TrafficLightGroupArray"
+POINT_CLOUD2 = "sensor_msgs/msg/PointCloud2"
 TF = "tf2_msgs/msg/TFMessage"
 CLOCK = "rosgraph_msgs/msg/Clock"
 

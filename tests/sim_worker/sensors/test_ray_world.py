@@ -13,7 +13,7 @@ from foretwin.contracts.drive import RoadUser
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Area
-from foretwin.sim_worker.sensors.ray_world import NO_BODIES, RayWorld, bodies_of
+from foretwin.sim_worker.sensors.ray_world import NO_BODIES, RayWorld, boxes_of
 from foretwin.world_gen.ground.islands import RING_ISLAND
 from tests.sim_worker.places import FRAME, box, crossroads
 
@@ -29,7 +29,7 @@ def user(x: float, y: float, yaw: float, **changes: object) -> RoadUser:
 
 
 def test_road_users_are_boxes_in_the_worlds_frame_as_high_as_their_kind() -> None:
-    found = bodies_of(crossroads(), [user(12.0, -4.0, 1.0), user(0.0, 9.0, -2.0, kind="bus")])
+    found = boxes_of(FRAME, [user(12.0, -4.0, 1.0), user(0.0, 9.0, -2.0, kind="bus")])
 
     assert found.xy_m == pytest.approx(np.array([[12.0, -4.0], [0.0, 9.0]]), abs=1e-6)
     assert found.yaw_rad == pytest.approx([1.0, -2.0], abs=1e-9)
@@ -38,14 +38,14 @@ def test_road_users_are_boxes_in_the_worlds_frame_as_high_as_their_kind() -> Non
 
 
 def test_nobody_is_no_body() -> None:
-    found = bodies_of(crossroads(), [])
+    found = boxes_of(FRAME, [])
 
     assert [part.shape for part in found] == [part.shape for part in NO_BODIES]
 
 
 def test_a_ray_tells_how_far_how_slanting_how_bright_and_whom() -> None:
     world = RayWorld(crossroads(buildings=(box(20.0, 0.0, 2.0, 5.0),)))
-    world.set_bodies(bodies_of(crossroads(), [user(-10.0, 0.0, 0.0)]))
+    world.set_bodies(boxes_of(FRAME, [user(-10.0, 0.0, 0.0)]))
     slanting = np.array([1.0, 0.1, 0.0]) / math.hypot(1.0, 0.1)
     ways = np.array([[1.0, 0, 0], slanting, [-1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0], [0, 0, 1.0]])
     found = world.look(np.array([0.0, 0.0, 1.0]), ways, time_s=1.0, range_m=50.0)

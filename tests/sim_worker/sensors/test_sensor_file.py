@@ -47,11 +47,15 @@ def test_the_bundled_ones_are_known_by_name() -> None:
     [
         ("[-15, -13,", "[-13, -15,", "line 9: lidar.elevation_deg: from the lowest ring"),
         ("[-15, -13,", "[-95, -13,", "line 9: lidar.elevation_deg: one or more angles"),
-        ("azimuths = 1808", "azimuths = 0", "line 10: lidar.azimuths 0: 1 to 262144 rays"),
-        ("azimuths = 1808", "azimuths = 20000", "lidar.azimuths 20000: 1 to 262144 rays"),
+        ("azimuths = 1808", "azimuths = 0", "line 10: lidar.azimuths 0: 1 to 262144"),
+        ("azimuths = 1808", "azimuths = 20000", "lidar.azimuths 20000: at most 262144 rays"),
         ("dropout = 0.005", "dropout = 1.5", "lidar.dropout 1.5: 0 to 1"),
         ("range_std_m = 0.03", "range_std_m = -1.0", "lidar.range_std_m -1: 0 to 10"),
-        ("min_range_m = 0.5", "min_range_m = 200.0", "lidar.min_range_m 200: 0 to 100"),
+        (
+            "min_range_m = 0.5",
+            "min_range_m = 200.0",
+            "lidar.min_range_m 200: below lidar.max_range_m",
+        ),
         ("up_m = 1.9", "up_m = nan", "mount.up_m nan: a finite number"),
         ("up_m = 1.9", "up = 1.9", "up"),
         ('"clockwise"', '"left"', "lidar.turns"),

@@ -1,0 +1,125 @@
+"""What a lidar would measure in a World, and real clouds with virtual bodies in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from foretwin.checks import expect, files_told, number, path_of, whole_number
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.did_you_mean import one_of
+from foretwin.contracts.drive import RoadUser, RoadUserKind, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import geo_pose, local_pose
+from foretwin.contracts.numbers import MAX_SEED
+from foretwin.contracts.point_cloud import POINT_COLUMNS, PointCloud
+from foretwin.contracts.world import World
+from foretwin.sim_worker.sensors.cloud_merge import merge
+from foretwin.sim_worker.sensors.lidar import BaseMotion, LidarScan, scan
+from foretwin.sim_worker.sensors.ray_world import RayWorld, boxes_of
+from foretwin.sim_worker.sensors.sensor_file import DEFAULT_FILE, SensorFile, load_sensor
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+from foretwin.telemetry.logs.write_mcap import create
+
+
+def road_user(
+    world: World,
+    kind: RoadUserKind,
+    x_m: float,
+    y_m: float,
+    *,
+    yaw_rad: float = 0.0,
+    speed_mps: float = 0.0,
+) -> RoadUser:
+    """Return a virtual road user of a kind's size, its middle at a place in the World's frame."""
+    expect("world", world, World)
+    if kind not in get_args(RoadUserKind):
+        raise UserError(f"kind {kind!r}: {one_of(str(kind), get_args(RoadUserKind))}")
+    place = number("x_m", x_m), number("y_m", y_m), number("yaw_rad", yaw_rad)
+    if not all(map(math.isfinite, (*place, number("speed_mps", speed_mps)))):
+        raise UserError(f"{kind}: place, yaw and speed must be finite numbers")
+    at = geo_pose(world.frame, *place)
+    size = KINDS[kind]
+    return RoadUser(
+        user_id=f"{kind} at {x_m:g}, {y_m:g}",
+        kind=kind,
+        position=at.position,
+        yaw_rad=at.yaw_rad,
+        speed_mps=float(speed_mps),
+        length_m=size.length_m,
+        width_m=size.width_m,
+        virtual=True,
+    )
+
+
+def lidar_scan(
+    world: World,
+    state: VehicleState,
+    road_users: Sequence[RoadUser] = (),
+    sensor: SensorFile | Path | str = DEFAULT_FILE,
+    *,
+    users_alone: bool = False,
+    seed: int = 0,
+) -> LidarScan:
+    """Return one turn of a lidar on a car, which begins with `state` and `road_users`.
+
+    Both drive on meanwhile. `sensor` is a bundled one's name, a file or what was read from one.
+    With `users_alone` nothing of the World is seen: for `merge_clouds`. The same seed gives the
+    same noise. Raises UserError for what is no sensor, or a state without a place.
+    """
+    expect("world", world, World)
+    expect("state", state, VehicleState)
+    if not isinstance(sensor, SensorFile):
+        sensor = load_sensor(path_of("sensor", sensor))
+    users = [expect("a road user", user, RoadUser) for user in road_users]
+    pose = local_pose(world.frame, state.position.validate(), state.yaw_rad)
+    motion = BaseMotion(pose, state.speed_mps, state.yaw_rate_radps)
+    rays = RayWorld(None if users_alone else world)
+    seed = whole_number("seed", seed, 0, MAX_SEED)
+    return scan(rays, sensor, motion, boxes_of(world.frame, users), seed=seed)
+
+
+def merge_clouds(real: Array | Array32, virtual: LidarScan) -> Array32:
+    """Return a real cloud (N, 6) into which a scan of road users alone is put, as (M, 6).
+
+    Columns are x, y, z, intensity, ring and time: metres in base_link as measured, percent, from
+    the lowest ring on, seconds since the turn began. What is real behind a virtual body goes, what
+    is virtual behind something real does not come. Raises UserError for another shape.
+    """
+    expect("virtual", virtual, LidarScan)
+    return merge(_cloud("real", real), virtual)
+
+
+def save_clouds(file: Path | str, clouds: Sequence[tuple[float, Array | Array32]]) -> Path:
+    """Write clouds (N, 6), each with its seconds, as sensor_msgs/PointCloud2 to an MCAP file.
+
+    Raises UserError for another shape, or where the file cannot be written.
+    """
+    file = path_of("file", file)
+    messages = [
+        PointCloud(stamp_ns=int(number("a time", time_s) * 1e9), points=_cloud("a cloud", points))
+        for time_s, points in clouds
+    ]
+    with files_told(file), create(file) as writer:
+        for message in messages:
+            try:
+                writer.add("point_cloud", message)
+            except ValueError as error:
+                raise UserError(f"{file}: {error}") from error
+    if writer.error is not None:
+        raise UserError(f"{file}: {writer.error.strerror or writer.error}")
+    return file
+
+
+def _cloud(what: str, given: Array | Array32) -> Array32:
+    try:
+        points = np.asarray(given, dtype=np.float32)
+    except (TypeError, ValueError):
+        raise UserError(f"{what}: an array of numbers is needed") from None
+    if points.ndim != 2 or points.shape[1] != len(POINT_COLUMNS):
+        raise UserError(f"{what} has the shape {points.shape}; (N, 6): {', '.join(POINT_COLUMNS)}")
+    return points
