@@ -204,6 +204,12 @@ class VehicleState(msgspec.Struct, frozen=True, kw_only=True):
     """False until the vehicle has moved far enough for a heading to be known."""
 
 
+class VehicleTime(msgspec.Struct, frozen=True, kw_only=True):
+    """What the time is by a vehicle's clock: the stamp of a sample that it would take now."""
+
+    stamp_ns: int
+
+
 class AdvanceRequest(msgspec.Struct, frozen=True, kw_only=True):
     """Lock step: publish every sample up to and including `until_stamp_ns`, then reply."""
 

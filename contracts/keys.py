@@ -134,9 +134,8 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
         "info": Channel(drive.InfoRequest, None, "what the vehicle is", drive.VehicleInfo),
     },
     (_VEHICLE, REQUEST, _ORCHESTRATOR): {
-        "advance": Channel(
-            drive.AdvanceRequest, None, "lock step: go on until", drive.AdvanceReply
-        ),
+        "vehicle_clock": Channel(fleet.ClockQuestion, 1, "time on board", drive.VehicleTime),
+        "advance": Channel(drive.AdvanceRequest, None, "lock step: go on", drive.AdvanceReply),
     },
     # Work.
     (_WORKER, REQUEST, _ORCHESTRATOR): {

@@ -68,6 +68,8 @@ class OtherVehicle(msgspec.Struct, frozen=True, kw_only=True):
 
     state: VehicleState
     commands: tuple[ControlCommand, ...] = ()
+    clock_std_s: float = 0.0
+    """How sure its stamp is by the car's clock."""
 
 
 class OtherVehicles(msgspec.Struct, frozen=True, kw_only=True):
@@ -75,6 +77,26 @@ class OtherVehicles(msgspec.Struct, frozen=True, kw_only=True):
 
     stamp_ns: int
     heard: tuple[OtherVehicle, ...]
+
+
+class VehicleEncounter(msgspec.Struct, frozen=True, kw_only=True):
+    """Two vehicles that came near one another: how near, when, and whether they touched."""
+
+    one: str
+    other: str
+    stamp_ns: int
+    """When their outlines came within 10 m, by the car's clock."""
+    end_stamp_ns: int
+    """When they were 20 m apart again, or when one was gone."""
+    least_m: float
+    """Between their outlines; 0 where they touched."""
+    least_stamp_ns: int
+    """When they were nearest, or began to touch."""
+    uncertain_m: float
+    """Of that distance: one standard deviation from both positions and clocks, and on top of it the
+    bound of who was reckoned then."""
+    touched: bool
+    """Whether their outlines overlapped."""
 
 
 class CastVehicle(msgspec.Struct, frozen=True, kw_only=True):

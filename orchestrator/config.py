@@ -62,10 +62,11 @@ class OtherVehicleConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     log: str | None = None
     """A recorded drive that it replays."""
     log_offset_s: float | None = None
-    """Seconds of the log that have passed as the car's drive begins; None: by UTC, where both logs
-    have it, else none."""
+    """Seconds of it passed as the car's drive begins; None: by UTC, where both have it."""
     live: bool = False
     """Whether a vehicle of this id speaks on the bus."""
+    same_clock: bool = False
+    """Whether a live one stamps by the car's own clock, as by satellites: nothing is estimated."""
     ros2: str | None = None
     """A mapping in TOML, or `autoware`: how a live vehicle's own ROS 2 topics are read."""
     seen_as: str | None = None
@@ -98,8 +99,7 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     tracks: str | None = None
     """A store of earlier drives that correct where lanes lie: `own`, or a folder; None is none."""
     route: str | None = None
-    """A GPX or GeoJSON file, `from-log`, or `live`: to the goal that the live car says it has; None
-    predicts the route from the road graph."""
+    """A GPX or GeoJSON file, `from-log`, or `live`: to the live car's goal; None predicts it."""
     log: str | None = None
     """A recorded drive to replay, in place of the stand-in car."""
     source: Source = "auto"
@@ -248,8 +248,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
         yield len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"
-        waiting = self.lock_step and any(other.live for other in self.vehicles)
-        yield not waiting, "vehicles: a live vehicle knows no --speed max"
+        waiting = self.speed != 1.0 and any(other.live for other in self.vehicles)
+        yield not waiting, "vehicles: a live vehicle knows no --speed but 1"
 
     @property
     def roles(self) -> dict[str, Role]:

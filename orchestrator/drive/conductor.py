@@ -84,7 +84,7 @@ class Conductor:
             "vehicle": VehicleHandler(self.tuning.parameters),
         }
         self.changes = RuntimeConfiguration(handlers)
-        self.beside = OtherVehicleFeed(context)
+        self.beside = OtherVehicleFeed(context, lambda: self.intake.clock_offset_ns)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self.active_world = ActiveWorldNews(
             context, self.questions, next_stamp_ns=lambda: self.intake.now_stamp_ns + 1
@@ -108,6 +108,7 @@ class Conductor:
             ),
             "prepare": self.worlds.prepare_reply,
             "info": lambda item: self.beside.take_info(item.tag, item.message),
+            "vehicle_clock": self.beside.take_time,
             **dict.fromkeys(("enlist", "admit", "clock"), self.fleet.reply),
         }
         """What takes the answers to each question that is asked through the mailbox."""
@@ -184,7 +185,7 @@ class Conductor:
         if state is None:
             return
         self.watch_telemetry(item.received_mono_ns)
-        self.beside.keep_up_with(state, self.intake.road_users)
+        self.beside.keep_up_with(state, self.intake.road_users, self.roles.roles)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.route.keep_up_with(state, self.intake.plan)
         self.rounds.take_state(state)

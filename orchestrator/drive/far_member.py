@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from foretwin.contracts.fleet import MOST_CLOCK_OFFSET_S, Enlisted, MachineInfo, machine_of
-from foretwin.orchestrator.drive.far_clock import FarClock
 from foretwin.orchestrator.record.machine import differences, other_arithmetic
+from foretwin.telemetry.estimator.far_clock import FarClock
 
 _NAMED = 4
 """So many functions are named."""

@@ -63,6 +63,11 @@ class Intake:
         """What estimates the state, None before the vehicle has said what it is."""
         return self._estimator
 
+    @property
+    def clock_offset_ns(self) -> int | None:
+        """Receipt less stamp of the least delayed sample; None before there is one."""
+        return None if self._estimator is None else self._estimator.clock_offset_ns
+
     def go_on(self, estimator: StateEstimator) -> None:
         """Estimate on from where another orchestrator's estimator was."""
         self._estimator = estimator

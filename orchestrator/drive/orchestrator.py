@@ -163,6 +163,7 @@ class Orchestrator:
             self._processes.let_give_way(conductor.alive, now_s)
             conductor.rounds.dispatcher.give_out()
             conductor.fleet.look(now_s)
+            conductor.beside.look(now_s)
             self._keep_junctions(conductor, now_s)
             self._meter.look()
             keeper.look(now_s)

@@ -55,6 +55,8 @@ def run_record(
         "telemetry": conductor.intake.record(),
         "tuning": conductor.tuning.record(),
         "free_twin": conductor.mirror.record(),
+        "encounters": conductor.beside.encounters.count.record(),
+        "clocks_beside": conductor.beside.clocks(),
         "futures": futures.record(
             wanted=plan.config.futures,
             missed=tally.missed,

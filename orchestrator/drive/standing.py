@@ -23,6 +23,7 @@ from foretwin.orchestrator.drive.processes import ORCHESTRATOR
 from foretwin.orchestrator.drive.side_by_side_handler import BesideStanding
 from foretwin.orchestrator.forecast.calibration import Calibration
 from foretwin.orchestrator.forecast.motion_history import MotionHistory
+from foretwin.orchestrator.other_vehicles.encounter_handler import EncounterCount
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
 from foretwin.orchestrator.record.kept_parts import read_removed
 from foretwin.orchestrator.record.ledger import RoundTally
@@ -85,6 +86,7 @@ class DriveStanding:
     beside: BesideStanding
     mirror_independent: bool | None
     touches: int
+    encounters: EncounterCount
     free_twin: tuple[int, int]
     """Samples that were compared, and those beyond a limit."""
     changes: FirstOf[Change]
@@ -148,6 +150,7 @@ def standing_of(
             beside=conductor.ads.standing,
             mirror_independent=conductor.mirror.independent,
             touches=conductor.mirror.touches,
+            encounters=conductor.beside.encounters.count,
             free_twin=(conductor.mirror.compared, conductor.mirror.beyond),
             changes=conductor.changes.made,
             dropped_rows=conductor.tables.dropped,
@@ -208,6 +211,7 @@ def go_on(
     conductor.ads.go_on(standing.beside)
     conductor.mirror.independent = standing.mirror_independent
     conductor.mirror.touches = standing.touches
+    conductor.beside.encounters.count = standing.encounters
     conductor.mirror.compared, conductor.mirror.beyond = standing.free_twin
     conductor.tables.lost_before = standing.dropped_rows
     watch.troubles[:] = standing.troubles

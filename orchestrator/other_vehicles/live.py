@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import msgspec
+
 from foretwin.contracts.bus import Received
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
+from foretwin.orchestrator.other_vehicles.vehicle_clock import (
+    THE_SAME,
+    ClockApart,
+    ClockReading,
+    VehicleClock,
+    between,
+)
 from foretwin.telemetry.estimator.estimator import estimator_of
 
 APART_NS = 1_000_000_000
@@ -17,10 +26,11 @@ APART_NS = 1_000_000_000
 
 
 class LiveVehicle(OtherVehicleSource):
-    """A vehicle that publishes on the bus by the car's own clock.
+    """A vehicle that publishes on the bus, by whatever clock; its states are in the car's time.
 
     `ask_info` asks it what it is, once, as its first sample comes; until it answers, and where it
-    does not, its reference point is taken as base_link.
+    does not, its reference point is taken as base_link. `own_clock` is how the car's clock stands
+    to ours; None: the vehicle stamps by that very clock.
     """
 
     def __init__(
@@ -30,8 +40,14 @@ class LiveVehicle(OtherVehicleSource):
         *,
         ask_info: Callable[[str], None],
         tell: Callable[[Notice], None],
+        own_clock: Callable[[], ClockReading | None] | None = None,
     ) -> None:
         super().__init__()
+        self.clock = VehicleClock()
+        """How its clock stands to ours."""
+        self.between: ClockApart | None = THE_SAME if own_clock is None else None
+        """How the car's stamps stand to its own."""
+        self._own_clock = own_clock
         self._id, self._vehicle = vehicle_id, vehicle
         self._ask_info, self._tell = ask_info, tell
         self._measured: OtherVehicleStates | None = None
@@ -63,7 +79,9 @@ class LiveVehicle(OtherVehicleSource):
             self._measured.begin_anew(estimator_of(info, self._vehicle))
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
-        """Return what has come since the last time."""
+        """Return what has come since the last time, by the car's clock once that is known."""
+        if self._own_clock is not None:
+            return self._in_own_time(self._own_clock())
         heard = super().states_until(own)
         if heard and not self._clock_reported:
             ahead_ns = heard[-1].state.stamp_ns - own.stamp_ns
@@ -76,3 +94,29 @@ class LiveVehicle(OtherVehicleSource):
                 )
                 self._tell(Notice("warning", text))
         return heard
+
+    def _in_own_time(self, own: ClockReading | None) -> list[OtherVehicle]:
+        one_way_ns = None if self._measured is None else self._measured.clock_offset_ns
+        theirs = self.clock.reading(one_way_ns)
+        if own is None or theirs is None:
+            self._heard.clear()  # when it was nobody can say
+            return []
+        self.between = found = between(own, theirs)
+        if self._heard and not self._clock_reported:
+            self._clock_reported = True
+            self._tell(Notice("info", f"{self._id}: {found.text}"))
+        heard = [_later(one, found) for one in self._heard]
+        self._heard.clear()
+        return heard
+
+
+def _later(heard: OtherVehicle, by: ClockApart) -> OtherVehicle:
+    """Return what was heard of a vehicle, with stamps of the car's clock."""
+    return OtherVehicle(
+        state=msgspec.structs.replace(heard.state, stamp_ns=heard.state.stamp_ns + by.later_ns),
+        commands=tuple(
+            msgspec.structs.replace(one, stamp_ns=one.stamp_ns + by.later_ns)
+            for one in heard.commands
+        ),
+        clock_std_s=by.std_s,
+    )

@@ -24,7 +24,7 @@ class OtherVehicleSource:
         self._heard: deque[OtherVehicle] = deque(maxlen=MOST_HEARD)
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
-        """Return what is new of it as the car comes to its own new state."""
+        """Return what is new of it as the car comes to its own new state, by the car's clock."""
         heard = list(self._heard)
         self._heard.clear()
         return heard
@@ -40,6 +40,11 @@ class OtherVehicleStates:
         self._id, self._estimator = vehicle_id, estimator
         self._commands: deque[ControlCommand] = deque(maxlen=MOST_HEARD)
         self._last_ns: int | None = None
+
+    @property
+    def clock_offset_ns(self) -> int | None:
+        """Receipt less stamp of the least delayed sample; None before there is one."""
+        return self._estimator.clock_offset_ns
 
     def begin_anew(self, estimator: StateEstimator) -> None:
         """Forget the motion so far, since more is known of the vehicle now."""

@@ -5,26 +5,38 @@ Nothing is taken that is later than the car's own newest state.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.bus import Received
 from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
+from foretwin.contracts.fleet import ClockQuestion
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.mailbox import Reply
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports
+from foretwin.orchestrator.other_vehicles.dead_reckoning import reckoned, reckoned_for_s
 from foretwin.orchestrator.other_vehicles.detected import DetectedVehicle, moved_ahead
+from foretwin.orchestrator.other_vehicles.encounter_handler import EncounterHandler
 from foretwin.orchestrator.other_vehicles.live import LiveVehicle
 from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
 from foretwin.orchestrator.other_vehicles.recorded import RecordedVehicle
+from foretwin.orchestrator.other_vehicles.vehicle_clock import (
+    THE_SAME,
+    ClockReading,
+    VehicleClock,
+)
 from foretwin.orchestrator.plan import OtherVehiclePlan
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
+ASK_EVERY_S = 1.0
+"""How often vehicles are asked for the time on board."""
 SAME_WITHIN_M = 2.0
 """A detection whose centre is so near to that of a vehicle with telemetry of its own is it."""
 
@@ -47,22 +59,31 @@ def road_user(state: VehicleState, vehicle: VehicleParameters) -> RoadUser:
 class OtherVehicleFeed:
     """All vehicles beside the car: passes their states on, and shows them to futures."""
 
-    def __init__(self, context: DriveContext) -> None:
-        """What a vehicle says of itself when it is asked lands in the mailbox, for `take_info`."""
+    def __init__(
+        self, context: DriveContext, own_offset_ns: Callable[[], int | None] = lambda: None
+    ) -> None:
+        """What vehicles say when they are asked lands in the mailbox, for `take_info`, `take_time`.
+
+        `own_offset_ns` is receipt less stamp of the car's least delayed sample.
+        """
         plan = context.plan
         self._context, self._crew, self._frame = context, plan.beside, plan.drive_frame
+        self.encounters = EncounterHandler(plan, context.tables, context.tell)
         self._sources: dict[str, OtherVehicleSource] = {}
         self._vehicles = {one.config.id: one.vehicle for one in plan.beside}
         self._seen_as = {one.config.seen_as for one in plan.beside}
         self._latest: dict[str, VehicleState] = {}
         self._detected_ns: int | None = None
+        self._own_clock, self._own_offset_ns = VehicleClock(), own_offset_ns
+        self._ask_at_s = 0.0
 
     def begin(self, own: VehicleInfo) -> None:
         """Open what there is, now that the car's clock is known."""
         self._sources = {one.config.id: self._source(one, own) for one in self._crew}
 
     def close(self) -> None:
-        """Let go of files and threads; idempotent."""
+        """End what goes on, and let go of files and threads; idempotent."""
+        self.encounters.finish()
         for source in self._sources.values():
             source.close()
 
@@ -80,7 +101,54 @@ class OtherVehicleFeed:
             )
         if config.seen_as is not None:
             return DetectedVehicle(config.id, config.seen_as, vehicle)
-        return LiveVehicle(config.id, vehicle, ask_info=self._ask_info, tell=self._context.tell)
+        own_clock = None if config.same_clock else self._own_reading
+        return LiveVehicle(
+            config.id,
+            vehicle,
+            ask_info=self._ask_info,
+            tell=self._context.tell,
+            own_clock=own_clock,
+        )
+
+    def _own_reading(self) -> ClockReading | None:
+        return self._own_clock.reading(self._own_offset_ns())
+
+    @property
+    def _asked(self) -> dict[str, VehicleClock]:
+        """The clocks that must be known: of live vehicles with one of their own, and the car's."""
+        foreign = {
+            name: source.clock
+            for name, source in self._sources.items()
+            if isinstance(source, LiveVehicle) and source.between is not THE_SAME
+        }
+        return foreign | {self._context.plan.config.vehicle_id: self._own_clock} if foreign else {}
+
+    def look(self, now_s: float) -> None:
+        """Ask for the time on board where that is due by our monotonic clock; call it often."""
+        if now_s < self._ask_at_s:
+            return
+        self._ask_at_s = now_s + ASK_EVERY_S
+        bus, mailbox = self._context.bus, self._context.mailbox
+        for name in self._asked:
+            asked = name, round(now_s * 1e9)
+            bus.request(
+                "vehicle_clock", ClockQuestion(), mailbox, tag=asked, timeout_s=2.0, vehicle=name
+            )
+
+    def take_time(self, reply: Reply) -> None:
+        """Take an answer to what time it is on board; who does not answer is judged by samples."""
+        vehicle_id, asked_ns = reply.tag
+        clock = self._asked.get(vehicle_id)
+        if reply.message is not None and clock is not None:
+            clock.answered(asked_ns, reply.received_mono_ns, reply.message.stamp_ns)
+
+    def clocks(self) -> dict[str, Any]:
+        """Return what run.json says of the clocks of live vehicles."""
+        return {
+            name: {"behind_car_s": found.later_ns / 1e9, "std_s": found.std_s, "how": found.how}
+            for name, source in self._sources.items()
+            if isinstance(source, LiveVehicle) and (found := source.between) is not None
+        }
 
     def _ask_info(self, vehicle_id: str) -> None:
         bus, mailbox = self._context.bus, self._context.mailbox
@@ -99,8 +167,13 @@ class OtherVehicleFeed:
         if isinstance(source, LiveVehicle):
             source.take_info(info)
 
-    def keep_up_with(self, own: VehicleState, detected: RoadUsers | None) -> None:
-        """Pass on everything up to the car's own new state; `detected` is what it saw last."""
+    def keep_up_with(
+        self, own: VehicleState, detected: RoadUsers | None, roles: Mapping[str, Role]
+    ) -> None:
+        """Pass on everything up to the car's own new state, and judge who meets whom.
+
+        `detected` is what it saw last.
+        """
         if not self._sources:
             return
         if detected is not None and detected.stamp_ns != self._detected_ns:
@@ -113,18 +186,21 @@ class OtherVehicleFeed:
         self._latest |= {one.state.vehicle_id: one.state for one in heard}
         message = OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard))
         self._context.publish("other_vehicles", message)
+        self.encounters.keep_up_with(own, heard, roles)
 
     def among(
         self, reports: LatestReports, own: VehicleState, roles: Mapping[str, Role]
     ) -> LatestReports:
-        """Return what surrounds the car with these vehicles in it, ghosts excepted."""
+        """Return what surrounds the car with these vehicles in it, ghosts excepted.
+
+        Each is where it is reckoned to be at the car's own stamp.
+        """
         if not self._sources:
             return reports
         mine = [
-            road_user(state, self._vehicles[name])
+            road_user(reckoned(state, own.stamp_ns), self._vehicles[name])
             for name, state in self._latest.items()
-            if roles.get(name) in ("twin", "shadow")
-            and abs(own.stamp_ns - state.stamp_ns) <= FRESH_NS
+            if roles.get(name) in ("twin", "shadow") and self._is_known(name, own.stamp_ns)
         ]
         users = reports.road_users
         fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
@@ -138,6 +214,10 @@ class OtherVehicleFeed:
         return reports._replace(
             road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine))
         )
+
+    def _is_known(self, name: str, stamp_ns: int) -> bool:
+        age_s = abs(stamp_ns - self._latest[name].stamp_ns) / 1e9
+        return age_s <= reckoned_for_s(self._vehicles[name])
 
     def _same(self, seen: Sequence[RoadUser], mine: Sequence[RoadUser]) -> Flags:
         """Return which of those that were seen are vehicles that are known anyway, (N,)."""

@@ -16,6 +16,7 @@ from foretwin.contracts.errors import one_line
 from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.gap import GapSample
 from foretwin.contracts.marks import EventMark
+from foretwin.contracts.roles import VehicleEncounter
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.contracts.simulation import (
     Comparison,
@@ -56,11 +57,9 @@ _FLIP = "flip_{0}_factor:float flip_{0}_m:float"
 _COLUMNS = {
     "comparisons": columns_of(Comparison),
     "forecasts": columns_of(ForecastOutcome),
-    "plan_comparisons": {
-        **columns_of(PlanComparison, PLAN),
-        **columns_of(HorizonError),
-        "path_offset_m": float,
-    },
+    "plan_comparisons": columns_of(PlanComparison, PLAN)
+    | columns_of(HorizonError)
+    | {"path_offset_m": float},
     "disagreements": {
         **columns_of(Disagreement, "vehicle_id segment aspect kind stamp_ns end_stamp_ns"),
         **columns("duration_s:float lat_deg:float lon_deg:float"),
@@ -78,6 +77,7 @@ _COLUMNS = {
     "mirror": columns_of(MirrorSample, MIRROR),
     "mirrored": {"stamp_ns": int, **columns_of(MirroredVehicle, MIRRORED)},
     "touches": columns("stamp_ns:int one:str other:str"),
+    "encounters": columns_of(VehicleEncounter),
     "changes": columns("stamp_ns:int asked_stamp_ns:int key:str before:str value:str"),
     "parameters": {"version": int, **columns_of(ParameterChange, PARAMETER)},
     "identifications": {

@@ -29,6 +29,7 @@ _ROWS = {
     "mirror": "the real car, its twin, shadow and ghost at one instant, and the gap between them",
     "mirrored": "a vehicle beside the car at one instant",
     "touches": "two who began to touch in the mirror",
+    "encounters": "two vehicles that came within 10 m of each other, as they were measured",
     "changes": "a change that an operator asked for",
     "parameters": "one parameter of the vehicle that counted from then on",
     "identifications": "what a stretch of driving says of one parameter",
@@ -179,6 +180,16 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         **_CORRECTIONS,
     },
     "touches": {"one": "a vehicle's id", "other": "whom it touched; world is what stands"},
+    "encounters": {
+        "one": "a vehicle's id",
+        "other": "whom it met",
+        "end_stamp_ns": "when their outlines were 20 m apart again, or one was gone",
+        "least_m": "least distance between their outlines; 0 where they touched",
+        "least_stamp_ns": "when that was, or when the touch began",
+        "uncertain_m": "of that distance: one standard deviation, from both positions and clocks, "
+        "and the bound of who was reckoned then",
+        "touched": "whether their outlines overlapped",
+    },
     "changes": {
         "asked_stamp_ns": "when it was asked for",
         "key": "what was changed",

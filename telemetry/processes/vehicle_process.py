@@ -15,7 +15,7 @@ import msgspec
 
 from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.bus import Bus, Mailbox, Request
-from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
+from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo, VehicleTime
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.trace import traced
@@ -89,6 +89,7 @@ class VehicleProcess:
         self._behind = False
         self._end_sent = False
         bus.serve("info", self._mailbox, vehicle=vehicle_id)
+        bus.serve("vehicle_clock", self._mailbox, vehicle=vehicle_id)
         if speed is None:
             bus.serve("advance", self._mailbox, vehicle=vehicle_id)
         life.ready()
@@ -110,12 +111,15 @@ class VehicleProcess:
             log.info("the orchestrator is ready")
             self._started_s = self._mono_s()
         if self._speed is not None and self._started_s is not None and not self._end_sent:
-            elapsed_ns = int((self._mono_s() - self._started_s) * self._speed * 1e9)
-            due_ns = self._source.first_stamp_ns + elapsed_ns
+            due_ns = self._now_ns(self._started_s, self._speed)
             # Questions are answered between portions, also by a source that cannot keep up.
             self._publish_until(min(due_ns, self._given_until_ns + _MOST_AT_ONCE_NS))
             self._behind = self._given_until_ns < due_ns
         return True
+
+    def _now_ns(self, started_s: float, speed: float) -> int:
+        elapsed_ns = int((self._mono_s() - started_s) * speed * 1e9)
+        return self._source.first_stamp_ns + elapsed_ns
 
     def _wait_s(self) -> float:
         if self._speed is None or self._end_sent:
@@ -128,6 +132,11 @@ class VehicleProcess:
         match item:
             case Request(channel="info"):
                 item.reply(world_from_lot_info(self._anchor, self._source.info))
+            case Request(channel="vehicle_clock"):
+                if self._started_s is None or self._speed is None:
+                    item.refuse("no clock runs")
+                else:
+                    item.reply(VehicleTime(stamp_ns=self._now_ns(self._started_s, self._speed)))
             case Request(channel="advance"):
                 try:
                     until_ns = item.message().until_stamp_ns

@@ -68,7 +68,7 @@ def test_how_often_each_is_said() -> None:
         5: {"progress"},
         4: {"gap"},
         2: {"job", "round", "plan_comparison", "worker_status"},
-        1: {"signals", "route", "clock"},
+        1: {"signals", "route", "clock", "vehicle_clock"},
         0.2: {"identification"},
     }
 

@@ -28,6 +28,7 @@ _SAID = {
     "mirror": "car, twin, shadow and ghost at an instant ([roles](roles.md))",
     "mirrored": "the same of another vehicle",
     "touches": "a vehicle of the mirror that touches another",
+    "encounters": "two vehicles that came near each other ([roles](roles.md))",
     "changes": "a change of the running drive by `foretwin set`",
     "parameters": "a change of the vehicle's parameters ([tuning](tuning.md))",
     "identifications": "an estimate of a parameter ([identification](identification.md))",

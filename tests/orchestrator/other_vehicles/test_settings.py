@@ -21,7 +21,7 @@ from foretwin.orchestrator.drive.plan import read_inputs
         ('[[vehicles]]\nid = "v"\nlive = true\nrole = "all"', "role all is the car's alone"),
         ('[[vehicles]]\nid = "a b"\nlive = true', "must be one word"),
         ('[[vehicles]]\nid = "ego"\nlive = true', "ids ego, ego must differ"),
-        ('speed = "max"\n[[vehicles]]\nid = "v"\nlive = true', "knows no --speed max"),
+        ('speed = "max"\n[[vehicles]]\nid = "v"\nlive = true', "knows no --speed but 1"),
         (
             '[[vehicles]]\nid = "v"\nrole = "wheel"',
             "vehicles[0].role 'wheel': one of all, ghost, shadow, twin",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -45,6 +46,7 @@ INFO = VehicleInfo(vehicle_id="ego", time_base="utc", start_stamp_ns=START_NS)
 ORIGIN = GeoPoint(52.5, 13.4)
 FRAME = LocalFrame(ORIGIN)
 
+ROLES: dict[str, Role] = {"ego": "all"}
 ASKED: list[str] = []
 TOLD: list[str] = []
 
@@ -90,7 +92,7 @@ def crew(at: Path, *configs: OtherVehicleConfig) -> tuple[OtherVehicleFeed, list
     lock_step = msgspec.structs.replace(plan.config, speed=None)
     plan = replace(plan, beside=members, drive_frame=FRAME, config=lock_step)
     bus = HearingBus()
-    tables: Any = None
+    tables: Any = SimpleNamespace(add=lambda *_: None)
     context = DriveContext(plan, bus, Mailbox(8), tables, lambda told: TOLD.append(told.text))
     beside = OtherVehicleFeed(context)
     beside.begin(INFO)
@@ -115,7 +117,7 @@ def van_log(folder: Path, *, start_ns: int) -> Path:
 
 def drive(beside: OtherVehicleFeed, until_s: float) -> None:
     for k in range(round(until_s * 20) + 1):
-        beside.keep_up_with(own(k / 20.0), None)
+        beside.keep_up_with(own(k / 20.0), None, ROLES)
 
 
 def x_of(state: VehicleState) -> float:
@@ -145,7 +147,7 @@ def test_a_log_beside_is_read_as_far_as_the_cars_time_has_come(
 
 
 def test_who_is_on_the_bus_is_estimated_from_what_it_sends(tmp_path: Path) -> None:
-    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
+    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
     bus, box = MemoryBus(), Mailbox(64)
     for channel in ("gnss", "speed"):
         bus.subscribe(channel, box, vehicle="van")
@@ -181,28 +183,28 @@ def on_the_bus(
 def test_who_is_on_the_bus_is_placed_by_its_antenna_once_it_says_where_that_sits(
     tmp_path: Path,
 ) -> None:
-    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
+    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
     on_the_bus(beside, from_s=0.0, to_s=2.0)
     said = msgspec.structs.replace(INFO, vehicle_id="van", body_from_antenna_m=(1.5, 0.0, 0.0))
     beside.take_info("van", said)
     on_the_bus(beside, from_s=2.0, to_s=5.0)
-    beside.keep_up_with(own(4.9), None)
+    beside.keep_up_with(own(4.9), None, ROLES)
     assert x_of(heard[-1].heard[-1].state) == pytest.approx(49.0 - 1.5, abs=0.5)
     assert ASKED == ["van"]
 
 
 def test_who_does_not_say_where_its_antenna_sits_is_told_of(tmp_path: Path) -> None:
-    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
+    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
     on_the_bus(beside, from_s=0.0, to_s=0.2)
     beside.take_info("van", None)
     assert "van does not say where on it its positions are of" in TOLD[-1]
 
 
 def test_stamps_of_another_clock_are_told_once(tmp_path: Path) -> None:
-    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True))
+    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
     for second in (0.0, 2.0):
         on_the_bus(beside, from_s=second, to_s=second + 2.0, later_s=30.0)
-        beside.keep_up_with(own(second + 1.9), None)
+        beside.keep_up_with(own(second + 1.9), None, ROLES)
     (told,) = (text for text in TOLD if "clock" in text)
     assert told.startswith("van stamps 30.0 s ahead of the car")
 
@@ -220,8 +222,8 @@ def test_who_the_car_detects_has_its_pose_at_the_rear_axle(tmp_path: Path) -> No
         users = RoadUsers(
             stamp_ns=own(k / 10).stamp_ns, users=(user("17", 20.0, yaw=0.1 * k), user("4", 9.0))
         )
-        beside.keep_up_with(own(k / 10), users)
-        beside.keep_up_with(own(k / 10 + 0.05), users)
+        beside.keep_up_with(own(k / 10), users, ROLES)
+        beside.keep_up_with(own(k / 10 + 0.05), users, ROLES)
     states = [one.state for message in heard for one in message.heard]
     assert len(states) == 3
     assert x_of(states[0]) == pytest.approx(20.0 - box_centre_from_base_m(VAN), abs=1e-3)
@@ -239,7 +241,7 @@ def test_futures_meet_twins_and_shadows_once_and_no_ghosts(tmp_path: Path) -> No
     now = own(2.0)
     users = (user("17", 60.0), user("5", 21.0), user("6", 40.0))
     seen = RoadUsers(stamp_ns=now.stamp_ns, users=users)
-    beside.keep_up_with(now, seen)
+    beside.keep_up_with(now, seen, ROLES)
     said = LatestReports(None, seen, ())
 
     def ids(**roles: str) -> list[str]:

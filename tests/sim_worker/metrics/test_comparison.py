@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import PlannedTrajectory
 from foretwin.contracts.frames import geo_from_local, geo_from_local_yaw
 from foretwin.contracts.futures import Trajectory
+from foretwin.geometry.constant_turn import constant_turn_rate
 from foretwin.sim_worker.metrics.comparison import (
     ActualTrack,
     NominalTrack,
     compare_nominal,
     compare_plan,
-    constant_turn_rate,
     constant_velocity,
 )
 from foretwin.sim_worker.metrics.displacement import distinct_count, horizon_error

@@ -13,6 +13,7 @@ from foretwin.contracts.drive import (
     InfoRequest,
     VehicleInfo,
 )
+from foretwin.contracts.fleet import ClockQuestion
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup
@@ -171,3 +172,18 @@ def test_a_drive_on_a_lot_is_published_in_the_world() -> None:
     assert len(fixes[0]) == len(fixes[1]) > 0
     moved = [Anchor(lot=LOT, world=WORLD).world_from_lot(one.position, 0.0) for one in fixes[0]]
     assert [one.position for one in fixes[1]] == [one.position for one in moved]
+
+
+def test_it_says_the_time_on_board_once_its_clock_runs() -> None:
+    rig = Rig(speed=2.0)
+    answers = Mailbox(1)
+    rig.bus.request("vehicle_clock", ClockQuestion(), answers, vehicle="car")
+    rig.process.step()
+    unasked = answers.take(1.0)
+    assert isinstance(unasked, Reply)
+    assert unasked.error == "no clock runs"
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    rig.now_s += 0.75
+    told = rig.ask("vehicle_clock", ClockQuestion())
+    assert (told.stamp_ns - START_NS) / SECOND_NS == pytest.approx(1.5)

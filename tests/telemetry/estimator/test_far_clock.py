@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.orchestrator.drive.far_clock import FarClock
+from foretwin.telemetry.estimator.far_clock import FarClock
 
 NOW_NS = 1_800_000_000_000_000_000
 
