@@ -71,6 +71,8 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Of the car: the size of its twin."""
     anchor: Anchor | None = None
     """Of a car on a lot: its topics live there, the run in the World."""
+    fence: tuple[tuple[float, float], ...] = ()
+    """Of the lot, corners in degrees; outside, nothing goes to the car."""
     listens_only: bool = False
     """Of a vehicle beside the car: nothing goes out to it, whatever the mapping says."""
 

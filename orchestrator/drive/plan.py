@@ -73,6 +73,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         read_parameters(Path(config.standin_parameters))
     progress = progress_of(config.progress_table)
     anchor = None if config.anchor is None else read_anchor(Path(config.anchor))
+    if anchor is not None and config.towards_vehicle and not anchor.fence:
+        raise ConfigError(f"--anchor {config.anchor}: --towards-vehicle needs its fence")
     ros2 = read_ros2(config)
     if config.secure is not None and config.endpoint is not None:
         check_campaign(Path(config.secure), config.endpoint, car=starts_a_car(config))

@@ -203,6 +203,7 @@ def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
         order_keys=plan.order_keys,
         vehicle=plan.vehicle,
         anchor=plan.lot,
+        fence=() if plan.anchor is None else plan.anchor.fence,
     )
 
 

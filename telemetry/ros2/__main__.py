@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import logging
+import math
 
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.foreign_bus import ZenohForeignBus
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import BusSetup, Ros2Setup
 from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.lot_guard import LotGuard
 from foretwin.telemetry.ros2.mapping import listening_only, parse_mapping
 from foretwin.telemetry.ros_messages.parts import typestore
 
 log = logging.getLogger("foretwin.telemetry.ros2")
+
+
+def lot_guard(setup: Ros2Setup) -> LotGuard | None:
+    """Return who watches the fence of the car's lot, None where it has none."""
+    if setup.anchor is None or not setup.fence:
+        return None
+    car = setup.vehicle
+    ahead_m = 0.0 if car is None else car.length_m.value - car.rear_overhang_m.value
+    aside_m = 0.0 if car is None else 0.5 * car.width_m.value
+    return LotGuard(setup.fence, frame=setup.anchor.lot.frame, reach_m=math.hypot(ahead_m, aside_m))
 
 
 def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
@@ -36,6 +48,7 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
             order_keys=setup.order_keys,
             car=setup.vehicle,
             anchor=setup.anchor,
+            guard=lot_guard(setup),
             refusals=life.refusals,
         )
         life.ready()

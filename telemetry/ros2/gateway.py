@@ -23,9 +23,11 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.simulation import Event, MirrorSample
 from foretwin.contracts.towards_vehicle import Authority, OrderKeys, VehicleCommand
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.telemetry.ros2.cadence import Cadence
 from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
+from foretwin.telemetry.ros2.lot_guard import LotGuard
 from foretwin.telemetry.ros2.mapping import Mapping, OutRow, Source
 from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
 from foretwin.telemetry.ros2.orders import Orders
@@ -62,6 +64,7 @@ class Gateway:
         order_keys: OrderKeys | None = None,
         car: VehicleParameters | None = None,
         anchor: Anchor | None = None,
+        guard: LotGuard | None = None,
         refusals: Refusals | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
@@ -70,10 +73,12 @@ class Gateway:
 
         `order_keys` say whose orders count: without them none does, and nothing goes towards the
         vehicle. `car` gives the size of the car's own twin, where that goes out. With an `anchor`
-        the car's topics live on its lot, and all that is said on `bus` in the World.
+        the car's topics live on its lot, and all that is said on `bus` in the World; `guard` knows
+        the lot's fence, and shuts the gate.
         """
         self._mapping, self._bus, self._foreign = mapping, bus, foreign
         self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
+        self._guard = guard
         self.inwards = Inwards(mapping, anchor)
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
         self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id, anchor=anchor)
@@ -81,6 +86,7 @@ class Gateway:
             mapping.towards_vehicle,
             config_on=mapping.towards_vehicle.enabled,
             flag_on=flag_on,
+            trouble=self._lot_trouble,
         )
         self.held: Counter[str] = Counter()
         """By topic, messages towards the vehicle that were not sent."""
@@ -88,16 +94,13 @@ class Gateway:
             at_most=mapping.towards_vehicle.max_objects, placed=mapping.placed
         )
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
-        self._last_ns: dict[str, int] = {}
         self.refusals = Refusals() if refusals is None else refusals
         """Of what came from the run's side."""
+        alt_m = self._out.ground_alt_m
         self._mirrored = MirroredObjects(
-            mapping.mirrored,
-            car=car,
-            drive_frame=drive_frame,
-            alt_m=self._out.ground_alt_m,
+            mapping.mirrored, car=car, drive_frame=drive_frame, alt_m=alt_m
         )
-        self._diagnostics = DiagnosticLevels()
+        self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
         self._inbox, self._views = Mailbox(2048), Mailbox(256)
         self._orders: Orders | None = None
         self._logged_gate = self.gate.state
@@ -106,16 +109,9 @@ class Gateway:
             foreign.subscribe(key, self._inbox, history=history)
         bus.serve("info", self._views, vehicle=vehicle_id)
         self._listen(run_id, order_keys)
-        self._sender.announce(
-            [
-                *mapping.inwards,
-                *(
-                    row
-                    for row in mapping.outwards
-                    if not row.towards_vehicle or self.gate.state != "off"
-                ),
-            ]
-        )
+        off = self.gate.state == "off"
+        said = (row for row in mapping.outwards if not (off and row.towards_vehicle))
+        self._sender.announce([*mapping.inwards, *said])
         log.info("towards the vehicle: %s", self.gate.why)
 
     def step(self, wait_s: float = 0.005) -> None:
@@ -167,12 +163,13 @@ class Gateway:
                 refusals=self.refusals,
             )
         mirrored = bool(self._mapping.mirrored)
-        if sources & {"state", "clock"} or self._virtual.has_own or mirrored:
+        if sources & {"state", "clock"} or self._virtual.has_own or mirrored or self._guard:
             self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
         if "twin" in sources or mirrored:
             self._bus.subscribe("mirror", self._views, run=run_id)
         if "virtual_objects" in sources:
-            self._bus.subscribe("virtual_objects", self._views, run=run_id)
+            for channel in ("virtual_objects", "virtual_traffic"):
+                self._bus.subscribe(channel, self._views, run=run_id)
         if "diagnostics" in sources:
             for channel in ("event", "gap_alarm", "verdict"):
                 self._bus.subscribe(channel, self._views, run=run_id)
@@ -187,8 +184,20 @@ class Gateway:
         if self.gate.state == "open":
             self.gate.look(now_ns=self._mono_ns(), link_up=self._foreign.connected)
         if self.gate.state != self._logged_gate:
-            self._logged_gate = self.gate.state
+            was, self._logged_gate = self._logged_gate, self.gate.state
             log.warning("towards the vehicle: %s: %s", self.gate.state, self.gate.why)
+            if (was, self.gate.state) == ("open", "shut"):
+                self._take_back()
+
+    def _lot_trouble(self, now_ns: int) -> str | None:
+        guard, heard_ns = self._guard, self.inwards.heard_mono_ns
+        return None if guard is None else guard.trouble(now_ns, heard_ns=heard_ns)
+
+    def _take_back(self) -> None:
+        """Say once that nobody is there, to who was told otherwise; afterwards all is silent."""
+        for row in self._out.rows("virtual_objects"):
+            if row.towards_vehicle and self._sender.sent[row.topic]:
+                self._sender.put(row, self._out.objects(self._virtual.nobody(), row.type))
 
     def _command(self, message: VehicleCommand) -> None:
         now_ns = self._mono_ns()
@@ -213,6 +222,8 @@ class Gateway:
             return
         match self._decoded(item):
             case drive.VehicleState() as state:
+                if self._guard is not None:
+                    self._guard.take_state(self._out.on_lot(state), now_ns=self._mono_ns())
                 self._mirrored.take_state(state.stamp_ns)
                 self._send("state", lambda _: self._out.state(state), every_ns=_STATE_EVERY_NS)
                 self._send(
@@ -249,16 +260,11 @@ class Gateway:
 
         def payload(row: OutRow) -> bytes:
             meant = without_own_twin(known) if row.towards_vehicle else known
+            if row.towards_vehicle:
+                self.inwards.injected.note(self._out.on_lot(meant))
             return self._out.objects(meant, row.type)
 
         self._send("virtual_objects", payload)
-
-    def _due(self, what: str, every_ns: int) -> bool:
-        now_ns = self._mono_ns()
-        if now_ns - self._last_ns.get(what, now_ns - every_ns) < every_ns:
-            return False
-        self._last_ns[what] = now_ns
-        return True
 
     def _send(
         self, source: Source, payload: Callable[[OutRow], bytes], *, every_ns: int = 0

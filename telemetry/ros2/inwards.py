@@ -15,6 +15,7 @@ from foretwin.contracts.numbering import Numberings
 from foretwin.telemetry.anchored import world_from_lot_message
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
+from foretwin.telemetry.ros2.injected import Injected
 from foretwin.telemetry.ros2.mapping import InRow, Mapping
 from foretwin.telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, UnusableError, channel_of, stamp_of
@@ -51,6 +52,10 @@ class Inwards:
         self.counts: Counter[str] = Counter()
         self.unused: Counter[str] = Counter()
         self._numbers = Numberings()
+        self.injected = Injected()
+        """What the car was shown: not taken for real where it says so itself."""
+        self.heard_mono_ns = 0
+        """When the newest sample of the car came."""
         self.first_stamp_ns: int | None = None
         self.tire_angle_rad: float | None = None
         """The newest measured angle at the tyres."""
@@ -156,6 +161,8 @@ class Inwards:
                 message = self._joiner.join(message)
             message = _in_our_units(message, row)
             message, left_out = admit(message, where=row.topic)
+            if isinstance(message, drive.RoadUsers):
+                message = self._without_ours(message, row)
             if left_out:
                 self.unused[f"{row.topic}: road users that cannot be"] += left_out
             self._note(message, arrived)
@@ -164,7 +171,14 @@ class Inwards:
             self.counts[channel] += 1
         return samples
 
+    def _without_ours(self, message: drive.RoadUsers, row: InRow) -> drive.RoadUsers:
+        real = self.injected.without(message)
+        if ours := len(message.users) - len(real.users):
+            self.unused[f"{row.topic}: road users that we have shown it"] += ours
+        return real
+
     def _note(self, message: msgspec.Struct, arrived: Arrived) -> None:
+        self.heard_mono_ns = arrived.received_mono_ns
         if self.first_stamp_ns is None:
             self.first_stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if isinstance(message, drive.SteeringSample) and message.tire_angle_rad is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from typing import Literal
 
 import msgspec
@@ -53,12 +54,20 @@ class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 class VehicleGate:
     """Decides over each command; asked with the time of every look at it.
 
-    `config_on` is the mapping's switch, `flag_on` the command line's. `counts` says what was held
-    back and why, and what was bounded.
+    `config_on` is the mapping's switch, `flag_on` the command line's; `trouble` says what else, at
+    a time, keeps it from opening and shuts it. `counts` says what was held back and why, and what
+    was bounded.
     """
 
-    def __init__(self, limits: CommandLimits, *, config_on: bool, flag_on: bool) -> None:
-        self._limits = limits.validate()
+    def __init__(
+        self,
+        limits: CommandLimits,
+        *,
+        config_on: bool,
+        flag_on: bool,
+        trouble: Callable[[int], str | None] = lambda _: None,
+    ) -> None:
+        self._limits, self._trouble = limits.validate(), trouble
         self._state: GateState = "waiting" if config_on and flag_on else "off"
         self._last_heartbeat_ns: int | None = None
         self._last_sent: tuple[int, VehicleCommand] | None = None
@@ -80,6 +89,10 @@ class VehicleGate:
         if not _is_fresh(sent_ns, now_ns):
             self.counts["word too old or not yet due"] += 1
             return
+        if (trouble := self._trouble(now_ns)) is not None:
+            self.why = trouble
+            self.counts["word before the car is ready"] += 1
+            return
         self._state = "open"
         self._last_heartbeat_ns = max(sent_ns, self._last_heartbeat_ns or sent_ns)
 
@@ -91,6 +104,8 @@ class VehicleGate:
                 self.shut("the link is down")
             elif not _is_fresh(self._last_heartbeat_ns, now_ns):
                 self.shut(f"no word of the orchestrator for {DEAD_MAN_NS / 1e6:.0f} ms")
+            elif (trouble := self._trouble(now_ns)) is not None:
+                self.shut(trouble)
         return self._state
 
     def shut(self, why: str) -> None:

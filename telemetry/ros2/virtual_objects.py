@@ -111,6 +111,10 @@ class VirtualObjects:
         time_s = (stamp_ns - self._begun_ns) * 1e-9
         return RoadUsers(stamp_ns=stamp_ns, users=tuple(one.at(time_s) for one in self._placed))
 
+    def nobody(self) -> RoadUsers:
+        """Return the last list of all: that nobody is there any more."""
+        return RoadUsers(stamp_ns=self._newest_ns, users=())
+
     def take(self, message: RoadUsers, *, now_ns: int) -> RoadUsers:
         """Return all that are known at one stamp; `now_ns` is the host's clock.
 

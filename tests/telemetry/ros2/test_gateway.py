@@ -13,6 +13,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.simulation import PlaneState
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.lot_guard import LotGuard
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.parts import ODOMETRY, typestore, yaw_of
@@ -62,6 +63,7 @@ class Ground:
         flag: bool,
         keys: bool = True,
         anchor: Anchor | None = None,
+        guard: LotGuard | None = None,
         **mapped: str,
     ) -> None:
         self.now_ns = S
@@ -80,6 +82,7 @@ class Ground:
             flag_on=flag,
             order_keys=self.orders.keys if keys else None,
             anchor=anchor,
+            guard=guard,
             mono_ns=lambda: self.now_ns,
             wall_ns=lambda: 10**18 + self.now_ns,
         )

@@ -51,6 +51,21 @@ def test_nothing_before_the_first_word() -> None:
     assert admit(gate, command(0), 0) is not None
 
 
+def test_what_else_is_wrong_keeps_it_from_opening_and_shuts_it() -> None:
+    wrong: list[str | None] = ["the car is outside its fence"]
+    gate = VehicleGate(LIMITS, config_on=True, flag_on=True, trouble=lambda _: wrong[0])
+    gate.heartbeat(0, now_ns=0)
+    assert (gate.state, gate.why) == ("waiting", "the car is outside its fence")
+    wrong[0] = None
+    gate.heartbeat(MS, now_ns=MS)
+    assert gate.look(now_ns=MS, link_up=True) == "open"
+    wrong[0] = "the car is outside its fence"
+    assert gate.look(now_ns=2 * MS, link_up=True) == "shut"
+    wrong[0] = None
+    gate.heartbeat(3 * MS, now_ns=3 * MS)
+    assert (gate.state, gate.why) == ("shut", "the car is outside its fence")
+
+
 def test_what_has_shut_stays_shut() -> None:
     gate = open_gate()
     late = DEAD_MAN_NS + 1

@@ -1,0 +1,72 @@
+"""Whether a car on a lot may be shown what is not there: well within its fence, and heard of now.
+
+Pure: times are monotonic nanoseconds of one host, states those of the lot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo
+
+REACTION_S = 2.5
+"""Of whoever takes over, until the brake acts: AASHTO, A Policy on Geometric Design of Highways and
+Streets (2018), section 3.2.2, brake reaction time."""
+BRAKING_MPS2 = 3.4
+"""With which whoever takes over stops: the same, comfortable for most drivers."""
+STALE_NS = 150_000_000
+"""Nothing is known of a car of which nothing new was heard for so long, or of its state."""
+
+
+def margin_m(speed_mps: float) -> float:
+    """Return how far a car goes at that speed until whoever takes over has stopped it."""
+    speed = abs(speed_mps)
+    return speed * REACTION_S + speed * speed / (2.0 * BRAKING_MPS2)
+
+
+class LotGuard:
+    """Knows the fence and the newest state of the car, and says what is wrong."""
+
+    def __init__(
+        self, fence_deg: Sequence[tuple[float, float]], *, frame: LocalFrame, reach_m: float
+    ) -> None:
+        """`fence_deg` are corners, latitude and longitude; `reach_m` is how far the car's body goes
+        from base_link."""
+        lat_deg, lon_deg = np.array(fence_deg).T
+        self._fence = shapely.Polygon(local_from_geo(frame, lat_deg, lon_deg))
+        self._edge = self._fence.exterior
+        self._frame, self._reach_m = frame, reach_m
+        self._state: VehicleState | None = None
+        self._state_ns = 0
+
+    def take_state(self, state: VehicleState, *, now_ns: int) -> None:
+        """Take the newest state; one that is not newer by the car's clock says nothing new."""
+        if self._state is None or state.stamp_ns != self._state.stamp_ns:
+            self._state, self._state_ns = state, now_ns
+
+    def trouble(self, now_ns: int, *, heard_ns: int) -> str | None:
+        """Return why nothing may go to the car now, None where it may.
+
+        `heard_ns` is when the car itself was heard of last.
+        """
+        state = self._state
+        if state is None or now_ns - self._state_ns > STALE_NS:
+            return f"no new state of the car for {STALE_NS / 1e6:.0f} ms"
+        if now_ns - heard_ns > STALE_NS:
+            return f"nothing heard of the car for {STALE_NS / 1e6:.0f} ms"
+        if "gnss" in state.stale:
+            return "the car's positions are overdue"
+        at = state.position
+        x_m, y_m = local_from_geo(self._frame, at.lat_deg, at.lon_deg).tolist()
+        place = shapely.Point(x_m, y_m) if math.isfinite(x_m + y_m) else shapely.Point()
+        if not self._fence.contains(place):
+            return "the car is outside its fence"
+        left_m = self._edge.distance(place) - self._reach_m
+        if not left_m >= (needed_m := margin_m(state.speed_mps)):
+            return f"the fence is {left_m:.1f} m off, {needed_m:.1f} m are needed at this speed"
+        return None

@@ -1,0 +1,89 @@
+"""What a car was shown does not come back as something that it has seen."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from msgspec.structs import replace
+
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros2.injected import Injected
+from foretwin.telemetry.ros2.virtual_objects import moved
+from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.objects import (
+    detected_from_users,
+    predicted_from_users,
+    users_from_detected,
+    users_from_predicted,
+)
+
+S = 10**9
+HERE = GeoPoint(52.5, 13.4)
+MAP = LocalFrame(HERE)
+
+
+def walker(**changed: Any) -> RoadUser:
+    user = RoadUser(
+        user_id="walker", kind="pedestrian", position=HERE, yaw_rad=math.pi / 2, speed_mps=1.4,
+        length_m=0.5, width_m=0.6, virtual=True,
+    )  # fmt: skip
+    return replace(user, **changed)
+
+
+def shown(*users: RoadUser, stamp_ns: int = 5 * S) -> Injected:
+    injected = Injected()
+    injected.note(RoadUsers(stamp_ns=stamp_ns, users=users))
+    return injected
+
+
+def test_it_is_known_by_its_uuid_wherever_it_is_seen():
+    echo = users_from_predicted(
+        predicted_from_users(RoadUsers(stamp_ns=6 * S, users=(moved(walker(), 20.0),)), MAP),
+        MAP, stamp_ns=6 * S,
+    )  # fmt: skip
+    real = replace(walker(), user_id="0123456789abcdef0123456789abcdef", virtual=False)
+    seen = replace(echo, users=(*echo.users, real))
+    assert [one.user_id for one in echo.users] != ["walker"]
+    assert shown(walker()).without(seen).users == (real,)
+    assert Injected().without(seen) is seen
+
+
+def test_in_a_list_without_ids_it_is_known_by_place_size_and_speed():
+    def seen(user: RoadUser, stamp_ns: int) -> RoadUsers:
+        ros = detected_from_users(RoadUsers(stamp_ns=stamp_ns, users=(user,)), MAP)
+        return users_from_detected(ros, MAP, stamp_ns=parts.stamp_ns_of(ros.header.stamp))
+
+    injected = shown(walker())
+    half_a_second_on = moved(walker(), 0.7)
+    assert injected.without(seen(half_a_second_on, 5 * S + S // 2)).users == ()
+    for real in (
+        moved(walker(), 1.3),  # elsewhere
+        replace(half_a_second_on, length_m=0.52),
+        replace(half_a_second_on, speed_mps=1.6),
+    ):
+        there = seen(real, 5 * S + S // 2)
+        assert injected.without(there) is there
+    long_gone = seen(moved(walker(), 1.4 * 3.0), 8 * S)
+    assert injected.without(long_gone) is long_gone
+
+
+def test_a_real_one_that_is_merged_into_the_list_stays_real():
+    real = walker(virtual=False, user_id="0123456789abcdef0123456789abcdef")
+    seen = RoadUsers(stamp_ns=5 * S, users=(real,))
+    assert shown(real).without(seen) is seen
+
+
+def test_the_newest_thousands_are_remembered():
+    injected = shown(*(walker(user_id=f"w{number}") for number in range(5000)))
+    ids = [bytes(injected_uuid(number)).hex() for number in (0, 4999)]
+    first, last = (RoadUsers(stamp_ns=9 * S, users=(walker(user_id=one),)) for one in ids)
+    assert injected.without(first) is first
+    assert injected.without(last).users == ()
+
+
+def injected_uuid(number: int) -> Any:
+    from foretwin.telemetry.ros_messages.shapes import uuid_from
+
+    return uuid_from(walker(user_id=f"w{number}")).uuid
