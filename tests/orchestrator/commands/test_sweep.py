@@ -244,7 +244,9 @@ def test_ctrl_c_ends_soon_and_keeps_what_is_done(tmp_path: Path) -> None:
     assert again["rows_sha256"] == whole["rows_sha256"]
 
 
-@pytest.mark.parametrize("sig", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "sig", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.judge)]
+)
 def test_a_sweep_that_is_told_to_end_ends_as_by_ctrl_c(tmp_path: Path, sig: signal.Signals) -> None:
     _ended_by(sig, _long_sweep(tmp_path), tmp_path / "out")
 
