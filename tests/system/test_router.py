@@ -12,19 +12,16 @@ from typing import Any
 
 import pytest
 
-from foretwin.contracts.ports import free_endpoint
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
     Pause,
     child_pids,
-    foretwin,
-    is_running,
     log_lines,
     run_folder,
     started,
     wait_for,
 )
-from tests.system.test_faults import ENDS_WITHIN_S, LIVE, assert_nothing_left, says, under_way, when
+from tests.system.test_faults import ENDS_WITHIN_S, LIVE, assert_nothing_left, says, under_way
 
 FROZEN_S = 8.0
 
@@ -122,30 +119,3 @@ def test_in_lock_step_the_end_of_the_router_ends_the_drive_with_one_line(tmp_pat
     assert "the router died, and with it what was on its way" in line
     assert json.loads((run / "run.json").read_text(encoding="utf-8"))["exit"] == "failed"
     assert_nothing_left(run)
-
-
-def test_the_router_ends_with_an_orchestrator_that_is_killed(tmp_path: Path) -> None:
-    out = tmp_path / "runs"
-    with started(out, *LIVE) as process:
-        run = under_way(out)
-        router = child_pids(run)["router"]
-        process.kill()
-        process.wait()
-        wait_for(lambda: not is_running(router), "the router's end")
-
-
-def test_a_port_that_is_taken_is_told_in_one_line(tmp_path: Path) -> None:
-    flags = ("--endpoint", free_endpoint(), "--insecure")
-    with started(tmp_path / "first", *LIVE, *flags) as process:
-        assert process.poll() is None
-        run = under_way(tmp_path / "first")
-        endpoint = json.loads((run / "run.json").read_text(encoding="utf-8"))["endpoint"]
-        second = foretwin(tmp_path / "second", *flags)
-    assert second.code == 2
-    port = endpoint.rsplit(":", 1)[1]
-    assert second.screen.splitlines() == [
-        f"foretwin: endpoint {endpoint}: port {port} is taken; end what listens on it, or give "
-        "another one"
-    ]
-    assert second.run is None
-    assert when(run, "on the map") > 0.0
