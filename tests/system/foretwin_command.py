@@ -54,11 +54,12 @@ def started(
 ) -> Iterator[subprocess.Popen[str]]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
-    `entry` is what Python is given to run. Without tuning unless it is asked for: a tenth of a
-    core in each of these drives.
+    `entry` is what Python is given to run. One worker and no tuning unless they are asked for:
+    each process takes a second of a core to start.
     """
-    if "--tuning" not in arguments:
-        arguments = (*arguments, "--tuning", "off")
+    for option, value in (("--tuning", "off"), ("--workers", "1")):
+        if option not in arguments:
+            arguments = (*arguments, option, value)
     process = subprocess.Popen(
         [sys.executable, "-P", *entry, "drive", "--view", "none", "--out", str(out),
          *arguments],

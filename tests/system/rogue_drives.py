@@ -119,7 +119,7 @@ def assert_all_were_refused(done: Finished, transport: Transport, heard: dict[st
     """Each is counted and told once, nobody else is, and the drive is what it would have been."""
     assert done.run is not None
     record, lines = done.record(), log_lines(done.run)
-    assert record["exit"] == "completed", done.screen
+    assert (done.code, record["exit"]) == (130, "interrupted"), done.screen
 
     wanted, counted = expected(transport, done.run.name), counted_in(record)
     uncounted = [(name, row) for row, name in wanted.items() if row not in counted]

@@ -24,7 +24,8 @@ from tests.system.foretwin_command import child_pids, foretwin, orchestrator_pid
 from tests.system.test_faults import LIVE, assert_nothing_left, says, under_way
 
 ENDS_WITHIN_S = 240.0
-LOCK_STEP = ("--speed", "max", "--futures", "16", "--rate", "1", "--end", "12")
+TWO = ("--workers", "2")
+LOCK_STEP = ("--speed", "max", "--futures", "16", "--rate", "1", "--end", "12", *TWO)
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -67,7 +68,7 @@ def frozen(pid: int) -> Iterator[None]:
 
 def test_a_sick_worker_takes_no_round_down_and_is_tried_again(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE) as process:
+    with started(out, *LIVE, *TWO) as process:
         run = under_way(out)
         wait_for(lambda: bool(loaded_by(run, "w1")), "the other worker's World")
         with hidden(run, loaded_by(run, "w1")):
@@ -91,7 +92,7 @@ def test_a_sick_worker_takes_no_round_down_and_is_tried_again(tmp_path: Path) ->
 @pytest.mark.judge
 def test_a_run_whose_workers_all_refuse_goes_on_and_says_so_last(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE, "--end", "25") as process:
+    with started(out, *LIVE, *TWO, "--end", "25") as process:
         run = under_way(out)
         wait_for(lambda: bool(loaded_by(run, "w1")), "the other worker's World")
         with hidden(run, loaded_by(run, "w1")):
@@ -110,7 +111,7 @@ def test_a_run_whose_workers_all_refuse_goes_on_and_says_so_last(tmp_path: Path)
 def test_the_ledger_balances_after_freezes_kills_and_strangers(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     endpoint = free_endpoint()
-    with started(out, *LIVE, "--endpoint", endpoint, "--insecure") as process:
+    with started(out, *LIVE, *TWO, "--endpoint", endpoint, "--insecure") as process:
         run = under_way(out)
         with ZenohBus(BusSetup(endpoint=endpoint)) as stranger:
             for name in ("w7", "w8"):

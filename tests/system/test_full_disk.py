@@ -8,7 +8,7 @@ import pytest
 
 from tests.system.foretwin_command import Finished, log_lines, run_folder, started, wait_for
 
-SMALL = ("--speed", "max", "--futures", "12", "--workers", "1", "--end", "12")
+SMALL = ("--speed", "max", "--futures", "12", "--end", "8")
 FULL_WHILE_THERE = """
 import errno, os, sys
 from pathlib import Path

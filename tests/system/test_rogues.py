@@ -4,6 +4,7 @@ drive is untouched, and tells who was refused."""
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -24,7 +25,7 @@ from tests.system.foretwin_command import Finished, started
 from tests.system.rogue_drives import Bus, assert_all_were_refused, play
 from tests.system.test_faults import assert_nothing_left, under_way
 
-LIVE = ("--end", "40", "--futures", "6", "--workers", "1", "--rate", "1", "--tuning", "report")
+LIVE = ("--futures", "6", "--rate", "1", "--tuning", "report")
 NOBODY = 65534
 CONNECTS = """
 import os, socket, sys
@@ -88,6 +89,7 @@ def test_a_drive_on_its_own_socket_is_untouched_by_every_rogue(tmp_path: Path) -
             assert said.stdout == "refused\n", said.stderr
         heard = play(bus_of(drive, tmp_path), run)
         passwords = passwords_of(drive)
+        process.send_signal(signal.SIGINT)
         screen, _ = process.communicate(timeout=240.0)
     assert_all_were_refused(Finished(process.returncode, screen, run), "socket", heard)
     assert len(passwords) > 8

@@ -6,6 +6,7 @@ from __future__ import annotations
 import datetime
 import json
 import shutil
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from tests.orchestrator.campaign.campaigns import campaign, expired, now
 from tests.system.foretwin_command import Finished, run_folder, started, wait_for
 from tests.system.rogue_drives import Bus, assert_all_were_refused, begun, play
 
-LIVE = ("--end", "40", "--futures", "6", "--workers", "1", "--rate", "1")
+LIVE = ("--futures", "6", "--rate", "1")
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,7 @@ def test_a_drive_over_tls_is_untouched_by_every_rogue(tmp_path: Path, campaigns:
         run = run_folder(out)
         assert run is not None
         heard = play(bus, run)
+        process.send_signal(signal.SIGINT)
         screen, _ = process.communicate(timeout=240.0)
     assert_all_were_refused(Finished(process.returncode, screen, run), "tls", heard)
 

@@ -33,7 +33,7 @@ sys.exit(main())
 """
 """A drive that listens to nobody before a file named `go` is there."""
 
-SMALL = ("--speed", "max", "--futures", "6", "--workers", "1", "--rate", "0.5", "--end", "10")
+SMALL = ("--speed", "max", "--futures", "6", "--rate", "0.5", "--end", "10")
 
 
 def test_roles_and_correction_of_a_running_drive_are_set(

@@ -164,8 +164,9 @@ def test_no_process_grows_over_a_long_drive(
     feature["geometry"]["coordinates"] = [*(there + back) * math.ceil(SOAK_MIN), there[0]]
     (tmp_path / "loop.geojson").write_text(json.dumps(route), encoding="utf-8")
     out = tmp_path / "runs"
-    arguments = ("--route", "loop.geojson", "--end", f"{whole_s:.0f}", "--tuning", "report")
-    with started(out, *arguments, entry=("-c", WITH_A_BUSY_CAR)) as process:
+    arguments = ("--route", "loop.geojson", "--end", f"{whole_s:.0f}")
+    two = ("--workers", "2", "--tuning", "report")
+    with started(out, *arguments, *two, entry=("-c", WITH_A_BUSY_CAR)) as process:
         screen, _ = process.communicate(timeout=whole_s + 300.0)
     done = Finished(process.returncode, screen, run_folder(out))
 

@@ -59,6 +59,14 @@ class Sweeps:
         return pq.read_table(self.out(name) / "rows").sort_by("cell").to_pylist()
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The summary of a sweep in which nothing befalls the stack."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(REPOSITORY))
+        return Sweeps(tmp_path_factory.mktemp("plain")).swept("straight", name="plain")
+
+
 @pytest.fixture
 def sweeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sweeps:
     monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
@@ -77,8 +85,9 @@ def test_one_that_remembers_gives_the_same_rows_with_one_and_two_workers(sweeps:
     wait_for(lambda: not commands_running(f"{MODULE} remembers"), "the end of the stacks")
 
 
-def test_who_dies_is_started_again_and_the_rows_are_the_same(sweeps: Sweeps) -> None:
-    plain = sweeps.swept("straight", name="plain")
+def test_who_dies_is_started_again_and_the_rows_are_the_same(
+    sweeps: Sweeps, plain: dict[str, Any]
+) -> None:
     mark = sweeps.folder / "mark"
     died = sweeps.swept(f"dies {mark}", name="died")
     assert mark.exists()
@@ -89,7 +98,9 @@ def test_who_dies_is_started_again_and_the_rows_are_the_same(sweeps: Sweeps) -> 
     assert "the sky is falling" in (sweeps.out("died") / "stacks" / "w0-mine-0.log").read_text()
 
 
-def test_who_hangs_leaves_failed_rows_which_the_next_start_plays(sweeps: Sweeps) -> None:
+def test_who_hangs_leaves_failed_rows_which_the_next_start_plays(
+    sweeps: Sweeps, plain: dict[str, Any]
+) -> None:
     mark = sweeps.folder / "mark"
     hung = sweeps.swept(f"hangs {mark}", name="out", table="answer_within_s = 2")
     failed = [row for row in sweeps.rows("out") if row["failure"]]
@@ -99,7 +110,7 @@ def test_who_hangs_leaves_failed_rows_which_the_next_start_plays(sweeps: Sweeps)
     assert {row["failure"] for row in failed} == {words}
     again = sweeps.swept(f"hangs {mark}", name="out", table="answer_within_s = 120")
     assert (again["failed"], again["jobs_played"]) == (0, 1)
-    assert again["rows_sha256"] == sweeps.swept("straight", name="plain")["rows_sha256"]
+    assert again["rows_sha256"] == plain["rows_sha256"]
 
 
 def test_a_sweep_that_is_killed_leaves_no_stack(sweeps: Sweeps) -> None:

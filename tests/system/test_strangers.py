@@ -21,7 +21,7 @@ from foretwin.contracts.setup import BusSetup
 from tests.contracts.hostile_messages import hostile_bytes
 from tests.system.foretwin_command import Finished, log_lines, run_folder, started, wait_for
 
-LIVE = ("--end", "12", "--futures", "8", "--workers", "1", "--rate", "1")
+LIVE = ("--end", "12", "--futures", "8", "--rate", "1")
 STAMP_NS = 1_000_000_000
 
 
@@ -130,7 +130,7 @@ sys.exit(main())
 
 def test_an_error_of_ours_in_the_last_mail_costs_no_table(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    small = ("--speed", "max", "--futures", "6", "--workers", "1", "--rate", "0.5", "--end", "6")
+    small = ("--speed", "max", "--futures", "6", "--rate", "0.5", "--end", "6")
     with started(out, *small, entry=("-c", BROKEN_AT_THE_END)) as process:
         screen, _ = process.communicate(timeout=240.0)
     done = Finished(process.returncode, screen, run_folder(out))
