@@ -35,13 +35,20 @@ def record_of(house: House) -> dict[str, Any]:
     return run_record(house.conductor, 0, exit_word="completed", wall_s=12.3456, mono_s=1000.0)
 
 
-def test_the_promised_keys_are_there_and_filled_by_a_drive(house: House) -> None:
-    house.drive(200, round_every=5)
-    house.end()
-    record = record_of(house)
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory: pytest.TempPathFactory) -> House:
+    """A house whose car has driven for a while, to its end."""
+    made = House(tmp_path_factory.mktemp("ended"))
+    made.drive(200, round_every=5)
+    made.end()
+    return made
+
+
+def test_the_promised_keys_are_there_and_filled_by_a_drive(ended: House) -> None:
+    record = record_of(ended)
 
     assert set(record) >= PROMISED
-    assert record["map"]["sha256"] == house.plan.osm.sha256
+    assert record["map"]["sha256"] == ended.plan.osm.sha256
     assert (record["route_source"], record["seed"]) == ("given", 0)
     (junction,) = record["intersections"]
     assert set(junction) >= {
@@ -150,14 +157,12 @@ def test_versions_name_what_decides_results() -> None:
     assert set(versions()) >= {"python", "mujoco", "eclipse-zenoh", "numpy"}
 
 
-def test_the_summary_names_every_junction_and_the_maps_source(house: House) -> None:
-    house.drive(200, round_every=5)
-    house.end()
-    text = summary_text(record_of(house))
+def test_the_summary_names_every_junction_and_the_maps_source(ended: House) -> None:
+    text = summary_text(record_of(ended))
 
     assert text.splitlines()[0].startswith("completed: 1 junction passed, ")
     assert "Mill Lane" in text
-    assert text.splitlines()[-1] == house.plan.osm.attribution
+    assert text.splitlines()[-1] == ended.plan.osm.attribution
 
 
 def test_the_summary_says_how_often_the_free_twin_was_beyond_a_limit(house: House) -> None:
@@ -189,11 +194,9 @@ def test_the_summary_says_where_the_map_helped_to_find_the_car(house: House) -> 
     ],
 )
 def test_the_summary_says_when_a_world_was_ready(
-    house: House, start_s: float, before_s: float, within_at_s: float, said: str
+    ended: House, start_s: float, before_s: float, within_at_s: float, said: str
 ) -> None:
-    house.drive(200, round_every=5)
-    house.end()
-    record = record_of(house)
+    record = record_of(ended)
     record["config"]["start_s"] = start_s
     record["intersections"][0] |= {
         "world_ready_before_s": before_s, "within_radius_at_s": within_at_s,
@@ -202,10 +205,8 @@ def test_the_summary_says_when_a_world_was_ready(
     assert said in summary_text(record)
 
 
-def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(house: House) -> None:
-    house.drive(200, round_every=5)
-    house.end()
-    record = record_of(house)
+def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(ended: House) -> None:
+    record = record_of(ended)
     record["config"]["speed"] = None
     record["intersections"][0]["world_ready_before_s"] = -2.34
     assert "): its world was ready\n" in summary_text(record)
@@ -213,10 +214,8 @@ def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(house: Hous
     assert "): its world never came\n" in summary_text(record)
 
 
-def test_the_summary_owns_up_to_what_a_slow_machine_left_out(house: House) -> None:
-    house.drive(200, round_every=5)
-    house.end()
-    record = record_of(house)
+def test_the_summary_owns_up_to_what_a_slow_machine_left_out(ended: House) -> None:
+    record = record_of(ended)
     assert "too slow" not in summary_text(record)
     record["futures"] |= {
         "smaller_rounds": 12, "spared_rounds": 3, "rounds_by_futures": {"3": 12, "6": 2},
