@@ -198,8 +198,6 @@ def _ended_by(sig: signal.Signals, spec: Path, out: Path) -> None:
          "--workers", "1"],
         cwd=Path(__file__).parents[3], stderr=subprocess.PIPE, text=True,
         env=os.environ | {"TMPDIR": str(temporary)},
-        # A shell's background jobs, and all they start, ignore Ctrl-C.
-        preexec_fn=lambda: sig == signal.SIGKILL or signal.signal(sig, signal.SIG_DFL),
     )  # fmt: skip
     try:
         deadline = time.monotonic() + STARTS_WITHIN_S

@@ -129,7 +129,7 @@ def test_the_ego_starts_the_lead_time_before_the_impact() -> None:
 
 def test_who_arrives_later_does_not_touch() -> None:
     scenario = catalogue()["scp"]
-    place = places(scenario, cross(), vehicle=VEHICLE).places[0]
+    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
     on_time = draw_cases(scenario)[0]
     late = {**on_time, "crossing_car.arrives_after_s": 3.0}
     case = played(scenario, late, place)
@@ -192,9 +192,10 @@ def test_gaps_run_from_bumper_to_bumper() -> None:
 def test_paths_hold_everybodys_start() -> None:
     """Who builds a path of `xy_m` finds all starts on it, without prolonging it backwards."""
     for id_, scenario in catalogue().items():
+        values = draw_cases(scenario)[0]
         for world in WORLDS.values():
-            for place in places(scenario, world, vehicle=VEHICLE, most=1).places:
-                case = played(scenario, draw_cases(scenario)[0], place)
+            for place in places(scenario, world, vehicle=VEHICLE, cases=[values], most=1).places:
+                case = played(scenario, values, place)
                 assert case.ego_arc_m >= 0.0, id_
                 for actor in case.actors:
                     assert 0.0 <= actor.start_arc_m <= FrenetPath(actor.xy_m).length_m + 100.0, id_
@@ -212,7 +213,7 @@ def test_somebody_off_the_road_is_refused() -> None:
 
 def test_an_impact_after_the_end_is_refused() -> None:
     scenario = catalogue()["scp"]
-    place = places(scenario, cross(), vehicle=VEHICLE).places[0]
+    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
     values = {**draw_cases(scenario)[0], "ego.speed_mps": 5.0}
     far = cast(scenario, values, place, vehicle=VEHICLE, ego_arc_m=0.0)
     assert isinstance(far, Unplaced)
@@ -221,7 +222,7 @@ def test_an_impact_after_the_end_is_refused() -> None:
 
 def test_a_standing_car_is_taken_to_set_off() -> None:
     scenario = catalogue()["scp"]
-    place = places(scenario, cross(), vehicle=VEHICLE).places[0]
+    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
     values = {**draw_cases(scenario)[0], "ego.speed_mps": 0.0}
     near = cast(scenario, values, place, vehicle=VEHICLE, ego_arc_m=place.ego.entry_m - 8.0)
     assert isinstance(near, StagedCase)
@@ -233,7 +234,7 @@ def test_the_same_values_give_the_same_cast() -> None:
     scenario = catalogue()["ltap_od"]
     values = draw_cases(scenario)[1]
     runs = [
-        played(scenario, values, places(scenario, cross(), vehicle=VEHICLE).places[0])
+        played(scenario, values, places(scenario, cross(), vehicle=VEHICLE, most=1).places[0])
         for _ in range(2)
     ]
     assert msgspec.json.encode(runs[0].actors[0].xy_m.tolist()) == msgspec.json.encode(

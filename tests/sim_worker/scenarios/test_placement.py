@@ -237,7 +237,7 @@ def test_the_clearest_turn_comes_first() -> None:
     world = tee((0.0, 180.0, 235.0, 270.0))
     network = RoadNetwork(world)
     for id_ in ("cbta", "cpta"):
-        first = places(catalogue()[id_], world).places[0]
+        first = places(catalogue()[id_], world, most=1).places[0]
         passages = {p.name: p for p in network.passages(first.junction_id)}
         offs = [
             unlike_its_turn(p.turn, p.exit_heading_rad - p.entry_heading_rad)

@@ -71,11 +71,11 @@ def test_the_catalogue_is_placed_on_a_sample_of_real_junctions(data_dir: Path) -
     counts: Counts = collections.defaultdict(collections.Counter)
     reasons: Counts = collections.defaultdict(collections.Counter)
     for file in SMALL.values():
-        for world in worlds_of(data_dir / file, most=3):
+        for world in worlds_of(data_dir / file, most=2):
             count(world, counts, reasons, check=True, most_cases=1)
     placed = sum(c["placed"] for c in counts.values())
     unplaced = sum(c["unplaced"] for c in counts.values())
-    assert placed >= 80
+    assert placed >= 55
     assert placed >= LEAST_SHARE * (placed + unplaced), dict(reasons)
     assert sum(c["cast"] for c in counts.values()) >= 0.95 * sum(
         c["cases"] for c in counts.values()
