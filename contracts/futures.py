@@ -27,6 +27,8 @@ SPEED_AHEAD_STEP_S = 0.5
 """Between two speeds that the nominal future aims at."""
 PATH_BEHIND_M = 10.0
 """How much of its path lies behind the car."""
+EngineName = Literal["mujoco", "multibody", "gazebo", "carla"]
+"""Whose physics moves the car."""
 JOB_SCHEMA_VERSION = 1
 """Of `Job`, which is recorded: raised where its bytes mean something else."""
 
@@ -165,7 +167,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """Which of a run's sets of parameters that is; 0 is the vehicle file's."""
     control_hz: float = 20.0
     """How often planners decide."""
-    engine: Literal["mujoco"] = "mujoco"
+    engine: EngineName = "mujoco"
     anchor: str | None = None
     """Name of what ties the simulation to reality; None for nothing."""
     model: dict[str, float] = {}

@@ -16,7 +16,7 @@ import scipy.spatial  # noqa: F401  A search for many points needs it: not withi
 from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
-from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.contracts.futures import EngineName, FuturesResult, Job
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.job_identity import JobBytes, vehicle_digest
 from foretwin.contracts.placement import PlaceRequest, WorldPlaces
@@ -30,7 +30,7 @@ from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world_building import BuiltWorld, WantedWorld
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
-from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.run_job import run_job, stage_for
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.world_places import places_in
 from foretwin.sim_worker.planner_interface import PlayAgain
@@ -59,23 +59,27 @@ class SimulationCache:
         self, setup: WorkerSetup, vehicle: VehicleParameters, *, worlds: WorldSource
     ) -> None:
         self._setup, self._vehicle, self._worlds = setup, vehicle, worlds
-        self._stages: OrderedDict[str, _Prepared] = OrderedDict()
+        self._stages: OrderedDict[tuple[str, EngineName], _Prepared] = OrderedDict()
 
-    def get(self, world_id: str) -> _Prepared:
-        """Return the stage of a World; raises as its source does where that has it not."""
-        if world_id in self._stages:
-            self._stages.move_to_end(world_id)
-            return self._stages[world_id]
+    def get(self, world_id: str, engine: EngineName = "mujoco") -> _Prepared:
+        """Return the stage of a World; raises as its source does where that has it not, and
+        ValueError for an engine that is not here."""
+        key = world_id, engine
+        if key in self._stages:
+            self._stages.move_to_end(key)
+            return self._stages[key]
         with span("compile a World", world=world_id):
-            prepared = self._compiled(world_id)
-        self._stages[world_id] = prepared
+            prepared = self._compiled(world_id, engine)
+        self._stages[key] = prepared
         while len(self._stages) > self._setup.kept_worlds:
-            self._stages.popitem(last=False)
+            _, (stage, _) = self._stages.popitem(last=False)
+            stage.close()
         return prepared
 
-    def _compiled(self, world_id: str) -> _Prepared:
+    def _compiled(self, world_id: str, engine: EngineName) -> _Prepared:
         setup, world = self._setup, self._worlds.world(world_id)
-        stage = BatchSimulation(
+        stage = stage_for(
+            engine,
             world,
             self._vehicle,
             nsim=setup.simulations,
@@ -93,7 +97,12 @@ class SimulationCache:
     @property
     def world_ids(self) -> tuple[str, ...]:
         """Return the Worlds that are compiled, the one used last at the end."""
-        return tuple(self._stages)
+        return tuple(dict.fromkeys(world_id for world_id, _ in self._stages))
+
+    def close(self) -> None:
+        """End what engines have started."""
+        for stage, _ in self._stages.values():
+            stage.close()
 
 
 class FuturesWorker:
@@ -193,7 +202,7 @@ class FuturesWorker:
                 f"job for version {job.vehicle_version} of the vehicle's parameters at a "
                 f"worker with version {self._version}"
             )
-        prepared = self._swept.get(job.vehicle, self._stages).get(job.world_id)
+        prepared = self._swept.get(job.vehicle, self._stages).get(job.world_id, job.engine)
         result = self._played(job, prepared)
         if question.cells is None:
             return JobAnswer(result=result)
@@ -219,9 +228,11 @@ class FuturesWorker:
                 log.warning("job %s is played again: %s", job.job_index, lost)
 
     def close(self) -> None:
-        """End the driving stacks that it has started."""
+        """End the driving stacks and engines that it has started."""
         for stack in self.stacks.values():
             stack.close()
+        for cache in (self._stages, *self._swept.values()):
+            cache.close()
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:
         assert isinstance(question, PlaceRequest)

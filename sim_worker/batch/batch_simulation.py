@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
+from foretwin.contracts.futures import EngineName
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.slopes import Slopes, slopes_of
@@ -43,6 +44,9 @@ class BatchSimulation:
     Belongs to one thread. Seeding with S ≤ nsim states uses the first S simulations. A result
     depends on the seeds and commands alone, not on what the stage did before.
     """
+
+    engine: EngineName = "mujoco"
+    """Whose physics moves the cars; another's stage is a class of its own."""
 
     def __init__(
         self,
@@ -94,6 +98,9 @@ class BatchSimulation:
         self._physics = Physics(self.model, vehicle, nsim=self.nsim, threads=self._threads)
         self._count = 0
         self._box = CarBox.of(vehicle, tick_s=self.control_dt_s)
+
+    def close(self) -> None:
+        """End what the stage has started: nothing here."""
 
     def _bind(self) -> None:
         model = self.model

@@ -22,6 +22,7 @@ from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.futures import (
     JOB_SCHEMA_VERSION,
     Accident,
+    EngineName,
     FuturesResult,
     Job,
     Outcome,
@@ -156,9 +157,28 @@ def _play(
 
 def run_alone(job: Job, world: World, vehicle: VehicleParameters) -> FuturesResult:
     """Simulate a job on a stage made for it alone; raises as `run_job`."""
-    return run_job(
-        job, BatchSimulation(world, vehicle, nsim=len(job.futures), control_hz=job.control_hz)
-    )
+    stage = stage_for(job.engine, world, vehicle, nsim=len(job.futures), control_hz=job.control_hz)
+    try:
+        return run_job(job, stage)
+    finally:
+        stage.close()
+
+
+def stage_for(
+    engine: EngineName,
+    world: World | None,
+    vehicle: VehicleParameters,
+    *,
+    nsim: int,
+    control_hz: float = 20.0,
+    threads: int = 1,
+) -> BatchSimulation:
+    """Return a stage whose cars an engine moves; raises ValueError where it is not at hand."""
+    if engine == "mujoco":
+        return BatchSimulation(world, vehicle, nsim=nsim, control_hz=control_hz, threads=threads)
+    from foretwin.sim_worker.engines.engine_stage import EngineStage
+
+    return EngineStage(world, vehicle, engine=engine, nsim=nsim, control_hz=control_hz)
 
 
 def check_job(job: Job, stage: BatchSimulation) -> None:
@@ -168,6 +188,8 @@ def check_job(job: Job, stage: BatchSimulation) -> None:
             f"a job of schema version {job.schema_version}; this foretwin plays version "
             f"{JOB_SCHEMA_VERSION}"
         )
+    if job.engine != stage.engine:
+        raise ValueError(f"a job for the engine {job.engine} on a stage of {stage.engine}")
     if job.anchor is not None or job.model:
         raise ValueError("a job with an anchor or a learnt model; this foretwin knows neither")
     ahead = job.speed_ahead_mps

@@ -31,7 +31,7 @@ _GROUND_CLEARANCE_M = 0.15
 _STEER_MASS_KG = 0.1
 _BRAKE_NS_PER_M = 2.0e5
 _STEER_KP, _STEER_ARMATURE = 1.0e5, 1.0
-_LEAST_STEERING_LAG_S = 0.0065
+LEAST_STEERING_LAG_S = 0.0065
 """Below it, the servo would overshoot."""
 
 
@@ -141,7 +141,7 @@ def _add_actuators(spec: mujoco.MjSpec, vehicle: VehicleParameters, *, timestep_
         actuator.forcerange = [-1e-9, 1e-9]
     limit = vehicle.max_tire_angle_rad.value
     steer = spec.add_actuator(name=STEER, trntype=joint, target="steer")
-    lag = max(vehicle.steering_lag_s.value, _LEAST_STEERING_LAG_S)
+    lag = max(vehicle.steering_lag_s.value, LEAST_STEERING_LAG_S)
     steer.set_to_position(kp=_STEER_KP, kv=_STEER_KP * lag)
     steer.ctrllimited = True
     steer.ctrlrange = [-limit, limit]

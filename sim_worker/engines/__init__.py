@@ -1,0 +1,1 @@
+"""Other physics than MuJoCo's for the same job, behind one protocol."""
