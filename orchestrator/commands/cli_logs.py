@@ -164,13 +164,19 @@ def repeat(
     ],
     as_json: Annotated[bool, typer.Option("--json", help="both hashes as JSON")] = False,
     view: Annotated[bool, typer.Option("--view", help="also draw it, into RUN/repeated")] = False,
+    physics: Annotated[
+        str | None, typer.Option(help="on another engine (multibody, gazebo): how far apart?")
+    ] = None,
 ) -> None:
     """Play a recorded future again, bit for bit: exit code 3 where it comes to something else.
 
     Example: foretwin repeat runs/NAME FUTURE --view
     """
+    from foretwin.orchestrator.commands.repeat import elsewhere
     from foretwin.orchestrator.commands.repeat import repeat as repeat_future
 
+    if physics is not None:
+        raise typer.Exit(elsewhere(folder, future, physics, as_json=as_json))
     raise typer.Exit(repeat_future(folder, future, as_json=as_json, view=view))
 
 

@@ -4,15 +4,53 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import get_args
+
+import msgspec
+import numpy as np
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import EngineName
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.record.played_again import play_again
 from foretwin.orchestrator.record.recorded_jobs import recorded_future
 from foretwin.orchestrator.record.run_folder import REPEATED
+from foretwin.sim_worker.engines.registry import trouble_with_engine
 
 DIFFERS = 3
+
+
+def elsewhere(folder: Path, future_id: str, physics: str, *, as_json: bool) -> int:
+    """Play a recorded future as it was and on another engine, and print how far apart they are.
+
+    Returns 0. Raises FileNotFoundError or UserError, in one line, where it cannot be played.
+    """
+    if physics not in (known := get_args(EngineName)):
+        raise UserError(f"--physics {physics}: {', '.join(known)}")
+    engine = msgspec.convert(physics, EngineName)
+    if (trouble := trouble_with_engine(engine)) is not None:
+        raise UserError(f"--physics {physics}: {trouble}")
+    recorded = recorded_future(folder, future_id)
+    here, there = play_again(recorded).result, play_again(recorded, engine=engine).result
+    if recorded.row.index not in here.future_indices:
+        raise UserError(f"{future_id}: was not played")
+    row = here.future_indices.index(recorded.row.index)
+    ways = [result.trajectory.states[row, :, :2] for result in (here, there)]
+    apart_m = np.hypot(*(ways[0] - ways[1]).T)
+    collided = [bool(result.outcome.collided[row]) for result in (here, there)]
+    if as_json:
+        words = {"future": future_id, "engines": [recorded.job.engine, engine]}
+        apart = {"end_m": float(apart_m[-1]), "most_m": float(apart_m.max())}
+        say(json.dumps(words | {"apart": apart, "collided": collided}))
+        return 0
+    said = ["collides" if one else "does not collide" for one in collided]
+    say(
+        f"{future_id}: {recorded.job.engine} and {engine} end {apart_m[-1]:.2f} m apart, at most "
+        f"{apart_m.max():.2f} m; on {recorded.job.engine} it {said[0]}, "
+        f"on {engine} it {said[1]}"
+    )
+    return 0
 
 
 def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:

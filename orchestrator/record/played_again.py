@@ -7,7 +7,7 @@ from typing import NamedTuple
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.contracts.futures import EngineName, FuturesResult, Job
 from foretwin.orchestrator.record.recorded_jobs import RecordedFuture
 from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.run_job import run_alone
@@ -23,8 +23,8 @@ class PlayedAgain(NamedTuple):
     sha256: dict[int, str | None]
 
 
-def play_again(recorded: RecordedFuture) -> PlayedAgain:
-    """Play the whole job of a recorded future, as it was then.
+def play_again(recorded: RecordedFuture, *, engine: EngineName | None = None) -> PlayedAgain:
+    """Play the whole job of a recorded future, as it was then, or on another engine.
 
     Raises UserError where the future was driven by a planner in another process.
     """
@@ -35,6 +35,8 @@ def play_again(recorded: RecordedFuture) -> PlayedAgain:
             "not recorded"
         )
     job = _without_others(recorded.job)
+    if engine is not None:
+        job = msgspec.structs.replace(job, engine=engine)
     result = run_alone(job, recorded.world, recorded.vehicle)
     rows = future_rows(job, result, job_sha256=known.job_sha256)
     return PlayedAgain(result, {row["index"]: row.get("trajectory_sha256") for row in rows})

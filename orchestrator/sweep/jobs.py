@@ -55,6 +55,7 @@ class JobMaker:
             accidents=spec.accidents,
             vehicle=self._vehicles[planned.vehicle],
             control_hz=spec.control_hz,
+            engine=spec.physics,
             planner_timing=(
                 spec.remote[planned.planner].timing
                 if planned.planner in spec.remote

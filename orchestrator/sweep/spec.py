@@ -10,7 +10,7 @@ import msgspec
 
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import RESULT_STEP_S
+from foretwin.contracts.futures import RESULT_STEP_S, EngineName
 from foretwin.contracts.numbers import FUTURE_NUMBERS, MAX_SEED, out_of_range
 from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.planner_link import PlannerJoined
@@ -26,6 +26,7 @@ from foretwin.orchestrator.sweep.stacks import (
     introduced,
 )
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
+from foretwin.sim_worker.engines.registry import trouble_with_engine
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
 from foretwin.sim_worker.planners.registry import REMOTE, check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
@@ -82,6 +83,8 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Driving stacks by the names under which `planners` knows them."""
     vehicles: tuple[str, ...] = ("bmw_320i",)
     """Bundled vehicles by name, or parameter files; the first decides on the places."""
+    physics: EngineName = "mujoco"
+    """Whose physics moves the cars: mujoco, multibody or gazebo; docs/engines.md."""
     metrics: tuple[str, ...] = DEFAULT_METRICS
     """What is measured of each future; docs/metrics.md."""
     parameters: dict[str, tuple[float, ...]] = {}
@@ -139,6 +142,8 @@ def check_spec(spec: SweepSpec, *, start_stacks: bool = True) -> Loaded:
     if spec.junctions != "all":
         for name in spec.junctions if spec.map is not None else ():
             node_of_id(name)
+    if (engine := trouble_with_engine(spec.physics)) is not None:
+        raise UserError(f"physics: {engine}")
     check_remote(spec.remote, control_hz=spec.control_hz)
     for name in spec.planners:
         if name == REMOTE and name not in spec.remote:

@@ -19,7 +19,7 @@ _BY_MASS = "m_s m_uf m_ur K_sf K_sdf K_sr K_sdr K_ras K_rad K_zt"
 _BY_MASS_AND_TRACK = "I_Phi_s K_tsf K_tsr I_uf I_ur"
 
 
-class MultiBodyCar(NamedTuple):
+class MultiBodyNumbers(NamedTuple):
     """Numbers of the equations, in the order of `BODY` and `TYRE`.
 
     `front_stiffness` and `rear_stiffness` scale the tyres' cornering stiffness, `grip_per_friction`
@@ -41,7 +41,7 @@ def _bmw_320i() -> Any:
     return parameters_vehicle2()
 
 
-def multibody_car(vehicle: VehicleParameters) -> MultiBodyCar:
+def multibody_car(vehicle: VehicleParameters) -> MultiBodyNumbers:
     """Return the multi-body car that stands for a vehicle."""
     model = _bmw_320i()
     mass, wheelbase = vehicle.mass_kg.value, vehicle.wheelbase_m.value
@@ -67,7 +67,7 @@ def multibody_car(vehicle: VehicleParameters) -> MultiBodyCar:
     given = vehicle.front_cornering_stiffness_npr.value, vehicle.rear_cornering_stiffness_npr.value
     stiffer = [c / (-tyre["p_ky1"] * load) for c, load in zip(given, loads, strict=True)]
     grips = tyre["p_kx1"] * max(loads) / 2.0
-    return MultiBodyCar(
+    return MultiBodyNumbers(
         body=tuple(numbers[name] for name in BODY),
         tyre=tuple(tyre[name] for name in TYRE),
         front_stiffness=stiffer[0],

@@ -7,6 +7,19 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.engines.engine import Engine
 
 
+def trouble_with_engine(name: EngineName) -> str | None:
+    """Return why this machine cannot play on an engine, in one line; None where it can."""
+    if name == "gazebo":
+        from foretwin.sim_worker.engines.gazebo import trouble_with_gazebo
+
+        return trouble_with_gazebo()
+    if name == "carla":
+        from foretwin.sim_worker.engines.carla import trouble_with_carla
+
+        return trouble_with_carla()
+    return None
+
+
 def begin_engine(name: EngineName, vehicle: VehicleParameters, *, count: int) -> Engine:
     """Return an engine with room for `count` cars; raises ValueError, in one line, where this
     machine has it not, or where it is MuJoCo, whose stage is none of these."""
@@ -14,4 +27,12 @@ def begin_engine(name: EngineName, vehicle: VehicleParameters, *, count: int) ->
         from foretwin.sim_worker.engines.multibody import MultiBody
 
         return MultiBody(vehicle, count=count)
-    raise ValueError(f"engine {name!r} is none that drives on open ground here; known: multibody")
+    if name == "gazebo":
+        from foretwin.sim_worker.engines.gazebo import Gazebo
+
+        return Gazebo(vehicle)
+    if name == "carla":
+        from foretwin.sim_worker.engines.carla import Carla
+
+        return Carla(vehicle)
+    raise ValueError(f"engine {name!r} has a stage of its own")

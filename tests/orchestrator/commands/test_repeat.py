@@ -211,3 +211,19 @@ def test_what_is_not_there_is_told(
     (tmp_path / "rows").mkdir()
     assert run(["repeat", str(tmp_path), "nobody-1"]) == 2
     assert f"{tmp_path}/rows: holds no rows" in _said(capsys)
+
+
+def test_on_another_engine_it_says_how_far_apart_they_are(
+    swept: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future_id = _rows(swept)[0]["future_id"]
+    assert run(["repeat", str(swept), future_id, "--physics", "multibody", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["engines"] == ["mujoco", "multibody"]
+    assert 0.0 < said["apart"]["end_m"] <= said["apart"]["most_m"] < 1.0
+    assert run(["repeat", str(swept), future_id, "--physics", "multibody"]) == 0
+    assert "mujoco and multibody end 0." in capsys.readouterr().out
+    assert run(["repeat", str(swept), future_id, "--physics", "mojuco"]) == 2
+    assert _said(capsys).endswith("--physics mojuco: mujoco, multibody, gazebo, carla\n")
+    assert run(["repeat", str(swept), future_id, "--physics", "carla"]) == 2
+    assert "needs CARLA's Python package" in _said(capsys)

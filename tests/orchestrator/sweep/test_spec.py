@@ -56,6 +56,7 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
             'map = "a"\nplanners = ["as_planned"]',
             "planner as_planned drives the plan that the car of",
         ),
+        ('map = "a"\nphysics = "carla"', "physics: engine 'carla' needs CARLA's Python package"),
         ('map = "a"\nvehicles = ["tank"]', "no vehicle file tank"),
         ('map = "a"\nmetrics = ["ade"]', "compares with a reference"),
         ('map = "a"\nmetrics = ["ttc_series"]', "is a series"),
