@@ -34,7 +34,7 @@ class Demand(NamedTuple):
     tire_angle_rad: Array
 
 
-class Engine(Protocol):
+class PhysicsEngine(Protocol):
     """S cars in motion on open ground; belongs to one thread."""
 
     def reset(self, rows: Indices, seeds: Seeds) -> None:

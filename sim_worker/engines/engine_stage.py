@@ -14,7 +14,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.engines.actuators import Actuators
-from foretwin.sim_worker.engines.engine import Demand, Engine, Seeds
+from foretwin.sim_worker.engines.engine import Demand, PhysicsEngine, Seeds
 from foretwin.sim_worker.engines.registry import begin_engine
 
 
@@ -33,7 +33,7 @@ class EngineStage(BatchSimulation):
         """Compile the World and begin the engine; raises ValueError as both do."""
         super().__init__(world, vehicle, nsim=nsim, control_hz=control_hz)
         self.engine = engine
-        self._moves: Engine = begin_engine(engine, vehicle, count=nsim)
+        self._moves: PhysicsEngine = begin_engine(engine, vehicle, count=nsim)
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Change the vehicle's parameters; seed anew afterwards."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from foretwin.contracts.futures import EngineName
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.engines.engine import Engine
+from foretwin.sim_worker.engines.engine import PhysicsEngine
 
 
 def trouble_with_engine(name: EngineName) -> str | None:
@@ -20,7 +20,7 @@ def trouble_with_engine(name: EngineName) -> str | None:
     return None
 
 
-def begin_engine(name: EngineName, vehicle: VehicleParameters, *, count: int) -> Engine:
+def begin_engine(name: EngineName, vehicle: VehicleParameters, *, count: int) -> PhysicsEngine:
     """Return an engine with room for `count` cars; raises ValueError, in one line, where this
     machine has it not, or where it is MuJoCo, whose stage is none of these."""
     if name == "multibody":
