@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from foretwin.contracts.forecast import PROGRESS_TIMES_S
 from foretwin.orchestrator.forecast.progress_model import progress_model
-from foretwin.orchestrator.forecast.scoring import score
+from foretwin.orchestrator.forecast.scoring import DriveScore, score
 from tests.orchestrator.forecast.town_drives import town_examples
 from tests.trust.progress import LEARNT_FROM, RANKS, DriveForecasts, pooled, row
 
 
-def town(name: str) -> DriveForecasts:
+@cache
+def scores() -> tuple[DriveScore, ...]:
     drive = town_examples(seed=4, minutes=6.0)
-    both = [score(progress_model(), drive, blind=blind) for blind in (True, False)]
-    return DriveForecasts(name, 340.0, *both)
+    return tuple(score(progress_model(), drive, blind=blind) for blind in (True, False))
+
+
+def town(name: str) -> DriveForecasts:
+    return DriveForecasts(name, 340.0, *scores())
 
 
 def test_a_row_has_as_many_cells_as_its_head() -> None:
@@ -37,7 +43,7 @@ def test_what_was_learnt_from_is_not_pooled() -> None:
 def test_what_really_came_is_what_is_scored() -> None:
     """A car that measures its speed right, beside one whose truth is a tenth farther."""
     drive = town_examples(seed=4, minutes=6.0)
-    right = score(progress_model(), drive, blind=True)
+    right, _ = scores()
     farther = score(progress_model(), drive, blind=True, truth_m=1.1 * drive.distance_m)
     moved = drive.distance_m[drive.speed_mps >= 0.5]
 
