@@ -39,6 +39,7 @@ from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_secure import doctor
 from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
+from foretwin.orchestrator.commands.cli_standin import standin
 from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
 from foretwin.orchestrator.commands.cli_view import LayoutOption
@@ -243,7 +244,7 @@ def world(
     raise typer.Exit(write_worlds(WorldRequest(**asked)))
 
 
-for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, worker):
+for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, worker, standin):
     app.command()(command)
 
 app.command("config")(config_files)

@@ -93,7 +93,7 @@ class VehicleGate:
             self.why = trouble
             self.counts["word before the car is ready"] += 1
             return
-        self._state = "open"
+        self._state, self.why = "open", "both switches are on"
         self._last_heartbeat_ns = max(sent_ns, self._last_heartbeat_ns or sent_ns)
 
     def look(self, *, now_ns: int, link_up: bool) -> GateState:

@@ -13,12 +13,17 @@ from typing import NamedTuple
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
 from foretwin.telemetry.standin.car import CarMotion
+from foretwin.telemetry.standin.obstacles import Hindrance
 from foretwin.telemetry.standin.parameters import CarParameters, DriverParameters
 from foretwin.telemetry.standin.path import DrivenPath
 
 _NEAR_STOP_M = 0.4
 _STANDING_MPS = 0.02
 _SPEED_GAIN_PS = 1.2
+_BEGINS = 0.8
+"""Of the comfortable deceleration, from which on it brakes for somebody."""
+_CLOSE_M, _CREEPS_MPS = 1.5, 0.8
+"""So close behind somebody it does not set off again, or creep on."""
 _STEERING_LAG_S = 0.09
 """Of the steering motor, which the driver has learnt to anticipate."""
 
@@ -50,6 +55,10 @@ class Driver:
     s_m: float = 0.0
     """How far along the path the car was at the last command."""
     arrived: bool = False
+    held: bool = False
+    """Whether it stands, whatever the path says."""
+    ahead: Hindrance | None = None
+    """Who is in its way now."""
     _next_stop: int = 0
     _waited_s: float = 0.0
 
@@ -88,6 +97,8 @@ class Driver:
 
     def _accel(self, s_m: float, speed_mps: float, stop: int) -> float:
         given = self.parameters
+        if self.held:
+            return -given.comfort_decel_mps2
         if self.path.stops_m[stop] - s_m < _NEAR_STOP_M and speed_mps < 1.2:
             return -1.0 if speed_mps < 0.5 else -given.comfort_decel_mps2
         ahead = s_m + speed_mps * self.car.drive_delay_s
@@ -95,8 +106,25 @@ class Driver:
         later = self._wished_speed(ahead + 0.5, stop)
         slope = (later * later - wished * wished) / 1.0
         slope = min(max(slope, -given.comfort_decel_mps2), 0.0)
-        accel = slope + _SPEED_GAIN_PS * (wished - speed_mps)
+        accel = min(slope + _SPEED_GAIN_PS * (wished - speed_mps), self._not_into(s_m, speed_mps))
         return min(max(accel, -given.max_decel_mps2), given.max_accel_mps2)
+
+    def _not_into(self, s_m: float, speed_mps: float) -> float:
+        """Return the most acceleration with which nobody ahead is run into.
+
+        It brakes as soon as comfort asks for it, by as much as it takes, and begins a little
+        earlier, to be through with it where it should be.
+        """
+        if self.ahead is None:
+            return math.inf
+        left_m = self.ahead.s_m - s_m - speed_mps * self.car.drive_delay_s
+        faster = speed_mps * abs(speed_mps) - self.ahead.speed_mps**2
+        if left_m <= 0.1:
+            return -self.parameters.max_decel_mps2 if faster > 0.0 else 0.0
+        needed = faster / (2.0 * left_m)
+        if needed < self.parameters.comfort_decel_mps2 * _BEGINS:
+            return math.inf if left_m > _CLOSE_M or speed_mps > _CREEPS_MPS else -1.0
+        return -needed
 
     def _steering_wheel(self, motion: CarMotion) -> float:
         speed = motion.vx_mps

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from foretwin.contracts.drive import ControlCommand, VehicleInfo
+from foretwin.contracts.drive import ControlCommand, RoadUser, VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
 from foretwin.telemetry.standin.driver import Driver, DriverCommand
+from foretwin.telemetry.standin.obstacles import Hindrance, hindrance
 from foretwin.telemetry.standin.parameters import StandinParameters
 from foretwin.telemetry.standin.path import DrivenPath
 from foretwin.telemetry.standin.sensors import PERIOD_MS, Sensors, planned_trajectory, status
@@ -53,6 +54,8 @@ class StandinSource:
         self._command = DriverCommand(0.0, 0.0)
         self._tick = 0
         self._last_tick = None if end_s is None else round(end_s / STEP_S)
+        self._users: tuple[RoadUser, ...] = ()
+        self._seen_ns = START_STAMP_NS
         self.first_stamp_ns = START_STAMP_NS
         self.ended = False
         self.skipped_invalid = 0
@@ -67,6 +70,35 @@ class StandinSource:
             sends=tuple(PERIOD_MS),
         )
 
+    def see(self, users: tuple[RoadUser, ...], *, stamp_ns: int) -> None:
+        """Take who is there at a stamp: the driver brakes for whom it finds in its way."""
+        self._users, self._seen_ns = users, stamp_ns
+
+    def hold(self, held: bool) -> None:
+        """Let the driver stand, or go on."""
+        self._driver.held = held
+
+    @property
+    def ahead(self) -> Hindrance | None:
+        """Who is in the way now."""
+        return self._driver.ahead
+
+    @property
+    def brakes(self) -> bool:
+        """Whether the driver brakes for who is in the way, comfortably or harder."""
+        least_mps2 = 0.5 * self._parameters.driver.comfort_decel_mps2
+        return self.ahead is not None and self._command.accel_mps2 <= -least_mps2
+
+    @property
+    def s_m(self) -> float:
+        """How far along the path the car is."""
+        return self._driver.s_m
+
+    @property
+    def speed_mps(self) -> float:
+        """How fast the car is."""
+        return self._car.motion().vx_mps
+
     def advance(self, until_stamp_ns: int) -> Iterator[tuple[str, Any]]:
         """Simulate up to and including the stamp; yield every sample once, in stamp order."""
         while not self.ended and START_STAMP_NS + self._tick * _TICK_NS <= until_stamp_ns:
@@ -78,6 +110,10 @@ class StandinSource:
                     altitude_m=self._path.altitude_at(s_m), grade=self._path.grade_at(s_m)
                 )
             if self._tick % _CONTROL_TICKS == 0:
+                age_s = (stamp_ns - self._seen_ns) * 1e-9
+                self._driver.ahead = hindrance(
+                    self._path, self._driver.s_m, self._users, age_s=age_s
+                )
                 self._command = self._driver.command(motion)
             # Time goes on before samples leave: a caller may stop between two of them.
             due = [

@@ -58,7 +58,7 @@ def test_what_else_is_wrong_keeps_it_from_opening_and_shuts_it() -> None:
     assert (gate.state, gate.why) == ("waiting", "the car is outside its fence")
     wrong[0] = None
     gate.heartbeat(MS, now_ns=MS)
-    assert gate.look(now_ns=MS, link_up=True) == "open"
+    assert (gate.look(now_ns=MS, link_up=True), gate.why) == ("open", "both switches are on")
     wrong[0] = "the car is outside its fence"
     assert gate.look(now_ns=2 * MS, link_up=True) == "shut"
     wrong[0] = None

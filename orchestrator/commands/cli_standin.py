@@ -1,0 +1,31 @@
+"""The command line of the stand-in car on a lot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def standin(
+    ros2: Annotated[
+        Path, typer.Option(help="mapping of its ROS 2 topics, TOML, as foretwin drive reads it")
+    ],
+    anchor: Annotated[Path, typer.Option(help="TOML file: where its lot lies, and its fence")],
+    route: Annotated[
+        Path | None,
+        typer.Option(help="GPX or GeoJSON line in the World [default: straight on]"),
+    ] = None,
+    way_m: Annotated[float, typer.Option("--way", help="metres straight on")] = 100.0,
+    speed_mps: Annotated[float, typer.Option("--speed", help="metres per second")] = 8.0,
+    end_s: Annotated[float, typer.Option("--end", help="seconds after which it ends")] = 120.0,
+    as_json: Annotated[bool, typer.Option("--json", help="what it came to, as JSON")] = False,
+) -> None:
+    """Drive the stand-in car on a lot, over ROS 2: it brakes for the objects that it is told of.
+
+    Example: foretwin standin --ros2 my.toml --anchor lot.toml
+    """
+    from foretwin.orchestrator.commands.standin import LotDrive, drive_on_lot
+
+    drive_on_lot(LotDrive(ros2, anchor, route, way_m, speed_mps, end_s), as_json=as_json)
