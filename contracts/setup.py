@@ -19,6 +19,7 @@ from foretwin.contracts.roles import MirrorCast
 from foretwin.contracts.segments import Roll
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.virtual_traffic import VirtualTraffic
 from foretwin.contracts.world import ATTRIBUTION
 
 
@@ -121,6 +122,15 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     """Loaded before the first job: those of other packages live in processes of their own."""
     stacks: tuple[tuple[str, StackSetup], ...] = ()
     """Driving stacks, by the names under which a sweep's futures know them."""
+
+
+class TrafficSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Virtual traffic around `vehicle`, the car."""
+
+    vehicle: VehicleParameters
+    worlds_dir: str
+    traffic: VirtualTraffic
+    seed: int
 
 
 class FarWorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

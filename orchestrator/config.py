@@ -16,7 +16,9 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED, Range
 from foretwin.contracts.ports import metrics_place, trouble_with_bus
 from foretwin.contracts.roles import Correction, FollowLimits, Role
+from foretwin.contracts.virtual_traffic import VirtualTraffic
 from foretwin.orchestrator.keep import parse_keep
+from foretwin.orchestrator.other_vehicle_config import OtherVehicleConfig as OtherVehicleConfig
 from foretwin.orchestrator.processors import processors, trouble_with_workers
 from foretwin.orchestrator.settings import flag_of
 from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning
@@ -44,45 +46,6 @@ RANGES: Mapping[str, Range] = MappingProxyType(
 
 class ConfigError(UserError):
     """A setting that cannot be used; the message names it and what would be right."""
-
-
-class OtherVehicleConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A vehicle beside the car: its role, its parameters, and where its telemetry comes from.
-
-    One of three: a recorded drive (`log`), a vehicle of this id on the bus (`live`), or who the car
-    itself detects under the id `seen_as`.
-    """
-
-    id: str
-    """What it is called, in one word; no two vehicles have one id."""
-    role: Role = "shadow"
-    """Of it as the drive begins."""
-    vehicle: str | None = None
-    """A parameter file or the name of a bundled vehicle; the car's own where left out."""
-    log: str | None = None
-    """A recorded drive that it replays."""
-    log_offset_s: float | None = None
-    """Seconds of it passed as the car's drive begins; None: by UTC, where both have it."""
-    live: bool = False
-    """Whether a vehicle of this id speaks on the bus."""
-    same_clock: bool = False
-    """Whether a live one stamps by the car's own clock, as by satellites: nothing is estimated."""
-    ros2: str | None = None
-    """A mapping in TOML, or `autoware`: how a live vehicle's own ROS 2 topics are read."""
-    seen_as: str | None = None
-    """The id under which the car itself detects it."""
-
-    def trouble(self) -> str | None:
-        """Return what is wrong with it, None where nothing is."""
-        if not self.id or any(c in self.id for c in "/*$#?{} ."):
-            return f"id {self.id!r} must be one word without / * $ # ? ."
-        if self.role == "all":
-            return "role all is the car's alone; must be twin, shadow or ghost"
-        if (self.log is not None) + self.live + (self.seen_as is not None) != 1:
-            return "needs exactly one of log = FILE, live = true, seen_as = ID"
-        if self.ros2 is not None and not self.live:
-            return "ros2 = MAPPING needs live = true: its topics are the vehicle's telemetry"
-        return None
 
 
 class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -152,6 +115,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How hard a twin that follows may be drawn."""
     vehicles: tuple[OtherVehicleConfig, ...] = ()
     """Others in the mirror besides the car, each with a role of its own."""
+    virtual_traffic: VirtualTraffic = VirtualTraffic()
+    """Road users who exist nowhere else: one going simulation around the car; see
+    docs/virtual-traffic.md."""
     view: View = "auto"
     """Where the drive is shown; `auto` is a window where there is a display."""
     layout: str = "drive"
@@ -246,6 +212,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         place = trouble_with_bus(self.endpoint, insecure=self.insecure, secure=self.secure)
         yield place is None, f"{place}"
         yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
+        traffic = self.virtual_traffic.trouble()
+        yield traffic is None, f"virtual_traffic: {traffic}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
         yield len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"
         waiting = self.speed != 1.0 and any(other.live for other in self.vehicles)

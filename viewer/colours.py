@@ -10,6 +10,8 @@ CRITICAL: Colour = (234, 62, 56)
 NOMINAL: Colour = (250, 250, 255)
 """Of the nominal future among those from safe to critical."""
 ROAD_USER: Colour = (214, 112, 214)
+VIRTUAL: Colour = (255, 150, 60)
+"""Of who exists in a going simulation alone."""
 
 REAL: Colour = (245, 246, 250)
 TWIN: Colour = (0, 200, 255)

@@ -17,6 +17,7 @@ from foretwin.viewer.colours import (
     SAFE,
     SHADOW,
     TWIN,
+    VIRTUAL,
     WATCH,
     Colour,
 )
@@ -57,6 +58,7 @@ ENTRIES: tuple[tuple[LegendEntry, ...], ...] = (
     (
         LegendEntry("line", ROUTE, "route"),
         LegendEntry("line", CORRECTION, "what corrects the twin"),
+        LegendEntry("box", VIRTUAL, "virtual road user"),
     ),
 )
 """Columns of entries; futures are coloured by criticality, likelihood times risk of a death."""

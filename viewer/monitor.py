@@ -19,6 +19,7 @@ from foretwin.viewer.log_drive import DriveLog
 from foretwin.viewer.log_roads import rows_of_roads
 from foretwin.viewer.log_run import RunLog, rows_of_event
 from foretwin.viewer.log_tuning import TuningLog
+from foretwin.viewer.log_virtual_traffic import VirtualTrafficLog
 from foretwin.viewer.log_world import rows_of_world, world_centre
 from foretwin.viewer.rows import Row
 
@@ -75,6 +76,7 @@ class Monitor:
                 one, ns, self._frame
             ),
             "mirror": self._drive.mirror,
+            "virtual_traffic": VirtualTrafficLog(drive_frame).rows,
             "active_world": self._active_world,
             "world": self._world,
             "worker_status": self._run.worker,

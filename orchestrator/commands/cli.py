@@ -33,6 +33,7 @@ from foretwin.orchestrator.commands.cli_options import (
     TracksOption,
     TuningOption,
     VehicleFileOption,
+    VirtualTrafficOption,
 )
 from foretwin.orchestrator.commands.cli_progress import learn_progress
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
@@ -126,6 +127,7 @@ def drive(
     tuning: TuningOption = None,
     progress_table: ProgressTableOption = None,
     map_aiding: MapAidingOption = None,
+    virtual_traffic: VirtualTrafficOption = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web, copilot or none [default: auto]")
     ] = None,

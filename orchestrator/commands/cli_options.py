@@ -86,6 +86,10 @@ ProgressTableOption = Annotated[
         "[default: the shipped one]"
     ),
 ]
+VirtualTrafficOption = Annotated[
+    str | None,
+    typer.Option(help="road users who exist nowhere else: model, or off [default: off]"),
+]
 EndpointOption = Annotated[
     str | None,
     typer.Option(

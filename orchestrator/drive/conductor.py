@@ -22,12 +22,13 @@ from foretwin.orchestrator.drive.mark_handler import MarkHandler
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR, expected_ids
-from foretwin.orchestrator.drive.questions import Questions
+from foretwin.orchestrator.drive.questions import ASKED_OF_SIMULATIONS, Questions
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
 from foretwin.orchestrator.drive.strangers import Strangers
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
+from foretwin.orchestrator.drive.virtual_traffic_link import VirtualTrafficLink
 from foretwin.orchestrator.drive.watcher_setups import WATCHERS
 from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, NotReady, UseWorld
@@ -36,7 +37,7 @@ from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.runtime_configuration import roles
-from foretwin.orchestrator.runtime_configuration.handler import ChangeHandler, RuntimeConfiguration
+from foretwin.orchestrator.runtime_configuration.handler import RuntimeConfiguration
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -78,12 +79,11 @@ class Conductor:
             tell=lambda message: self.questions.ask(MIRROR, "use_roles", message),
         )
         self.tuning = TuningLink(context, intake=self.intake, rounds=self.rounds, alive=self.alive)
-        handlers: dict[str, ChangeHandler] = {
-            "role": roles.RoleHandler(self.roles),
-            "correction": roles.CorrectionHandler(self.roles),
-            "vehicle": VehicleHandler(self.tuning.parameters),
-        }
-        self.changes = RuntimeConfiguration(handlers)
+        self.traffic = VirtualTrafficLink(context, self.questions, self.intake)
+        self.changes = RuntimeConfiguration(
+            roles.role_changes(self.roles)
+            | {"vehicle": VehicleHandler(self.tuning.parameters), "virtual_traffic": self.traffic}
+        )
         self.beside = OtherVehicleFeed(context, lambda: self.intake.clock_offset_ns)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self.active_world = ActiveWorldNews(
@@ -96,11 +96,12 @@ class Conductor:
             **dict.fromkeys(FINDINGS, self.tuning.heard),
             "route": self.route.take,
             "mirror": lambda item: self.mirror.take(item.message()),
+            "virtual_traffic": lambda item: self.traffic.take(item.message()),
             "event": lambda item: self.events.heard(item.message()),
         }
         """What takes the messages of each channel that `join` subscribes to."""
         self._on_reply: dict[str, Callable[[Reply], object]] = {
-            **dict.fromkeys(("use_world", "use_roles"), lambda _: self.questions.answered()),
+            **dict.fromkeys(ASKED_OF_SIMULATIONS, lambda _: self.questions.answered()),
             **dict.fromkeys(("use_vehicle", "tune"), self._tuning_reply),
             "job": self.rounds.reply,
             "build": lambda item: self.worlds.build_reply(
@@ -126,7 +127,7 @@ class Conductor:
             for channel in keys.TELEMETRY_CHANNELS:
                 self.bus.subscribe(channel, self.mailbox, vehicle=one)
         self.route.join(self.bus, self.mailbox)
-        self.context.subscribe("mirror", "event")
+        self.context.subscribe("mirror", "virtual_traffic", "event")
         self.tuning.join()
         for question in ("set", "mark"):
             self.bus.serve(question, self.mailbox, run=run)
@@ -143,8 +144,6 @@ class Conductor:
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
             self.tell(unplaced(info.reference_point))
-
-    # Messages.
 
     def handle(self, item: object) -> None:
         """Take one item of the mailbox; None, where nothing came, changes nothing.
@@ -211,6 +210,7 @@ class Conductor:
                 self.rounds.tally.not_ready(world_late=intent.world_late)
                 return False
             reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+            reports = self.traffic.met_in(intent, reports, latest.state)
             self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
         return True
 
@@ -220,8 +220,6 @@ class Conductor:
         self.ads.finish()
         if self.intake.end is not None:
             self.intake.counts.settle(self.intake.end.published)
-
-    # Worlds.
 
     def obey(self, instructions: list[Instruction]) -> None:
         """Carry out what the mission says."""
@@ -253,8 +251,6 @@ class Conductor:
         self.tuning.hand_over()
         self.fleet.keep_up()
 
-    # Processes.
-
     @property
     def _near(self) -> tuple[str, ...]:  # those for which a World waits
         return tuple(one for one in self.rounds.dispatcher.workers if one in self.alive)
@@ -272,6 +268,7 @@ class Conductor:
         self.alive.add(process_id)
         if not self.tuning.process_up(process_id):
             self._worker_up(process_id)
+        self.traffic.process_up(process_id)
         if process_id == MIRROR:
             self.active_world.mirror_up()
             self.roles.announce(self.intake.now_stamp_ns)

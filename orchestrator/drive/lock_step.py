@@ -62,6 +62,7 @@ class LockStepLoop:
             conductor.active_world.announce()
             self._wait("the mirror", lambda: not conductor.questions.unanswered)
             self._wait("tuning", lambda: not conductor.tuning.weighing)
+            self._wait("virtual traffic", lambda: not conductor.traffic.is_behind)
             conductor.tuning.take_weighed()
             conductor.make_changes()
             self._wait("changes", lambda: not questions.unanswered and parameters.settled)
@@ -71,6 +72,7 @@ class LockStepLoop:
                 conductor.rounds.tally.due += conductor.mission.wants_rounds
                 if conductor.start_round():
                     self._wait("the round", lambda: not conductor.rounds.open)
+                self._wait("virtual traffic", lambda: not questions.unanswered)
             if self.stop():
                 return False
             if advanced.ended:

@@ -19,6 +19,7 @@ from foretwin.contracts.setup import (
     TuningSetup,
     WorkerSetup,
 )
+from foretwin.orchestrator.drive import traffic_setup as traffic
 from foretwin.orchestrator.drive.watcher_setups import (
     COPILOT,
     RECORDER,
@@ -32,10 +33,7 @@ from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR, SUPERVISOR = "orchestrator", "supervisor"
-ROUTER = "router"
-BUILDER = "builder"
-MIRROR = "mirror"
-TUNING = "tuning"
+ROUTER, BUILDER, MIRROR, TUNING = "router", "builder", "mirror", "tuning"
 VEHICLE = "vehicle"
 ROS2_BESIDE = "ros2-beside"
 
@@ -164,7 +162,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     )
 
 
-def _watcher(made: Callable[[DrivePlan, dict[str, Any]], ProcessSetup]) -> _MakesSetup:
+def _made_by(made: Callable[[DrivePlan, dict[str, Any]], ProcessSetup]) -> _MakesSetup:
     return lambda plan, process_id: made(plan, _base(plan, process_id))
 
 
@@ -237,14 +235,17 @@ PROCESSES = (
     ProcessRow(BUILDER, "orchestrator.worlds.builder_process", "restart", _builder, nice=10),
     ProcessRow("w", "sim_worker", "restart", _worker, how_many=lambda plan: plan.config.workers),
     ProcessRow(MIRROR, "sim_worker", "restart", _worker),
+    ProcessRow(
+        traffic.TRAFFIC, traffic.MODULE, "restart", _made_by(traffic.made), runs=traffic.runs
+    ),
     ProcessRow(TUNING, "sim_worker.analysis.process", "restart", _tuning, nice=10, runs=_tunes),
-    ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _watcher(recorder_setup)),
-    ProcessRow(VIEWER, "viewer", "restart", _watcher(viewer_setup), nice=10),
+    ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _made_by(recorder_setup)),
+    ProcessRow(VIEWER, "viewer", "restart", _made_by(viewer_setup), nice=10),
     ProcessRow(
         COPILOT,
         "viewer.copilot",
         "restart",
-        _watcher(copilot_setup),
+        _made_by(copilot_setup),
         nice=5,
         runs=lambda plan: plan.copilot_port is not None,
     ),

@@ -10,6 +10,8 @@ import msgspec
 from foretwin.orchestrator.context import DriveContext
 
 ANSWER_TIMEOUT_S = 10.0
+ASKED_OF_SIMULATIONS = "use_world", "use_roles", "use_course"
+"""Of the mirror and of virtual traffic: the answer says that it counts."""
 
 
 @dataclass(slots=True)

@@ -54,6 +54,7 @@ def run_record(
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
         "tuning": conductor.tuning.record(),
+        "virtual_traffic": conductor.traffic.record(),
         "free_twin": conductor.mirror.record(),
         "encounters": conductor.beside.encounters.count.record(),
         "clocks_beside": conductor.beside.clocks(),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from foretwin.contracts.roles import CORRECTIONS, ROLES, Correction, Role, UseRoles
-from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
+from foretwin.orchestrator.runtime_configuration.handler import ChangeHandler, Made, RefusedError
 
 
 class RolesInForce:
@@ -76,3 +76,8 @@ class CorrectionHandler:
         self.in_force.correction = next(one for one in CORRECTIONS if one == value)
         self.in_force.announce(stamp_ns)
         return Made(before, value)
+
+
+def role_changes(in_force: RolesInForce) -> dict[str, ChangeHandler]:
+    """Return what makes changes of roles and of the correction, by the first part of their keys."""
+    return {"role": RoleHandler(in_force), "correction": CorrectionHandler(in_force)}

@@ -120,6 +120,19 @@ class LawAbiding:
         ):
             mine[same[0]] = theirs[same[1]]
 
+    def take_over(self, before: LawAbiding, column_of: Indices, shift_m: Array) -> None:
+        """Let those of one future know what they did in columns `column_of` (R,), -1 for who was
+        not there, on paths whose arc lengths are `shift_m` (R,) more; they keep their distance."""
+        place = {column: k for k, column in enumerate(before.columns.tolist())}
+        pairs = [
+            (k, place[column_of[r]])
+            for k, r in enumerate(self.columns.tolist())
+            if int(column_of[r]) in place
+        ]
+        same = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+        self.noticed.take_over(before.noticed, same, shift_m[self.columns[same[0]]])
+        self._keeps[same[0]] = before._keeps[same[1]]
+
     def _for_bends(self, arc: Array, speed: Array) -> Array:
         """Return what brings a driver to the speed that bends allow where it decides next."""
         there = self._table.place(self._on, arc + speed * driver.DECIDE_EVERY_S)

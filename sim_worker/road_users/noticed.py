@@ -52,11 +52,17 @@ class Noticed:
 
     def carry_on(self, before: Noticed, futures: Flags) -> None:
         """Let those of the `futures` (S,) know what they knew before; the others begin anew."""
+        self.take_over(before, self.same_as(before, futures))
+
+    def take_over(self, before: Noticed, same: Indices, shift_m: Array | float = 0.0) -> None:
+        """Let those in places `same` (2, N) here and there know what they knew before, where arc
+        lengths of their paths are `shift_m` (N,) more; the others begin anew."""
         if not len(before._seen):
             return
-        to, of = self.same_as(before, futures)
+        to, of = same
         self._seen = np.zeros((*before._seen.shape[:2], len(self._number)))
         self._seen[:, :, to], self._known[to] = before._seen[:, :, of], before._known[of]
+        self._seen[:, 0, to] += shift_m
         self._count, self._every_s = before._count, before._every_s
         self._late = np.rint(self._reaction_s / self._every_s).astype(np.intp)
 

@@ -115,6 +115,14 @@ class Traffic:
         self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
         self._put()
 
+    def take_over(self, before: Traffic, column_of: Indices, shift_m: Array) -> None:
+        """Let the road users of one future decide as those in columns `column_of` (R,) of other
+        traffic would have gone on, -1 for who was not there; the arc lengths of their paths are
+        `shift_m` (R,) more than there."""
+        there = column_of >= 0
+        self._accel[0, there] = before._accel[0, column_of[there]]
+        self._lawful.take_over(before._lawful, column_of, shift_m)
+
     def step(self, *, time_s: float | Array, dt_s: float) -> None:
         """Advance by `dt_s` from `time_s`, one or (S, 1), with what was decided last."""
         self._now_s = time_s + dt_s
@@ -145,6 +153,10 @@ class Traffic:
         brakes_by = self.crowd.brakes_by_mps2[self._paced]
         clock_s = self._clock_s + now_s
         return self._paces.braked(self._motion, clock_s, self._brakes_at_s, brakes_by)
+
+    def brake_at_most(self, decel_mps2: Array) -> None:
+        """Let nobody brake harder than so (R,) by what was decided last."""
+        np.maximum(self._accel, -decel_mps2, out=self._accel)
 
     def decide(self, ego: EgoBoxes, red_arcs_m: Array, *, every_s: float = DECIDE_EVERY_S) -> None:
         """Let law-abiding road users choose their accelerations, as they do `every_s`; `red_arcs_m`

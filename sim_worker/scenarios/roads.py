@@ -223,7 +223,7 @@ class RoadNetwork:
                 break
             last = onward[0]
             chain.append(last)
-            walked += max(0.5, length(self._line(last)))
+            walked += max(0.5, length(self.line(last)))
         return chain
 
     def _on_ring(self, id_: str, entering: Connection) -> bool:
@@ -237,8 +237,8 @@ class RoadNetwork:
         self, name: str, *, before: Sequence[str], middle: Sequence[str], after: Sequence[str]
     ) -> Way:
         """Return the way along lanes and connections; `middle` is what lies in the junction."""
-        parts = [self._line(i) for i in (*before, *middle, *after)]
-        limits = [np.full(len(self._line(i)), self._limit(i)) for i in (*before, *middle, *after)]
+        parts = [self.line(i) for i in (*before, *middle, *after)]
+        limits = [np.full(len(self.line(i)), self.limit_mps(i)) for i in (*before, *middle, *after)]
         xy, limit = np.concatenate(parts), np.concatenate(limits)
         keep = apart(xy, tolerance_m=0.02)
         count = sum(len(part) for part in parts[: len(before)])
@@ -258,38 +258,38 @@ class RoadNetwork:
             return [lane, after.id]
         return [lane, after.from_lane_id, after.id]
 
-    def _line(self, id_: str) -> Array:
-        lane = self.lanes.get(id_)
-        return lane.centerline if lane is not None else self.connections[id_].centerline
+    def line(self, id_: str) -> Array:
+        """Return the middle (N, 2) of a lane or connection."""
+        return (self.lanes.get(id_) or self.connections[id_]).centerline
 
-    def _limit(self, id_: str) -> float:
-        lane = self.lanes.get(id_)
-        if lane is None:
-            lane = self.lanes[self.connections[id_].from_lane_id]
+    def limit_mps(self, id_: str) -> float:
+        """Return the speed limit of a lane, or of the one that a connection comes from."""
+        lane = self.lanes.get(id_) or self.lanes[self.connections[id_].from_lane_id]
         return float(lane.speed_limit_mps.value)
 
     def _led(self, lane_id: str, *, back: bool) -> list[str]:
         """Return a lane and what leads to it, or on from it, the straightest way, in its order."""
         links, far_m = (self._into, APPROACH_M) if back else (self._out_of, DEPARTURE_M)
-        chain, walked = [lane_id], length(self._line(lane_id))
+        chain, walked = [lane_id], length(self.line(lane_id))
 
         def bend(id_: str) -> float:
-            lines = self._line(chain[-1]), self._line(id_)
+            lines = self.line(chain[-1]), self.line(id_)
             return bend_between(*(lines[::-1] if back else lines))
 
         while walked < far_m:
-            more = [i for i in links.get(chain[-1], ()) if i not in chain and self._drivable(i)]
+            more = [i for i in links.get(chain[-1], ()) if i not in chain and self.drivable(i)]
             if not more:
                 break
             chain.append(min(more, key=bend))
-            walked += length(self._line(chain[-1]))
+            walked += length(self.line(chain[-1]))
         return chain[::-1] if back else chain
 
     def after(self, id_: str) -> tuple[str, ...]:
         """Return the lanes and connections that begin where a lane or connection ends."""
         return tuple(self._out_of.get(id_, ()))
 
-    def _drivable(self, id_: str) -> bool:
+    def drivable(self, id_: str) -> bool:
+        """Whether a lane or connection is for cars."""
         if id_ in self.lanes:
             return self._car(id_)
         return id_ in self.connections and self._car(self.connections[id_].from_lane_id)

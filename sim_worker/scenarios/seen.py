@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.futures import SeenRoadUser
 from foretwin.contracts.world import Lane
@@ -28,7 +29,7 @@ class SeenActors:
 
     def __init__(self, network: RoadNetwork) -> None:
         self._network = network
-        self._lanes = _Lanes(tuple(network.lanes.values()))
+        self._lanes = LaneSearch(tuple(network.lanes.values()))
         self._path_of_lane: dict[str, FrenetPath] = {}
 
     def actors(self, users: Sequence[SeenRoadUser]) -> tuple[Player, ...]:
@@ -40,7 +41,7 @@ class SeenActors:
     def _lane_path(self, user: SeenRoadUser) -> FrenetPath | None:
         if user.kind == "pedestrian" or user.speed_mps < _STANDS_MPS:
             return None
-        lane = self._lanes.under(user)
+        lane = self._lanes.under(np.array([user.x_m, user.y_m]), user.yaw_rad)
         if lane is None:
             return None
         if lane.id not in self._path_of_lane:
@@ -71,7 +72,7 @@ def _actor(number: int, user: SeenRoadUser, path: FrenetPath | None) -> Player:
     )
 
 
-class _Lanes:
+class LaneSearch:
     """The steps of all lanes of a World in one array, to find the lane under a road user."""
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
@@ -84,9 +85,9 @@ class _Lanes:
         steps = np.array([len(line) - 1 for line in lines], dtype=np.intp)
         self._lane_of = np.repeat(np.arange(len(lines)), steps)
 
-    def under(self, user: SeenRoadUser) -> Lane | None:
-        """Return the lane that a road user is on and heads along, the nearest of them."""
-        to_user = np.array([user.x_m, user.y_m]) - self._from
+    def under(self, xy_m: Array, yaw_rad: float) -> Lane | None:
+        """Return the lane that a road user at (2,) is on and heads along, the nearest of them."""
+        to_user = xy_m - self._from
         along = np.clip((to_user * self._steps).sum(axis=1) / self._square, 0.0, 1.0)
         away = np.hypot(*(to_user - along[:, None] * self._steps).T)
         best, best_m = None, _LANE_WITHIN_M
@@ -94,7 +95,7 @@ class _Lanes:
         for lane in np.unique(self._lane_of[near]):
             mine = near[self._lane_of[near] == lane]
             step = mine[away[mine].argmin()]
-            turned = abs(float(wrap_angle(self._heading[step] - user.yaw_rad)))
+            turned = abs(float(wrap_angle(self._heading[step] - yaw_rad)))
             if away[step] < best_m and turned < _LANE_WITHIN_RAD:
                 best, best_m = self._lanes[lane], float(away[step])
         return best

@@ -18,7 +18,7 @@ from foretwin.contracts.keys import (
     vehicle_of_key,
 )
 
-COVERS = ("foretwin.contracts.bounds",)
+COVERS = ("foretwin.contracts.bounds", "foretwin.contracts.channel")
 
 IDS = {"vehicle": "ego", "run": "r1", "process": "w0"}
 
@@ -67,7 +67,7 @@ def test_how_often_each_is_said() -> None:
         8: {"comparison"},
         5: {"progress"},
         4: {"gap"},
-        2: {"job", "round", "plan_comparison", "worker_status"},
+        2: {"use_course", "job", "round", "plan_comparison", "worker_status"},
         1: {"signals", "route", "clock", "vehicle_clock"},
         0.2: {"identification"},
     }

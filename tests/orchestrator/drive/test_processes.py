@@ -25,7 +25,11 @@ from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
 from tests.orchestrator.trip import town_plan
 
-COVERS = ("foretwin.orchestrator.drive.watcher_setups",)
+COVERS = (
+    "foretwin.orchestrator.drive.traffic_setup",
+    "foretwin.orchestrator.drive.watcher_setups",
+    "foretwin.orchestrator.other_vehicle_config",
+)
 
 
 def configured(plan: DrivePlan, **settings: object) -> DrivePlan:

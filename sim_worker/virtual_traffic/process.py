@@ -1,0 +1,108 @@
+"""Virtual traffic on the bus: the car's states and its course in, road users out."""
+
+from __future__ import annotations
+
+import logging
+import time
+from pathlib import Path
+
+from foretwin.contracts.bus import Bus, Mailbox, Received, Request
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.guard import Refused
+from foretwin.contracts.lights import ShownLights
+from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.setup import TrafficSetup
+from foretwin.contracts.trace import span
+from foretwin.contracts.virtual_traffic import TrafficCourse
+from foretwin.sim_worker.virtual_traffic.going import GoingTraffic
+from foretwin.sim_worker.virtual_traffic.model import ModelTraffic
+from foretwin.sim_worker.world_file import load_world
+
+_DEPTH = 4096
+_IDLE_S = 0.2
+_LAST_WORDS_S, _QUIET_S = 0.5, 0.1
+"""After the run's end, as of the mirror."""
+
+log = logging.getLogger("traffic")
+
+
+class TrafficWorker:
+    """Feeds a GoingTraffic from messages; one that cannot be used is logged and passed over.
+
+    In lock step lights are those of the course alone: what comes from another process beside the
+    states must not decide by which of the two is faster.
+    """
+
+    def __init__(self, setup: TrafficSetup, bus: Bus, *, refusals: Refusals | None = None) -> None:
+        self._setup, self._bus = setup, bus
+        self._refusals = Refusals() if refusals is None else refusals
+        self._world_id: str | None = None
+        choice = setup.traffic
+        source = ModelTraffic(setup.vehicle, count=choice.count, seed=setup.seed)
+        self.going = GoingTraffic(source, setup.vehicle)
+
+    def handle(self, item: Received | Request) -> None:
+        """Take one message or question; never raises."""
+        try:
+            message = item.message()
+            match message:
+                case VehicleState():
+                    for users in self.going.take_state(message):
+                        self._bus.publish("virtual_traffic", users, run=self._setup.run_id)
+                case ShownLights():
+                    self.going.take_lights(message)
+                case TrafficCourse():
+                    self._take_course(message)
+            if isinstance(item, Request):
+                item.reply(message)
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
+            if isinstance(item, Request):
+                item.refuse(one_line(refused))
+        except Exception as error:
+            log.exception("message on %s passed over", item.key)
+            if isinstance(item, Request):
+                item.refuse(one_line(error))
+
+    def _take_course(self, told: TrafficCourse) -> None:
+        world = None
+        if told.world_id is not None and told.world_id != self._world_id:
+            world = load_world(Path(self._setup.worlds_dir), told.world_id)
+            self._world_id = told.world_id
+        self.going.take_course(told, world)
+
+
+def serve_traffic(setup: TrafficSetup, bus: Bus, life: ProcessLife) -> None:
+    """Let virtual road users go on beside the car until the run is over."""
+    mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
+    worker = TrafficWorker(setup, bus, refusals=life.refusals)
+    bus.serve("use_course", mailbox, run=setup.run_id, process=setup.process_id)
+    if not setup.bus.lossless:
+        bus.subscribe("lights", mailbox, run=setup.run_id)
+    bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
+    life.ready()
+    while not life.over:
+        _take(worker, mailbox.take(_IDLE_S))
+        for _ in range(len(mailbox)):
+            _take(worker, mailbox.take())
+    deadline = time.monotonic() + _LAST_WORDS_S
+    while setup.bus.lossless or time.monotonic() < deadline:
+        item = mailbox.take_last(_QUIET_S if setup.bus.lossless else 0.0)
+        if item is None:
+            break
+        _take(worker, item)
+    if mailbox.dropped or worker.going.missed:
+        log.warning(
+            "virtual traffic passed over %d messages and left out %d steps",
+            mailbox.dropped,
+            worker.going.missed,
+        )
+
+
+def _take(worker: TrafficWorker, item: object) -> None:
+    if isinstance(item, Received | Request):
+        with span(item.channel):
+            worker.handle(item)

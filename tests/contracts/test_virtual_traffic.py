@@ -1,0 +1,24 @@
+"""What may be asked of virtual traffic."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from foretwin.contracts.virtual_traffic import MOST_COUNT, VirtualTraffic
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, None),
+        ({"count": MOST_COUNT}, None),
+        ({"count": 0}, "count 0: 1 to 500"),
+        ({"count": MOST_COUNT + 1}, "count 501: 1 to 500"),
+        ({"seed": -1}, "seed -1: 0 to 9223372036854775807"),
+        ({"seed": 0}, None),
+    ],
+)
+def test_what_cannot_be_is_said(changes: dict[str, int], said: str | None) -> None:
+    chosen = msgspec.convert({"source": "model"} | changes, VirtualTraffic)
+    assert chosen.trouble() == said

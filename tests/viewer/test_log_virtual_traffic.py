@@ -1,0 +1,61 @@
+"""Virtual road users on screen: boxes where they are, at 10 Hz, and none once they are gone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_pose
+from foretwin.viewer.log_virtual_traffic import PATH, VirtualTrafficLog
+
+FRAME = LocalFrame(GeoPoint(52.5, 13.4))
+
+
+def users(*places: tuple[float, float, float]) -> RoadUsers:
+    found = []
+    for x, y, yaw in places:
+        pose = geo_pose(FRAME, x, y, yaw)
+        found.append(
+            RoadUser(
+                user_id=f"{x}",
+                kind="van",
+                position=pose.position,
+                yaw_rad=pose.yaw_rad,
+                speed_mps=1.0,
+                length_m=6.0,
+                width_m=2.0,
+                virtual=True,
+            )
+        )
+    return RoadUsers(stamp_ns=0, users=tuple(found))
+
+
+def cells(batch: object) -> list[list[float]]:
+    return batch.as_arrow_array().to_pylist()  # type: ignore[attr-defined,no-any-return]
+
+
+def test_boxes_stand_where_they_are() -> None:
+    (row,) = VirtualTrafficLog(FRAME).rows(users((200.0, -30.0, 0.0), (0.0, 50.0, math.pi / 2)), 0)
+    boxes = row.components
+    assert row.path == PATH
+    assert isinstance(boxes, rr.Boxes3D)
+    assert np.array(cells(boxes.centers))[:, :2] == pytest.approx(
+        np.array([[200.0, -30.0], [0.0, 50.0]]), abs=1e-3
+    )
+    assert np.array(cells(boxes.half_sizes)) == pytest.approx(np.array([[3.0, 1.0, 0.8]] * 2))
+    assert np.array(cells(boxes.quaternions))[:, 2] == pytest.approx(
+        [0.0, math.sqrt(0.5)], abs=1e-5
+    )
+
+
+def test_they_are_drawn_ten_times_a_second_and_taken_away_at_once() -> None:
+    log = VirtualTrafficLog(FRAME)
+    drawn = [bool(log.rows(users((1.0, 2.0, 0.0)), k * 50_000_000)) for k in range(6)]
+    assert drawn == [True, False] * 3
+    (row,) = log.rows(users(), 260_000_000)
+    assert isinstance(row.components, rr.Clear)
+    assert log.rows(users((1.0, 2.0, 0.0)), 270_000_000)

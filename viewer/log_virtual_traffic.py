@@ -1,0 +1,49 @@
+"""Virtual traffic as rows: boxes in a colour of their own, whose name says that nobody is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from foretwin.contracts.drive import RoadUsers
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.viewer.colours import VIRTUAL
+from foretwin.viewer.log_drive import PERIOD_NS
+from foretwin.viewer.rows import Row
+
+PATH = "world/virtual_traffic"
+_HEIGHT_M = 1.6
+"""Of all: they do not say how high they are."""
+
+
+class VirtualTrafficLog:
+    """Turns road users of the going simulation into rows, at most at about 10 Hz of drive time."""
+
+    def __init__(self, drive_frame: LocalFrame) -> None:
+        self._frame = drive_frame
+        self._last_ns: int | None = None
+
+    def rows(self, message: RoadUsers, drive_ns: int) -> list[Row]:
+        """Return the boxes of all, none where there is nobody any more."""
+        users = message.users
+        if not users:
+            self._last_ns = None
+            return [Row(PATH, drive_ns, rr.Clear(recursive=False))]
+        if self._last_ns is not None and 0 <= drive_ns - self._last_ns < PERIOD_NS:
+            return []
+        self._last_ns = drive_ns
+        degrees = np.array([(user.position.lat_deg, user.position.lon_deg) for user in users]).T
+        xy = local_from_geo(self._frame, *degrees)
+        yaw = local_from_geo_yaw(self._frame, np.array([one.yaw_rad for one in users]), *degrees)
+        size = np.array([(one.length_m, one.width_m, _HEIGHT_M) for one in users])
+        turned = np.zeros((len(users), 4))
+        turned[:, 2], turned[:, 3] = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
+        boxes = rr.Boxes3D(
+            half_sizes=0.5 * size,
+            centers=np.column_stack([xy, np.full(len(users), 0.5 * _HEIGHT_M + 0.05)]),
+            quaternions=turned,
+            colors=[VIRTUAL],
+            radii=0.04,
+            fill_mode="majorwireframe",
+        )
+        return [Row(PATH, drive_ns, boxes)]
