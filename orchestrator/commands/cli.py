@@ -40,6 +40,7 @@ from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_secure import doctor
 from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
+from foretwin.orchestrator.commands.cli_standin import anchor as anchor_poses
 from foretwin.orchestrator.commands.cli_standin import standin
 from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
@@ -250,6 +251,7 @@ for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, wor
     app.command()(command)
 
 app.command("config")(config_files)
+app.command("anchor")(anchor_poses)
 app.command("set")(set_value)
 app.add_typer(secure_commands, name="secure")
 

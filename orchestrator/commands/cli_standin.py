@@ -1,4 +1,4 @@
-"""The command line of the stand-in car on a lot."""
+"""The command line of cars on lots: where a lot is in the World, and the stand-in on it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,24 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from foretwin.orchestrator.commands.cli_options import MapArgument
+
+
+def anchor(
+    map_file: MapArgument,
+    at: Annotated[str, typer.Option(help="LAT,LON: on the lane, near a junction")],
+    before_m: Annotated[
+        float, typer.Option("--before", help="metres before the lane's end")
+    ] = 60.0,
+) -> None:
+    """Print where a lot can be anchored: poses on lanes, as the [world] of an anchor file.
+
+    Example: foretwin anchor MAP.osm --at 52.5127,13.3914
+    """
+    from foretwin.orchestrator.commands.anchor import show_anchors
+
+    show_anchors(map_file, at=at, before_m=before_m)
 
 
 def standin(

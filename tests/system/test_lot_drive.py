@@ -91,7 +91,7 @@ def test_it_stands_before_a_pedestrian_whom_only_the_world_holds(
         folder.mkdir()
         with on_the_lot(folder, dialect=dialect, objects=objects) as (report, log, kept_s):
             print(dialect, report, f"kept waiting {kept_s:.2f} s")
-            if "shut: " in log and "150 ms" in log:
+            if "shut: " in log and kept_s > 1.0:
                 continue
             assert report["brakes"] == ["pedestrian"]
             assert report["stood_before_m"] == pytest.approx(2.0, abs=1.0)

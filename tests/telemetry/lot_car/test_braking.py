@@ -37,6 +37,8 @@ ANCHOR = Anchor(
     lot=AnchorPose(lat_deg=52.4739, lon_deg=13.395, yaw_deg=2.0),
     world=AnchorPose(lat_deg=52.5128636, lon_deg=13.3914225, yaw_deg=-84.21),
 )
+FENCE_M = ((-40.0, -60.0), (110.0, -60.0), (110.0, 60.0), (-40.0, 60.0))
+"""Of the lot, from its point."""
 MAPPING = """
 dialect = "{dialect}"
 antenna_m = [0.95, 0.0, 1.45]
@@ -130,8 +132,7 @@ class Meeting:
         at = geo_pose(ANCHOR.world.frame, ahead_m * cos, ahead_m * sin, 0.0).position
         text = MAPPING.format(dialect=dialect, objects=objects, lat=at.lat_deg, lon=at.lon_deg)
         mapping = parse_mapping(text, name="m.toml")
-        corners = ((-400.0, -100.0), (400.0, -100.0), (400.0, 100.0), (-400.0, 100.0))
-        fence = [geo_pose(ANCHOR.lot.frame, *one, 0.0).position for one in corners]
+        fence = [geo_pose(ANCHOR.lot.frame, *one, 0.0).position for one in FENCE_M]
         self.gateway = Gateway(
             mapping, bus=self.bus, foreign=self.wire, run_id="r", vehicle_id="ego",
             drive_frame=ANCHOR.world.frame, flag_on=True, order_keys=self.orders.keys,
@@ -215,6 +216,18 @@ def test_when_injection_ends_it_goes_on_by_what_it_sees_itself():
     meeting.go_on(4.0)
     assert meeting.car.report().driven_m > stood_at_m + 2.0
     assert meeting.gateway.report()["sent"]["/virtual/objects"] == meeting.car.report().lists
+
+
+def test_a_list_that_is_a_second_old_says_nothing_of_now():
+    meeting = Meeting("ros2dds", "PredictedObjects", ahead_m=12.0)
+    meeting.go_on(6.0)
+    stood_at_m = meeting.car.report().driven_m
+    assert meeting.car.report().stood_before_m is not None
+    for seconds, goes_on in ((0.9, False), (3.0, True)):
+        for _ in range(round(50 * seconds)):
+            meeting.wire.now_ns += 20 * MS
+            meeting.car.step(0.0)
+        assert (meeting.car.report().driven_m > stood_at_m + 0.2) == goes_on
 
 
 def test_without_a_word_it_stands_and_says_its_samples():

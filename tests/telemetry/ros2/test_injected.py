@@ -83,6 +83,15 @@ def test_the_newest_thousands_are_remembered():
     assert injected.without(last).users == ()
 
 
+def test_one_that_is_shown_again_and_again_is_not_forgotten_for_new_ones():
+    injected = shown(walker())
+    for begin in range(0, 4500, 500):
+        others = (walker(user_id=f"w{begin + number}") for number in range(500))
+        injected.note(RoadUsers(stamp_ns=6 * S, users=(walker(), *others)))
+    echo = predicted_from_users(RoadUsers(stamp_ns=6 * S, users=(walker(),)), MAP)
+    assert injected.without(users_from_predicted(echo, MAP, stamp_ns=6 * S)).users == ()
+
+
 def injected_uuid(number: int) -> Any:
     from foretwin.telemetry.ros_messages.shapes import uuid_from
 
