@@ -91,7 +91,6 @@ class RayWorld:
         geoms = slice(self._first, self._first + count)
         model.geom_size[geoms] = half
         model.geom_rbound[geoms] = np.linalg.norm(half, axis=1)
-        model.geom_aabb[geoms] = np.hstack([np.zeros((count, 3)), half])
         self._reflectivity[geoms] = bodies.reflectivity
         self._data.mocap_pos[:, 2] = _AWAY_M
         self._data.mocap_pos[:count, 2] = half[:, 2]

@@ -173,6 +173,25 @@ def test_a_body_that_drives_moves_on_during_a_turn() -> None:
     assert points[points[:, 4] == 2][:, 0] == pytest.approx(17.0, abs=0.1)
 
 
+def test_who_comes_from_the_side_is_seen_where_it_is_when_the_rays_are() -> None:
+    from_left = bodies((0.0, 20.0, -math.pi / 2.0, 4.0, 2.0, 1.6, 20.0))
+    points = scan(RayWorld(), exact(), HERE, from_left).points
+    level = points[(points[:, 4] == 2) & (np.abs(points[:, 0]) < 0.5)]
+
+    # To the left is a quarter of a turn from the rear: 0.025 s, in which it comes 0.5 m nearer.
+    assert len(level) > 2
+    assert level[:, 1] == pytest.approx(17.5, abs=0.05)
+
+
+def test_how_far_is_seen_goes_by_the_square_root_of_the_light() -> None:
+    sensor = exact(elevation_deg=(0.0,), seen_to_m=50.0, seen_reflectivity=0.5)
+    for away_m, seen in ((34.0, True), (37.0, False)):
+        grey = bodies((away_m + 0.5, 0.0, 0.0, 1.0, 60.0, 3.0, 0.0))
+        grey = grey._replace(reflectivity=np.array([0.25]))
+        found = scan(RayWorld(), sensor, HERE, grey)
+        assert np.isfinite(found.range_m[180, 0]) == seen
+
+
 def test_the_darker_and_the_more_slanting_a_surface_the_nearer_it_must_be() -> None:
     sensor = exact(elevation_deg=(0.0,), seen_to_m=50.0, seen_reflectivity=0.5)
     dark = bodies((45.0, 0.0, 0.0, 1.0, 60.0, 3.0, 0.0))

@@ -28,6 +28,7 @@ def test_each_field_is_found_where_it_is_said_to_be() -> None:
     }
     assert found == {name: points[:, k].tolist() for k, name in enumerate(POINT_COLUMNS)}
     assert (ros.height, ros.width, ros.header.frame_id) == (1, 3, "base_link")
+    assert ros.is_dense
     assert (ros.header.stamp.sec, ros.header.stamp.nanosec) == (2, 500_000_000)
 
 
