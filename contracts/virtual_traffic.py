@@ -10,7 +10,7 @@ from foretwin.contracts.drive import SignalState
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.numbers import MAX_SEED
 
-TrafficSource = Literal["off", "model"]
+TrafficSource = Literal["off", "model", "scenario", "sumo"]
 MOST_COUNT = 500
 """Road users of one going simulation; a message may hold ten times as many."""
 
@@ -19,9 +19,14 @@ class VirtualTraffic(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """Road users of one going simulation around the car, who exist nowhere else."""
 
     source: TrafficSource = "off"
-    """What moves them: law-abiding drivers on the World's lanes (model)."""
+    """What moves them: law-abiding drivers on the World's lanes (model), a scenario at each
+    junction that it is for (scenario), or SUMO in a district (sumo)."""
+    scenario: str = "cpta"
+    """Of source scenario: an id of the catalogue, or a TOML file."""
+    network: str | None = None
+    """Of source sumo: the district as OpenDRIVE that foretwin wrote, or SUMO's .net.xml of it."""
     count: int = 20
-    """So many there are."""
+    """So many there are; of source scenario those that it has."""
     seed: int | None = None
     """Of everything that is drawn; None is that of the drive."""
 
@@ -31,6 +36,8 @@ class VirtualTraffic(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
             return f"count {self.count}: 1 to {MOST_COUNT}"
         if self.seed is not None and not 0 <= self.seed <= MAX_SEED:
             return f"seed {self.seed}: 0 to {MAX_SEED}"
+        if self.source == "sumo" and self.network is None:
+            return 'source sumo needs network = "FILE.xodr", as foretwin world --bbox writes it'
         return None
 
 

@@ -16,8 +16,8 @@ KNOWN_HOLES = {"lxml": "6.0.4", "pyarrow": "23.0.0"}
 """The newest version of a package with a hole that concerns us."""
 
 
-APART = {"ray"}
-"""Extras that `make setup` does not install: 264 MB, which its own judge alone needs."""
+APART = {"ray", "sumo"}
+"""Extras that `make setup` does not install: 264 and 510 MB, which their own judges alone need."""
 
 
 def requirements() -> list[Requirement]:

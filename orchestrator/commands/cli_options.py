@@ -88,7 +88,9 @@ ProgressTableOption = Annotated[
 ]
 VirtualTrafficOption = Annotated[
     str | None,
-    typer.Option(help="road users who exist nowhere else: model, or off [default: off]"),
+    typer.Option(
+        help="road users who exist nowhere else: model, scenario, sumo, or off [default: off]"
+    ),
 ]
 EndpointOption = Annotated[
     str | None,

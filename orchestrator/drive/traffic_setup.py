@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.setup import TrafficSetup
+from foretwin.contracts.virtual_traffic import VirtualTraffic
 from foretwin.orchestrator.plan import DrivePlan
+from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.virtual_traffic.staged import check_going
+from foretwin.sim_worker.virtual_traffic.sumo import NEEDS_SUMO, is_there
 
 TRAFFIC, MODULE = "traffic", "sim_worker.virtual_traffic"
 
@@ -25,3 +31,14 @@ def made(plan: DrivePlan, base: dict[str, Any]) -> TrafficSetup:
         traffic=chosen,
         seed=plan.config.seed if chosen.seed is None else chosen.seed,
     )
+
+
+def check(chosen: VirtualTraffic) -> None:
+    """Raise UserError for a scenario, a network or a SUMO that is not there, before a drive."""
+    if chosen.source == "scenario":
+        check_going(find_scenario(chosen.scenario))
+    if chosen.source == "sumo":
+        if not is_there():
+            raise UserError(NEEDS_SUMO)
+        if not Path(chosen.network or "").is_file():
+            raise UserError(f"virtual_traffic: network {chosen.network}: no such file")

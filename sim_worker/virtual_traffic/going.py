@@ -13,7 +13,13 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, VehicleState
-from foretwin.contracts.frames import GeoPoint, geo_from_local, grid_convergence, wrap_angle
+from foretwin.contracts.frames import (
+    GeoPoint,
+    LocalFrame,
+    geo_from_local,
+    grid_convergence,
+    wrap_angle,
+)
 from foretwin.contracts.lights import ShownLights
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.virtual_traffic import TrafficCourse
@@ -69,7 +75,8 @@ class GoingTraffic:
             if self._next_ns is not None:
                 self.missed += max(0, passed_ns // STEP_NS)
             self._next_ns = state.stamp_ns
-        row = local_state(state, self._world.frame, self._vehicle)
+        assert self._source.frame is not None
+        row = local_state(state, self._source.frame, self._vehicle)
         while self._next_ns <= state.stamp_ns:
             found.append(self._step(row, self._next_ns))
             self._next_ns += STEP_NS
@@ -88,10 +95,10 @@ class GoingTraffic:
         return [RoadUsers(stamp_ns=stamp_ns, users=())] if was_on and not told.on else []
 
     def _step(self, car: Array, stamp_ns: int) -> RoadUsers:
-        assert self._world is not None
+        assert self._source.frame is not None
         time_s = (stamp_ns - self._start_ns) * 1e-9
         users = self._source.step(car, time_s=time_s, colours=self._colours(time_s))
-        return RoadUsers(stamp_ns=stamp_ns, users=_on_earth(users, self._world))
+        return RoadUsers(stamp_ns=stamp_ns, users=_on_earth(users, self._source.frame))
 
     def _colours(self, time_s: float) -> dict[str, SignalColour]:
         """Return what lights show: as heard, else by the World's plans."""
@@ -108,12 +115,12 @@ class GoingTraffic:
         return found
 
 
-def _on_earth(users: tuple[VirtualUser, ...], world: World) -> tuple[RoadUser, ...]:
+def _on_earth(users: tuple[VirtualUser, ...], frame: LocalFrame) -> tuple[RoadUser, ...]:
     if not users:
         return ()
     place = np.array([(user.x_m, user.y_m, user.yaw_rad) for user in users])
-    lat, lon = geo_from_local(world.frame, place[:, :2]).T
-    yaw = wrap_angle(place[:, 2] - grid_convergence(world.frame, lat, lon))
+    lat, lon = geo_from_local(frame, place[:, :2]).T
+    yaw = wrap_angle(place[:, 2] - grid_convergence(frame, lat, lon))
     return tuple(
         RoadUser(
             user_id=user.user_id,

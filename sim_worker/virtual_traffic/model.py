@@ -12,6 +12,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.drive import RoadUserKind, SignalColour
+from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
@@ -74,6 +75,11 @@ class ModelTraffic:
         self._stale = True
         """Whether who drives where is no longer as the simulation has it."""
         self._colours: Mapping[str, SignalColour] = {}
+
+    @property
+    def frame(self) -> LocalFrame | None:
+        """That of the World in force."""
+        return None if self._roads is None else self._roads.network.world.frame
 
     def use_world(self, world: World) -> None:
         """Go on in another World; ways are led on along its lanes where they reach them."""

@@ -16,8 +16,12 @@ from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import TrafficSetup
 from foretwin.contracts.trace import span
 from foretwin.contracts.virtual_traffic import TrafficCourse
+from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.virtual_traffic.going import GoingTraffic
 from foretwin.sim_worker.virtual_traffic.model import ModelTraffic
+from foretwin.sim_worker.virtual_traffic.source import TrafficSource
+from foretwin.sim_worker.virtual_traffic.staged import ScenarioTraffic
+from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, net_of
 from foretwin.sim_worker.world_file import load_world
 
 _DEPTH = 4096
@@ -39,9 +43,7 @@ class TrafficWorker:
         self._setup, self._bus = setup, bus
         self._refusals = Refusals() if refusals is None else refusals
         self._world_id: str | None = None
-        choice = setup.traffic
-        source = ModelTraffic(setup.vehicle, count=choice.count, seed=setup.seed)
-        self.going = GoingTraffic(source, setup.vehicle)
+        self.going = GoingTraffic(_source(setup), setup.vehicle)
 
     def handle(self, item: Received | Request) -> None:
         """Take one message or question; never raises."""
@@ -73,6 +75,20 @@ class TrafficWorker:
             world = load_world(Path(self._setup.worlds_dir), told.world_id)
             self._world_id = told.world_id
         self.going.take_course(told, world)
+
+
+def _source(setup: TrafficSetup) -> TrafficSource:
+    chosen, vehicle, seed = setup.traffic, setup.vehicle, setup.seed
+    match chosen.source:
+        case "scenario":
+            return ScenarioTraffic(vehicle, find_scenario(chosen.scenario), seed=seed)
+        case "sumo":
+            assert chosen.network is not None
+            folder = Path(setup.worlds_dir).parent / "processes"
+            net = net_of(Path(chosen.network), folder)
+            return SumoTraffic(vehicle, net, count=chosen.count, seed=seed)
+        case _:
+            return ModelTraffic(vehicle, count=chosen.count, seed=seed)
 
 
 def serve_traffic(setup: TrafficSetup, bus: Bus, life: ProcessLife) -> None:

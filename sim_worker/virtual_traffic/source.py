@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind, SignalColour
+from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.world import World
 
 STEP_S = 0.05
@@ -29,8 +30,12 @@ class VirtualUser(NamedTuple):
 class TrafficSource(Protocol):
     """A going simulation: a state machine without a clock, the same from the same calls."""
 
+    @property
+    def frame(self) -> LocalFrame | None:
+        """The plane of all places, None where there is none yet."""
+
     def use_world(self, world: World) -> None:
-        """Go on in another World, in its frame: nobody jumps."""
+        """Go on in another World: nobody jumps."""
 
     def use_path(self, xy_m: Array) -> None:
         """Take where the car will drive (N, 2)."""

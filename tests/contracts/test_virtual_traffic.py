@@ -17,8 +17,12 @@ from foretwin.contracts.virtual_traffic import MOST_COUNT, VirtualTraffic
         ({"count": MOST_COUNT + 1}, "count 501: 1 to 500"),
         ({"seed": -1}, "seed -1: 0 to 9223372036854775807"),
         ({"seed": 0}, None),
+        (
+            {"source": "sumo"},
+            'source sumo needs network = "FILE.xodr", as foretwin world --bbox writes it',
+        ),
     ],
 )
-def test_what_cannot_be_is_said(changes: dict[str, int], said: str | None) -> None:
+def test_what_cannot_be_is_said(changes: dict[str, int | str], said: str | None) -> None:
     chosen = msgspec.convert({"source": "model"} | changes, VirtualTraffic)
     assert chosen.trouble() == said

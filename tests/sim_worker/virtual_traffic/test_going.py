@@ -10,7 +10,7 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUsers, SignalColour, SignalState
-from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.lights import ShownLight, ShownLights
 from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.virtual_traffic import TrafficCourse
@@ -29,6 +29,7 @@ class Noted:
     """A source with one road user, who is where the car is; notes what it is told."""
 
     def __init__(self) -> None:
+        self.frame: LocalFrame | None = None
         self.worlds: list[str] = []
         self.paths = 0
         self.times_s: list[float] = []
@@ -36,6 +37,7 @@ class Noted:
 
     def use_world(self, world: World) -> None:
         self.worlds.append(world.id)
+        self.frame = world.frame
 
     def use_path(self, xy_m: Array) -> None:
         self.paths += 1
