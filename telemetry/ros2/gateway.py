@@ -28,10 +28,12 @@ from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.lot_guard import LotGuard
-from foretwin.telemetry.ros2.mapping import Mapping, OutRow, Source
+from foretwin.telemetry.ros2.mapping import Mapping
+from foretwin.telemetry.ros2.merged_objects import MergedObjects
 from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
 from foretwin.telemetry.ros2.orders import Orders
 from foretwin.telemetry.ros2.outwards import Outwards
+from foretwin.telemetry.ros2.rows import OutRow, Source
 from foretwin.telemetry.ros2.safety import VehicleGate
 from foretwin.telemetry.ros2.sender import RosSender
 from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
@@ -82,17 +84,13 @@ class Gateway:
         self.inwards = Inwards(mapping, anchor)
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
         self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id, anchor=anchor)
+        limits = mapping.towards_vehicle
         self.gate = VehicleGate(
-            mapping.towards_vehicle,
-            config_on=mapping.towards_vehicle.enabled,
-            flag_on=flag_on,
-            trouble=self._lot_trouble,
+            limits, config_on=limits.enabled, flag_on=flag_on, trouble=self._lot_trouble
         )
         self.held: Counter[str] = Counter()
         """By topic, messages towards the vehicle that were not sent."""
-        self._virtual = VirtualObjects(
-            at_most=mapping.towards_vehicle.max_objects, placed=mapping.placed
-        )
+        self._virtual = VirtualObjects(at_most=limits.max_objects, placed=mapping.placed)
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self.refusals = Refusals() if refusals is None else refusals
         """Of what came from the run's side."""
@@ -101,6 +99,7 @@ class Gateway:
             mapping.mirrored, car=car, drive_frame=drive_frame, alt_m=alt_m
         )
         self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
+        self._merged = MergedObjects(mapping.merged, frame=drive_frame)
         self._inbox, self._views = Mailbox(2048), Mailbox(256)
         self._orders: Orders | None = None
         self._logged_gate = self.gate.state
@@ -109,9 +108,7 @@ class Gateway:
             foreign.subscribe(key, self._inbox, history=history)
         bus.serve("info", self._views, vehicle=vehicle_id)
         self._listen(run_id, order_keys)
-        off = self.gate.state == "off"
-        said = (row for row in mapping.outwards if not (off and row.towards_vehicle))
-        self._sender.announce([*mapping.inwards, *said])
+        self._sender.announce(mapping.announced(towards_vehicle=self.gate.state != "off"))
         log.info("towards the vehicle: %s", self.gate.why)
 
     def step(self, wait_s: float = 0.005) -> None:
@@ -122,6 +119,8 @@ class Gateway:
             if arrived is None:
                 break
             for channel, message in self.inwards.take(arrived):
+                if isinstance(message, drive.RoadUsers):
+                    self._send_merged(message)
                 self._bus.publish(channel, message, vehicle=self._vehicle_id)
             arrived = self._inbox.take() if left else None
         for _ in range(_PORTION):
@@ -137,6 +136,7 @@ class Gateway:
 
     def report(self) -> dict[str, dict[str, int]]:
         """Return all counts: what came in, what was left out, what was sent, bounded and held."""
+        words = 0 if self._orders is None else self._orders.dropped
         return {
             "in": dict(self.inwards.counts),
             "unused": dict(self.inwards.unused),
@@ -144,35 +144,25 @@ class Gateway:
             "sent": dict(self._sender.sent),
             "held": dict(self.held),
             "refused": self.refusals.counts(),
+            "merged": dict(+self._merged.counts),
             "gate": dict(self.gate.counts),
             "dropped": {
                 "samples": self._inbox.dropped,
-                "words": 0 if self._orders is None else self._orders.dropped,
+                "words": words,
                 "views": self._views.dropped,
             },
         }
 
     def _listen(self, run_id: str, order_keys: OrderKeys | None) -> None:
-        sources = {row.source for row in self._mapping.outwards}
         if self.gate.state != "off" and order_keys is not None:
             self._orders = Orders(
-                self._bus,
-                run_id=run_id,
-                keys=order_keys,
-                commands="vehicle_command" in sources,
-                refusals=self.refusals,
-            )
-        mirrored = bool(self._mapping.mirrored)
-        if sources & {"state", "clock"} or self._virtual.has_own or mirrored or self._guard:
-            self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
-        if "twin" in sources or mirrored:
-            self._bus.subscribe("mirror", self._views, run=run_id)
-        if "virtual_objects" in sources:
-            for channel in ("virtual_objects", "virtual_traffic"):
-                self._bus.subscribe(channel, self._views, run=run_id)
-        if "diagnostics" in sources:
-            for channel in ("event", "gap_alarm", "verdict"):
-                self._bus.subscribe(channel, self._views, run=run_id)
+                self._bus, run_id=run_id, keys=order_keys, refusals=self.refusals,
+                commands="vehicle_command" in self._mapping.sources,
+            )  # fmt: skip
+        for channel in self._mapping.vehicle_channels or (("state",) if self._guard else ()):
+            self._bus.subscribe(channel, self._views, vehicle=self._vehicle_id)
+        for channel in self._mapping.run_channels:
+            self._bus.subscribe(channel, self._views, run=run_id)
 
     def _take_orders(self) -> None:
         """Take the orders that have come, then look whether the gate may stay open."""
@@ -225,10 +215,10 @@ class Gateway:
                 if self._guard is not None:
                     self._guard.take_state(self._out.on_lot(state), now_ns=self._mono_ns())
                 self._mirrored.take_state(state.stamp_ns)
-                self._send("state", lambda _: self._out.state(state), every_ns=_STATE_EVERY_NS)
-                self._send(
-                    "clock", lambda _: self._out.clock(state.stamp_ns), every_ns=_STATE_EVERY_NS
-                )
+                self._merged.take_state(state)
+                every_ns, stamp_ns = _STATE_EVERY_NS, state.stamp_ns
+                self._send("state", lambda _: self._out.state(state), every_ns=every_ns)
+                self._send("clock", lambda _: self._out.clock(stamp_ns), every_ns=every_ns)
                 if self._virtual.has_own and self._due("virtual objects", _OBJECTS_EVERY_NS):
                     self._objects(lambda: self._virtual.own(state.stamp_ns))
             case MirrorSample() as mirror:
@@ -241,10 +231,8 @@ class Gateway:
                 self._diagnostics.take(finding)
 
     def _decoded(self, item: Any) -> Any:
-        if not isinstance(item, Received):
-            return None
         try:
-            return item.message()
+            return item.message() if isinstance(item, Received) else None
         except Refused as refused:
             if text := self.refusals.take(refused):
                 log.warning("%s", text)
@@ -265,6 +253,17 @@ class Gateway:
             return self._out.objects(meant, row.type)
 
         self._send("virtual_objects", payload)
+
+    def _send_merged(self, real: drive.RoadUsers) -> None:
+        """Send what the car says that it sees, at once, with what is virtual beside it."""
+
+        def payload(row: OutRow) -> bytes:
+            virtual = without_own_twin(self._virtual.at(real.stamp_ns, now_ns=self._mono_ns()))
+            one = self._merged.merged(real, virtual, self.inwards.objects)
+            self.inwards.injected.note(self._out.on_lot(one.virtual))
+            return self._out.merged(one, row.type)
+
+        self._send("merged_objects", payload)
 
     def _send(
         self, source: Source, payload: Callable[[OutRow], bytes], *, every_ns: int = 0

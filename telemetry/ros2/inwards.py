@@ -16,8 +16,10 @@ from foretwin.telemetry.anchored import world_from_lot_message
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
 from foretwin.telemetry.ros2.injected import Injected
-from foretwin.telemetry.ros2.mapping import InRow, Mapping
+from foretwin.telemetry.ros2.mapping import Mapping
+from foretwin.telemetry.ros2.merged_objects import HeardObjects
 from foretwin.telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
+from foretwin.telemetry.ros2.rows import InRow
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, UnusableError, channel_of, stamp_of
 from foretwin.telemetry.ros_messages.motion import route_from_lanelets
 from foretwin.telemetry.ros_messages.parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
@@ -60,6 +62,8 @@ class Inwards:
         self.tire_angle_rad: float | None = None
         """The newest measured angle at the tyres."""
         self.tire_angle_mono_ns = 0
+        self.objects = HeardObjects(None)
+        """What the newest road users came in."""
         self.route: drive.RouteToGoal | None = None
         """The newest route of the vehicle's own driving stack."""
 
@@ -153,6 +157,8 @@ class Inwards:
         stamp_ns = arrived.received_wall_ns
         if row.stamp == "header":
             stamp_ns = stamp_of(ros) or stamp_ns
+        if "objects" in how.channels:
+            self.objects = HeardObjects(ros)
         if "gnss" in how.channels:
             self._antenna_frame = str(ros.header.frame_id)
         samples: Samples = []
@@ -173,8 +179,10 @@ class Inwards:
 
     def _without_ours(self, message: drive.RoadUsers, row: InRow) -> drive.RoadUsers:
         real = self.injected.without(message)
-        if ours := len(message.users) - len(real.users):
-            self.unused[f"{row.topic}: road users that we have shown it"] += ours
+        if len(message.users) > len(real.users):
+            ours = {one.user_id for one in message.users} - {one.user_id for one in real.users}
+            self.unused[f"{row.topic}: road users that we have shown it"] += len(ours)
+            self.objects = self.objects._replace(echoes=frozenset(ours))
         return real
 
     def _note(self, message: msgspec.Struct, arrived: Arrived) -> None:

@@ -10,121 +10,28 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
-from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.drive import Vector3
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.ports import trouble_with_endpoint
 from foretwin.contracts.toml_file import parse_toml, toml_text
-from foretwin.telemetry.logs.units import ANGLE, SPEED
+from foretwin.telemetry.mixed.merge import MergeRules
 from foretwin.telemetry.ros2.mirrored import Mirrored
-from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
+from foretwin.telemetry.ros2.names import Dialect
+from foretwin.telemetry.ros2.rows import SHOWS_VIRTUAL, InRow, OutRow, Source
 from foretwin.telemetry.ros2.safety import CommandLimits
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
-from foretwin.telemetry.ros_messages import parts
-from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 
-DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 AUTOWARE = Path(__file__).with_name("autoware.toml")
-
-Source = Literal["state", "twin", "virtual_objects", "diagnostics", "clock", "vehicle_command"]
-_TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
-    "state": (parts.ODOMETRY,),
-    "twin": (parts.ODOMETRY,),
-    "virtual_objects": (parts.PREDICTED_OBJECTS, parts.DETECTED_OBJECTS),
-    "diagnostics": (DIAGNOSTICS,),
-    "clock": (parts.CLOCK,),
-    "vehicle_command": (parts.CONTROL, parts.ACKERMANN),
-}
-CHANNEL_OF_OTHERS = {parts.TF: "transforms", parts.CLOCK: "clock", parts.LANELET_ROUTE: "route"}
-"""Types that are taken in but are no samples of the vehicle's telemetry."""
 
 
 class MappingError(UserError):
     """A mapping that cannot be used; the text names the file, the line and what would be right."""
-
-
-class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One topic that is listened to."""
-
-    topic: str
-    """Absolute name of the ROS topic."""
-    type: str
-    """Its ROS type, such as sensor_msgs/msg/NavSatFix."""
-    channel: str
-    """What it becomes."""
-    stamp: Literal["header", "arrival"] = "header"
-    """By whose clock a sample counts."""
-    angle_unit: str = "rad"
-    """Of steering and commands."""
-    left_positive: bool = True
-    """Of steering and commands."""
-    speed_unit: str = "m/s"
-    """Of a speed."""
-    axes: Literal["forward_left_up", "forward_right_down"] = "forward_left_up"
-    """Of an Imu."""
-
-    def validate(self) -> None:
-        """Raise ValueError naming the key at fault."""
-        check_topic(self.topic)
-        dds_type(self.type)
-        known = {kind: how.channels[0] for kind, how in FOREIGN.items()} | CHANNEL_OF_OTHERS
-        if self.type not in known:
-            raise ValueError(f"type {self.type!r}: readable are {', '.join(sorted(known))}")
-        if self.channel != known[self.type]:
-            raise ValueError(f"channel {self.channel!r}: {self.type} gives {known[self.type]!r}")
-        for name, units in (("angle_unit", ANGLE), ("speed_unit", SPEED)):
-            if getattr(self, name) not in units:
-                raise ValueError(
-                    f"{name} {getattr(self, name)!r}: {one_of(getattr(self, name), units)}"
-                )
-        angles = self.angle_unit != "rad" or not self.left_positive
-        if angles and self.channel not in ("steering", "control"):
-            raise ValueError(f"angle_unit, left_positive: not of channel {self.channel!r}")
-        if self.speed_unit != "m/s" and self.channel != "speed":
-            raise ValueError(f"speed_unit: not of channel {self.channel!r}")
-        if self.axes != "forward_left_up" and self.channel != "imu":
-            raise ValueError(f"axes: not of channel {self.channel!r}")
-
-    @property
-    def is_latched(self) -> bool:
-        """Whether ROS says it once and keeps it for who comes later (transient local)."""
-        return self.type in (parts.TF, parts.LANELET_ROUTE)
-
-    @property
-    def stream(self) -> str:
-        """What must come from one topic alone."""
-        return FOREIGN[self.type].stream if self.type in FOREIGN else self.type + self.topic
-
-
-class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One topic that is published."""
-
-    topic: str
-    """Absolute name of the ROS topic."""
-    type: str
-    """Its ROS type."""
-    source: Source
-    """What is told on it."""
-
-    def validate(self) -> None:
-        """Raise ValueError naming the key at fault."""
-        check_topic(self.topic)
-        if self.type not in _TYPES_OF_SOURCE[self.source]:
-            raise ValueError(
-                f"type {self.type!r}: {self.source} goes out as "
-                f"{' or '.join(_TYPES_OF_SOURCE[self.source])}"
-            )
-
-    @property
-    def towards_vehicle(self) -> bool:
-        """Whether software of the vehicle might obey it: a command, or a topic that is not ours."""
-        return self.source == "vehicle_command" or not self.topic.startswith(OWN_PREFIX)
 
 
 class MapPlace(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -176,6 +83,8 @@ class Mapping(
     """Virtual road users that the gateway itself says."""
     mirrored: Mirrored = Mirrored()
     """Vehicles of the mirror that go out among the virtual objects."""
+    merged: MergeRules = MergeRules()
+    """How virtual objects are merged with those that the car really sees."""
     towards_vehicle: TowardsVehicle = TowardsVehicle()
     """What may go to the vehicle, and within which bounds."""
 
@@ -184,6 +93,34 @@ class Mapping(
         """The plane of `map`, None where the file does not place it."""
         at = self.map_place
         return None if at is None else LocalFrame(GeoPoint(at.lat_deg, at.lon_deg, at.alt_m))
+
+    def announced(self, *, towards_vehicle: bool) -> list[InRow | OutRow]:
+        """Return the topics that ROS is told of, of those towards the vehicle only by request."""
+        return [
+            *self.inwards,
+            *(row for row in self.outwards if towards_vehicle or not row.towards_vehicle),
+        ]
+
+    @property
+    def sources(self) -> frozenset[Source]:
+        """What goes out on some topic."""
+        return frozenset(row.source for row in self.outwards)
+
+    @property
+    def vehicle_channels(self) -> tuple[str, ...]:
+        """Channels of the vehicle's estimate from which something goes out."""
+        wanted = self.sources & {"state", "clock", "merged_objects"}
+        return ("state",) if wanted or self.placed or self.mirrored else ()
+
+    @property
+    def run_channels(self) -> tuple[str, ...]:
+        """Channels of the run, orders apart, from which something goes out."""
+        sources = self.sources
+        return (
+            *(("mirror",) if "twin" in sources or self.mirrored else ()),
+            *(("virtual_objects", "virtual_traffic") if sources & set(SHOWS_VIRTUAL) else ()),
+            *(("event", "gap_alarm", "verdict") if "diagnostics" in sources else ()),
+        )
 
 
 class MappingFile(NamedTuple):
@@ -211,6 +148,7 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     mapping = file.convert(Mapping)
     try:
         mapping.towards_vehicle.validate()
+        mapping.merged.validate()
         _check_head(mapping)
         _check_mirrored(mapping)
     except ValueError as error:
@@ -251,7 +189,7 @@ def _check_head(mapping: Mapping) -> None:
 
 
 def _check_mirrored(mapping: Mapping) -> None:
-    rows = [row for row in mapping.outwards if row.source == "virtual_objects"]
+    rows = [row for row in mapping.outwards if row.source in SHOWS_VIRTUAL]
     if mapping.mirrored and not rows:
         raise ValueError(
             '[mirrored]: without an [[out]] of source "virtual_objects" it goes nowhere'
@@ -268,7 +206,7 @@ def _check_alone(
 ) -> None:
     """Refuse two topics for one stream, what stands twice, and objects that cannot go out."""
     if isinstance(row, PlacedObject):
-        if not any(one.source == "virtual_objects" for one in mapping.outwards):
+        if not any(one.source in SHOWS_VIRTUAL for one in mapping.outwards):
             raise ValueError('without an [[out]] of source "virtual_objects" it goes nowhere')
         keys, first = {f"virtual {row.user_id}": f"id {row.user_id!r}"}, row.user_id
     elif isinstance(row, InRow):
@@ -281,7 +219,20 @@ def _check_alone(
         keys = {f"out {row.topic}": f"topic {row.topic}"}
         if row.source == "virtual_objects" and row.towards_vehicle and mapping.map_place is None:
             raise ValueError("virtual objects towards the vehicle need [map] lat_deg, lon_deg")
+        _check_no_echo(row, mapping)
     for key, what in keys.items():
         if key in seen:
             raise ValueError(f"{what} stands twice; first: {seen[key]}")
         seen[key] = first
+
+
+def _check_no_echo(row: OutRow, mapping: Mapping) -> None:
+    """Refuse what would come back as real, and a merged list of which the real half lacks."""
+    if row.source in SHOWS_VIRTUAL and any(row.topic == one.topic for one in mapping.inwards):
+        raise ValueError(f"topic {row.topic} is listened to: what goes out would come back as real")
+    if row.source != "merged_objects":
+        return
+    if not any(one.type == row.type for one in mapping.inwards):
+        raise ValueError(f"merged objects need an [[in]] of their type, {row.type}: the real ones")
+    if mapping.map_place is None:
+        raise ValueError("merged objects need [map] lat_deg, lon_deg")

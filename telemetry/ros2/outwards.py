@@ -10,11 +10,13 @@ from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.telemetry.anchored import Message, lot_from_world_message
-from foretwin.telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
+from foretwin.telemetry.ros2.mapping import Mapping
+from foretwin.telemetry.ros2.merged_objects import MergedList
+from foretwin.telemetry.ros2.rows import DIAGNOSTICS, OutRow, Source
 from foretwin.telemetry.ros_messages import parts
 from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
 from foretwin.telemetry.ros_messages.motion import odometry_from_state
-from foretwin.telemetry.ros_messages.objects import detected_from_users, predicted_from_users
+from foretwin.telemetry.ros_messages.objects import CERTAIN, FROM_USERS, joined
 from foretwin.telemetry.ros_messages.parts import ros_message
 
 DRIVE_FRAME = "foretwin_drive"
@@ -90,9 +92,16 @@ class Outwards:
         )
 
     def objects(self, message: drive.RoadUsers, kind: str) -> bytes:
-        """Return DetectedObjects or PredictedObjects."""
-        convert = detected_from_users if kind == parts.DETECTED_OBJECTS else predicted_from_users
-        return _cdr(self._framed(convert(self.on_lot(message), self._map or self._car_frame)), kind)
+        """Return DetectedObjects, TrackedObjects or PredictedObjects."""
+        convert = FROM_USERS[kind]
+        ros = convert(self.on_lot(message), self._map or self._car_frame, CERTAIN)
+        return _cdr(self._framed(ros), kind)
+
+    def merged(self, one: MergedList, kind: str) -> bytes:
+        """Return the car's own list, of the type `kind`, with what is added to it."""
+        assert self._map is not None  # the mapping asks for it
+        ours = FROM_USERS[kind](self.on_lot(one.virtual), self._map, one.spread)
+        return _cdr(joined(one.real.ros, ours, without=one.without), kind)
 
     def clock(self, stamp_ns: int) -> bytes:
         """Return a Clock."""

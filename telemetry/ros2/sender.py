@@ -11,7 +11,8 @@ import msgspec
 from foretwin.contracts.foreign_bus import ForeignBus
 from foretwin.telemetry.ros2 import names
 from foretwin.telemetry.ros2.attachment import Attachment, pack
-from foretwin.telemetry.ros2.mapping import InRow, Mapping, OutRow
+from foretwin.telemetry.ros2.mapping import Mapping
+from foretwin.telemetry.ros2.rows import InRow, OutRow
 
 NODE = "foretwin"
 

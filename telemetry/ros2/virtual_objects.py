@@ -128,9 +128,7 @@ class VirtualObjects:
             raise UnfitError("virtual objects that are not finite")
         if not all(map(_is_possible, message.users)):
             raise UnfitError("virtual objects of an impossible size or speed")
-        fresh = {
-            name: one for name, one in self._latest.items() if now_ns - one.heard_ns <= LIVES_NS
-        }
+        fresh = self._fresh(now_ns)
         fresh |= {user.user_id: _Latest(now_ns, message.stamp_ns, user) for user in message.users}
         if len(fresh) > self._at_most:
             raise UnfitError("virtual objects that are too many")
@@ -139,10 +137,19 @@ class VirtualObjects:
         if 0 < self._newest_ns - stamp_ns < _STEP_BACK_NS:
             stamp_ns = self._newest_ns
         self._newest_ns = stamp_ns
-        return RoadUsers(
-            stamp_ns=stamp_ns,
-            users=tuple(_at(one, stamp_ns) for _, one in sorted(fresh.items())),
-        )
+        return _all_at(fresh, stamp_ns)
+
+    def at(self, stamp_ns: int, *, now_ns: int) -> RoadUsers:
+        """Return all that are known at another stamp, that of what the car itself sees."""
+        return _all_at(self._fresh(now_ns), stamp_ns)
+
+    def _fresh(self, now_ns: int) -> dict[str, _Latest]:
+        return {n: one for n, one in self._latest.items() if now_ns - one.heard_ns <= LIVES_NS}
+
+
+def _all_at(latest: dict[str, _Latest], stamp_ns: int) -> RoadUsers:
+    users = tuple(_at(one, stamp_ns) for _, one in sorted(latest.items()))
+    return RoadUsers(stamp_ns=stamp_ns, users=users)
 
 
 def _at(latest: _Latest, stamp_ns: int) -> RoadUser:

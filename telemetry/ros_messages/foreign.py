@@ -157,8 +157,9 @@ FOREIGN: dict[str, Foreign] = {
     parts.CONTROL_MODE_REPORT: _sample("status", status.mode_from_ros, "status/mode"),
     parts.GEAR_REPORT: _sample("status", status.gear_from_ros, "status/gear"),
     parts.TURN_INDICATORS_REPORT: _sample("status", status.indicator_from_ros, "status/indicator"),
-    # Predicted before detected: they have identities, and lie in `map`.
+    # Predicted and tracked before detected: they have identities, and lie in `map`.
     parts.PREDICTED_OBJECTS: _users_by(objects.users_from_predicted),
+    parts.TRACKED_OBJECTS: _users_by(objects.users_from_tracked),
     parts.DETECTED_OBJECTS: _users_by(objects.users_from_detected),
     parts.TRAFFIC_LIGHTS: Foreign("signals", ("signals",), _signals),
 }

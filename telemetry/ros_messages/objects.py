@@ -1,4 +1,4 @@
-"""Road users as Autoware's DetectedObjects and PredictedObjects, and back.
+"""Road users as Autoware's DetectedObjects, TrackedObjects and PredictedObjects, and back.
 
 Poses are box centres in the frame `map`, which a LocalFrame places on Earth. Twists are in the
 object's own axes. A detected object has no identity: its id is its place in the message. Boxes have
@@ -8,8 +8,9 @@ may drive over or under is left out.
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,9 +22,22 @@ from foretwin.telemetry.ros_messages import parts, shapes
 from foretwin.telemetry.ros_messages.parts import MAP_FRAME, ros_message
 
 _HEADING_KNOWN = 2
-"""DetectedObjectKinematics.orientation_availability: AVAILABLE."""
+"""orientation_availability of DetectedObjectKinematics and TrackedObjectKinematics: AVAILABLE."""
+_STANDS_MPS = 0.1
+"""Slower than this a tracked object is told to stand; chosen."""
 _HORIZON_S, _STEP_S = 8.0, 0.5
 """Of predicted paths, as Autoware's own prediction has them."""
+
+
+class ObjectSpread(NamedTuple):
+    """How sure the sender is: standard deviations, 0 where it knows."""
+
+    position_m: float = 0.0
+    yaw_rad: float = 0.0
+    speed_mps: float = 0.0
+
+
+CERTAIN = ObjectSpread()
 
 
 class _Box(NamedTuple):
@@ -41,6 +55,19 @@ def users_from_detected(ros: Any, frame: LocalFrame, *, stamp_ns: int) -> drive.
     boxes = (
         _Box(str(place), one.pose_with_covariance.pose, one.twist_with_covariance.twist)
         for place, one in enumerate(kinematics)
+    )
+    return _users(ros, boxes, frame, stamp_ns)
+
+
+def users_from_tracked(ros: Any, frame: LocalFrame, *, stamp_ns: int) -> drive.RoadUsers:
+    """Return the road users of a TrackedObjects; see users_from_detected."""
+    boxes = (
+        _Box(
+            bytes(one.object_id.uuid).hex(),
+            one.kinematics.pose_with_covariance.pose,
+            one.kinematics.twist_with_covariance.twist,
+        )
+        for one in ros.objects
     )
     return _users(ros, boxes, frame, stamp_ns)
 
@@ -85,17 +112,21 @@ def _user(box: _Box, one: Any, frame: LocalFrame) -> drive.RoadUser:
     )
 
 
-def detected_from_users(message: drive.RoadUsers, frame: LocalFrame) -> Any:
+def detected_from_users(
+    message: drive.RoadUsers, frame: LocalFrame, spread: ObjectSpread = CERTAIN
+) -> Any:
     """Return the DetectedObjects of road users in the frame `map`."""
     objects = []
     for user in message.users:
         (now,) = _poses(user, frame, np.zeros(1))
         kinematics = ros_message(
             "autoware_perception_msgs/msg/DetectedObjectKinematics",
-            pose_with_covariance=_certain("Pose", now),
+            pose_with_covariance=_pose(now, spread),
+            has_position_covariance=spread.position_m > 0.0,
             orientation_availability=_HEADING_KNOWN,
-            twist_with_covariance=_certain("Twist", parts.twist_from(user.speed_mps, 0.0)),
+            twist_with_covariance=_twist(user, spread),
             has_twist=True,
+            has_twist_covariance=spread.speed_mps > 0.0,
         )
         kind = "autoware_perception_msgs/msg/DetectedObject"
         objects.append(ros_message(kind, kinematics=kinematics, **_seen(user)))
@@ -103,15 +134,37 @@ def detected_from_users(message: drive.RoadUsers, frame: LocalFrame) -> Any:
     return ros_message(parts.DETECTED_OBJECTS, header=header, objects=objects)
 
 
-def predicted_from_users(message: drive.RoadUsers, frame: LocalFrame) -> Any:
+def tracked_from_users(
+    message: drive.RoadUsers, frame: LocalFrame, spread: ObjectSpread = CERTAIN
+) -> Any:
+    """Return the TrackedObjects of road users in the frame `map`."""
+    objects = []
+    for user in message.users:
+        (now,) = _poses(user, frame, np.zeros(1))
+        kinematics = ros_message(
+            "autoware_perception_msgs/msg/TrackedObjectKinematics",
+            pose_with_covariance=_pose(now, spread),
+            orientation_availability=_HEADING_KNOWN,
+            twist_with_covariance=_twist(user, spread),
+            is_stationary=abs(user.speed_mps) < _STANDS_MPS,
+        )
+        kind, object_id = "autoware_perception_msgs/msg/TrackedObject", shapes.uuid_from(user)
+        objects.append(ros_message(kind, object_id=object_id, kinematics=kinematics, **_seen(user)))
+    header = parts.header_from(message.stamp_ns, MAP_FRAME)
+    return ros_message(parts.TRACKED_OBJECTS, header=header, objects=objects)
+
+
+def predicted_from_users(
+    message: drive.RoadUsers, frame: LocalFrame, spread: ObjectSpread = CERTAIN
+) -> Any:
     """Return the PredictedObjects of road users in `map`, each going straight on at its speed."""
     objects = []
     for user in message.users:
         path = _poses(user, frame, np.arange(0.0, _HORIZON_S + _STEP_S, _STEP_S))
         kinematics = ros_message(
             "autoware_perception_msgs/msg/PredictedObjectKinematics",
-            initial_pose_with_covariance=_certain("Pose", path[0]),
-            initial_twist_with_covariance=_certain("Twist", parts.twist_from(user.speed_mps, 0.0)),
+            initial_pose_with_covariance=_pose(path[0], spread),
+            initial_twist_with_covariance=_twist(user, spread),
             predicted_paths=[
                 ros_message(
                     "autoware_perception_msgs/msg/PredictedPath",
@@ -127,6 +180,29 @@ def predicted_from_users(message: drive.RoadUsers, frame: LocalFrame) -> Any:
     return ros_message(parts.PREDICTED_OBJECTS, header=header, objects=objects)
 
 
+FROM_USERS: dict[str, Callable[[drive.RoadUsers, LocalFrame, ObjectSpread], Any]] = {
+    parts.DETECTED_OBJECTS: detected_from_users,
+    parts.TRACKED_OBJECTS: tracked_from_users,
+    parts.PREDICTED_OBJECTS: predicted_from_users,
+}
+"""How road users go out as each type."""
+
+
+def joined(ros: Any, ours: Any, *, without: Collection[str]) -> Any:
+    """Return one list of objects as they came and of ours, with the header of those that came.
+
+    `without` are ids of those left out: a UUID's 32 digits, else the place in the message. All
+    else that was said of an object that came, such as its predicted paths, stays as it was.
+    """
+    kept = [
+        one
+        for place, one in enumerate(ros.objects)
+        if (bytes(one.object_id.uuid).hex() if hasattr(one, "object_id") else str(place))
+        not in without
+    ]
+    return dataclasses.replace(ros, objects=[*kept, *ours.objects])
+
+
 def _seen(user: drive.RoadUser) -> dict[str, Any]:
     """Return the fields that detected and predicted objects share."""
     return {
@@ -136,9 +212,18 @@ def _seen(user: drive.RoadUser) -> dict[str, Any]:
     }
 
 
-def _certain(name: str, value: Any) -> Any:
-    """Return a PoseWithCovariance or TwistWithCovariance whose covariance is zero."""
-    return ros_message(f"geometry_msgs/msg/{name}WithCovariance", **{name.lower(): value})
+def _pose(pose: Any, spread: ObjectSpread) -> Any:
+    place, turn = spread.position_m**2, spread.yaw_rad**2
+    covariance = parts.covariance(6, d0=place, d1=place, d5=turn)
+    kind = "geometry_msgs/msg/PoseWithCovariance"
+    return ros_message(kind, pose=pose, covariance=covariance)
+
+
+def _twist(user: drive.RoadUser, spread: ObjectSpread) -> Any:
+    twist = parts.twist_from(user.speed_mps, 0.0)
+    covariance = parts.covariance(6, d0=spread.speed_mps**2)
+    kind = "geometry_msgs/msg/TwistWithCovariance"
+    return ros_message(kind, twist=twist, covariance=covariance)
 
 
 def _poses(user: drive.RoadUser, frame: LocalFrame, after_s: Array) -> list[Any]:

@@ -83,10 +83,14 @@ def shape_from(user: drive.RoadUser) -> Any:
 
 
 def uuid_from(user: drive.RoadUser) -> Any:
+    """Return the UUID of a road user's id."""
+    octets = np.frombuffer(bytes.fromhex(uuid_text(user.user_id)), dtype=np.uint8).copy()
+    return ros_message("unique_identifier_msgs/msg/UUID", uuid=octets)
+
+
+def uuid_text(user_id: str) -> str:
     """Return the UUID that an id spells in 32 hexadecimal digits, else one derived from it."""
     try:
-        found = uuid.UUID(hex=user.user_id)
+        return uuid.UUID(hex=user_id).hex
     except ValueError:
-        found = uuid.uuid5(_IDS, user.user_id)
-    octets = np.frombuffer(found.bytes, dtype=np.uint8).copy()
-    return ros_message("unique_identifier_msgs/msg/UUID", uuid=octets)
+        return uuid.uuid5(_IDS, user_id).hex

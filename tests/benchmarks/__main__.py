@@ -27,6 +27,7 @@ BENCHMARKS = (
     "boxes_1000",
     "full_scene",
     "live_metrics",
+    "merged_objects",
     "metadrive",
     "gym_steps",
     "world_from_open_map",

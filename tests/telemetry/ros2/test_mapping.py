@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foretwin.telemetry.mixed.merge import MergeRules
 from foretwin.telemetry.ros2.mapping import (
     InRow,
     Mapping,
@@ -20,6 +21,8 @@ from foretwin.telemetry.ros2.mapping import (
 )
 from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
+
+COVERS = ("foretwin.telemetry.ros2.rows",)
 
 GOOD = """dialect = "rmw_zenoh"
 [[in]]
@@ -155,7 +158,7 @@ def test_what_is_left_out_of_a_mapping() -> None:
     ) == {
         "dialect": "rmw_zenoh", "endpoint": None, "domain": 0, "namespace": "/", "antenna_m": None,
         "map_place": None, "inwards": (), "outwards": (), "placed": (), "mirrored": Mirrored(),
-        "towards_vehicle": TowardsVehicle(),
+        "merged": MergeRules(), "towards_vehicle": TowardsVehicle(),
     }  # fmt: skip
     assert (mapping.towards_vehicle.enabled, mapping.towards_vehicle.max_objects) == (False, 64)
     assert (Mirrored().own_twin, Mirrored().vehicles) == (False, ())
@@ -200,3 +203,49 @@ def test_virtual_objects_towards_the_vehicle_need_a_map() -> None:
 def test_a_missing_file() -> None:
     with pytest.raises(FileNotFoundError, match="no such file"):
         read_mapping(Path("nowhere.toml"))
+
+
+REAL = """
+[[in]]
+topic = "/perception/objects"
+type = "autoware_perception_msgs/msg/{real}"
+channel = "objects"
+[map]
+lat_deg = 52.5
+lon_deg = 13.4
+[[out]]
+topic = "{topic}"
+type = "autoware_perception_msgs/msg/{kind}"
+source = "{source}"
+"""
+
+
+@pytest.mark.parametrize("kind", ["PredictedObjects", "TrackedObjects", "DetectedObjects"])
+def test_a_merged_list_goes_out_as_the_real_one_comes_in(kind: str) -> None:
+    row = {"topic": "/merged/objects", "kind": kind, "source": "merged_objects"}
+    text = 'dialect = "ros2dds"\n' + REAL.format(real=kind, **row)
+    mapping = parse_mapping(text, name="m.toml")
+    assert mapping.outwards[0].towards_vehicle
+    assert (mapping.vehicle_channels, mapping.run_channels) == (
+        ("state",),
+        ("virtual_objects", "virtual_traffic"),
+    )
+    other = "DetectedObjects" if kind == "TrackedObjects" else "TrackedObjects"
+    with pytest.raises(MappingError, match=r"merged objects need an .* of their type"):
+        parse_mapping('dialect = "ros2dds"\n' + REAL.format(real=other, **row), name="m.toml")
+    nowhere = text.replace("[map]\nlat_deg = 52.5\nlon_deg = 13.4\n", "")
+    with pytest.raises(MappingError, match=r"merged objects need \[map\]"):
+        parse_mapping(nowhere, name="m.toml")
+
+
+@pytest.mark.parametrize("source", ["merged_objects", "virtual_objects"])
+def test_what_goes_out_is_not_listened_to(source: str) -> None:
+    kind = "PredictedObjects"
+    text = REAL.format(real=kind, kind=kind, topic="/perception/objects", source=source)
+    with pytest.raises(MappingError, match="would come back as real"):
+        parse_mapping('dialect = "ros2dds"\n' + text, name="m.toml")
+
+
+def test_rules_of_the_merge_are_checked() -> None:
+    with pytest.raises(MappingError, match=r"range_m 0\.0: above 0"):
+        parse_mapping(GOOD + "[merged]\nrange_m = 0.0\n", name="m.toml")

@@ -1,0 +1,1 @@
+"""What is really around the car and what only the simulation holds, as one surrounding."""
