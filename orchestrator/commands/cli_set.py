@@ -16,7 +16,7 @@ def set_value(
         typer.Argument(
             metavar="KEY=VALUE",
             help="role.ID=all, twin, shadow or ghost; correction=free or follow; "
-            "vehicle.NAME=a number, pin, unpin or rollback",
+            "vehicle.NAME=a number, pin, unpin or rollback; light.GROUP=red, green, … or auto",
         ),
     ],
     run: Annotated[

@@ -18,6 +18,7 @@ from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.far_member import FleetTag
 from foretwin.orchestrator.drive.fleet_handler import FleetHandler
 from foretwin.orchestrator.drive.intake import Intake, unplaced
+from foretwin.orchestrator.drive.light_link import LightLink
 from foretwin.orchestrator.drive.mark_handler import MarkHandler
 from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
@@ -41,7 +42,6 @@ from foretwin.orchestrator.runtime_configuration.handler import RuntimeConfigura
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
 
 log = logging.getLogger(ORCHESTRATOR)
-
 MAILBOX_DEPTH = 16384
 
 
@@ -49,8 +49,7 @@ class Conductor:
     """The state of one drive between its messages."""
 
     def __init__(self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables) -> None:
-        self.plan, self.bus = plan, bus
-        self.mission, self.tables = mission, tables
+        self.plan, self.bus, self.mission, self.tables = plan, bus, mission, tables
         full: Literal["block", "drop_oldest"] = "block" if plan.config.lock_step else "drop_oldest"
         self.mailbox = Mailbox(MAILBOX_DEPTH, when_full=full)
         self.intake = Intake(plan.vehicle, pace=plan.config.speed)
@@ -80,9 +79,11 @@ class Conductor:
         )
         self.tuning = TuningLink(context, intake=self.intake, rounds=self.rounds, alive=self.alive)
         self.traffic = VirtualTrafficLink(context, self.questions, self.intake)
+        self.lights = LightLink(context, self.intake)
         self.changes = RuntimeConfiguration(
             roles.role_changes(self.roles)
             | {"vehicle": VehicleHandler(self.tuning.parameters), "virtual_traffic": self.traffic}
+            | {"light": self.lights.handler}
         )
         self.beside = OtherVehicleFeed(context, lambda: self.intake.clock_offset_ns)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
@@ -99,7 +100,6 @@ class Conductor:
             "virtual_traffic": lambda item: self.traffic.take(item.message()),
             "event": lambda item: self.events.heard(item.message()),
         }
-        """What takes the messages of each channel that `join` subscribes to."""
         self._on_reply: dict[str, Callable[[Reply], object]] = {
             **dict.fromkeys(ASKED_OF_SIMULATIONS, lambda _: self.questions.answered()),
             **dict.fromkeys(("use_vehicle", "tune"), self._tuning_reply),
@@ -112,7 +112,6 @@ class Conductor:
             "vehicle_clock": self.beside.take_time,
             **dict.fromkeys(("enlist", "admit", "clock"), self.fleet.reply),
         }
-        """What takes the answers to each question that is asked through the mailbox."""
         self._on_question: dict[str, Callable[[Request], object]] = {
             "set": lambda item: self.changes.take(item, stamp_ns=self.intake.now_stamp_ns),
             "mark": MarkHandler(context, self.intake, mission).take,
@@ -187,6 +186,7 @@ class Conductor:
         self.beside.keep_up_with(state, self.intake.road_users, self.roles.roles)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.route.keep_up_with(state, self.intake.plan)
+        self.lights.keep_up_with(state)
         self.rounds.take_state(state)
         self.rounds.windows.take(self.intake.surroundings, state, self.mission.way.closed_to_cars)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
@@ -209,7 +209,8 @@ class Conductor:
             if isinstance(intent, NotReady):
                 self.rounds.tally.not_ready(world_late=intent.world_late)
                 return False
-            reports = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+            told = self.lights.among(self.intake.surroundings)
+            reports = self.beside.among(told, latest.state, self.roles.roles)
             reports = self.traffic.met_in(intent, reports, latest.state)
             self.rounds.start(intent, latest, reports, started_mono_ns=started_mono_ns)
         return True
@@ -229,6 +230,7 @@ class Conductor:
                     self.worlds.want(junction_id, load=load, workers=self._near)
                 case UseWorld(world_id):
                     self.active_world.use(world_id)
+                    self.lights.use_world(self.worlds.world(world_id) if world_id else None)
                     if not self.plan.config.lock_step:
                         self.active_world.announce()
                 case Notice():
@@ -242,14 +244,15 @@ class Conductor:
 
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""
-        if self.rounds.open:
-            return
-        stamp_ns, start_ns = self.intake.now_stamp_ns + 1, self.intake.start_stamp_ns
-        for change in self.changes.make(stamp_ns=stamp_ns, start_stamp_ns=start_ns):
+        intake, between = self.intake, not self.rounds.open
+        times = {"stamp_ns": intake.now_stamp_ns + 1, "start_stamp_ns": intake.start_stamp_ns}
+        for change in self.changes.make(**times, between_rounds=between):
             self.tell(Notice("info", f"set {change.text}"))
             self.tables.add("changes", [change.row()])
-        self.tuning.hand_over()
-        self.fleet.keep_up()
+            self.lights.say()
+        if between:
+            self.tuning.hand_over()
+            self.fleet.keep_up()
 
     @property
     def _near(self) -> tuple[str, ...]:  # those for which a World waits

@@ -33,6 +33,7 @@ class VirtualTrafficLink:
     most: int = 0
     on: bool = True
     keys: str = "virtual_traffic"
+    at_once: bool = False
     _first_ns: int | None = None
     _course: TrafficCourse | None = None
 

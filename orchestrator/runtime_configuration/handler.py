@@ -32,6 +32,10 @@ class ChangeHandler(Protocol):
     def keys(self) -> str:
         """How its keys look, for those who asked for another."""
 
+    @property
+    def at_once(self) -> bool:
+        """Whether its changes do not wait for the end of the round in progress."""
+
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError where `value` cannot be given to `name`, the key after its dot."""
 
@@ -67,7 +71,8 @@ class _Waiting(NamedTuple):
 class RuntimeConfiguration:
     """Takes questions of the channel `set`, refuses what makes no sense, and lets the rest wait.
 
-    `make` is called between two rounds, so that no round is half of one kind and half of another.
+    `make` is called between two rounds, so that no round is half of one kind and half of another,
+    and during one for changes that no round in progress is told of.
     A handler stands in the table under the part of its keys before the first dot.
     """
 
@@ -101,9 +106,15 @@ class RuntimeConfiguration:
             raise Refused(request.key, NOT_TO_BE_SET, str(refused)) from refused
         self._waiting.append(_Waiting(request, asked, stamp_ns))
 
-    def make(self, *, stamp_ns: int, start_stamp_ns: int) -> list[Change]:
+    def make(
+        self, *, stamp_ns: int, start_stamp_ns: int, between_rounds: bool = True
+    ) -> list[Change]:
         """Make what waits, in the order in which it was asked for, and answer; returns what was."""
-        waiting, self._waiting = self._waiting, []
+        everything, self._waiting = self._waiting, []
+        waiting: list[_Waiting] = []
+        for one in everything:
+            now = between_rounds or self._handlers[self._split(one.asked.key)[0]].at_once
+            (waiting if now else self._waiting).append(one)
         changes = []
         for request, asked, asked_stamp_ns in waiting:
             prefix, name = self._split(asked.key)

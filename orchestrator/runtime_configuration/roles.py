@@ -37,6 +37,7 @@ class RoleHandler:
 
     in_force: RolesInForce
     keys: str = "role.ID"
+    at_once: bool = False
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown vehicle or role."""
@@ -62,6 +63,7 @@ class CorrectionHandler:
 
     in_force: RolesInForce
     keys: str = "correction"
+    at_once: bool = False
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown correction."""

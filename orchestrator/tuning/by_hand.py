@@ -18,6 +18,7 @@ class VehicleHandler:
 
     parameters: ParameterVersions
     keys: str = "vehicle.NAME"
+    at_once: bool = False
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown parameter, a word or a number that cannot be."""

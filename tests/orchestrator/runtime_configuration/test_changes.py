@@ -123,7 +123,8 @@ def test_a_change_waits_for_the_round_that_runs(house: House) -> None:
         ("correction", "yes", "correction=yes: must be correction=free or correction=follow"),
         ("correction.ego", "free",
          "correction.ego=free: must be correction=free or correction=follow"),
-        ("speed", "3", "speed: unknown key; can be set: role.ID, correction, vehicle.NAME"),
+        ("speed", "3", "speed: unknown key; can be set: role.ID, correction, vehicle.NAME, "
+             "virtual_traffic, light.GROUP"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_set_is_refused_in_one_line(
