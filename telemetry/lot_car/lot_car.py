@@ -21,7 +21,8 @@ from foretwin.contracts.foreign_bus import ForeignBus
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.telemetry.lot_car.ros_voice import RosVoice
 from foretwin.telemetry.ros2.inwards import Inwards
-from foretwin.telemetry.ros2.mapping import InRow, Mapping, OutRow
+from foretwin.telemetry.ros2.mapping import Mapping
+from foretwin.telemetry.ros2.rows import InRow, OutRow
 from foretwin.telemetry.ros2.sender import RosSender
 from foretwin.telemetry.standin.source import StandinSource
 

@@ -9,7 +9,8 @@ from msgspec.structs import replace
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
-from foretwin.telemetry.ros2.mapping import InRow, Mapping
+from foretwin.telemetry.ros2.mapping import Mapping
+from foretwin.telemetry.ros2.rows import InRow
 from foretwin.telemetry.ros_messages import commands, motion, parts, sensors
 from foretwin.telemetry.ros_messages.parts import ros_message
 
