@@ -10,6 +10,7 @@ import pytest
 
 from foretwin.contracts.lights import ShownLights
 from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.signals import LearntSignal
 from foretwin.contracts.tuning import SetRequest
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import town, town_world
@@ -69,6 +70,16 @@ def test_a_light_that_is_flipped_is_told_at_once_and_futures_see_it(house: House
     reports = lights.among(house.conductor.intake.surroundings)
     assert [(one.group_id, one.colour) for one in reports.signals] == [(group, "red")]
     assert reports.signals[0].stamp_ns == house.conductor.intake.now_stamp_ns
+    # A cycle that was learnt of it says nothing any more; one of another light does.
+    learnt = [
+        LearntSignal(
+            group_id=name, begins_ns=0, cycle_s=60.0, from_s=(0.0,), colours=("green",), cycles=2,
+            spread_s=0.0,
+        )
+        for name in (group, "another")
+    ]  # fmt: skip
+    reports = lights.among(reports._replace(learnt_signals=tuple(learnt)))
+    assert [one.group_id for one in reports.learnt_signals] == ["another"]
 
 
 def test_a_flip_waits_for_no_round_in_progress(
