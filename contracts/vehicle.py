@@ -87,6 +87,13 @@ class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     """From the rear bumper to the rear axle."""
 
 
+class VehicleFile(VehicleParameters, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A vehicle as its file holds it; a small car in its own size."""
+
+    scale: float = 1.0
+    """So many times as large it drives in a World: 10 for a car of 1:10; its anchor's scale."""
+
+
 def kind_by_length(length_m: float) -> RoadUserKind:
     """Return what others take a vehicle of this length for."""
     if length_m <= _VAN_M:

@@ -7,12 +7,15 @@ from pathlib import Path
 
 from foretwin.contracts.errors import MissingFileError
 from foretwin.contracts.toml_file import read_toml
-from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.contracts.vehicle import Parameter, VehicleFile, VehicleParameters
 from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE, check_plausible
+from foretwin.sim_worker.vehicle.similarity import in_world_size
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "bmw_320i.toml"
 GRAVITY_MPS2 = 9.81
+MOST_SCALE = 100.0
+"""As of an anchor."""
 
 
 def bundled_vehicles() -> tuple[str, ...]:
@@ -23,6 +26,8 @@ def bundled_vehicles() -> tuple[str, ...]:
 def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
     """Read the parameters of a bundled vehicle by its name, or of a file; None is the BMW 320i.
 
+    A small car comes as large as it is in a World, by the `scale` of its file.
+
     Raises MissingFileError for neither a name nor a file and UserError, in one line with the file
     and the field, for anything that is no vehicle.
     """
@@ -30,17 +35,30 @@ def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
     if str(source) in bundled_vehicles():
         source = _FOLDER / f"{source}.toml"
     try:
-        return read_toml(source, VehicleParameters, what="vehicle", check=check_vehicle)
+        file = read_toml(source, VehicleFile, what="vehicle", check=_check_file)
     except FileNotFoundError as error:
         names = ", ".join(bundled_vehicles())
         raise MissingFileError(f"{error}, and no bundled vehicle of that name: {names}") from error
+    fields = (name for name in VehicleParameters.__struct_fields__)
+    vehicle = VehicleParameters(**{name: getattr(file, name) for name in fields})
+    return vehicle if file.scale == 1.0 else in_world_size(vehicle, file.scale)
 
 
-def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:
-    """Return `vehicle`, or raise ValueError naming the first field that no road vehicle has so."""
+def _check_file(file: VehicleFile) -> VehicleFile:
+    if not 1.0 <= file.scale <= MOST_SCALE:
+        raise ValueError(f"scale {file.scale:g}: 1, or of a small car up to {MOST_SCALE:g}")
+    check_vehicle(file, scale=file.scale)
+    return file
+
+
+def check_vehicle(vehicle: VehicleParameters, *, scale: float = 1.0) -> VehicleParameters:
+    """Return `vehicle`, or raise ValueError naming the first field that no road vehicle has so.
+
+    A small car, in its own size, is held against one `scale` times as large that is built alike.
+    """
     for name in PLAUSIBLE:
         parameter: Parameter = getattr(vehicle, name)
-        check_plausible(name, parameter.value)
+        check_plausible(name, parameter.value, scale=scale)
         std = parameter.std
         if std is not None and not 0.0 <= std < math.inf:
             raise ValueError(f"{name} has the std {std:g}; it must be zero or more, and finite")

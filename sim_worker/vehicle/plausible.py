@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from foretwin.sim_worker.vehicle.similarity import as_road_vehicle
+
 PLAUSIBLE: dict[str, tuple[float, float]] = {
     "mass_kg": (150.0, 60_000.0),
     "yaw_inertia_kgm2": (50.0, 1_000_000.0),
@@ -38,9 +40,12 @@ Futures add up to 0.4 s to the delay of the steering, and its buffer of samples 
 """
 
 
-def check_plausible(name: str, value: float) -> float:
-    """Return `value`; raises ValueError, with what would be right, for one that no vehicle has."""
-    low, high = PLAUSIBLE[name]
+def check_plausible(name: str, value: float, *, scale: float = 1.0) -> float:
+    """Return `value`; raises ValueError, with what would be right, for one that no vehicle has.
+
+    That of a small car counts as that of a road vehicle `scale` times as large that is built alike.
+    """
+    low, high = (end / as_road_vehicle(name, 1.0, scale) for end in PLAUSIBLE[name])
     if not low <= value <= high:
         raise ValueError(f"{name} {value:g} is implausible; it must be {low:g} to {high:g}")
     return value
