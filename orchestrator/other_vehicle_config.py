@@ -30,6 +30,8 @@ class OtherVehicleConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     """Whether a live one stamps by the car's own clock, as by satellites: nothing is estimated."""
     ros2: str | None = None
     """A mapping in TOML, or `autoware`: how a live vehicle's own ROS 2 topics are read."""
+    anchor: str | None = None
+    """An anchor file: where a recorded vehicle, or one behind ROS 2, really is."""
     seen_as: str | None = None
     """The id under which the car itself detects it."""
 
@@ -43,4 +45,6 @@ class OtherVehicleConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
             return "needs exactly one of log = FILE, live = true, seen_as = ID"
         if self.ros2 is not None and not self.live:
             return "ros2 = MAPPING needs live = true: its topics are the vehicle's telemetry"
+        if self.anchor is not None and self.log is None and self.ros2 is None:
+            return "anchor = FILE needs log or ros2: who speaks on the bus is in the World already"
         return None

@@ -46,6 +46,8 @@ class OtherVehiclePlan(NamedTuple):
     commands_recorded: bool
     ros2: MappingFile | None = None
     """How its own ROS 2 topics are read."""
+    lot: Anchor | None = None
+    """Where it really is, and where that is in the World."""
 
 
 @dataclass(frozen=True, kw_only=True)

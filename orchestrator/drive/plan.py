@@ -176,14 +176,15 @@ def _read_beside(
     config: OtherVehicleConfig, drive: DriveConfig, own: VehicleParameters
 ) -> OtherVehiclePlan:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
+    lot = None if config.anchor is None else read_anchor(Path(config.anchor)).anchor
     if config.log is None:
         ros2 = read_ros2_beside(config, drive)
-        return OtherVehiclePlan(config, vehicle, commands_recorded=config.live, ros2=ros2)
+        return OtherVehiclePlan(config, vehicle, config.live, ros2=ros2, lot=lot)
     file = Path(config.log)
     if not file.exists():
         raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")
     return OtherVehiclePlan(
-        config, vehicle, commands_recorded="control" in open_log(file).info.sends
+        config, vehicle, commands_recorded="control" in open_log(file).info.sends, lot=lot
     )
 
 

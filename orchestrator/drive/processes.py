@@ -222,6 +222,7 @@ def _ros2_beside(plan: DrivePlan, process_id: str) -> ProcessSetup:
         mapping_name=one.ros2.name,
         drive_frame=plan.drive_frame,
         listens_only=True,
+        anchor=one.lot,
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.mailbox import Mailbox
@@ -14,6 +15,7 @@ from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource, OtherVehicleStates
+from foretwin.telemetry.anchored import world_from_lot_info, world_from_lot_message
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
@@ -46,7 +48,7 @@ class RecordedVehicle(OtherVehicleSource):
     this log has passed as the car's drive begins. With `waits` (lock step) the drive waits for what
     is to come, so that results do not depend on the disk; else it takes what has been read, and a
     log that is read too slowly gives its states late. A log that breaks off is told of, and the
-    vehicle is gone then.
+    vehicle is gone then. It drove on its `lot`, where that is given.
     """
 
     def __init__(
@@ -58,12 +60,13 @@ class RecordedVehicle(OtherVehicleSource):
         own: VehicleInfo,
         offset_s: float | None,
         waits: bool,
+        lot: Anchor | None = None,
         tell: Callable[[Notice], None],
     ) -> None:
         super().__init__()
         self._file, self._id, self._vehicle = file, vehicle_id, vehicle
         self._own, self._offset_s = own, offset_s
-        self._waits, self._tell = waits, tell
+        self._waits, self._tell, self._lot = waits, tell, lot
         self._read: Mailbox = Mailbox(AHEAD_SAMPLES, when_full="block")
         self._next: _Read | None = None
         self._newest_ns = own.start_stamp_ns
@@ -121,10 +124,12 @@ class RecordedVehicle(OtherVehicleSource):
         try:
             source = ReplaySource(open_log(self._file), vehicle_id=self._id)
             later_ns = self._later_ns(source.info)
-            measured = OtherVehicleStates(self._id, estimator_of(source.info, self._vehicle))
-            for channel, message in source.advance(_FOREVER_NS):
+            info = world_from_lot_info(self._lot, source.info)
+            measured = OtherVehicleStates(self._id, estimator_of(info, self._vehicle))
+            for channel, on_lot in source.advance(_FOREVER_NS):
                 if self._stop.is_set():
                     return
+                message = world_from_lot_message(self._lot, on_lot)
                 heard = measured.take(channel, message, later_ns=later_ns)
                 self._read.put(_Read(message.stamp_ns + later_ns, heard))
         except Exception as error:  # whatever a reader raises over a broken file

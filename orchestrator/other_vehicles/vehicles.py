@@ -97,6 +97,7 @@ class OtherVehicleFeed:
                 own=own,
                 offset_s=config.log_offset_s,
                 waits=self._context.plan.config.lock_step,
+                lot=beside.lot,
                 tell=self._context.tell,
             )
         if config.seen_as is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from foretwin.contracts.errors import MissingFileError
 from foretwin.contracts.toml_file import read_toml
 from foretwin.contracts.vehicle import Parameter, VehicleFile, VehicleParameters
-from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE, check_plausible
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE, check_plausible, is_plausible
 from foretwin.sim_worker.vehicle.similarity import in_world_size
 
 _FOLDER = Path(__file__).parent
@@ -51,14 +51,18 @@ def _check_file(file: VehicleFile) -> VehicleFile:
     return file
 
 
-def check_vehicle(vehicle: VehicleParameters, *, scale: float = 1.0) -> VehicleParameters:
+def check_vehicle(
+    vehicle: VehicleParameters, *, scale: float = 1.0, before: VehicleParameters | None = None
+) -> VehicleParameters:
     """Return `vehicle`, or raise ValueError naming the first field that no road vehicle has so.
 
     A small car, in its own size, is held against one `scale` times as large that is built alike.
+    What was no road vehicle's `before` need not be one's now: a small car's grip in a World.
     """
     for name in PLAUSIBLE:
         parameter: Parameter = getattr(vehicle, name)
-        check_plausible(name, parameter.value, scale=scale)
+        if before is None or is_plausible(name, getattr(before, name).value):
+            check_plausible(name, parameter.value, scale=scale)
         std = parameter.std
         if std is not None and not 0.0 <= std < math.inf:
             raise ValueError(f"{name} has the std {std:g}; it must be zero or more, and finite")

@@ -40,6 +40,12 @@ Futures add up to 0.4 s to the delay of the steering, and its buffer of samples 
 """
 
 
+def is_plausible(name: str, value: float) -> bool:
+    """Whether a road vehicle may have a parameter so."""
+    low, high = PLAUSIBLE[name]
+    return low <= value <= high
+
+
 def check_plausible(name: str, value: float, *, scale: float = 1.0) -> float:
     """Return `value`; raises ValueError, with what would be right, for one that no vehicle has.
 

@@ -86,7 +86,7 @@ def accepted(
             vehicle, **{name: Parameter(value, std, f"{source}, {result.excited_s:.0f} s")}
         )
         try:
-            vehicle = check_vehicle(changed)
+            vehicle = check_vehicle(changed, before=vehicle)
         except ValueError:
             continue
         changes.append(

@@ -81,7 +81,8 @@ class ParametersInForce:
         if name == UNDERSTEER_GRADIENT:
             raise UserError(f"{name} follows from the stiffnesses: set {STIFFNESS}")
         try:
-            check_vehicle(msgspec.structs.replace(self.vehicle, **{name: Parameter(value)}))
+            changed = msgspec.structs.replace(self.vehicle, **{name: Parameter(value)})
+            check_vehicle(changed, before=self.vehicle)
         except ValueError as error:
             raise UserError(str(error)) from error
 
@@ -114,7 +115,8 @@ class ParametersInForce:
     ) -> ParameterChange:
         before: Parameter = getattr(self.vehicle, name)
         try:
-            self.vehicle = check_vehicle(msgspec.structs.replace(self.vehicle, **{name: parameter}))
+            changed = msgspec.structs.replace(self.vehicle, **{name: parameter})
+            self.vehicle = check_vehicle(changed, before=self.vehicle)
         except ValueError as error:
             raise UserError(str(error)) from error
         self._before[name].append(before)

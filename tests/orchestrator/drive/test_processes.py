@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.credentials import make_credentials
 from foretwin.contracts.local_bus import LocalBus
 from foretwin.contracts.process_setup import BusSetup
@@ -23,6 +24,7 @@ from foretwin.orchestrator.drive.processes import (
 from foretwin.orchestrator.drive.watcher_setups import COPILOT, copilot_address
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
+from tests.contracts.test_anchor import LOT, WORLD
 from tests.orchestrator.trip import town_plan
 
 COVERS = (
@@ -58,15 +60,23 @@ def test_a_drive_has_its_workers_one_source_and_what_it_is_asked_for(tmp_path: P
 
 def test_each_vehicle_beside_with_topics_of_its_own_has_its_gateway(tmp_path: Path) -> None:
     plan = configured(town_plan(tmp_path), tuning="off")
+    anchor = Anchor(lot=LOT, world=WORLD)
     beside = tuple(
-        OtherVehiclePlan(OtherVehicleConfig(id=name, live=True), plan.vehicle, True, ros2=topics)
-        for name, topics in (("a", autoware()), ("b", None), ("c", autoware()))
+        OtherVehiclePlan(
+            OtherVehicleConfig(id=name, live=True), plan.vehicle, True, ros2=topics, lot=lot
+        )
+        for name, topics, lot in (
+            ("a", autoware(), None),
+            ("b", None, None),
+            ("c", autoware(), anchor),
+        )
     )
     plan = replace(plan, beside=beside)
     (row,) = (row for row in PROCESSES if row.name == "ros2-beside")
     setups = [row.setup(plan, one) for one in process_ids(row, plan)]
     assert [setup.process_id for setup in setups] == ["ros2-beside0", "ros2-beside1"]
     assert [setup.vehicle_id for setup in setups] == ["a", "c"]
+    assert [setup.anchor for setup in setups] == [None, anchor]  # type: ignore[attr-defined]
 
 
 def test_every_process_is_started_for_this_run_and_the_mirror_plays_no_futures(

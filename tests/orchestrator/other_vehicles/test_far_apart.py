@@ -10,7 +10,7 @@ import pytest
 
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from tests.orchestrator.other_vehicles.far_link import FarCar, Judged, Link, judged, lot
+from tests.orchestrator.other_vehicles.far_link import BEGINS_S, FarCar, Judged, Link, judged, lot
 from tests.orchestrator.other_vehicles.two_cars import Drive, Met, co_located, drawn
 
 COVERS = ("foretwin.orchestrator.other_vehicles.live",)
@@ -34,6 +34,8 @@ def clear_cases(count: int, *, seed: int) -> list[tuple[Drive, Drive, Met]]:
     cases = []
     while len(cases) < count:
         a, b = drawn(random)
+        if co_located(CAR, a, VAN, b, from_s=BEGINS_S, to_s=0.0).least_m < 20.0:
+            continue  # they met before, while estimators and clocks settled
         truth = co_located(CAR, a, VAN, b)
         grown = co_located(CAR, a, _narrower(VAN, WITHIN_M), b)
         if truth.least_m < 9.0 and (truth.least_m > WITHIN_M or grown.touched):

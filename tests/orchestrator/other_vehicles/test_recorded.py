@@ -8,10 +8,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from foretwin.contracts.anchor import Anchor, AnchorPose
 from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
-from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_pose
 from foretwin.orchestrator.other_vehicles import recorded
 from foretwin.orchestrator.other_vehicles.recorded import RecordedVehicle
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -28,8 +30,6 @@ DEADLINE_S = 30.0
 
 def samples(count: int) -> Iterator[Sample]:
     """Positions, ten a second, of who drives east at 10 m/s."""
-    import numpy as np
-
     for k in range(count):
         lat, lon = geo_from_local(FRAME, np.array([float(k), 0.0])).tolist()
         yield "gnss", GnssFix(stamp_ns=START_NS + k * 10**8, position=GeoPoint(lat, lon))
@@ -50,9 +50,9 @@ class Ground:
         self.opened: list[RecordedVehicle] = []
         self.read: Callable[[], Iterator[Sample]] = lambda: samples(100)
 
-    def open(self, *, waits: bool) -> RecordedVehicle:
+    def open(self, *, waits: bool, lot: Anchor | None = None) -> RecordedVehicle:
         log = RecordedVehicle(
-            Path("van.mcap"), "van", CAR, own=INFO, offset_s=None, waits=waits,
+            Path("van.mcap"), "van", CAR, own=INFO, offset_s=None, waits=waits, lot=lot,
             tell=lambda told: self.told.append(told.text),
         )  # fmt: skip
         self.opened.append(log)
@@ -175,3 +175,15 @@ def test_a_log_that_is_closed_early_leaves_no_thread(ground: Ground) -> None:
     log.close()
     log.close()
     assert threading.active_count() == before
+
+
+def test_a_vehicle_that_drove_on_a_lot_is_where_that_is_in_the_world(ground: Ground) -> None:
+    lot = AnchorPose(lat_deg=52.5, lon_deg=13.4, yaw_deg=0.0)
+    world = AnchorPose(lat_deg=48.0, lon_deg=11.0, yaw_deg=90.0)
+    log = ground.open(waits=True, lot=Anchor(lot=lot, world=world, scale=2.0))
+    state = log.states_until(own(5.0))[-1].state
+    x_m, y_m, yaw_rad = local_pose(world.frame, state.position, state.yaw_rad)
+    # East on the lot is north in the World, where 50 m are 100.
+    assert (x_m, y_m) == pytest.approx((0.0, 100.0), abs=1.0)
+    assert yaw_rad == pytest.approx(np.pi / 2, abs=0.05)
+    assert state.speed_mps == pytest.approx(20.0, abs=1.0)

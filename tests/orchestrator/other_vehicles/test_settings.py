@@ -17,6 +17,7 @@ from foretwin.orchestrator.drive.plan import read_inputs
     [
         ('[[vehicles]]\nid = "v"', "vehicles, v: needs exactly one of log = FILE, live = true"),
         ('[[vehicles]]\nid = "v"\nlive = true\nseen_as = "3"', "vehicles, v: needs exactly one"),
+        ('[[vehicles]]\nid = "v"\nlive = true\nanchor = "l"', "anchor = FILE needs log or ros2"),
         ('[[vehicles]]\nid = "v"\nlog = "x"\nros2 = "y"', "ros2 = MAPPING needs live = true"),
         ('[[vehicles]]\nid = "v"\nlive = true\nrole = "all"', "role all is the car's alone"),
         ('[[vehicles]]\nid = "a b"\nlive = true', "must be one word"),

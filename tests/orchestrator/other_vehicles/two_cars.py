@@ -72,9 +72,17 @@ class Met(NamedTuple):
     least_m: float
 
 
-def co_located(one: VehicleParameters, a: Drive, other: VehicleParameters, b: Drive) -> Met:
-    """Return the verdict of `first_touches` and the clearance, every millisecond of 8 s."""
-    time_s = np.arange(0.0, 8.0, TRUTH_S)
+def co_located(
+    one: VehicleParameters,
+    a: Drive,
+    other: VehicleParameters,
+    b: Drive,
+    *,
+    from_s: float = 0.0,
+    to_s: float = 8.0,
+) -> Met:
+    """Return the verdict of `first_touches` and the clearance, every millisecond."""
+    time_s = np.arange(from_s, to_s, TRUTH_S)
     mine, theirs = a.poses(time_s), b.poses(time_s)
     states = np.zeros((1, len(time_s), 8))
     states[0, :, :3] = mine
