@@ -37,7 +37,6 @@ ROUTER, BUILDER, MIRROR, TUNING = "router", "builder", "mirror", "tuning"
 VEHICLE = "vehicle"
 ROS2_BESIDE = "ros2-beside"
 
-
 _ROLES: dict[str, BusRole] = {
     ORCHESTRATOR: "orchestrator",
     RECORDER: "recorder",

@@ -8,9 +8,24 @@ import msgspec
 import numpy as np
 import pytest
 
+from foretwin.contracts.codec import encode
+from foretwin.contracts.drive import ControlCommand, GnssFix, SpeedSample, VehicleState
+from foretwin.contracts.frames import geo_pose
+from foretwin.contracts.keys import CHANNELS, key
+from foretwin.contracts.mailbox import Received
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.orchestrator.other_vehicles.live import LiveVehicle
+from foretwin.orchestrator.other_vehicles.vehicle_clock import VehicleClock
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from tests.orchestrator.other_vehicles.far_link import BEGINS_S, FarCar, Judged, Link, judged, lot
+from tests.orchestrator.other_vehicles.far_link import (
+    BEGINS_S,
+    FRAME,
+    FarCar,
+    Judged,
+    Link,
+    judged,
+    lot,
+)
 from tests.orchestrator.other_vehicles.two_cars import Drive, Met, co_located, drawn
 
 COVERS = ("foretwin.orchestrator.other_vehicles.live",)
@@ -94,3 +109,34 @@ def test_a_vehicle_that_does_not_say_the_time_is_judged_by_its_samples_and_said_
     check(found, truth)
     assert found.clocks["van"]["how"] == "one way"
     assert found.clocks["van"]["std_s"] == pytest.approx(0.07, abs=0.001)
+
+
+def test_what_a_far_vehicle_was_told_is_in_the_cars_time_as_its_states_are() -> None:
+    ahead_ns = 1_000_000_000
+    own = VehicleClock()
+    own.answered(0, 0, 0)
+    far = LiveVehicle(
+        "van", VAN, ask_info=lambda _: None, tell=lambda _: None, own_clock=lambda: own.reading(0)
+    )
+    far.clock.answered(0, 0, ahead_ns)
+    for k in range(30):
+        ns = ahead_ns + k * 100_000_000
+        there = geo_pose(FRAME, float(k), 0.0, 0.0)
+        for channel, message in (
+            ("control", ControlCommand(stamp_ns=ns, accel_mps2=0.0, tire_angle_rad=0.0)),
+            ("speed", SpeedSample(stamp_ns=ns, speed_mps=10.0)),
+            ("gnss", GnssFix(stamp_ns=ns, position=there.position)),
+        ):
+            sent = encode(message)
+            item = Received(channel, key(channel, vehicle="van"), sent, CHANNELS[channel].kind)
+            item.received_mono_ns = ns - ahead_ns
+            far.take(item)
+    state = VehicleState(
+        vehicle_id="ego", stamp_ns=0, position=there.position, yaw_rad=0.0, speed_mps=0.0,
+        yaw_rate_radps=0.0, accel_mps2=0.0,
+    )  # fmt: skip
+    heard = far.states_until(state)
+    told = [command.stamp_ns for one in heard for command in one.commands]
+    assert heard[-1].state.stamp_ns == 2_900_000_000
+    assert told[0] == 0
+    assert max(told) == 2_900_000_000

@@ -266,12 +266,12 @@ def test_the_van_as_a_road_user_has_its_own_size_and_centre(tmp_path: Path) -> N
         tmp_path, OtherVehicleConfig(id="van", log=str(van_log(tmp_path, start_ns=START_NS)))
     )
     drive(beside, until_s=2.0)
-    users = beside.among(LatestReports(None, None, ()), own(2.0), {"van": "twin"}).road_users
+    users = beside.among(LatestReports(None, None, ()), own(2.3), {"van": "twin"}).road_users
     assert users is not None
     (van,) = users.users
     assert (van.length_m, van.width_m) == (VAN.length_m.value, VAN.width_m.value)
     centre = local_from_geo(FRAME, van.position.lat_deg, van.position.lon_deg)
-    assert centre[0] == pytest.approx(20.0 + box_centre_from_base_m(VAN), abs=0.3)
+    assert centre[0] == pytest.approx(23.0 + box_centre_from_base_m(VAN), abs=0.3)
 
 
 @pytest.mark.parametrize(("role", "met"), [("shadow", {"van"}), ("ghost", set())])
