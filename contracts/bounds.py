@@ -16,6 +16,7 @@ from foretwin.contracts import (
     gap,
     placement,
     planner_link,
+    point_cloud,
     side_by_side,
     simulation,
 )
@@ -109,6 +110,7 @@ SHAPES: dict[type[msgspec.Struct], dict[str, str]] = {
         "touch_xy_m": "C 2",
         "touch_names": "C",
     },
+    point_cloud.PointCloud: {"points": "N 6"},
 }  # fmt: skip
 """Arrays that belong together: equal letters are equal lengths; with ? one may be empty instead."""
 

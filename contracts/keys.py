@@ -15,6 +15,7 @@ from foretwin.contracts import (
     marks,
     placement,
     planner_link,
+    point_cloud,
     roles,
     runner,
     side_by_side,
@@ -150,6 +151,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     },
     (_RUN, LIVE, (Writer("worker", "traffic"),)): {
         "virtual_traffic": Channel(drive.RoadUsers, 20, "road users of one going simulation"),
+    },
+    (_RUN, WATCH, (Writer("worker", "sensors"),)): {
+        "point_cloud": Channel(point_cloud.PointCloud, 10, "what virtual lidars measure"),
     },
     (_RUN, WATCH, _ORCHESTRATOR): {
         "worker_status": Channel(simulation.WorkerStatus, 2, "health of the workers"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import msgspec
 
 from foretwin.contracts.anchor import Anchor
@@ -131,6 +133,26 @@ class TrafficSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     worlds_dir: str
     traffic: VirtualTraffic
     seed: int
+
+
+SensorSees = Literal["world", "users"]
+"""What rays of a virtual sensor meet: the World and the road users in it, or these alone."""
+
+
+class SensorSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A virtual sensor: the text of its TOML, as it was when it was checked, and its file."""
+
+    text: str
+    name: str
+    sees: SensorSees = "world"
+
+
+class SensorsSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Measures what virtual sensors on the car would; each turn is told on `point_cloud`."""
+
+    worlds_dir: str
+    sensors: tuple[SensorSetup, ...]
+    seed: int = 0
 
 
 class FarWorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

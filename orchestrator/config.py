@@ -20,6 +20,7 @@ from foretwin.contracts.virtual_traffic import VirtualTraffic
 from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.other_vehicle_config import OtherVehicleConfig as OtherVehicleConfig
 from foretwin.orchestrator.processors import processors, trouble_with_workers
+from foretwin.orchestrator.sensor_config import SensorConfig as SensorConfig
 from foretwin.orchestrator.settings import flag_of
 from foretwin.orchestrator.tuning_choice import Tuning, TuningChoice, choose_tuning
 
@@ -118,6 +119,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     virtual_traffic: VirtualTraffic = VirtualTraffic()
     """Road users who exist nowhere else: one going simulation around the car; see
     docs/virtual-traffic.md."""
+    sensors: tuple[SensorConfig, ...] = ()
+    """Sensors that measure the virtual world from the car; each takes half a core."""
     view: View = "auto"
     """Where the drive is shown; `auto` is a window where there is a display."""
     layout: str = "drive"

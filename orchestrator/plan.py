@@ -19,7 +19,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.local_bus import LocalBus
 from foretwin.contracts.ports import WEB_PORT
 from foretwin.contracts.segments import DRIVE_FILE
-from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.setup import BusSetup, SensorSetup
 from foretwin.contracts.towards_vehicle import OrderKeys
 from foretwin.contracts.trace import TRACE_PARTS
 from foretwin.contracts.tracks import DrivenTrack
@@ -80,6 +80,8 @@ class DriveInputs:
     """How the live car's ROS 2 topics are read, and what goes back."""
     progress: ProgressModel | None = None
     """What forecasts how far the car will get; None where nobody wants to know."""
+    sensors: tuple[SensorSetup, ...] = ()
+    """Virtual ones on the car."""
     tracks: tuple[DrivenTrack, ...] = ()
     """Of earlier drives near the map, where the user asks for them."""
 

@@ -26,11 +26,11 @@ from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR,
 from foretwin.orchestrator.drive.questions import ASKED_OF_SIMULATIONS, Questions
 from foretwin.orchestrator.drive.refusal_handler import RefusalHandler
 from foretwin.orchestrator.drive.route_handler import RouteHandler
+from foretwin.orchestrator.drive.sensors_setup import TOLD_WORLDS
 from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
 from foretwin.orchestrator.drive.strangers import Strangers
 from foretwin.orchestrator.drive.tuning_link import FINDINGS, TuningLink
 from foretwin.orchestrator.drive.virtual_traffic_link import VirtualTrafficLink
-from foretwin.orchestrator.drive.watcher_setups import WATCHERS
 from foretwin.orchestrator.drive.world_handler import WorldHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, Notice, NotReady, UseWorld
 from foretwin.orchestrator.other_vehicles.vehicles import OtherVehicleFeed
@@ -277,7 +277,7 @@ class Conductor:
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
-        elif process_id in WATCHERS:
+        elif process_id in TOLD_WORLDS:
             self.active_world.viewer_up()
 
     def _worker_up(self, process_id: str) -> None:

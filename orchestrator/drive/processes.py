@@ -19,6 +19,7 @@ from foretwin.contracts.setup import (
     TuningSetup,
     WorkerSetup,
 )
+from foretwin.orchestrator.drive import sensors_setup as sensors
 from foretwin.orchestrator.drive import traffic_setup as traffic
 from foretwin.orchestrator.drive.watcher_setups import (
     COPILOT,
@@ -34,8 +35,7 @@ from foretwin.orchestrator.runner.supervisor import WhenDead
 
 ORCHESTRATOR, SUPERVISOR = "orchestrator", "supervisor"
 ROUTER, BUILDER, MIRROR, TUNING = "router", "builder", "mirror", "tuning"
-VEHICLE = "vehicle"
-ROS2_BESIDE = "ros2-beside"
+VEHICLE, ROS2_BESIDE = "vehicle", "ros2-beside"
 
 _ROLES: dict[str, BusRole] = {
     ORCHESTRATOR: "orchestrator",
@@ -239,6 +239,7 @@ PROCESSES = (
         traffic.TRAFFIC, traffic.MODULE, "restart", _made_by(traffic.made), runs=traffic.runs
     ),
     ProcessRow(TUNING, "sim_worker.analysis.process", "restart", _tuning, nice=10, runs=_tunes),
+    ProcessRow(sensors.SENSORS, sensors.MODULE, "restart", _made_by(sensors.made), 5, sensors.runs),
     ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _made_by(recorder_setup)),
     ProcessRow(VIEWER, "viewer", "restart", _made_by(viewer_setup), nice=10),
     ProcessRow(
@@ -275,7 +276,7 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     """
     if row.name == ROUTER and plan.config.lock_step:
         return row._replace(when_dead="end_drive")
-    if row.name in (TUNING, RECORDER, VIEWER, COPILOT) and plan.config.lock_step:
+    if row.name in (TUNING, sensors.SENSORS, RECORDER, VIEWER, COPILOT) and plan.config.lock_step:
         return row._replace(when_dead="report")
     return row
 

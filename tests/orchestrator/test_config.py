@@ -9,7 +9,11 @@ import pytest
 from foretwin.orchestrator.config import ConfigError, DriveConfig
 from foretwin.orchestrator.config_file import load_config, parse_speed
 
-COVERS = ("foretwin.orchestrator.config_file", "foretwin.orchestrator.settings")
+COVERS = (
+    "foretwin.orchestrator.config_file",
+    "foretwin.orchestrator.other_vehicle_config",
+    "foretwin.orchestrator.settings",
+)
 
 
 def test_flags_lie_over_the_file(tmp_path: Path) -> None:

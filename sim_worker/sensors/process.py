@@ -1,0 +1,85 @@
+"""The process of virtual sensors: `python -m foretwin.sim_worker.sensors.process --setup FILE`."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.drive import RoadUsers, VehicleState
+from foretwin.contracts.guard import Refused
+from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.setup import SensorsSetup
+from foretwin.contracts.simulation import ActiveWorld
+from foretwin.sim_worker.sensors.sensor_file import sensor_of
+from foretwin.sim_worker.sensors.virtual_sensors import VirtualSensors
+from foretwin.sim_worker.world_file import load_world
+
+_DEPTH, _STATES = 64, 8
+"""Of states few: who falls behind leaves out turns, and tells none that are old."""
+_IDLE_S = 0.2
+
+log = logging.getLogger("sim_worker.sensors")
+
+
+class SensorsProcess:
+    """Feeds the sensors from messages; one that cannot be used is logged and passed over."""
+
+    def __init__(self, setup: SensorsSetup, bus: Bus, *, refusals: Refusals | None = None) -> None:
+        self._bus, self._run_id = bus, setup.run_id
+        self.told = 0
+        """Clouds so far."""
+        self._worlds_dir = Path(setup.worlds_dir)
+        self._refusals = Refusals() if refusals is None else refusals
+        self._sensors = VirtualSensors(
+            [(sensor_of(one.text, one.name), one.sees) for one in setup.sensors], seed=setup.seed
+        )
+        self.mailbox = Mailbox(_STATES, when_full="block" if setup.bus.lossless else "drop_oldest")
+        # Apart from the states, which must not push out the one word on the World.
+        self.news = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
+        bus.subscribe("active_world", self.news, run=setup.run_id)
+        for channel in ("virtual_traffic", "virtual_objects"):
+            bus.subscribe(channel, self.news, run=setup.run_id)
+        bus.subscribe("state", self.mailbox, vehicle=setup.vehicle_id)
+
+    def step(self, wait_s: float = _IDLE_S) -> None:
+        """Take what has come, or wait a moment for it; never raises."""
+        item = self.mailbox.take(wait_s)
+        while (one := self.news.take()) is not None:
+            self._handle(one)
+        if item is not None:
+            self._handle(item)
+
+    def _handle(self, item: object) -> None:
+        if not isinstance(item, Received):
+            return
+        try:
+            match item.message():
+                case VehicleState() as state:
+                    for cloud in self._sensors.take_state(state):
+                        self._bus.publish("point_cloud", cloud, run=self._run_id)
+                        self.told += 1
+                case RoadUsers() as users:
+                    self._sensors.take_users(users)
+                case ActiveWorld(world_id=world_id):
+                    world = None if world_id is None else load_world(self._worlds_dir, world_id)
+                    self._sensors.use_world(world)
+        except Refused as refused:
+            if text := self._refusals.take(refused):
+                log.warning("%s", text)
+        except Exception:
+            log.exception("message on %s passed over", item.key)
+
+
+def serve(setup: SensorsSetup, bus: Bus, life: ProcessLife) -> None:
+    """Measure until the run is over."""
+    process = SensorsProcess(setup, bus, refusals=life.refusals)
+    life.ready()
+    while not life.over:
+        process.step()
+    log.info("told %d clouds, passed over %d states", process.told, process.mailbox.dropped)
+
+
+if __name__ == "__main__":
+    run_process(SensorsSetup, serve)

@@ -1,0 +1,48 @@
+"""A drive's virtual sensors: read before it begins, and a process where there are any."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.access import may_say
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.keys import CHANNELS
+from foretwin.contracts.setup import SensorsSetup
+from foretwin.orchestrator.config_file import load_config
+from foretwin.orchestrator.drive.processes import PROCESSES, expected_ids, member, row_of
+from foretwin.orchestrator.drive.sensors_setup import SENSORS, TOLD_WORLDS, read_sensor
+from foretwin.orchestrator.sensor_config import SensorConfig
+from foretwin.sim_worker.sensors.sensor_file import load_sensor, sensor_of
+from tests.orchestrator.trip import town_plan
+
+COVERS = ("foretwin.orchestrator.sensor_config",)
+
+
+def test_a_drive_without_sensors_has_no_process_of_them(tmp_path: Path) -> None:
+    plan = town_plan(tmp_path)
+    assert SENSORS not in expected_ids(plan)
+    with_one = replace(plan, sensors=(read_sensor(SensorConfig(file="os1_64", sees="users")),))
+    assert SENSORS in expected_ids(with_one)
+
+    (row,) = (row for row in PROCESSES if row.name == SENSORS)
+    setup = row.setup(with_one, SENSORS)
+    assert isinstance(setup, SensorsSetup)
+    (sensor,) = setup.sensors
+    assert sensor_of(sensor.text, sensor.name) == load_sensor("os1_64")
+    assert (sensor.sees, setup.worlds_dir) == ("users", str(plan.worlds_dir))
+    assert may_say(member(with_one, SENSORS), CHANNELS["point_cloud"])
+    assert SENSORS in TOLD_WORLDS
+    assert row_of(row, town_plan(tmp_path / "x", speed=None)).when_dead == "report"
+
+
+def test_settings_name_sensors(tmp_path: Path) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text('[[sensors]]\nfile = "vlp_16"\n\n[[sensors]]\nfile = "x"\nsees = "users"\n')
+    config = load_config(file, {})
+
+    assert config.sensors == (SensorConfig(file="vlp_16"), SensorConfig(file="x", sees="users"))
+    with pytest.raises(UserError, match="no bundled sensor of that name"):
+        read_sensor(config.sensors[1])

@@ -1,0 +1,74 @@
+"""The process of sensors on a bus: states, Worlds and road users in, clouds out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from foretwin.contracts.bus import Mailbox
+from foretwin.contracts.codec import write_message
+from foretwin.contracts.point_cloud import PointCloud
+from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.setup import BusSetup, SensorSetup, SensorsSetup
+from foretwin.contracts.simulation import ActiveWorld, RunEnd
+from foretwin.sim_worker.sensors.process import SensorsProcess, serve
+from foretwin.sim_worker.sensors.sensor_file import sensor_text
+from tests.contracts.memory_bus import MemoryBus
+from tests.sim_worker.places import box, crossroads, state_at
+from tests.sim_worker.sensors.test_virtual_sensors import users
+
+RUN, CAR = {"run": "r1"}, {"vehicle": "car"}
+WORLD = crossroads(buildings=(box(20.0, 0.0, 2.0, 30.0),))
+
+
+def setup_in(folder: Path) -> SensorsSetup:
+    text, name = sensor_text("vlp_16")
+    return SensorsSetup(
+        run_id="r1", process_id="sensors", vehicle_id="car", bus=BusSetup(endpoint="tcp/x:1"),
+        log_file=str(folder / "log.jsonl"), worlds_dir=str(folder),
+        sensors=tuple(SensorSetup(text=text, name=name, sees=sees) for sees in ("world", "users")),
+    )  # fmt: skip
+
+
+def test_clouds_come_of_the_world_in_force_and_of_both_who_say_road_users(tmp_path: Path) -> None:
+    bus, heard = MemoryBus(), Mailbox(16)
+    process = SensorsProcess(setup_in(tmp_path), bus)
+    bus.subscribe("point_cloud", heard, **RUN)
+    write_message(WORLD, tmp_path / f"{WORLD.id}.world")
+    bus.publish("active_world", ActiveWorld(stamp_ns=0, world_id=WORLD.id), **RUN)
+    bus.publish("virtual_traffic", users(0, "ahead"), **RUN)
+    bus.publish("virtual_objects", users(0, "behind", x=-10.0), **RUN)
+    for stamp_ns in (0, 100_000_000):
+        bus.publish("state", state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ns), **CAR)
+        process.step(0.0)
+    clouds = [item.message() for item in iter(heard.take, None)]
+
+    assert all(isinstance(cloud, PointCloud) for cloud in clouds)
+    assert process.told == len(clouds)
+    whole, alone = (cloud.points for cloud in clouds)
+    assert len(whole) > 5000 > len(alone) > 200
+    assert 6.9 < np.abs(alone[:, 0]).min() < 7.2
+    assert (alone[:, 0] > 0.0).any()
+    assert (alone[:, 0] < 0.0).any()
+
+
+def test_a_world_that_is_not_there_ends_nothing(tmp_path: Path) -> None:
+    bus, heard = MemoryBus(), Mailbox(16)
+    process = SensorsProcess(setup_in(tmp_path), bus)
+    bus.subscribe("point_cloud", heard, **RUN)
+    bus.publish("active_world", ActiveWorld(stamp_ns=0, world_id="nowhere"), **RUN)
+    for stamp_ns in (0, 100_000_000):
+        bus.publish("state", state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ns), **CAR)
+        process.step(0.0)
+
+    assert len(heard) == 1, "of the sensor that sees road users alone"
+
+
+def test_it_leaves_when_the_run_ends(tmp_path: Path) -> None:
+    bus, setup = MemoryBus(), setup_in(tmp_path)
+    life = ProcessLife(setup, bus)
+    bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+    serve(setup, bus, life)
+
+    assert life.over

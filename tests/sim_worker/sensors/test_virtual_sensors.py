@@ -1,0 +1,114 @@
+"""Sensors of a car that drives: a cloud each time a turn is over, of what was there as it began."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import RoadUsers
+from foretwin.contracts.point_cloud import PointCloud
+from foretwin.sim_worker.sensors.virtual_sensors import LIVES_NS, VirtualSensors
+from tests.sim_worker.places import box, crossroads, state_at
+from tests.sim_worker.sensors.test_lidar import exact
+from tests.sim_worker.sensors.test_ray_world import user
+
+MS = 1_000_000
+TOWN = crossroads(buildings=(box(20.0, 0.0, 2.0, 30.0),))
+
+
+def driven(
+    sensors: VirtualSensors, until_ms: int, *, from_ms: int = 0, every_ms: int = 20
+) -> list[PointCloud]:
+    """Stand at the origin, a state each 20 ms."""
+    stamps = range(from_ms, until_ms + 1, every_ms)
+    states = (state_at(0.0, 0.0, speed=0.0, stamp_ns=one * MS) for one in stamps)
+    return [cloud for state in states for cloud in sensors.take_state(state)]
+
+
+def users(stamp_ms: int, *names: str, x: float = 10.0, speed_mps: float = 0.0) -> RoadUsers:
+    there = (user(x, 0.0, 0.0, user_id=name, speed_mps=speed_mps) for name in names)
+    return RoadUsers(stamp_ns=stamp_ms * MS, users=tuple(there))
+
+
+def ahead_m(cloud: PointCloud) -> float:
+    """How far away is what the level ring sees straight ahead."""
+    points = cloud.points[cloud.points[:, 4] == 2]
+    return float(points[np.argmin(np.abs(np.arctan2(points[:, 1], points[:, 0]))), 0])
+
+
+def test_a_turn_is_told_when_it_is_over_with_the_stamp_of_its_beginning() -> None:
+    sensors = VirtualSensors([(exact(), "world")])
+    sensors.use_world(TOWN)
+    clouds = driven(sensors, 300)
+
+    assert [cloud.stamp_ns // MS for cloud in clouds] == [0, 100, 200]
+    assert {cloud.sensor for cloud in clouds} == {"exact"}
+    assert ahead_m(clouds[0]) == pytest.approx(18.0, abs=1e-3)
+
+
+def test_road_users_are_there_for_as_long_as_somebody_says_so() -> None:
+    sensors = VirtualSensors([(exact(), "world")])
+    sensors.use_world(TOWN)
+    sensors.take_users(users(0, "van"))
+    until_ms = LIVES_NS // MS
+    clouds = driven(sensors, until_ms + 300)
+    seen = [ahead_m(cloud) < 10.0 for cloud in clouds]
+
+    assert seen == [cloud.stamp_ns <= LIVES_NS for cloud in clouds]
+    assert True in seen
+    assert False in seen
+
+
+def test_the_last_word_on_a_road_user_counts_and_is_led_on() -> None:
+    sensors = VirtualSensors([(exact(), "users")])
+    sensors.take_users(users(0, "van", x=30.0))
+    sensors.take_users(users(60, "van", x=12.0, speed_mps=10.0))
+    sensors.take_users(users(30, "van", x=25.0))
+    clouds = driven(sensors, 200)
+
+    # The rear of a van of 6 m whose middle is at 12 m at 60 ms; ahead is seen 50 ms into a turn.
+    wanted = [12.0 - 3.0 + 10.0 * (begun_s + 0.05 - 0.06) for begun_s in (0.0, 0.1)]
+    assert [ahead_m(cloud) for cloud in clouds] == pytest.approx(wanted, abs=0.02)
+
+
+def test_a_sensor_of_road_users_alone_sees_no_world_and_needs_none() -> None:
+    sensors = VirtualSensors([(exact(), "users"), (exact(), "world")])
+    sensors.take_users(users(0, "van"))
+    without = driven(sensors, 100)
+    sensors.use_world(TOWN)
+    sensors.take_users(users(100, "van"))
+    alone, whole = driven(sensors, 200, from_ms=120)
+
+    assert len(without) == 1
+    assert ahead_m(without[0]) == ahead_m(alone) == pytest.approx(7.0, abs=1e-3)
+    assert len(whole.points) > 2 * len(alone.points)
+
+
+def test_who_missed_states_or_whose_clock_was_set_begins_anew() -> None:
+    sensors = VirtualSensors([(exact(), "world")])
+    sensors.use_world(TOWN)
+    assert len(driven(sensors, 200)) == 2
+    assert driven(sensors, 5000, from_ms=5000) == []
+    assert [cloud.stamp_ns // MS for cloud in driven(sensors, 5100, from_ms=5020)] == [5000]
+    assert driven(sensors, 80) == []
+
+
+def test_without_a_heading_nothing_is_measured() -> None:
+    sensors = VirtualSensors([(exact(), "world")])
+    sensors.use_world(TOWN)
+    blind = [state_at(0.0, 0.0, stamp_ns=k * 50 * MS) for k in range(4)]
+    states = [msgspec.structs.replace(one, yaw_valid=False) for one in blind]
+    assert [cloud for state in states for cloud in sensors.take_state(state)] == []
+
+
+def test_the_same_drive_and_seed_give_the_same_noise() -> None:
+    def clouds(seed: int) -> list[PointCloud]:
+        sensors = VirtualSensors([(exact(range_std_m=0.05), "world")], seed=seed)
+        sensors.use_world(TOWN)
+        return driven(sensors, 200)
+
+    first, again, other = clouds(1), clouds(1), clouds(2)
+    assert all(np.array_equal(a.points, b.points) for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[0].points[:, :3], other[0].points[:, :3])
+    assert not np.array_equal(first[0].points[:, :3], first[1].points[:, :3])
