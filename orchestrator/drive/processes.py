@@ -48,7 +48,6 @@ _ROLES: dict[str, BusRole] = {
 }
 """Roles of processes by name, where it is none of a worker; a gateway speaks for its vehicle."""
 
-
 _MakesSetup = Callable[[DrivePlan, str], ProcessSetup]
 
 

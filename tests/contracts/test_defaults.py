@@ -49,6 +49,7 @@ LISTED: dict[str, dict[str, Any]] = {
         "kind": "car", "turn": "straight", "speed_mps": 8.33, "conduct": "heedless",
         "impact_share": 0.5, "gap_m": 20.0, "decel_mps2": 4.0,
     },
+    "Anchor": {"scale": 1.0},
     "Area": {"source": "inferred"},
     "Connection": {"control": "none"},
     "DriveEnd": {"reason": "end of source"},
@@ -78,15 +79,18 @@ LISTED: dict[str, dict[str, Any]] = {
     "Road": {"lane_count_source": "inferred"},
     "Roll": {"most_bytes": 67_108_864, "most_s": 3600.0},
     "Scenario": {"horizon_s": 8.0, "lead_time_s": 4.0, "samples": 1},
+    "SensorSetup": {"sees": "world"},
     "StackSetup": {"instances": 1, "answer_within_s": 60.0, "start_within_s": 120.0},
     "StandinSetup": {"speed": 1.0},
     "Tally": {"part": 1},
+    "VehicleFile": {"scale": 1.0},
     "VehicleInfo": {"reference_point": "unknown"},
     "VehicleState": {"yaw_valid": True},
     "VehicleStatus": {"control_mode": "unknown", "gear": "unknown", "indicator": "unknown"},
     "ViewerSetup": {
         "live": "none", "page_port": WEB_PORT, "title": "foretwin", "attribution": OSM,
     },
+    "VirtualTraffic": {"source": "off", "scenario": "cpta", "count": 20},
     "Where": {"setting": "junction"},
     "WorkerSetup": {
         "simulations": 32, "kept_worlds": 8, "control_hz": 20.0, "mirror_window_s": 8.0,
@@ -154,6 +158,7 @@ def test_what_a_file_holds_that_nobody_knows_is_refused(module: Any) -> None:
 
 WRITTEN_ONLY = {
     "UseRoles", "OtherVehicle", "OtherVehicles", "CastVehicle", "MirrorCast", "Parameter",
+    "VehicleEncounter",
 }  # fmt: skip
 """Messages, and what stands in a file that says itself what it knows."""
 
