@@ -16,7 +16,8 @@ def set_value(
         typer.Argument(
             metavar="KEY=VALUE",
             help="role.ID=all, twin, shadow or ghost; correction=free or follow; "
-            "vehicle.NAME=a number, pin, unpin or rollback; light.GROUP=red, green, … or auto",
+            "vehicle.NAME=a number, pin, unpin or rollback; light.GROUP=a "
+            "colour or auto; virtual_traffic=on or off",
         ),
     ],
     run: Annotated[
@@ -28,7 +29,8 @@ def set_value(
         Path | None, typer.Option(help="the operator's certificate, where the drive wants one")
     ] = None,
 ) -> None:
-    """Change a running drive: a vehicle's role, the twins' correction, the car's parameters.
+    """Change a running drive: a vehicle's role, the twins' correction, the car's parameters,
+    what a light shows, virtual traffic.
 
     Example: foretwin set vehicle.mass_kg=1500
     """

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import msgspec
 
 from foretwin.contracts.anchor import Anchor
-from foretwin.contracts.bus import Bus, Mailbox, Request
+from foretwin.contracts.bus import Bus, Mailbox, Received, Request
 from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo, VehicleTime
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
@@ -82,6 +82,7 @@ class VehicleProcess:
         self._speed, self._anchor = speed, anchor
         self._mono_s = mono_s
         self._mailbox = Mailbox(256)
+        self._heard: dict[str, Callable[[Any], None]] = {}
         self._published: Counter[str] = Counter()
         self._last_stamp_ns = source.first_stamp_ns
         self._given_until_ns = source.first_stamp_ns
@@ -98,6 +99,16 @@ class VehicleProcess:
     def published(self) -> dict[str, int]:
         """Samples published so far by channel."""
         return dict(self._published)
+
+    def hear(self, channel: str, take: Callable[[Any], None], *, run_id: str) -> None:
+        """Hand on what is said on a channel of the run; what the guard refuses is counted."""
+        self._heard[channel] = take
+        self._bus.subscribe(channel, self._mailbox, run=run_id)
+
+    def serve(self) -> None:
+        """Be on the bus until the run is over; blocks."""
+        while self.step():
+            pass
 
     def step(self) -> bool:
         """Answer what was asked, publish what is due, wait a moment; return False to leave."""
@@ -130,6 +141,12 @@ class VehicleProcess:
 
     def _answer(self, item: Any) -> None:
         match item:
+            case Received(channel=channel) if channel in self._heard:
+                try:
+                    self._heard[channel](item.message())
+                except Refused as refused:
+                    if text := self._life.refusals.take(refused):
+                        log.warning("%s", text)
             case Request(channel="info"):
                 item.reply(world_from_lot_info(self._anchor, self._source.info))
             case Request(channel="vehicle_clock"):
@@ -178,5 +195,4 @@ def serve_vehicle(
     process = VehicleProcess(
         source, bus=bus, life=life, vehicle_id=vehicle_id, speed=speed, anchor=anchor
     )
-    while process.step():
-        pass
+    process.serve()

@@ -7,7 +7,7 @@ from pathlib import Path
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import StandinSetup
-from foretwin.telemetry.processes.vehicle_process import serve_vehicle
+from foretwin.telemetry.processes.vehicle_process import VehicleProcess
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import read_path
 from foretwin.telemetry.standin.source import StandinSource
@@ -24,10 +24,19 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
         seed=setup.seed,
         end_s=setup.end_s,
         plan_shift_m=setup.plan_shift_m,
+        anchor=setup.anchor,
     )
-    serve_vehicle(
-        source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed, anchor=setup.anchor
+    process = VehicleProcess(
+        source,
+        bus=bus,
+        life=life,
+        vehicle_id=setup.vehicle_id,
+        speed=setup.speed,
+        anchor=setup.anchor,
     )
+    if setup.speed is not None:  # in lock step nothing may depend on when a message comes
+        process.hear("lights", source.heed, run_id=setup.run_id)
+    process.serve()
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
 from foretwin.telemetry.standin.car import CarMotion
+from foretwin.telemetry.standin.lights_ahead import LightAhead
 from foretwin.telemetry.standin.obstacles import Hindrance
 from foretwin.telemetry.standin.parameters import CarParameters, DriverParameters
 from foretwin.telemetry.standin.path import DrivenPath
@@ -59,6 +60,8 @@ class Driver:
     """Whether it stands, whatever the path says."""
     ahead: Hindrance | None = None
     """Who is in its way now."""
+    lights: tuple[LightAhead, ...] = ()
+    """Those that let nobody pass."""
     _next_stop: int = 0
     _waited_s: float = 0.0
 
@@ -106,19 +109,36 @@ class Driver:
         later = self._wished_speed(ahead + 0.5, stop)
         slope = (later * later - wished * wished) / 1.0
         slope = min(max(slope, -given.comfort_decel_mps2), 0.0)
-        accel = min(slope + _SPEED_GAIN_PS * (wished - speed_mps), self._not_into(s_m, speed_mps))
+        accel = slope + _SPEED_GAIN_PS * (wished - speed_mps)
+        accel = min(accel, self._not_into(s_m, speed_mps), self._not_over(s_m, speed_mps))
         return min(max(accel, -given.max_decel_mps2), given.max_accel_mps2)
 
     def _not_into(self, s_m: float, speed_mps: float) -> float:
-        """Return the most acceleration with which nobody ahead is run into.
+        """Return the most acceleration with which nobody ahead is run into."""
+        if self.ahead is None:
+            return math.inf
+        return self._braked_to(self.ahead.s_m - s_m, self.ahead.speed_mps, speed_mps)
+
+    def _not_over(self, s_m: float, speed_mps: float) -> float:
+        """Return the most acceleration with which it stands before every light that it can still
+        stand before: at amber in comfort, else as hard as it brakes."""
+        given, most = self.parameters, math.inf
+        for light in self.lights:
+            accel = self._braked_to(light.s_m - s_m, 0.0, speed_mps)
+            hardest = given.comfort_decel_mps2 if light.amber else given.max_decel_mps2
+            left_m = max(light.s_m - s_m - speed_mps * self.car.drive_delay_s, 0.1)
+            if speed_mps * speed_mps <= 2.0 * left_m * hardest:
+                most = min(most, accel)
+        return most
+
+    def _braked_to(self, left_m: float, to_mps: float, speed_mps: float) -> float:
+        """Return the most acceleration with which a speed is reached in so many metres.
 
         It brakes as soon as comfort asks for it, by as much as it takes, and begins a little
         earlier, to be through with it where it should be.
         """
-        if self.ahead is None:
-            return math.inf
-        left_m = self.ahead.s_m - s_m - speed_mps * self.car.drive_delay_s
-        faster = speed_mps * abs(speed_mps) - self.ahead.speed_mps**2
+        left_m -= speed_mps * self.car.drive_delay_s
+        faster = speed_mps * abs(speed_mps) - to_mps**2
         if left_m <= 0.1:
             return -self.parameters.max_decel_mps2 if faster > 0.0 else 0.0
         needed = faster / (2.0 * left_m)

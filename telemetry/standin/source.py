@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.drive import ControlCommand, RoadUser, VehicleInfo
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.lights import ShownLights
 from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
 from foretwin.telemetry.standin.driver import Driver, DriverCommand
+from foretwin.telemetry.standin.lights_ahead import STALE_NS, lights_ahead
 from foretwin.telemetry.standin.obstacles import Hindrance, hindrance
 from foretwin.telemetry.standin.parameters import StandinParameters
 from foretwin.telemetry.standin.path import DrivenPath
@@ -32,6 +35,7 @@ class StandinSource:
         seed: int = 0,
         end_s: float | None = None,
         plan_shift_m: float = 0.0,
+        anchor: Anchor | None = None,
     ) -> None:
         """Place the car at rest at the path's beginning; raises UserError for an end before it."""
         if end_s is not None and not end_s > 0.0:
@@ -56,6 +60,7 @@ class StandinSource:
         self._last_tick = None if end_s is None else round(end_s / STEP_S)
         self._users: tuple[RoadUser, ...] = ()
         self._seen_ns = START_STAMP_NS
+        self._anchor, self._lights = anchor, ShownLights(stamp_ns=0, world_id=None)
         self.first_stamp_ns = START_STAMP_NS
         self.ended = False
         self.skipped_invalid = 0
@@ -73,6 +78,11 @@ class StandinSource:
     def see(self, users: tuple[RoadUser, ...], *, stamp_ns: int) -> None:
         """Take who is there at a stamp: the driver brakes for whom it finds in its way."""
         self._users, self._seen_ns = users, stamp_ns
+
+    def heed(self, lights: ShownLights) -> None:
+        """Take what lights of the World show: the driver stands before those that let nobody pass,
+        until other word comes, or none for a second."""
+        self._lights = lights
 
     def hold(self, held: bool) -> None:
         """Let the driver stand, or go on."""
@@ -113,6 +123,12 @@ class StandinSource:
                 age_s = (stamp_ns - self._seen_ns) * 1e-9
                 self._driver.ahead = hindrance(
                     self._path, self._driver.s_m, self._users, age_s=age_s
+                )
+                fresh = stamp_ns - self._lights.stamp_ns <= STALE_NS
+                self._driver.lights = (
+                    lights_ahead(self._path, self._driver.s_m, self._lights, anchor=self._anchor)
+                    if fresh
+                    else ()
                 )
                 self._command = self._driver.command(motion)
             # Time goes on before samples leave: a caller may stop between two of them.

@@ -98,7 +98,7 @@ def test_who_writes_for_later_gives_way() -> None:
 
 def test_who_watches_and_records_is_started_again_but_not_in_lock_step() -> None:
     live, stepped = (Namespace(config=Namespace(lock_step=step)) for step in (False, True))
-    watching = [row(name) for name in ("tuning", "recorder", "viewer", "copilot")]
+    watching = [row(name) for name in ("tuning", "sensors", "recorder", "viewer", "copilot")]
     assert {row_of(one, live).when_dead for one in watching} == {"restart"}  # type: ignore[arg-type]
     assert {row_of(one, stepped).when_dead for one in watching} == {"report"}  # type: ignore[arg-type]
     assert row_of(row("router"), live).when_dead == "restart"  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ from foretwin.contracts.drive import (
 )
 from foretwin.contracts.fleet import ClockQuestion
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.lights import ShownLights
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
@@ -187,3 +188,12 @@ def test_it_says_the_time_on_board_once_its_clock_runs() -> None:
     rig.now_s += 0.75
     told = rig.ask("vehicle_clock", ClockQuestion())
     assert (told.stamp_ns - START_NS) / SECOND_NS == pytest.approx(1.5)
+
+
+def test_it_hands_on_what_the_run_says_on_a_channel() -> None:
+    rig, heard = Rig(speed=1.0), []
+    rig.process.hear("lights", heard.append, run_id="r")
+    said = ShownLights(stamp_ns=7, world_id="w")
+    rig.bus.publish("lights", said, run="r")
+    assert rig.process.step()
+    assert heard == [said]
