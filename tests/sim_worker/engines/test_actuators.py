@@ -82,3 +82,12 @@ def test_some_begin_anew_beside_others() -> None:
     given = two.follow(np.zeros(2), np.full(2, 0.1), None)
     assert given.tire_angle_rad[:, 1] == pytest.approx(np.full(5, 0.3))
     assert given.tire_angle_rad[-1, 0] == pytest.approx(0.1)
+
+
+def test_a_delay_of_no_whole_steps_lies_between_its_neighbours() -> None:
+    after = [
+        actuators(CAR, delay_s).follow(np.zeros(1), np.full(1, 0.1), None).tire_angle_rad[-1, 0]
+        for delay_s in (0.02, 0.025, 0.03)
+    ]
+    assert after[1] == pytest.approx((after[0] + after[2]) / 2.0)
+    assert after[0] > after[2]
