@@ -23,7 +23,7 @@ from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_accept
 from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
-from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.parameters import load_vehicle, scale_of
 from foretwin.telemetry.logs import open_log
 
 _FINE_S, _COARSE_S = 0.01, 0.02
@@ -70,7 +70,9 @@ def identify_log(
         changed, _ = accepted(told, vehicle, source=f"identified from {log_file.name}")
         body = msgspec.json.encode(told)
         with named_in_errors(f"--out {out}"), new_files(out):
-            (out / "vehicle.toml").write_text(vehicle_toml(changed), encoding="utf-8")
+            (out / "vehicle.toml").write_text(
+                vehicle_toml(changed, scale=scale_of(vehicle_file)), encoding="utf-8"
+            )
             (out / "identification.json").write_bytes(msgspec.json.format(body, indent=1) + b"\n")
             draw_estimates(told, out / "estimates.png")
             # A drive without steering, yaw rate or speed has no such picture: the table says so.

@@ -31,17 +31,27 @@ def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
     Raises MissingFileError for neither a name nor a file and UserError, in one line with the file
     and the field, for anything that is no vehicle.
     """
+    file = _read_file(path)
+    fields = (name for name in VehicleParameters.__struct_fields__)
+    vehicle = VehicleParameters(**{name: getattr(file, name) for name in fields})
+    return vehicle if file.scale == 1.0 else in_world_size(vehicle, file.scale)
+
+
+def scale_of(path: Path | str | None) -> float:
+    """Return the `scale` in the file of a vehicle, 1 but for a small car; raises as `load_vehicle`
+    does."""
+    return _read_file(path).scale
+
+
+def _read_file(path: Path | str | None) -> VehicleFile:
     source = DEFAULT_FILE if path is None else Path(path)
     if str(source) in bundled_vehicles():
         source = _FOLDER / f"{source}.toml"
     try:
-        file = read_toml(source, VehicleFile, what="vehicle", check=_check_file)
+        return read_toml(source, VehicleFile, what="vehicle", check=_check_file)
     except FileNotFoundError as error:
         names = ", ".join(bundled_vehicles())
         raise MissingFileError(f"{error}, and no bundled vehicle of that name: {names}") from error
-    fields = (name for name in VehicleParameters.__struct_fields__)
-    vehicle = VehicleParameters(**{name: getattr(file, name) for name in fields})
-    return vehicle if file.scale == 1.0 else in_world_size(vehicle, file.scale)
 
 
 def _check_file(file: VehicleFile) -> VehicleFile:

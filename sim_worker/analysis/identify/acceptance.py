@@ -19,6 +19,7 @@ from foretwin.contracts.tuning import (
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
 from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
+from foretwin.sim_worker.vehicle.similarity import in_world_size
 
 HALF_OF_95 = 1.96
 """Standard deviations to either side that hold 95 % of a Gaussian."""
@@ -103,9 +104,13 @@ def accepted(
     return vehicle, tuple(changes)
 
 
-def vehicle_toml(vehicle: VehicleParameters) -> str:
-    """Return the text of a parameter file that `load_vehicle` reads as `vehicle`."""
+def vehicle_toml(vehicle: VehicleParameters, *, scale: float = 1.0) -> str:
+    """Return the text of a parameter file that `load_vehicle` reads as `vehicle`, which is `scale`
+    times as large as the car is: the file holds that in its own size."""
     lines = [f"name = {json.dumps(vehicle.name)}"]
+    if scale != 1.0:
+        lines.append(f"scale = {scale!r}")
+        vehicle = in_world_size(vehicle, 1.0 / scale)
     for field in msgspec.structs.fields(vehicle):
         parameter = getattr(vehicle, field.name)
         if not isinstance(parameter, Parameter):

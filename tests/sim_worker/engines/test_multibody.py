@@ -6,7 +6,7 @@ import pytest
 from foretwin.contracts.futures import EngineName
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.futures.run_job import stage_for
-from foretwin.sim_worker.vehicle.parameters import bundled_vehicles, load_vehicle
+from foretwin.sim_worker.vehicle.parameters import bundled_vehicles, load_vehicle, scale_of
 from tests.sim_worker.driving import altered, drive, seed, states
 
 COVERS = ("foretwin.sim_worker.engines.engine", "foretwin.sim_worker.engines.multibody_car")
@@ -19,7 +19,7 @@ def stage(engine: EngineName, vehicle: str = "bmw_320i", nsim: int = 4) -> Batch
     return stage_for(engine, None, load_vehicle(vehicle), nsim=nsim)
 
 
-@pytest.mark.parametrize("vehicle", bundled_vehicles())
+@pytest.mark.parametrize("vehicle", [one for one in bundled_vehicles() if scale_of(one) == 1.0])
 def test_in_ordinary_driving_it_goes_where_the_twin_goes(vehicle: str) -> None:
     ends = []
     engines: tuple[EngineName, EngineName] = ("mujoco", "multibody")
