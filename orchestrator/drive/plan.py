@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.contracts.anchor import Anchor, AnchorLine
-from foretwin.contracts.anchor_file import read_anchor
+from foretwin.contracts.anchor_file import AnchorFile, read_anchor
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.campaign import role_files
 from foretwin.contracts.codec import write_message
@@ -43,7 +43,7 @@ from foretwin.orchestrator.worlds.heights import profiles_of, slopes_in
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.sim_worker.planners.registry import check_planner
-from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.parameters import DEFAULT_FILE, load_vehicle, scale_of
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.world_gen.opening import Clip
@@ -75,7 +75,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
     progress = progress_of(config.progress_table)
-    anchor = None if config.anchor is None else read_anchor(Path(config.anchor))
+    anchor = _anchor_for(config.anchor, config.vehicle)
     if anchor is not None and config.towards_vehicle and not anchor.fence:
         raise ConfigError(f"--anchor {config.anchor}: --towards-vehicle needs its fence")
     ros2 = read_ros2(config)
@@ -179,7 +179,8 @@ def _read_beside(
     config: OtherVehicleConfig, drive: DriveConfig, own: VehicleParameters
 ) -> OtherVehiclePlan:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
-    lot = None if config.anchor is None else read_anchor(Path(config.anchor)).anchor
+    file_on_lot = _anchor_for(config.anchor, config.vehicle or drive.vehicle)
+    lot = None if file_on_lot is None else file_on_lot.anchor
     if config.log is None:
         ros2 = read_ros2_beside(config, drive)
         return OtherVehiclePlan(config, vehicle, config.live, ros2=ros2, lot=lot)
@@ -189,6 +190,19 @@ def _read_beside(
     return OtherVehiclePlan(
         config, vehicle, commands_recorded="control" in open_log(file).info.sends, lot=lot
     )
+
+
+def _anchor_for(file: str | None, vehicle: str | None) -> AnchorFile | None:
+    """Return the anchor that a file holds; ConfigError where its vehicle is of another scale."""
+    if file is None:
+        return None
+    anchor, scale = read_anchor(Path(file)), scale_of(vehicle)
+    if anchor.scale != scale:
+        raise ConfigError(
+            f"anchor {file}: scale = {anchor.scale:g}, but vehicle {vehicle or DEFAULT_FILE.stem} "
+            f"is one of scale {scale:g}: lot and car have to be of one size"
+        )
+    return anchor
 
 
 def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:

@@ -250,3 +250,9 @@ def test_a_car_on_a_lot_drives_where_its_anchor_says(tmp_path: Path) -> None:
     assert begin == pytest.approx(line[0], abs=0.01)
     with pytest.raises(UserError, match="holds no position"):
         inputs_for(tmp_path, **settings)
+    with pytest.raises(ConfigError, match=r"scale = 1, but vehicle f1tenth is one of scale 10: "):
+        inputs_for(tmp_path, anchor=str(file), vehicle="f1tenth", **settings)
+    small = tmp_path / "small.toml"
+    small.write_text(f"scale = 10.0\n{file.read_text()}")
+    with pytest.raises(ConfigError, match=r"scale = 10, but vehicle bmw_320i is one of scale 1: "):
+        inputs_for(tmp_path, anchor=str(small), **settings)
