@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Array32, Indices
 from foretwin.contracts.frames import LocalPose
 from foretwin.contracts.point_cloud import POINT_COLUMNS
+from foretwin.geometry.constant_turn import constant_turn_rate
 from foretwin.sim_worker.sensors.materials import back_scatter
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayHits, RayWorld
 from foretwin.sim_worker.sensors.sensor_file import Lidar, Mount, SensorFile
@@ -165,10 +166,11 @@ def _turn(rays: RayWorld, sensor: SensorFile, motion: BaseMotion, bodies: Moving
 
 
 def _moved(motion: BaseMotion, time_s: Array) -> tuple[Array, Array, Array]:
-    """Return x, y and yaw (N,) after times (N,) with steady speed and yaw rate: along a circle."""
-    half = motion.yaw_rate_radps * time_s / 2.0
-    chord = motion.speed_mps * time_s * np.sinc(half / math.pi)
-    heading = motion.pose.yaw_rad + half
-    x_m = motion.pose.x_m + chord * np.cos(heading)
-    y_m = motion.pose.y_m + chord * np.sin(heading)
-    return x_m, y_m, heading + half
+    """Return x, y and yaw (N,) after times (N,) with steady speed and yaw rate."""
+    poses = constant_turn_rate(
+        np.array([motion.pose.x_m, motion.pose.y_m, motion.pose.yaw_rad]),
+        speed_mps=motion.speed_mps,
+        yaw_rate_radps=motion.yaw_rate_radps,
+        time_s=time_s,
+    )
+    return poses[:, 0], poses[:, 1], poses[:, 2]
