@@ -1,7 +1,8 @@
 """What the law-abiding make of those around them: follow, stop at red, leave ground to others.
 
 Free road and following: improved intelligent driver model (`driver_model.improved_idm_mps2`), the
-nearest of a leader, a red light and ground to be left to others counting as what is ahead.
+nearest of a leader, a red light and ground to be left to others counting as what is ahead. All of
+it is noticed late (`noticed.py`); who watches lights sees one turn red at once, and its green late.
 """
 
 from __future__ import annotations
@@ -66,7 +67,15 @@ class LawAbiding:
         ]
         self._pairs: tuple[int, _Pairs] | None = None
 
-    def accelerations(self, now: Now, ego: EgoBoxes, red_arcs_m: Array, *, every_s: float) -> Array:
+    def accelerations(
+        self,
+        now: Now,
+        ego: EgoBoxes,
+        red_arcs_m: Array,
+        *,
+        every_s: float,
+        watch_lights: bool = False,
+    ) -> Array:
         """Return (K,) what they choose, `every_s`; `red_arcs_m` (P, K) of paths, or (S, P, K)."""
         s, r, decel, most = self.rows, self.columns, self._decel, self._most
         arc, speed = now.arc_m[s, r], now.speed_mps[s, r]
@@ -74,7 +83,8 @@ class LawAbiding:
         gap, lead_speed = self._leader(now, ego, bend)
         self._look_first(gap, speed, lead_speed)
         red = red_arcs_m[self._path] if red_arcs_m.ndim == 2 else red_arcs_m[s, self._path]
-        still = np.minimum(self._before(red, arc, speed), self._wait(now, ego, arc, speed))
+        line = self._before(red, arc, speed)
+        still = np.minimum(line, self._wait(now, ego, arc, speed))
         nearer = still < gap
         ahead = np.stack(
             [
@@ -85,6 +95,10 @@ class LawAbiding:
         )
         end, lead_speed, least = self.noticed.after(ahead, every_s=every_s)
         gap = end - arc
+        if watch_lights:
+            nearer = line < gap
+            gap = np.where(nearer, line, gap)
+            lead_speed, least = np.where(nearer, 0.0, (lead_speed, least))
         wanted = least + driver.dynamic_gap_m(
             speed, lead_speed, self._keeps * self._time_gap, most, decel
         )

@@ -158,10 +158,19 @@ class Traffic:
         """Let nobody brake harder than so (R,) by what was decided last."""
         np.maximum(self._accel, -decel_mps2, out=self._accel)
 
-    def decide(self, ego: EgoBoxes, red_arcs_m: Array, *, every_s: float = DECIDE_EVERY_S) -> None:
+    def decide(
+        self,
+        ego: EgoBoxes,
+        red_arcs_m: Array,
+        *,
+        every_s: float = DECIDE_EVERY_S,
+        watch_lights: bool = False,
+    ) -> None:
         """Let law-abiding road users choose their accelerations, as they do `every_s`; `red_arcs_m`
-        (P, K) of paths, or (S, P, K)."""
+        (P, K) of paths, or (S, P, K). Who watches lights sees one turn red without delay."""
         if self.reacts:
             now = Now(self.poses, self.speed_mps, self.arc_m)
-            chosen = self._lawful.accelerations(now, ego, red_arcs_m, every_s=every_s)
+            chosen = self._lawful.accelerations(
+                now, ego, red_arcs_m, every_s=every_s, watch_lights=watch_lights
+            )
             self._accel[self._lawful.rows, self._lawful.columns] = chosen

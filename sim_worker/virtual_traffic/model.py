@@ -121,7 +121,9 @@ class ModelTraffic:
         traffic, path = self._traffic, self._car_path
         if traffic is None or path is None or self._rules is None:
             return ()
-        # Who sees a light change decides at once; so the first step after it is another one.
+        # Who sees a light change decides at once; so the first step after it is another one. The
+        # reaction time of these drivers is for what moves: a red light that the real car is shown
+        # must find nobody driving on who could still stop.
         if self._steps % _EVERY == 0 or colours != self._colours:
             self._colours = dict(colours)
             boxes = EgoBoxes(
@@ -131,7 +133,7 @@ class ModelTraffic:
                 path.locate(middle[None]).arc_m,
                 *self._size_m,
             )
-            traffic.decide(boxes, self._rules.red(colours))
+            traffic.decide(boxes, self._rules.red(colours), watch_lights=True)
             traffic.brake_at_most(self._grip_left())
         traffic.step(time_s=time_s - STEP_S, dt_s=STEP_S)
         self._steps += 1

@@ -58,6 +58,28 @@ def test_a_light_that_turns_too_late_is_passed_and_another_stopped_at(tmp_path: 
         assert np.diff(seen[:, 1]).min() / 0.05 >= -driver.EMERGENCY_DECEL_MPS2 - 1e-9
 
 
+@pytest.mark.parametrize("watches", [True, False])
+def test_who_watches_lights_sees_red_at_once_and_green_late(tmp_path: Path, watches: bool) -> None:
+    """With 0.8 s of reaction: red comes after 2 s, green after 12 s."""
+    world = crossroads(tmp_path)
+    east = straight_on(world, EAST)
+    moving = traffic(world, [east], before_m=[52.0], speed_mps=[8.0], lawful=[True], reaction_s=0.8)
+    line, speeds = np.array([[centre_arc(east) - 20.0]]), []
+    for tick in range(280):
+        if tick % 4 == 0:
+            shows_red = 40 <= tick < 240
+            moving.decide(
+                FAR_EGO, line if shows_red else np.full((1, 1), np.inf), watch_lights=watches
+            )
+        moving.step(time_s=tick * 0.05, dt_s=0.05)
+        speeds.append(float(moving.speed_mps[0, 0]))
+    braking = next(tick for tick in range(40, 240) if speeds[tick] < speeds[39] - 1e-3)
+    assert braking == (40 if watches else 40 + 16)
+    assert max(speeds[200:240]) < 0.45
+    setting_off = next(tick for tick in range(240, 280) if speeds[tick] > 0.45)
+    assert 240 + 16 <= setting_off <= 240 + 24
+
+
 def test_nobody_brakes_harder_than_tyres_do_however_late_it_sees_who_stands(tmp_path: Path) -> None:
     world = crossroads(tmp_path)
     east = straight_on(world, EAST)
