@@ -67,7 +67,8 @@ class Sight:
         self._hides = crowd.hidden_by[self._hidden]
         self._by_actors = len(self._hides) > 0
         self._unknown = crowd.present & ~crowd.known
-        self._walls = walls if self._unknown.any() else None
+        self._strangers = np.flatnonzero(self._unknown.any(axis=0))
+        self._walls = walls if len(self._strangers) else None
         self.needs_eyes = self._by_actors or self._walls is not None
         """Whether it matters where the cars' eyes are."""
         self._behind_walls: Flags | None = None
@@ -138,10 +139,11 @@ class Sight:
         if self._walls is not None:
             due = not isinstance(tick, int) or tick % self._walls_every == 0
             if due or self._behind_walls is None:
-                length_m = self._crowd.length_m
-                found = hidden(self._walls, eyes_xy_m, poses, length_m)
-                self._behind_walls = found & self._unknown
-            unseen |= self._behind_walls
+                these = slice(None), self._strangers
+                length_m = self._crowd.length_m[these]
+                found = hidden(self._walls, eyes_xy_m, poses[these], length_m)
+                self._behind_walls = found & self._unknown[these]
+            unseen[:, self._strangers] |= self._behind_walls
         return unseen
 
     def _lost(self, time_s: float | Array) -> Flags:

@@ -57,9 +57,9 @@ DRIVEWAY = FrenetPath(np.array([[24.5, 20.0], [24.5, -30.0]]))
 def test_a_wall_hides_whom_the_map_knows_but_not_whom_the_car_perceives() -> None:
     walker = Player("walker", "pedestrian", DRIVEWAY, 0.0, 1.5)
     perceived = walker._replace(name="perceived", known=True)
-    eyes, traffic = sight(walker, perceived, walls=WALL)
+    eyes, traffic = sight(perceived, walker, walls=WALL)
     found = eyes.look(0, traffic, np.array([[0.0, 0.0]]))
-    assert np.isfinite(found.arc_m).tolist() == [[False, True]]
+    assert np.isfinite(found.arc_m).tolist() == [[True, False]]
     assert np.isfinite(eyes.look(2, traffic, np.array([[21.0, 0.0]])).arc_m).all()
     alone, traffic = sight(perceived, walls=WALL)
     assert not alone.needs_eyes
