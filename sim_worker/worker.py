@@ -14,10 +14,8 @@ import numpy as np
 import scipy.spatial  # noqa: F401  A search for many points needs it: not within the first job.
 
 from foretwin.contracts.bus import Bus, Mailbox, Request
-from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.futures import EngineName, FuturesResult, Job
-from foretwin.contracts.guard import Refused
 from foretwin.contracts.job_identity import JobBytes, vehicle_digest
 from foretwin.contracts.placement import PlaceRequest, WorldPlaces
 from foretwin.contracts.process import ProcessLife
@@ -33,6 +31,7 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.futures.run_job import run_job, stage_for
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.world_places import places_in
+from foretwin.sim_worker.message_loop import passed_over_where_unfit
 from foretwin.sim_worker.planner_interface import PlayAgain
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
@@ -156,19 +155,8 @@ class FuturesWorker:
             self._handle(request)
 
     def _handle(self, request: Request) -> None:
-        try:
-            answer = self.answer(request.channel, request.message())
-        except Refused as refused:
-            if text := self._refusals.take(refused):
-                log.warning("%s", text)
-            request.refuse(one_line(refused))
-            return
-        except Exception as error:
-            # The run goes on without this answer; the traceback is for the log's reader.
-            log.exception("%s refused", request.channel)
-            request.refuse(one_line(error))
-            return
-        request.reply(answer)
+        with passed_over_where_unfit(request, refusals=self._refusals, log=log):
+            request.reply(self.answer(request.channel, request.message()))
 
     def answer(self, channel: str, question: msgspec.Struct) -> msgspec.Struct:
         """Return the answer to a question; raises whatever keeps it from being answered."""

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections import deque
 from pathlib import Path
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request
 from foretwin.contracts.drive import ControlCommand, VehicleState
-from foretwin.contracts.errors import one_line
-from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.roles import OtherVehicles, UseRoles
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import ActiveWorld
-from foretwin.contracts.trace import span
 from foretwin.contracts.tuning import UseVehicle
+from foretwin.sim_worker.message_loop import passed_over_where_unfit, take_messages
 from foretwin.sim_worker.mirror.mirror import Mirror
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS
 from foretwin.sim_worker.world_file import load_world
 
 _DEPTH = 4096
-_IDLE_S = 0.2
 _GATHER_S = 0.05
 """States are taken in portions: a sample of the mirror is made of several."""
-_LAST_WORDS_S = 0.5
-"""How long the messages that are here may take once the run is over; in lock step none is left."""
-_QUIET_S = 0.1
 
 log = logging.getLogger("sim_worker")
 
@@ -64,7 +57,7 @@ class MirrorWorker:
 
     def handle(self, item: Received | Request) -> None:
         """Take one message or question; never raises."""
-        try:
+        with passed_over_where_unfit(item, refusals=self._refusals, log=log):
             message = item.message()
             match message:
                 case VehicleState():
@@ -87,15 +80,6 @@ class MirrorWorker:
                 item.reply(message)
             else:
                 self._release()
-        except Refused as refused:
-            if text := self._refusals.take(refused):
-                log.warning("%s", text)
-            if isinstance(item, Request):
-                item.refuse(one_line(refused))
-        except Exception as error:
-            log.exception("message on %s passed over", item.key)
-            if isinstance(item, Request):
-                item.refuse(one_line(error))
 
     def finish(self) -> None:
         """Handle the states that still wait for commands: none will come."""
@@ -134,24 +118,8 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     bus.subscribe("control", mailbox, vehicle=setup.vehicle_id)
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()
-    while not life.over:
-        if not setup.bus.lossless:
-            mailbox.gather(_GATHER_S)
-        _take(worker, mailbox.take(_IDLE_S))
-        for _ in range(len(mailbox)):
-            _take(worker, mailbox.take())
-    deadline = time.monotonic() + _LAST_WORDS_S
-    while setup.bus.lossless or time.monotonic() < deadline:
-        item = mailbox.take_last(_QUIET_S if setup.bus.lossless else 0.0)
-        if item is None:
-            break
-        _take(worker, item)
+    lossless = setup.bus.lossless
+    take_messages(mailbox, worker.handle, life, lossless=lossless, gather_s=_GATHER_S)
     worker.finish()
     if mailbox.dropped:
         log.warning("the mirror fell behind and passed over %d messages", mailbox.dropped)
-
-
-def _take(worker: MirrorWorker, item: object) -> None:
-    if isinstance(item, Received | Request):
-        with span(item.channel):
-            worker.handle(item)

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.drive import RoadUsers, VehicleState
-from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import SensorsSetup
 from foretwin.contracts.simulation import ActiveWorld
+from foretwin.sim_worker.message_loop import passed_over_where_unfit
 from foretwin.sim_worker.sensors.sensor_file import sensor_of
 from foretwin.sim_worker.sensors.virtual_sensors import VirtualSensors
 from foretwin.sim_worker.world_file import load_world
@@ -54,7 +54,7 @@ class SensorsProcess:
     def _handle(self, item: object) -> None:
         if not isinstance(item, Received):
             return
-        try:
+        with passed_over_where_unfit(item, refusals=self._refusals, log=log):
             match item.message():
                 case VehicleState() as state:
                     for cloud in self._sensors.take_state(state):
@@ -65,11 +65,6 @@ class SensorsProcess:
                 case ActiveWorld(world_id=world_id):
                     world = None if world_id is None else load_world(self._worlds_dir, world_id)
                     self._sensors.use_world(world)
-        except Refused as refused:
-            if text := self._refusals.take(refused):
-                log.warning("%s", text)
-        except Exception:
-            log.exception("message on %s passed over", item.key)
 
 
 def serve(setup: SensorsSetup, bus: Bus, life: ProcessLife) -> None:

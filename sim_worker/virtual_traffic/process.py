@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import logging
-import time
 from pathlib import Path
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.errors import one_line
-from foretwin.contracts.guard import Refused
 from foretwin.contracts.lights import ShownLights
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import TrafficSetup
-from foretwin.contracts.trace import span
 from foretwin.contracts.virtual_traffic import TrafficCourse
+from foretwin.sim_worker.message_loop import passed_over_where_unfit, take_messages
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.virtual_traffic.going import GoingTraffic
 from foretwin.sim_worker.virtual_traffic.model import ModelTraffic
@@ -25,9 +22,6 @@ from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, net_of
 from foretwin.sim_worker.world_file import load_world
 
 _DEPTH = 4096
-_IDLE_S = 0.2
-_LAST_WORDS_S, _QUIET_S = 0.5, 0.1
-"""After the run's end, as of the mirror."""
 
 log = logging.getLogger("traffic")
 
@@ -47,7 +41,7 @@ class TrafficWorker:
 
     def handle(self, item: Received | Request) -> None:
         """Take one message or question; never raises."""
-        try:
+        with passed_over_where_unfit(item, refusals=self._refusals, log=log):
             message = item.message()
             match message:
                 case VehicleState():
@@ -59,15 +53,6 @@ class TrafficWorker:
                     self._take_course(message)
             if isinstance(item, Request):
                 item.reply(message)
-        except Refused as refused:
-            if text := self._refusals.take(refused):
-                log.warning("%s", text)
-            if isinstance(item, Request):
-                item.refuse(one_line(refused))
-        except Exception as error:
-            log.exception("message on %s passed over", item.key)
-            if isinstance(item, Request):
-                item.refuse(one_line(error))
 
     def _take_course(self, told: TrafficCourse) -> None:
         world = None
@@ -100,25 +85,10 @@ def serve_traffic(setup: TrafficSetup, bus: Bus, life: ProcessLife) -> None:
         bus.subscribe("lights", mailbox, run=setup.run_id)
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()
-    while not life.over:
-        _take(worker, mailbox.take(_IDLE_S))
-        for _ in range(len(mailbox)):
-            _take(worker, mailbox.take())
-    deadline = time.monotonic() + _LAST_WORDS_S
-    while setup.bus.lossless or time.monotonic() < deadline:
-        item = mailbox.take_last(_QUIET_S if setup.bus.lossless else 0.0)
-        if item is None:
-            break
-        _take(worker, item)
+    take_messages(mailbox, worker.handle, life, lossless=setup.bus.lossless)
     if mailbox.dropped or worker.going.missed:
         log.warning(
             "virtual traffic passed over %d messages and left out %d steps",
             mailbox.dropped,
             worker.going.missed,
         )
-
-
-def _take(worker: TrafficWorker, item: object) -> None:
-    if isinstance(item, Received | Request):
-        with span(item.channel):
-            worker.handle(item)
