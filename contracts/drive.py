@@ -155,6 +155,15 @@ class RoadUsers(msgspec.Struct, frozen=True, kw_only=True):
     users: tuple[RoadUser, ...]
 
 
+class OthersAround(msgspec.Struct, frozen=True, kw_only=True):
+    """Who else is around a vehicle in the World, by that vehicle's own clock, each moving straight
+    on."""
+
+    users: RoadUsers
+    known_for_s: float
+    """So long after its stamp each of them is within a metre of where that leads."""
+
+
 class SignalState(msgspec.Struct, frozen=True, kw_only=True):
     """The live colour of one signal group; `group_id` as in the World."""
 

@@ -75,6 +75,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     (_VEHICLE, REQUEST, (*_ORCHESTRATOR, *_WHO_RECKONS_TIME)): {
         "info": Channel(drive.InfoRequest, None, "what the vehicle is", drive.VehicleInfo),
     },
+    (_VEHICLE, LIVE, _ORCHESTRATOR): {
+        "surroundings": Channel(drive.OthersAround, 20, "who else is around, by its own clock"),
+    },
     (_VEHICLE, REQUEST, _ORCHESTRATOR): {
         "vehicle_clock": Channel(fleet.ClockQuestion, 1, "time on board", drive.VehicleTime),
         "advance": Channel(drive.AdvanceRequest, None, "lock step: go on", drive.AdvanceReply),
@@ -117,6 +120,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     },
     (f"{_RUN}/builder/{{process}}", REQUEST, _ORCHESTRATOR): {
         "build": Channel(simulation.BuildRequest, None, "build a World", simulation.BuildReply),
+    },
+    (f"{_RUN}/beside/{{vehicle}}", REQUEST, _CAR): {
+        "join": Channel(roles.JoinRequest, 1, "speak as a vehicle beside the car", roles.JoinReply),
     },
     (_RUN, REQUEST, _OPERATOR): {
         "set": Channel(tuning.SetRequest, None, "change a running drive", tuning.SetReply),
@@ -230,6 +236,11 @@ def process_of_alive_key(full_key: str) -> str:
 def vehicle_of_key(full_key: str) -> str:
     """Return the vehicle's id in the key of a channel of a vehicle."""
     return full_key.removeprefix(f"{PREFIX}/vehicle/").split("/", 1)[0]
+
+
+def vehicle_that_joins(full_key: str) -> str:
+    """Return the vehicle's id in the key by which it joins a run."""
+    return full_key.rsplit("/", 2)[1]
 
 
 def run_of_alive_key(full_key: str) -> str:

@@ -32,6 +32,9 @@ BUS = "bus"
 """The folder of names and passwords where there can be no socket."""
 WATCH = "viewer-watch"
 """Who looks on from another seat; it needs no token, since nobody waits for it."""
+CAR_OF = "car-of-"
+"""Before a vehicle's id: the name, and the process, of who speaks for it and was not started by the
+drive."""
 OUTSIDERS = (
     BusMember("operator", "operator"),
     BusMember("planner", "planner"),

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import msgspec
 
 from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.vehicle import VehicleParameters
 
 Role = Literal["all", "twin", "shadow", "ghost"]
@@ -97,6 +98,29 @@ class VehicleEncounter(msgspec.Struct, frozen=True, kw_only=True):
     bound of who was reckoned then."""
     touched: bool
     """Whether their outlines overlapped."""
+
+
+class JoinRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody asks to speak as a vehicle beside the car, and again every second while it does."""
+
+    instance: str
+    """A word of its own for as long as it lives."""
+    scale: float
+    """Of the anchor between its lot and the World."""
+    leaves: bool = False
+
+
+class JoinReply(msgspec.Struct, frozen=True, kw_only=True):
+    """Whether it may: `refused` says why not, `trouble` what is missing until now."""
+
+    refused: str = ""
+    trouble: str = ""
+    drive_frame: LocalFrame | None = None
+    """Of the run; None before it may begin to speak."""
+    clock: str = ""
+    """How its clock stands to the car's, in words."""
+    over: bool = False
+    """Whether its last word was heard."""
 
 
 class CastVehicle(msgspec.Struct, frozen=True, kw_only=True):

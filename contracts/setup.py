@@ -48,6 +48,8 @@ class StandinSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     """Moves the published plan to the left: a known error, for tests of the plan comparison."""
     anchor: Anchor | None = None
     """It drives on that lot; the path is one of the World."""
+    beside: bool = False
+    """Whether it is a vehicle beside the car, by a clock of its own."""
 
 
 class RecorderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

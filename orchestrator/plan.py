@@ -48,6 +48,8 @@ class OtherVehiclePlan(NamedTuple):
     """How its own ROS 2 topics are read."""
     lot: Anchor | None = None
     """Where it really is, and where that is in the World."""
+    scale: float = 1.0
+    """Of a small car: metres in the World for one of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)

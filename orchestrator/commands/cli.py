@@ -14,6 +14,7 @@ from foretwin.contracts.exit_codes import INTERRUPTED, USER
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_config import config as config_files
 from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, WholeSentences
+from foretwin.orchestrator.commands.cli_join import join
 from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
 from foretwin.orchestrator.commands.cli_maps import maps
 from foretwin.orchestrator.commands.cli_options import (
@@ -247,7 +248,7 @@ def world(
     raise typer.Exit(write_worlds(WorldRequest(**asked)))
 
 
-for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, worker, standin):
+for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, worker, standin, join):
     app.command()(command)
 
 app.command("config")(config_files)

@@ -75,7 +75,7 @@ def work(request: WorkerRequest) -> int:
     code = EXIT_DONE
     while not ended.asked:
         try:
-            run_id = _drive_at(bus, ended)
+            run_id = drive_at(bus, ended)
         except UserError as nobody:
             if not request.stay:
                 raise
@@ -121,7 +121,7 @@ def _bus_and_name(request: WorkerRequest) -> tuple[BusSetup, str]:
     return BusSetup(endpoint=request.connect, tls=tls), name
 
 
-def _drive_at(setup: BusSetup, ended: Interruption) -> str | None:
+def drive_at(setup: BusSetup, ended: Interruption) -> str | None:
     """Return the id of the run whose orchestrator is there, None where it was ended before.
 
     Raises UserError where nobody lets us in, or nobody drives.

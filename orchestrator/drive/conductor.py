@@ -115,6 +115,7 @@ class Conductor:
         self._on_question: dict[str, Callable[[Request], object]] = {
             "set": lambda item: self.changes.take(item, stamp_ns=self.intake.now_stamp_ns),
             "mark": MarkHandler(context, self.intake, mission).take,
+            "join": self.beside.take_join,
             "world_file": self.fleet.give_world,
         }
 
@@ -123,15 +124,14 @@ class Conductor:
         run, vehicle = self.plan.run_id, self.plan.config.vehicle_id
         live = [one.config.id for one in self.plan.beside if one.config.live]
         for one in (vehicle, *live):
+            self.bus.serve("join", self.mailbox, run=run, vehicle=one)
             for channel in keys.TELEMETRY_CHANNELS:
                 self.bus.subscribe(channel, self.mailbox, vehicle=one)
         self.route.join(self.bus, self.mailbox)
         self.context.subscribe("mirror", "virtual_traffic", "event")
         self.tuning.join()
-        for question in ("set", "mark"):
+        for question in ("set", "mark", *(("world_file",) if self.fleet.open else ())):
             self.bus.serve(question, self.mailbox, run=run)
-        if self.fleet.open:
-            self.bus.serve("world_file", self.mailbox, run=run)
         self.bus.watch_alive(keys.alive_key(run=run, process="*"), self.mailbox)
 
     def take_info(self, info: VehicleInfo) -> None:

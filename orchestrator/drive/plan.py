@@ -179,11 +179,13 @@ def _read_beside(
     config: OtherVehicleConfig, drive: DriveConfig, own: VehicleParameters
 ) -> OtherVehiclePlan:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
-    file_on_lot = _anchor_for(config.anchor, config.vehicle or drive.vehicle)
+    kind = config.vehicle or drive.vehicle
+    file_on_lot = _anchor_for(config.anchor, kind)
     lot = None if file_on_lot is None else file_on_lot.anchor
     if config.log is None:
         ros2 = read_ros2_beside(config, drive)
-        return OtherVehiclePlan(config, vehicle, config.live, ros2=ros2, lot=lot)
+        scale = scale_of(kind)
+        return OtherVehiclePlan(config, vehicle, config.live, ros2=ros2, lot=lot, scale=scale)
     file = Path(config.log)
     if not file.exists():
         raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")

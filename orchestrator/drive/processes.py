@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.access import BusMember
 from foretwin.contracts.keys import BusRole
-from foretwin.contracts.local_bus import OUTSIDERS, member_of
+from foretwin.contracts.local_bus import CAR_OF, OUTSIDERS, member_of
 from foretwin.contracts.process_setup import RouterSetup
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
@@ -83,7 +83,7 @@ def members(plan: DrivePlan) -> tuple[BusMember, ...]:
         outside.append(config.vehicle_id)
     return (
         *(member(plan, one) for one in (ORCHESTRATOR, *sorted(expected_ids(plan)))),
-        *(BusMember(f"car-of-{one}", "car", vehicle_id=one) for one in outside),
+        *(BusMember(f"{CAR_OF}{one}", "car", vehicle_id=one) for one in outside),
         *OUTSIDERS,
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from foretwin.contracts.bus import Received
-from foretwin.contracts.drive import VehicleInfo, VehicleState
+from foretwin.contracts.drive import DriveEnd, VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Notice
@@ -23,6 +23,8 @@ from foretwin.telemetry.estimator.estimator import estimator_of
 
 APART_NS = 1_000_000_000
 """Stamps that differ by more are not by one clock."""
+SILENT_S = 2.0
+"""Who was not heard for so long is told of: gone it is long before."""
 
 
 class LiveVehicle(OtherVehicleSource):
@@ -52,10 +54,45 @@ class LiveVehicle(OtherVehicleSource):
         self._ask_info, self._tell = ask_info, tell
         self._measured: OtherVehicleStates | None = None
         self._clock_reported = False
+        self._heard_s: float | None = None
+        self._silent = False
+        self.over = False
+        """Whether its last word was heard."""
+
+    @property
+    def trouble(self) -> str:
+        """Why its states do not count yet, in words; empty where they do."""
+        if self.between is not None:
+            return ""
+        if self._measured is None:
+            return f"nothing was heard of {self._id}"
+        return f"nobody can tell how the clock of {self._id} stands to the car's"
+
+    def begin_anew(self) -> None:
+        """Forget what was heard: somebody else speaks for it from now on, or nobody."""
+        own_clock = self._own_clock
+        self.clock, self.between = VehicleClock(), THE_SAME if own_clock is None else None
+        self._measured, self._heard_s = None, None
+        self._clock_reported = self._silent = self.over = False
+        self._heard.clear()
+
+    def look(self, now_s: float) -> None:
+        """Tell once where nothing comes any more, by our monotonic clock."""
+        silent = self._heard_s is not None and now_s - self._heard_s > SILENT_S
+        if silent and not (self._silent or self.over):
+            self._silent = True
+            self._tell(Notice("warning", f"{self._id} is silent: gone until it is heard again"))
 
     def take(self, item: Received) -> None:
         """Take a sample from the bus; raises Refused where the guard does not let it in."""
         message = item.message()
+        self._heard_s = item.received_mono_ns / 1e9
+        if isinstance(message, DriveEnd):
+            self.over = True
+            return
+        if self._silent:
+            self._silent = False
+            self._tell(Notice("info", f"{self._id} is heard again"))
         if self._measured is None:
             info = VehicleInfo(
                 vehicle_id=self._id, time_base="utc", start_stamp_ns=message.stamp_ns

@@ -12,48 +12,36 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
-from foretwin.contracts.bus import Received
+from foretwin.contracts.bus import Received, Request
 from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
 from foretwin.contracts.fleet import ClockQuestion
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.keys import vehicle_that_joins
 from foretwin.contracts.mailbox import Reply
-from foretwin.contracts.roles import OtherVehicles, Role
-from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
+from foretwin.contracts.roles import JoinRequest, OtherVehicles, Role
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.other_vehicles.dead_reckoning import reckoned, reckoned_for_s
-from foretwin.orchestrator.other_vehicles.detected import DetectedVehicle, moved_ahead
+from foretwin.orchestrator.other_vehicles.detected import DetectedVehicle
 from foretwin.orchestrator.other_vehicles.encounter_handler import EncounterHandler
+from foretwin.orchestrator.other_vehicles.joined import JoinedVehicles
 from foretwin.orchestrator.other_vehicles.live import LiveVehicle
 from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
 from foretwin.orchestrator.other_vehicles.recorded import RecordedVehicle
+from foretwin.orchestrator.other_vehicles.surroundings import Measured, road_user, surroundings
 from foretwin.orchestrator.other_vehicles.vehicle_clock import (
     THE_SAME,
     ClockReading,
     VehicleClock,
 )
 from foretwin.orchestrator.plan import OtherVehiclePlan
-from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 ASK_EVERY_S = 1.0
 """How often vehicles are asked for the time on board."""
+TOLD_EVERY_NS = 50_000_000
+"""How often live vehicles are told who is around them."""
 SAME_WITHIN_M = 2.0
 """A detection whose centre is so near to that of a vehicle with telemetry of its own is it."""
-
-
-def road_user(state: VehicleState, vehicle: VehicleParameters) -> RoadUser:
-    """Return a vehicle as the road user that futures meet."""
-    length_m = vehicle.length_m.value
-    ahead_m = box_centre_from_base_m(vehicle)
-    return RoadUser(
-        user_id=state.vehicle_id,
-        kind=kind_by_length(length_m),
-        position=moved_ahead(state.position, state.yaw_rad, ahead_m),
-        yaw_rad=state.yaw_rad,
-        speed_mps=state.speed_mps,
-        length_m=length_m,
-        width_m=vehicle.width_m.value,
-    )
 
 
 class OtherVehicleFeed:
@@ -71,6 +59,8 @@ class OtherVehicleFeed:
         self.encounters = EncounterHandler(plan, context.tables, context.tell)
         self._sources: dict[str, OtherVehicleSource] = {}
         self._vehicles = {one.config.id: one.vehicle for one in plan.beside}
+        self._joined = JoinedVehicles(plan, context.tell)
+        self._told_ns = 0
         self._seen_as = {one.config.seen_as for one in plan.beside}
         self._latest: dict[str, VehicleState] = {}
         self._detected_ns: int | None = None
@@ -115,12 +105,17 @@ class OtherVehicleFeed:
         return self._own_clock.reading(self._own_offset_ns())
 
     @property
+    def _live(self) -> dict[str, LiveVehicle]:
+        sources = self._sources.items()
+        return {name: one for name, one in sources if isinstance(one, LiveVehicle)}
+
+    @property
     def _asked(self) -> dict[str, VehicleClock]:
         """The clocks that must be known: of live vehicles with one of their own, and the car's."""
         foreign = {
             name: source.clock
-            for name, source in self._sources.items()
-            if isinstance(source, LiveVehicle) and source.between is not THE_SAME
+            for name, source in self._live.items()
+            if source.between is not THE_SAME
         }
         return foreign | {self._context.plan.config.vehicle_id: self._own_clock} if foreign else {}
 
@@ -129,6 +124,8 @@ class OtherVehicleFeed:
         if now_s < self._ask_at_s:
             return
         self._ask_at_s = now_s + ASK_EVERY_S
+        for source in self._live.values():
+            source.look(now_s)
         bus, mailbox = self._context.bus, self._context.mailbox
         for name in self._asked:
             asked = name, round(now_s * 1e9)
@@ -147,8 +144,8 @@ class OtherVehicleFeed:
         """Return what run.json says of the clocks of live vehicles."""
         return {
             name: {"behind_car_s": found.later_ns / 1e9, "std_s": found.std_s, "how": found.how}
-            for name, source in self._sources.items()
-            if isinstance(source, LiveVehicle) and (found := source.between) is not None
+            for name, source in self._live.items()
+            if (found := source.between) is not None
         }
 
     def _ask_info(self, vehicle_id: str) -> None:
@@ -161,6 +158,12 @@ class OtherVehicleFeed:
         source = self._sources.get(vehicle_id)
         if isinstance(source, LiveVehicle):
             source.take(item)
+
+    def take_join(self, question: Request) -> None:
+        """Answer who asks to speak as a vehicle beside the car, or says that it leaves."""
+        name, now_s = vehicle_that_joins(question.key), question.received_mono_ns / 1e9
+        asked: JoinRequest = question.message()
+        question.reply(self._joined.answer(name, asked, self._live.get(name), now_s=now_s))
 
     def take_info(self, vehicle_id: str, info: VehicleInfo | None) -> None:
         """Take what a vehicle on the bus says of itself, None where it does not answer."""
@@ -188,6 +191,32 @@ class OtherVehicleFeed:
         message = OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard))
         self._context.publish("other_vehicles", message)
         self.encounters.keep_up_with(own, heard, roles)
+        if self._live and abs(own.stamp_ns - self._told_ns) >= TOLD_EVERY_NS:
+            self._told_ns = own.stamp_ns
+            self._tell_surroundings(own, roles)
+
+    def _tell_surroundings(self, own: VehicleState, roles: Mapping[str, Role]) -> None:
+        """Tell each live vehicle, and the car, of the others; ghosts meet nobody."""
+        plan = self._context.plan
+        clocks = {name: one.between for name, one in self._live.items()}
+        if plan.ros2 is None:  # else the car hears of them by its gateway, from the mirror
+            clocks[plan.config.vehicle_id] = THE_SAME
+        there = [Measured(own, plan.vehicle)] if own.yaw_valid else []
+        there += [
+            Measured(self._latest[name], self._vehicles[name])
+            for name in clocks
+            if name in self._latest
+        ]
+        for name, clock in clocks.items():
+            if clock is None or roles.get(name) == "ghost":
+                continue
+            others = [
+                one
+                for one in there
+                if (other := one.state.vehicle_id) != name and roles.get(other) != "ghost"
+            ]
+            message = surroundings(others, stamp_ns=own.stamp_ns, later_ns=clock.later_ns)
+            self._context.bus.publish("surroundings", message, vehicle=name)
 
     def among(
         self, reports: LatestReports, own: VehicleState, roles: Mapping[str, Role]

@@ -100,10 +100,10 @@ class VehicleProcess:
         """Samples published so far by channel."""
         return dict(self._published)
 
-    def hear(self, channel: str, take: Callable[[Any], None], *, run_id: str) -> None:
-        """Hand on what is said on a channel of the run; what the guard refuses is counted."""
+    def hear(self, channel: str, take: Callable[[Any], None], **ids: str) -> None:
+        """Hand on what is said on a channel; what the guard refuses is counted."""
         self._heard[channel] = take
-        self._bus.subscribe(channel, self._mailbox, run=run_id)
+        self._bus.subscribe(channel, self._mailbox, recover=False, **ids)
 
     def serve(self) -> None:
         """Be on the bus until the run is over; blocks."""

@@ -110,7 +110,10 @@ class Mapping(
     def vehicle_channels(self) -> tuple[str, ...]:
         """Channels of the vehicle's estimate from which something goes out."""
         wanted = self.sources & {"state", "clock", "merged_objects"}
-        return ("state",) if wanted or self.placed or self.mirrored else ()
+        return (
+            *(("state",) if wanted or self.placed or self.mirrored else ()),
+            *(("surroundings",) if self.sources & set(SHOWS_VIRTUAL) else ()),
+        )
 
     @property
     def run_channels(self) -> tuple[str, ...]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from foretwin.contracts.bus import Bus
+from foretwin.contracts.drive import OthersAround
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import StandinSetup
+from foretwin.telemetry.anchored import lot_from_world_message
 from foretwin.telemetry.processes.vehicle_process import VehicleProcess
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import read_path
@@ -35,7 +37,14 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
         anchor=setup.anchor,
     )
     if setup.speed is not None:  # in lock step nothing may depend on when a message comes
-        process.hear("lights", source.heed, run_id=setup.run_id)
+
+        def see(around: OthersAround) -> None:
+            seen = lot_from_world_message(setup.anchor, around.users)
+            source.see(seen.users, stamp_ns=seen.stamp_ns, known_for_s=around.known_for_s)
+
+        process.hear("surroundings", see, vehicle=setup.vehicle_id)
+        if not setup.beside:  # what lights show is stamped by the clock of the drive's own car
+            process.hear("lights", source.heed, run=setup.run_id)
     process.serve()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -59,7 +60,7 @@ class StandinSource:
         self._tick = 0
         self._last_tick = None if end_s is None else round(end_s / STEP_S)
         self._users: tuple[RoadUser, ...] = ()
-        self._seen_ns = START_STAMP_NS
+        self._seen_ns, self._known_for_s = START_STAMP_NS, math.inf
         self._anchor, self._lights = anchor, ShownLights(stamp_ns=0, world_id=None)
         self.first_stamp_ns = START_STAMP_NS
         self.ended = False
@@ -75,9 +76,12 @@ class StandinSource:
             sends=tuple(PERIOD_MS),
         )
 
-    def see(self, users: tuple[RoadUser, ...], *, stamp_ns: int) -> None:
-        """Take who is there at a stamp: the driver brakes for whom it finds in its way."""
-        self._users, self._seen_ns = users, stamp_ns
+    def see(
+        self, users: tuple[RoadUser, ...], *, stamp_ns: int, known_for_s: float = math.inf
+    ) -> None:
+        """Take who is there at a stamp: the driver brakes for whom it finds in its way, and forgets
+        them `known_for_s` after it."""
+        self._users, self._seen_ns, self._known_for_s = users, stamp_ns, known_for_s
 
     def heed(self, lights: ShownLights) -> None:
         """Take what lights of the World show: the driver stands before those that let nobody pass,
@@ -121,9 +125,8 @@ class StandinSource:
                 )
             if self._tick % _CONTROL_TICKS == 0:
                 age_s = (stamp_ns - self._seen_ns) * 1e-9
-                self._driver.ahead = hindrance(
-                    self._path, self._driver.s_m, self._users, age_s=age_s
-                )
+                users = self._users if age_s <= self._known_for_s else ()
+                self._driver.ahead = hindrance(self._path, self._driver.s_m, users, age_s=age_s)
                 fresh = stamp_ns - self._lights.stamp_ns <= STALE_NS
                 self._driver.lights = (
                     lights_ahead(self._path, self._driver.s_m, self._lights, anchor=self._anchor)

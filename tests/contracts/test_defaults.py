@@ -158,7 +158,7 @@ def test_what_a_file_holds_that_nobody_knows_is_refused(module: Any) -> None:
 
 WRITTEN_ONLY = {
     "UseRoles", "OtherVehicle", "OtherVehicles", "CastVehicle", "MirrorCast", "Parameter",
-    "VehicleEncounter",
+    "VehicleEncounter", "JoinRequest", "JoinReply",
 }  # fmt: skip
 """Messages, and what stands in a file that says itself what it knows."""
 

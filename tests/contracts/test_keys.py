@@ -16,6 +16,7 @@ from foretwin.contracts.keys import (
     process_of_alive_key,
     run_of_alive_key,
     vehicle_of_key,
+    vehicle_that_joins,
 )
 
 COVERS = ("foretwin.contracts.bounds", "foretwin.contracts.channel")
@@ -62,7 +63,7 @@ def test_how_often_each_is_said() -> None:
     assert by_rate == {
         100: {"imu"},
         50: {"speed", "steering", "control", "state", "other_vehicles", "vehicle_command"},
-        20: {"authority", "virtual_traffic"},
+        20: {"authority", "virtual_traffic", "surroundings"},
         10: {
             "gnss",
             "heading",
@@ -78,7 +79,7 @@ def test_how_often_each_is_said() -> None:
         5: {"progress"},
         4: {"gap"},
         2: {"use_course", "job", "round", "plan_comparison", "worker_status"},
-        1: {"signals", "route", "clock", "vehicle_clock"},
+        1: {"signals", "route", "clock", "vehicle_clock", "join"},
         0.2: {"identification"},
     }
 
@@ -95,6 +96,7 @@ def test_only_questions_wait_and_what_a_car_says_is_kept_for_who_missed_it() -> 
 @pytest.mark.parametrize(
     ("name", "server"),
     [("job", "worker"), ("build", "worker"), ("info", "car"), ("set", "orchestrator"),
+     ("join", "orchestrator"),
      ("world_file", "orchestrator"), ("gnss", None), ("planner_scene", None)],
 )  # fmt: skip
 def test_a_question_is_answered_by_whom_its_key_names(name: str, server: str | None) -> None:
@@ -117,6 +119,7 @@ def test_the_process_comes_back_out_of_its_liveliness_key(process: str) -> None:
 def test_the_vehicle_comes_back_out_of_its_keys() -> None:
     for name in (*TELEMETRY_CHANNELS, "state", "info"):
         assert vehicle_of_key(key(name, vehicle="ego")) == "ego"
+    assert vehicle_that_joins(key("join", run="r1", vehicle="second")) == "second"
 
 
 @given(

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.codec import content_bytes
-from foretwin.contracts.drive import GnssFix, PlannedTrajectory, VehicleState
-from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.contracts.drive import GnssFix, PlannedTrajectory, RoadUser, VehicleState
+from foretwin.contracts.frames import geo_pose, local_from_geo, local_from_geo_yaw, wrap_angle
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath, read_path
 from tests.telemetry.standin_drive import FRAME, STOP_AT_M, new_source, whole_drive, wished_path
@@ -170,3 +170,21 @@ def test_a_parameter_file_with_an_unknown_name_is_refused(tmp_path: Path) -> Non
     file.write_text("[car]\nwheels = 5\n")
     with pytest.raises(ValueError, match=r"car\.toml.*wheels"):
         read_parameters(file)
+
+
+@pytest.mark.parametrize(("known_for_s", "seen"), [(math.inf, True), (1.5, True), (0.5, False)])
+def test_it_forgets_whom_it_was_told_of_once_nobody_can_say_where_they_are(
+    known_for_s: float, seen: bool
+) -> None:
+    source = new_source()
+    path = DrivenPath(*wished_path(), driver=read_parameters().driver)
+    at = path.at(20.0)
+    place = geo_pose(path.frame, at.x_m, at.y_m, at.yaw_rad)
+    car = RoadUser(
+        user_id="second", kind="car", position=place.position, yaw_rad=place.yaw_rad,
+        speed_mps=0.0, length_m=4.5, width_m=1.6,
+    )  # fmt: skip
+    source.see((car,), stamp_ns=source.first_stamp_ns, known_for_s=known_for_s)
+    for _ in source.advance(source.first_stamp_ns + 1_000_000_000):
+        pass
+    assert (source.ahead is not None) == seen

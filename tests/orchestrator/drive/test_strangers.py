@@ -38,6 +38,8 @@ def test_a_strangers_name_is_told_so_that_a_terminal_shows_it() -> None:
     told: list[Notice] = []
     strangers = Strangers(frozenset({"w0"}), told.append)
     assert not strangers.refuse("w0", up=True)
+    assert strangers.refuse("car-of-second", up=True)
+    assert not told, "who speaks for a vehicle wants no work"
     assert strangers.refuse("\x1b[2Jw0", up=True)
     assert strangers.refuse("\x1b[2Jw0", up=False)
     assert strangers.count == 1

@@ -28,7 +28,6 @@ from tests.orchestrator.other_vehicles.far_link import (
 )
 from tests.orchestrator.other_vehicles.two_cars import Drive, Met, co_located, drawn
 
-COVERS = ("foretwin.orchestrator.other_vehicles.live",)
 CAR, VAN = load_vehicle(None), load_vehicle("vw_vanagon")
 HERE, THERE = lot(48.1, 11.6, 30.0), lot(51.0, 13.8, -110.0)
 NEAR, FAR = Link(0.005, 0.005, 0.0), Link(0.08, 0.02, 0.05)

@@ -14,6 +14,7 @@ import pytest
 from foretwin.contracts.drive import (
     ControlCommand,
     GnssFix,
+    OthersAround,
     RoadUser,
     RoadUsers,
     SpeedSample,
@@ -37,7 +38,6 @@ from tests.orchestrator.trip import START_NS, town_plan
 
 COVERS = (
     "foretwin.orchestrator.other_vehicles.detected",
-    "foretwin.orchestrator.other_vehicles.live",
     "foretwin.orchestrator.other_vehicles.measured",
 )
 
@@ -49,12 +49,15 @@ FRAME = LocalFrame(ORIGIN)
 ROLES: dict[str, Role] = {"ego": "all"}
 ASKED: list[str] = []
 TOLD: list[str] = []
+AROUND: dict[str, OthersAround] = {}
+"""What vehicles were told last of who is around them."""
 
 
 @pytest.fixture(autouse=True)
 def nothing_said() -> None:
     ASKED.clear()
     TOLD.clear()
+    AROUND.clear()
 
 
 def at(x_m: float, y_m: float = 0.0) -> GeoPoint:
@@ -77,8 +80,11 @@ class HearingBus(MemoryBus):
         self.heard: list[OtherVehicles] = []
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
-        assert isinstance(message, OtherVehicles)
-        self.heard.append(message)
+        if isinstance(message, OthersAround):
+            AROUND[ids["vehicle"]] = message
+        else:
+            assert isinstance(message, OtherVehicles)
+            self.heard.append(message)
 
     def request(self, channel: str, message: msgspec.Struct, *_: object, **ids: object) -> None:
         assert channel == "info"
@@ -191,13 +197,6 @@ def test_who_is_on_the_bus_is_placed_by_its_antenna_once_it_says_where_that_sits
     beside.keep_up_with(own(4.9), None, ROLES)
     assert x_of(heard[-1].heard[-1].state) == pytest.approx(49.0 - 1.5, abs=0.5)
     assert ASKED == ["van"]
-
-
-def test_who_does_not_say_where_its_antenna_sits_is_told_of(tmp_path: Path) -> None:
-    beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
-    on_the_bus(beside, from_s=0.0, to_s=0.2)
-    beside.take_info("van", None)
-    assert "van does not say where on it its positions are of" in TOLD[-1]
 
 
 def test_stamps_of_another_clock_are_told_once(tmp_path: Path) -> None:

@@ -192,7 +192,7 @@ def test_it_says_the_time_on_board_once_its_clock_runs() -> None:
 
 def test_it_hands_on_what_the_run_says_on_a_channel() -> None:
     rig, heard = Rig(speed=1.0), []
-    rig.process.hear("lights", heard.append, run_id="r")
+    rig.process.hear("lights", heard.append, run="r")
     said = ShownLights(stamp_ns=7, world_id="w")
     rig.bus.publish("lights", said, run="r")
     assert rig.process.step()
