@@ -20,7 +20,7 @@ _LAST_WORDS_S = 0.5
 _QUIET_S = 0.1
 
 
-class Life(Protocol):
+class LoopLife(Protocol):
     """Tells whether the run is over: a `ProcessLife` does."""
 
     @property
@@ -52,7 +52,7 @@ def passed_over_where_unfit(
 def take_messages(
     mailbox: Mailbox,
     handle: Callable[[Received | Request], None],
-    life: Life,
+    life: LoopLife,
     *,
     lossless: bool,
     gather_s: float = 0.0,
