@@ -7,11 +7,20 @@ from __future__ import annotations
 
 import msgspec
 
+from foretwin.contracts.lights import WhyShown
 from foretwin.viewer.copilot.alerts import Kind
 from foretwin.viewer.copilot.right_of_way import Sign
 from foretwin.viewer.danger import Level
 
 Points = list[list[float]]
+
+
+class AheadLight(msgspec.Struct, frozen=True, kw_only=True):
+    """The light for the car at the junction ahead, and by whose word it shows its colour."""
+
+    group: str
+    colour: str
+    why: WhyShown
 
 
 class AheadFrame(msgspec.Struct, frozen=True, kw_only=True):
@@ -25,7 +34,9 @@ class AheadFrame(msgspec.Struct, frozen=True, kw_only=True):
     sign: Sign
     control: str
     colour: str = ""
-    """Of the light for the car, where it is heard."""
+    """Of the light for the car, where it is heard or set by hand."""
+    light: AheadLight | None = None
+    """Whatever it shows, by plan too; None where the car's lane is not known, or has none."""
 
 
 class DangerFrame(msgspec.Struct, frozen=True, kw_only=True):
@@ -80,7 +91,7 @@ class PageFrame(msgspec.Struct, frozen=True, kw_only=True):
     """The car's paths in futures that rank after the first."""
     seen: list[SeenFrame]
     lights: dict[str, str]
-    """Colours that are heard, by group."""
+    """Colours that are heard or set by hand, by group."""
     roles: dict[str, str]
     marks: int
     round_age_s: float | None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32
-from foretwin.contracts.drive import RoadUsers, SignalState, VehicleState
+from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.frames import target_from_source_m as moved_m
 from foretwin.contracts.simulation import (
@@ -24,12 +24,13 @@ from foretwin.contracts.world import World
 from foretwin.viewer.copilot import words
 from foretwin.viewer.copilot.alerts import Alerts
 from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
+from foretwin.viewer.copilot.lights_now import LightsNow
 from foretwin.viewer.copilot.right_of_way import RightOfWay, of_junction, right_of_way
 from foretwin.viewer.danger import Danger, SteadyLevel, dangers_of, instant_of
 
 ROUND_FOR_S = 3.0
 """So long a round is shown; the slowest pace is one in two seconds."""
-SEEN_FOR_NS, LIGHT_FOR_NS = 1_000_000_000, 5_000_000_000
+SEEN_FOR_NS = 1_000_000_000
 MOST_SEEN = 60
 _OTHERS_SHOWN = 10
 
@@ -58,7 +59,7 @@ class DriveNow:
         self._round: tuple[RoundView, float] | None = None
         self._dangers: tuple[Danger, ...] = ()
         self._seen: RoadUsers | None = None
-        self._lights: dict[str, SignalState] = {}
+        self._lights = LightsNow()
         self._active: str | None = None
         self._worlds: dict[str, str] = {}
         """World ids by junction."""
@@ -71,7 +72,8 @@ class DriveNow:
             "round": self._take_round,
             "mirror": lambda one, _: setattr(self, "_mirror", one),
             "objects": lambda one, _: setattr(self, "_seen", one),
-            "signals": lambda one, _: self._lights.__setitem__(one.group_id, one),
+            "signals": lambda one, _: self._lights.take_heard(one),
+            "lights": lambda one, _: self._lights.take_shown(one),
             "active_world": self._take_active,
             "world": self._take_world,
             "worker_status": lambda one, _: self.alerts.worker(one),
@@ -219,6 +221,7 @@ class DriveNow:
             sign=way.sign,
             control=way.text,
             colour=light or "",
+            light=self._lights.of(way.group_id),
         )
 
     def _pose(self) -> list[float] | None:
@@ -252,14 +255,7 @@ class DriveNow:
         ]
 
     def _lights_now(self) -> dict[str, str]:
-        if self._state is None:
-            return {}
-        now_ns = self._state.stamp_ns
-        return {
-            group: one.colour.replace("_", " and ")
-            for group, one in self._lights.items()
-            if abs(now_ns - one.stamp_ns) <= LIGHT_FOR_NS and one.colour != "unknown"
-        }
+        return {} if self._state is None else self._lights.colours(self._state.stamp_ns)
 
     def _roles(self) -> dict[str, str]:
         if self._mirror is None:

@@ -75,6 +75,12 @@ class Pages:
             "one => document.querySelector(one).getBoundingClientRect().toJSON()", selector
         )
 
+    def text(self, selector: str) -> str:
+        return str(self._page.inner_text(selector))
+
+    def click(self, selector: str) -> None:
+        self._page.click(selector)
+
     def press(self, key: str) -> None:
         self._page.keyboard.press(key)
 

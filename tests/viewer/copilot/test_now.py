@@ -8,19 +8,25 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.contracts.drive import RoadUser, RoadUsers, SignalState
+from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, SignalState
 from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
 from foretwin.contracts.simulation import ActiveWorld, RunEnd, WorldNotice
 from foretwin.contracts.world import World
-from foretwin.viewer.copilot.frame import PageFrame
-from foretwin.viewer.copilot.now import LIGHT_FOR_NS, ROUND_FOR_S, SEEN_FOR_NS, DriveNow
+from foretwin.viewer.copilot.frame import AheadFrame, AheadLight, PageFrame
+from foretwin.viewer.copilot.lights_now import LIGHT_FOR_NS
+from foretwin.viewer.copilot.now import ROUND_FOR_S, SEEN_FOR_NS, DriveNow
 from tests.viewer import scene
 from tests.viewer.copilot.rounds import line, round_of
 from tests.viewer.copilot.test_right_of_way import drawn
 from tests.viewer.copilot.test_words import AHEAD
 from tests.viewer.scene import DRIVE_FRAME, START_NS, WORLD_ID, mirror_at, state_at
 
-COVERS = ("foretwin.viewer.copilot.frame", "foretwin.viewer.colours")
+COVERS = (
+    "foretwin.viewer.copilot.frame",
+    "foretwin.viewer.copilot.lights_now",
+    "foretwin.viewer.colours",
+)
 
 AHEAD_OF_X1 = msgspec.structs.replace(AHEAD, junction_id="x1", junction_control="signals")
 
@@ -100,6 +106,28 @@ def test_a_drive_towards_a_junction_is_whole_in_one_frame() -> None:
     assert "signals red and amber" in frame.sentence
     assert msgspec.json.decode(msgspec.json.encode(frame), type=PageFrame) == frame
     assert len(msgspec.json.encode(frame)) < 6000
+
+
+def test_the_light_ahead_is_told_with_whose_word_it_is() -> None:
+    drive = Drive(drawn("signal", "signal", group="g1"))
+    drive.goes_on(4.0)
+    drive.take("round", a_round())
+
+    def ahead(colour: SignalColour, why: WhyShown) -> AheadFrame:
+        lights = tuple(ShownLight(group_id=g, colour=colour, why=why) for g in ("g0", "g1"))
+        drive.take("lights", ShownLights(stamp_ns=0, world_id=WORLD_ID, lights=lights))
+        found = drive.frame().ahead
+        assert found is not None
+        return found
+
+    by_plan, by_hand = ahead("green", "plan"), ahead("red_amber", "set")
+    assert by_plan.light == AheadLight(group="g1", colour="green", why="plan")
+    assert by_plan.colour == "", "a plan is a guess"
+    assert by_hand.light == AheadLight(group="g1", colour="red and amber", why="set")
+    assert by_hand.colour == "red and amber"
+    assert drive.frame().lights == {"g0": "red and amber", "g1": "red and amber"}
+    drive.take("lights", ShownLights(stamp_ns=0, world_id=None))
+    assert ahead("green", "plan").colour == ""
 
 
 def test_a_pose_is_where_the_mirror_has_the_car() -> None:

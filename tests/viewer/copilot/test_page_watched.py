@@ -13,12 +13,21 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foretwin.contracts.bus import Mailbox, Request, ZenohBus
+from foretwin.contracts.codec import write_message
+from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import RunEnd
+from foretwin.contracts.tuning import SetReply, SetRequest
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.copilot.chromium import Browser, judges_python
-from tests.viewer.copilot.display import DisplayRun
+from tests.viewer.copilot.display import RUN, DisplayRun
 from tests.viewer.copilot.test_alerts import gap, worker
 from tests.viewer.copilot.test_now import AHEAD_OF_X1, a_round
+from tests.viewer.copilot.test_right_of_way import drawn
 from tests.viewer.copilot.test_words import verdict
 
 pytestmark = [pytest.mark.judge, pytest.mark.timeout(900)]
@@ -79,6 +88,61 @@ def test_an_alarm_is_on_the_first_screen_within_half_a_second(
     assert took_s <= 0.5
     assert inside["top"] >= 0
     assert inside["bottom"] <= 600
+
+
+@pytest.mark.parametrize("operator", [True, False], ids=["operator", "another seat"])
+def test_the_light_ahead_is_flipped_and_given_back_by_the_operator_alone(
+    tmp_path: Path, browser: Browser, operator: bool
+) -> None:
+    judges_python()
+    endpoint = free_endpoint()
+    run = DisplayRun(tmp_path, **({"operator": BusSetup(endpoint=endpoint)} if operator else {}))
+    write_message(
+        drawn("signal", "signal", group="g1"), tmp_path / f"worlds/{scene.WORLD_ID}.world"
+    )
+    asked: list[SetRequest] = []
+
+    def say(why: WhyShown, colour: SignalColour) -> None:
+        go_on(run, 4.0)
+        run.send("round", a_round())
+        light = ShownLight(group_id="g1", colour=colour, why=why)
+        run.send("lights", ShownLights(stamp_ns=0, world_id=scene.WORLD_ID, lights=(light,)))
+
+    def answer(item: object) -> None:
+        assert isinstance(item, Request)
+        asked.append(item.message())
+        item.reply(SetReply(done=True, text="light.g1: done"))
+
+    try:
+        with ZenohBus(BusSetup(endpoint=endpoint), router=True) as drive:
+            questions = Mailbox(4)
+            drive.serve("set", questions, run=RUN)
+            browser.do("open", url=run.address, size=(1024, 600))
+            say("plan", "green")
+            if not operator:
+                browser.do("wait", selector="#twin-text:not(:empty)")
+                browser.do("press", key="l")
+                assert browser.do("box", selector="#flip")["width"] == 0
+                assert questions.take(0.5) is None
+                return
+            browser.do("wait", selector="#flip:not([hidden])")
+            assert browser.do("text", selector="#flip-state") == "green (plan)"
+            assert browser.do("box", selector="#flip")["right"] <= 1024
+            browser.do("press", key="l")
+            answer(questions.take(DEADLINE_S))
+            say("set", "red")
+            browser.do("wait", selector="#flip[aria-pressed=true]")
+            assert browser.do("text", selector="#flip-state") == "red (set)"
+            assert browser.do("text", selector="#control-text") == "signals red"
+            browser.do("click", selector="#flip")
+            answer(questions.take(DEADLINE_S))
+        assert [(one.key, one.value) for one in asked] == [
+            ("light.g1", "red"),
+            ("light.g1", "auto"),
+        ]
+    finally:
+        browser.do("close")
+        run.close()
 
 
 def test_nothing_leaves_the_machine_and_a_frozen_browser_changes_nothing(

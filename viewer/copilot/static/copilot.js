@@ -18,7 +18,7 @@ const SIGNS = {
 
 const plan = new Plan(element("canvas"));
 const fixed = new URLSearchParams(location.search).get("at");
-const own = { frame: null, at: 0, level: "none", said: "", mark: null, over: false, sign: null };
+const own = { frame: null, at: 0, level: "none", said: "", mark: null, over: false, sign: null, light: null, operator: false };
 
 function put(id, text) {
   const found = element(id);
@@ -60,6 +60,7 @@ function show(frame) {
   put("pace", frame.pace);
   put("marks", frame.marks ? `${frame.marks}` : "");
   put("sentence", frame.sentence);
+  flipOf(ahead ? ahead.light : null);
   notice(frame, level);
   plan.take(frame, own.at);
 }
@@ -202,6 +203,21 @@ function openRoles() {
   element("roles").showModal();
 }
 
+// The light ahead: red until it is given back.
+function flipOf(light) {
+  own.light = light;
+  element("flip").hidden = !own.operator || !light;
+  if (!light) return;
+  element("flip").setAttribute("aria-pressed", `${light.why === "set"}`);
+  put("flip-state", `${light.colour} (${light.why})`);
+}
+
+async function flip() {
+  if (element("flip").hidden || !own.light) return;
+  const key = `light.${own.light.group}`;
+  try { toast((await post("change", { key, value: own.light.why === "set" ? "auto" : "red" })).text); } catch (problem) { toast(problem.message); }
+}
+
 async function change(key, value, line) {
   put("roles-said", `${key} = ${value} …`);
   try {
@@ -214,7 +230,7 @@ async function change(key, value, line) {
 
 const KEYS = {
   " ": mark, d: () => element("theme").click(), s: () => toggle("sound"), v: () => toggle("speech"),
-  r: openRoles, n: () => { if (!element("note").hidden) element("note-text").focus(); },
+  r: openRoles, l: flip, n: () => { if (!element("note").hidden) element("note-text").focus(); },
 };
 const typing = (event) => event.target.tagName === "INPUT" || element("roles").open;
 document.addEventListener("keydown", (event) => {
@@ -234,6 +250,7 @@ element("theme").addEventListener("click", () => {
 element("sound").addEventListener("click", () => toggle("sound"));
 element("speech").addEventListener("click", () => toggle("speech"));
 element("change").addEventListener("click", openRoles);
+element("flip").addEventListener("click", flip);
 
 // Frames.
 function lost() {
@@ -250,7 +267,8 @@ async function begin() {
   theme();
   const about = await (await fetch("about")).json();
   put("attribution", about.attribution);
-  element("change").hidden = !about.may_change;
+  own.operator = about.may_change;
+  element("change").hidden = !own.operator;
   document.title = `foretwin co-pilot · ${about.run}`;
   if (fixed !== null) {
     show(await (await fetch(`frame?at=${encodeURIComponent(fixed)}`)).json());
