@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.codec import SchemaMismatch, read_message
@@ -124,7 +125,7 @@ def _file_of(table: Path, column: str, value: str) -> Path:
         try:
             with opened(path) as file:
                 check_result_schema(path, file.schema_arrow)
-                if value in file.read([column])[column].to_pylist():
+                if pc.any(pc.equal(file.read([column])[column], value)).as_py():
                     return path
         except UserError as error:
             unread = unread or error
@@ -134,9 +135,9 @@ def _file_of(table: Path, column: str, value: str) -> Path:
 def _row(path: Path, column: str, value: str, kind: type[_Row]) -> _Row:
     with opened(path) as file:
         _check_same(path, file.schema_arrow)
-        for row in file.read(list(kind.__struct_fields__)).to_pylist():
-            if row[column] == value:
-                return msgspec.convert(row, kind)
+        table = file.read(list(kind.__struct_fields__))
+        for row in table.filter(pc.field(column) == value).slice(0, 1).to_pylist():
+            return msgspec.convert(row, kind)
     raise UserError(f"{path}: no {column} {value!r}")
 
 

@@ -65,9 +65,14 @@ def _plots(figures: Sequence[Any]) -> tuple[str, str, dict[int, str]]:
     """Return the library, the script that draws, and the place of each figure by its identity."""
     if not figures:
         return "", "", {}
+    from bokeh.document import Document
     from bokeh.embed import components
     from bokeh.resources import Resources
 
+    document = Document()
+    with document.models.freeze():  # Else all models are gathered anew with each figure.
+        for one in figures:
+            document.add_root(one)
     script, places = components(tuple(figures))
     library = "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
     return library, script, {id(one): place for one, place in zip(figures, places, strict=True)}

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.colors import Normalize
 from matplotlib.path import Path as Outline
 
 from foretwin.contracts.arrays import Array
@@ -20,6 +21,9 @@ from foretwin.geometry.polyline import left_of, offset
 from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import picture_style as style
 from foretwin.world_gen.export.picture_style import Look, View
+
+HEIGHT_SCALE_M = Normalize(0.0, 40.0, clip=True)
+"""Of buildings: the highest colour is for all above."""
 
 
 def draw_ground(axes: Axes, world: World, view: View) -> None:
@@ -67,7 +71,7 @@ def _buildings(axes: Axes, world: World, view: View) -> None:
         if view.meets(building.outline):
             # What cars pass below is drawn see-through.
             groups[building.height_m.source, building.min_height_m >= HEADROOM_M].append(building)
-    colours = ScalarMappable(style.HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
+    colours = ScalarMappable(HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
     for (source, overhang), buildings in sorted(groups.items()):
         heights = np.array([b.height_m.value for b in buildings])
         # Hatching is drawn in the edge's colour: tagged heights are marked by their firm outline.

@@ -17,6 +17,7 @@ from foretwin.contracts.terminal import visible
 from foretwin.contracts.world import World, WorldJunction
 from foretwin.world_gen.export import picture_style as style
 from foretwin.world_gen.export.picture_fonts import FIXED, fonts_for
+from foretwin.world_gen.export.picture_ground import HEIGHT_SCALE_M
 from foretwin.world_gen.export.picture_style import Look, View
 from foretwin.world_gen.report.report import JunctionReport, WorldReport
 from foretwin.world_gen.report.text import subject_table
@@ -140,7 +141,7 @@ def draw_legend(figure: Figure) -> None:
 def draw_height_scale(figure: Figure, box: tuple[float, float, float, float]) -> None:
     """Draw the scale of building heights."""
     bar = figure.add_axes(box)
-    scale = ScalarMappable(style.HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
+    scale = ScalarMappable(HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
     figure.colorbar(scale, cax=bar, orientation="horizontal")
     bar.set_xlabel("building height in m (40 and more: darkest)", fontsize=9)
     bar.tick_params(labelsize=8)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import Normalize
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Provenance
@@ -54,7 +53,6 @@ DASH: Mapping[Provenance, Any] = {
     "default": (0, (1, 1.6)),
 }
 """Solid what the map says, dashed what follows from it, dotted what is a default."""
-HEIGHT_SCALE_M = Normalize(0.0, 40.0, clip=True)
 HEIGHT_COLOURS = "YlOrBr"
 
 

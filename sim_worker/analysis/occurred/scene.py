@@ -10,7 +10,6 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.drive import RoadUserKind
@@ -203,11 +202,20 @@ def _course(chain: Sequence[Detected], ego: DrivenMotion) -> OtherCourse | None:
 
 
 def _smoothed(values: Array, over_s: float, order: int) -> Array:
+    """Return values (N, ...), or a derivative, by parabolas (Savitzky and Golay 1964) as SciPy lays
+    them; scipy.signal takes half a second to import."""
     window = min(round(over_s / STEP_S) | 1, (len(values) - 1) | 1)
     window = window if window <= len(values) else window - 2
-    return np.asarray(
-        savgol_filter(values, window, 2, deriv=order, delta=STEP_S, axis=0, mode="interp")
-    )
+    half = window // 2
+    around = np.arange(-half, half + 1)
+    fit = np.linalg.pinv(np.vander(around, 3, increasing=True).astype(np.float64))
+    windows = np.lib.stride_tricks.sliding_window_view(values, window, axis=0)
+    parabolas = windows @ fit.T
+    at = np.concatenate([around[:half], np.zeros(len(parabolas)), around[half + 1 :]])
+    which = np.clip(np.arange(len(values)) - half, 0, len(parabolas) - 1)
+    slopes = np.array([np.ones(len(at)), at, at**2] if order == 0 else [0.0 * at, at**0, 2.0 * at])
+    smoothed: Array = np.einsum("n...k,kn->n...", parabolas[which], slopes)
+    return smoothed / STEP_S**order
 
 
 def _heading(velocity: Array, speed: Array, told: Array) -> Array:

@@ -9,7 +9,7 @@ import pytest
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.write_report import report_of_folders
-from tests.orchestrator.report.test_write_report import Read
+from tests.orchestrator.report.read_page import ReadPage
 from tests.orchestrator.report.told_runs import told_run
 
 
@@ -24,7 +24,7 @@ def test_two_runs_stand_side_by_side(tmp_path: Path) -> None:
     assert report.verdict.startswith("What B foresaw lies 0.50 m farther from what was driven")
     assert "constant_speed" in page
     assert "last minus first" in page
-    read = Read(page)
+    read = ReadPage(page)
     assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
 
 

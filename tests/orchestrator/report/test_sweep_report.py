@@ -11,7 +11,7 @@ from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.repeat import repeat
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.write_report import report_of_folders
-from tests.orchestrator.report.test_write_report import MOST_BYTES, Read
+from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
 from tests.orchestrator.sweeps import small_sweep
 
 COVERS = (
@@ -35,7 +35,7 @@ def page(swept: Path) -> str:
 
 @pytest.mark.judge
 def test_it_tells_outcomes_and_stands_alone(swept: Path, page: str) -> None:
-    read, record = Read(page), json.loads((swept / "sweep.json").read_text())
+    read, record = ReadPage(page), json.loads((swept / "sweep.json").read_text())
 
     assert f"Of {record['placed']} cases that could be played {record['collided']}" in page
     assert "Outcome by junction, scenario and planner" in page
@@ -47,7 +47,7 @@ def test_it_tells_outcomes_and_stands_alone(swept: Path, page: str) -> None:
 
 @pytest.mark.judge
 def test_worst_cases_play_again_to_the_same_hash(swept: Path, page: str) -> None:
-    commands = [code.split() for code in Read(page).codes if code.startswith("foretwin repeat")]
+    commands = [code.split() for code in ReadPage(page).codes if code.startswith("foretwin repeat")]
 
     assert commands
     for command in commands[::3]:

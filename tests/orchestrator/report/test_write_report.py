@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.repeat import repeat
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.write_report import report_of_folders, write_report
+from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
 from tests.orchestrator.report.told_runs import (
     NAME,
     OSM,
@@ -36,40 +36,6 @@ COVERS = (
     "foretwin.orchestrator.report.run_report",
     "foretwin.orchestrator.report.vehicle_parts",
 )
-MOST_BYTES = 3_000_000
-
-
-class Read(HTMLParser):
-    """What a browser would look for in a page: anchors, links to them, and what it would load."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.anchors: set[str] = set()
-        self.links: list[str] = []
-        self.loaded: list[str] = []
-        self.codes: list[str] = []
-        self._in_code = False
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        said = {name: value or "" for name, value in attrs}
-        self._in_code = tag == "code"
-        if "id" in said:
-            self.anchors.add(said["id"])
-        if tag == "a":
-            self.links.append(said["href"])
-        elif tag in ("link", "iframe", "object", "embed", "base"):
-            self.loaded.append(tag)
-        self.loaded += [
-            f"{tag} {name}" for name in ("src", "srcset", "data", "xlink:href") if name in said
-        ]
-
-    def handle_endtag(self, tag: str) -> None:
-        self._in_code = self._in_code and tag != "code"
-
-    def handle_data(self, data: str) -> None:
-        if self._in_code:
-            self.codes.append(data)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +51,7 @@ def page(run: Path) -> str:
 
 
 def test_it_stands_alone(page: str) -> None:
-    read = Read(page)
+    read = ReadPage(page)
 
     assert read.loaded == []
     assert read.links
@@ -107,7 +73,7 @@ def test_it_says_what_was_foreseen_and_what_came(page: str) -> None:
 
 
 def test_worst_futures_come_with_a_command_that_plays_them_again(run: Path, page: str) -> None:
-    commands = [code.split() for code in Read(page).codes if code.startswith("foretwin repeat")]
+    commands = [code.split() for code in ReadPage(page).codes if code.startswith("foretwin repeat")]
 
     assert len(commands) >= 4
     assert {command[2] for command in commands} == {str(run)}

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
+from foretwin.sim_worker.analysis.occurred import scene
 from foretwin.sim_worker.analysis.occurred.scene import Detected, OtherCourse, courses_of
 from tests.sim_worker.analysis.occurred.scenes import ego_eastwards, other
 
@@ -45,6 +47,16 @@ def test_who_begins_elsewhere_or_is_of_another_class_is_somebody_else() -> None:
     first, second = cut(line(10.0), 50, 62)
     assert len(courses(first, second._replace(xy_m=second.xy_m + np.array([9.0, 0.0])))) == 2
     assert len(courses(*cut(line(10.0), 50, 62, "pedestrian"))) == 2
+
+
+@pytest.mark.parametrize("count", [3, 4, 7, 90])
+@pytest.mark.parametrize("order", [0, 1])
+def test_courses_are_smoothed_as_scipy_does(count: int, order: int) -> None:
+    xy_m = RANDOM.normal(0.0, 1.0, (count, 2))
+    window = min(7, count - (count + 1) % 2)
+    expected = savgol_filter(xy_m, window, 2, deriv=order, delta=0.1, axis=0)
+
+    assert scene._smoothed(xy_m, 0.7, order) == pytest.approx(expected, abs=1e-9)
 
 
 def test_what_shakes_or_is_there_for_a_moment_is_nobody() -> None:
