@@ -155,7 +155,7 @@ class BatchSimulation:
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
-            friction=self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64),
+            friction=self._friction(friction_factor),
             ctrl=self._controls,
             biasprm=self._physics.biasprm[rows],
             forcerange=self._physics.forcerange[rows],
@@ -172,6 +172,9 @@ class BatchSimulation:
         self._motion_now = self._physics.motion[rows].T
         self._heading = np.array([np.cos(start[:, 2]), np.sin(start[:, 2])])
         self._feel_slope()
+
+    def _friction(self, factor: Array) -> Array:
+        return self.vehicle.friction.value * np.asarray(factor, dtype=np.float64)
 
     def _feel_slope(self) -> None:
         if self.slopes is not None:
@@ -193,7 +196,7 @@ class BatchSimulation:
         self._tire_command[rows] = start[:, 6]
         self._physics.history[rows, self._steer_history] = start[:, 6:7]
         self._physics.delay[rows, self._actuators.steer] = steering_delay_s
-        friction = self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
+        friction = self._friction(friction_factor)
         self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
         self._drift_m[rows] = most_drift_m(self.vehicle, friction_factor, self._box)
         self.static_contact[rows] = False

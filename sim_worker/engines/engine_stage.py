@@ -76,9 +76,6 @@ class EngineStage(BatchSimulation):
         seeds = Seeds(start, self._friction(friction_factor), self._backwards)
         self._moves.reset(np.arange(count), seeds)
 
-    def _friction(self, factor: Array) -> Array:
-        return self.vehicle.friction.value * np.asarray(factor, dtype=np.float64)
-
     def reseed(
         self,
         rows: Indices,
