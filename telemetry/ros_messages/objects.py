@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,28 +61,20 @@ def users_from_detected(ros: Any, frame: LocalFrame, *, stamp_ns: int) -> drive.
 
 def users_from_tracked(ros: Any, frame: LocalFrame, *, stamp_ns: int) -> drive.RoadUsers:
     """Return the road users of a TrackedObjects; see users_from_detected."""
-    boxes = (
-        _Box(
-            bytes(one.object_id.uuid).hex(),
-            one.kinematics.pose_with_covariance.pose,
-            one.kinematics.twist_with_covariance.twist,
-        )
-        for one in ros.objects
-    )
-    return _users(ros, boxes, frame, stamp_ns)
+    return _users(ros, _known(ros, ""), frame, stamp_ns)
 
 
 def users_from_predicted(ros: Any, frame: LocalFrame, *, stamp_ns: int) -> drive.RoadUsers:
     """Return the road users of a PredictedObjects as they are now; see users_from_detected."""
-    boxes = (
-        _Box(
-            bytes(one.object_id.uuid).hex(),
-            one.kinematics.initial_pose_with_covariance.pose,
-            one.kinematics.initial_twist_with_covariance.twist,
-        )
-        for one in ros.objects
-    )
-    return _users(ros, boxes, frame, stamp_ns)
+    return _users(ros, _known(ros, "initial_"), frame, stamp_ns)
+
+
+def _known(ros: Any, when: str) -> Iterator[_Box]:
+    """Yield the boxes of objects that have an identity, from fields that begin with `when`."""
+    for one in ros.objects:
+        pose = getattr(one.kinematics, f"{when}pose_with_covariance").pose
+        twist = getattr(one.kinematics, f"{when}twist_with_covariance").twist
+        yield _Box(bytes(one.object_id.uuid).hex(), pose, twist)
 
 
 def _users(ros: Any, boxes: Iterable[_Box], frame: LocalFrame, stamp_ns: int) -> drive.RoadUsers:
