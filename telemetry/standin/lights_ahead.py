@@ -11,7 +11,7 @@ from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.frames import local_pose, wrap_angle
 from foretwin.contracts.lights import ShownLights, StopPlace
 from foretwin.telemetry.standin.obstacles import FRONT_M
-from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.path import DrivenPath, PathPiece
 
 _SHORT_OF_M = 1.0
 """As far before the line the bumper stops; chosen."""
@@ -40,34 +40,34 @@ def lights_ahead(
     Lights are in the World; with an `anchor` the path is on its lot. Lights that only a plan knows
     count for nobody who follows a real road.
     """
-    near = (path.s_m >= s_m) & (path.s_m <= s_m + _AHEAD_M)
-    if not near.any():
-        return ()
-    found = [
-        LightAhead(at_m, light.colour == "amber")
+    stops = [
+        (light.colour == "amber", stop)
         for light in shown.lights
         if light.binds_car and light.stops_cars and not light.on_foot
         for stop in light.stops
-        if (at_m := _stand_m(path, near, stop, anchor)) is not None and at_m > s_m - _SHORT_OF_M
+    ]
+    ahead = path.piece(s_m, s_m + _AHEAD_M) if stops else None
+    if ahead is None:
+        return ()
+    found = [
+        LightAhead(at_m, amber)
+        for amber, stop in stops
+        if (at_m := _stand_m(path, ahead, stop, anchor)) is not None and at_m > s_m - _SHORT_OF_M
     ]
     return tuple(sorted(found))
 
 
 def _stand_m(
-    path: DrivenPath, near: np.ndarray, stop: StopPlace, anchor: Anchor | None
+    path: DrivenPath, ahead: PathPiece, stop: StopPlace, anchor: Anchor | None
 ) -> float | None:
     """Return where base_link stands before a stop line; None where the path does not cross it."""
     at = stop.position, stop.yaw_rad
     if anchor is not None:
         at = anchor.lot_from_world(*at)
     x_m, y_m, yaw_rad = local_pose(path.frame, *at)
-    offset_m = np.array([x_m, y_m]) - path.xy_m[near]
-    place = int(np.argmin((offset_m**2).sum(axis=1)))
-    along_rad = float(path.yaw_rad[near][place])
-    cos, sin = math.cos(along_rad), math.sin(along_rad)
-    along_m = cos * offset_m[place, 0] + sin * offset_m[place, 1]
-    aside_m = cos * offset_m[place, 1] - sin * offset_m[place, 0]
+    line_m, left_m, along_rad = (float(one[0]) for one in ahead.locate(np.array([[x_m, y_m]])))
+    beyond_m = line_m - float(np.clip(line_m, ahead.s_m[0], ahead.s_m[-1]))
     turned_rad = float(wrap_angle(yaw_rad - along_rad))
-    if abs(turned_rad) > _TURNED_RAD or math.hypot(along_m, aside_m) > _ASIDE_M:
+    if abs(turned_rad) > _TURNED_RAD or math.hypot(beyond_m, left_m) > _ASIDE_M:
         return None
-    return float(path.s_m[near][place] + along_m) - FRONT_M - _SHORT_OF_M
+    return line_m - FRONT_M - _SHORT_OF_M

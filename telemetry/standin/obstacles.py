@@ -9,7 +9,7 @@ import numpy as np
 
 from foretwin.contracts.drive import RoadUser
 from foretwin.contracts.frames import local_pose
-from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.path import DrivenPath, PathPiece
 
 FRONT_M, HALF_WIDTH_M = 3.54, 0.81
 """From the rear axle to the front bumper, and half the width: CommonRoad's vehicle 2 (length 4.508,
@@ -38,33 +38,26 @@ def hindrance(
     path: DrivenPath, s_m: float, users: Sequence[RoadUser], *, age_s: float = 0.0
 ) -> Hindrance | None:
     """Return the nearest of `users`, seen `age_s` ago, in the way of a car `s_m` along its path."""
-    near = (path.s_m >= s_m) & (path.s_m <= s_m + _AHEAD_M)
-    if not users or not near.any():
+    ahead = path.piece(s_m, s_m + _AHEAD_M) if users else None
+    if ahead is None:
         return None
     found = [
-        one for user in users if (one := _of_one(path, s_m, near, user, age_s=age_s)) is not None
+        one for user in users if (one := _of_one(path, s_m, ahead, user, age_s=age_s)) is not None
     ]
     return min(found, key=lambda one: one.s_m, default=None)
 
 
 def _of_one(
-    path: DrivenPath, s_m: float, near: np.ndarray, user: RoadUser, *, age_s: float
+    path: DrivenPath, s_m: float, ahead: PathPiece, user: RoadUser, *, age_s: float
 ) -> Hindrance | None:
     x_m, y_m, yaw_rad = local_pose(path.frame, user.position, user.yaw_rad)
     way_m = user.speed_mps * (age_s + np.arange(0.0, _AHEAD_S + _STEP_S, _STEP_S))
     going = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
-    place_m = np.array([x_m, y_m]) + way_m[:, None] * going
-    offset_m = place_m[:, None, :] - path.xy_m[near]
-    nearest = np.argmin((offset_m**2).sum(axis=-1), axis=1)
-    offset_m = offset_m[np.arange(len(nearest)), nearest]
-    along_rad, at_m = path.yaw_rad[near][nearest], path.s_m[near][nearest]
-    cos, sin = np.cos(along_rad), np.sin(along_rad)
-    aside_m = np.abs(cos * offset_m[:, 1] - sin * offset_m[:, 0])
-    at_m = at_m + cos * offset_m[:, 0] + sin * offset_m[:, 1]
+    at_m, left_m, along_rad = ahead.locate(np.array([x_m, y_m]) + way_m[:, None] * going)
     turned = np.abs(np.cos(yaw_rad - along_rad)), np.abs(np.sin(yaw_rad - along_rad))
     half_along_m = 0.5 * (user.length_m * turned[0] + user.width_m * turned[1])
     half_aside_m = 0.5 * (user.length_m * turned[1] + user.width_m * turned[0])
-    in_the_way = aside_m <= HALF_WIDTH_M + _BESIDE_M + half_aside_m
+    in_the_way = np.abs(left_m) <= HALF_WIDTH_M + _BESIDE_M + half_aside_m
     # Whom the bumper has passed is beside the car, not before it.
     in_the_way &= at_m + half_along_m > s_m + FRONT_M
     if not in_the_way.any():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +29,33 @@ class PathPoint(NamedTuple):
     y_m: float
     yaw_rad: float
     curvature_pm: float
+
+
+class Located(NamedTuple):
+    """Points (N,) seen from a path: how far along it, how far to its left, its heading there."""
+
+    s_m: Array
+    left_m: Array
+    yaw_rad: Array
+
+
+class PathPiece(NamedTuple):
+    """A part of a driven path: distances (N,) along all of it, points (N, 2), headings (N,)."""
+
+    s_m: Array
+    xy_m: Array
+    yaw_rad: Array
+
+    def locate(self, xy_m: Array) -> Located:
+        """Return where points (M, 2) are, each by the tangent at the piece's nearest point."""
+        offset_m = xy_m[:, None, :] - self.xy_m
+        nearest = np.argmin((offset_m**2).sum(axis=-1), axis=1)
+        offset_m = offset_m[np.arange(len(nearest)), nearest]
+        yaw_rad = self.yaw_rad[nearest]
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        along_m = cos * offset_m[:, 0] + sin * offset_m[:, 1]
+        left_m = cos * offset_m[:, 1] - sin * offset_m[:, 0]
+        return Located(self.s_m[nearest] + along_m, left_m, yaw_rad)
 
 
 class DrivenPath:
@@ -120,15 +146,21 @@ class DrivenPath:
         """Return the wished speed at a distance along the path, without regard to stops."""
         return float(np.interp(s_m, self.s_m, self.speed_mps))
 
+    def piece(self, first_m: float, last_m: float) -> PathPiece | None:
+        """Return the points between two distances along the path; None where there are none."""
+        first, end = np.searchsorted(self.s_m, first_m), np.searchsorted(self.s_m, last_m, "right")
+        if first >= end:
+            return None
+        some = slice(int(first), int(end))
+        return PathPiece(self.s_m[some], self.xy_m[some], self.yaw_rad[some])
+
     def locate(self, x_m: float, y_m: float, *, near_s_m: float) -> float:
         """Return how far along the path a point is, looking a few metres around `near_s_m`."""
         first = max(0, int(np.searchsorted(self.s_m, near_s_m - 3.0)) - 1)
-        window = self.xy_m[first : first + 24]
-        nearest = first + int(np.argmin((window[:, 0] - x_m) ** 2 + (window[:, 1] - y_m) ** 2))
-        px, py = self.xy_m[nearest]
-        yaw = self.yaw_rad[nearest]
-        along = (x_m - px) * math.cos(yaw) + (y_m - py) * math.sin(yaw)
-        return float(min(max(self.s_m[nearest] + along, 0.0), self.length_m))
+        window = slice(first, first + 24)
+        piece = PathPiece(self.s_m[window], self.xy_m[window], self.yaw_rad[window])
+        s_m = float(piece.locate(np.array([[x_m, y_m]])).s_m[0])
+        return min(max(s_m, 0.0), self.length_m)
 
 
 def _smoothed(xy_m: Array, sigma: float) -> Array:

@@ -52,6 +52,7 @@ def test_a_red_light_is_met_a_metre_before_its_line() -> None:
         {"stops": (stop(yaw_rad=math.pi),)},
         {"stops": (stop(yaw_rad=math.pi / 2),)},
         {"stops": (stop(along_m=7.0),)},
+        {"stops": (stop(along_m=110.0),)},
         {"stops": ()},
     ],
     ids=str,
