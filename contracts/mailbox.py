@@ -117,11 +117,16 @@ class Mailbox:
     """A bounded queue with many writers and one reader.
 
     When full, `drop_oldest` forgets the oldest item and counts it, `block` makes the writer wait
-    (lock step alone: nothing may block a live drive).
+    (lock step alone: nothing may block a live drive). Who waits for two waits at one, which the
+    other `nudges` as something comes to it.
     """
 
     def __init__(
-        self, depth: int, *, when_full: Literal["drop_oldest", "block"] = "drop_oldest"
+        self,
+        depth: int,
+        *,
+        when_full: Literal["drop_oldest", "block"] = "drop_oldest",
+        nudges: Mailbox | None = None,
     ) -> None:
         if depth < 1:
             raise ValueError(f"mailbox depth {depth} must be at least 1")
@@ -132,7 +137,8 @@ class Mailbox:
         self._changed = threading.Condition(lock)
         self._pressing = threading.Condition(lock)
         self._pressing_items = 0
-        self._closed = False
+        self._closed = self._nudged = False
+        self._nudges = nudges
         self.dropped = 0
 
     def put(self, item: Item) -> None:
@@ -150,12 +156,23 @@ class Mailbox:
             if not isinstance(item, Received):
                 self._pressing_items += 1
                 self._pressing.notify_all()
+        if self._nudges is not None:
+            self._nudges.nudge()
+
+    def nudge(self) -> None:
+        """Let who waits in `take`, or comes to wait next, go on without an item."""
+        with self._changed:
+            self._nudged = True
+            self._changed.notify_all()
 
     def take(self, timeout_s: float | None = 0.0) -> Item | None:
         """Return the oldest item, or None after `timeout_s` (None waits for ever) or `close`."""
         with self._changed:
             if not self._items and timeout_s != 0.0:
-                self._changed.wait_for(lambda: bool(self._items) or self._closed, timeout_s)
+                self._changed.wait_for(
+                    lambda: bool(self._items) or self._closed or self._nudged, timeout_s
+                )
+                self._nudged = False
             if not self._items:
                 return None
             item = self._popped()

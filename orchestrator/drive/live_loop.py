@@ -13,6 +13,7 @@ from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.trace import item_name, span
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.missed_end import MissedEnd
+from foretwin.telemetry.estimator.estimator import STATE_PERIOD_NS
 
 HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
@@ -21,6 +22,9 @@ LAST_ROUND_GRACE_S = 1.0
 GATHER_S = 0.04
 """Samples are taken in portions: waking up for each of 330 a second costs more than what most of
 them are about. Neither an answer nor a round that is due waits."""
+_BEFORE_STATE_S = 0.002
+"""Where something goes back to the car, so long before the next state is due nothing is gathered
+any more: what the car is shown is as old as the state that it is of."""
 UNPLACED_S = 5.0
 """So long after a restart nothing falls due before it is known where the car is; then it does where
 it did before."""
@@ -89,7 +93,7 @@ class LiveLoop:
                     self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             if not self._telemetry_waits():
-                until_s = min(now_s + GATHER_S, self._next_due_s, next_housekeeping_s)
+                until_s = min(self._gather_until(now_s), self._next_due_s, next_housekeeping_s)
                 conductor.mailbox.gather(max(0.0, until_s - now_s))
             wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
             until_s = min(self._next_due_s, wake_s)
@@ -126,6 +130,15 @@ class LiveLoop:
                 return True
         self._leave_out(time.monotonic())
         return False
+
+    def _gather_until(self, now_s: float) -> float:
+        """Return until when samples are gathered: for a car that is shown things, to no state."""
+        if not self.conductor.plan.towards_vehicle:
+            return now_s + GATHER_S
+        latest = self.conductor.intake.latest
+        if latest is None:
+            return now_s
+        return (latest.receipt_mono_ns + STATE_PERIOD_NS) * 1e-9 - _BEFORE_STATE_S
 
     @property
     def _at_the_latest_s(self) -> float:

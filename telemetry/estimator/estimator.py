@@ -22,7 +22,8 @@ from foretwin.telemetry.estimator.reordering import Reordering
 from foretwin.telemetry.estimator.reported_state import StateConsistency
 from foretwin.telemetry.estimator.staleness import Staleness
 
-_STATE_PERIOD_NS = 20_000_000
+STATE_PERIOD_NS = 20_000_000
+"""The next sample after so long gives a new state; a position gives one at once."""
 _MOTION = ("gnss", "imu", "speed", "heading", "steering")
 """Channels that say how the car moves."""
 _KINDS: dict[str, type] = {name: CHANNELS[name].kind for name in _MOTION}
@@ -196,7 +197,7 @@ class StateEstimator:
             return self._leave(self._track.state(stamp_ns, fix=message), stamp_ns)
         if not self._track.started or self._state_ns is None:
             return None
-        if stamp_ns - self._state_ns < _STATE_PERIOD_NS:
+        if stamp_ns - self._state_ns < STATE_PERIOD_NS:
             return None
         return self._leave(self._track.state(stamp_ns), stamp_ns)
 
@@ -211,7 +212,7 @@ class StateEstimator:
         newest = reordering.newest
         assert newest is not None
         is_newest = newest.message is message
-        due = self._state_ns is None or newest.stamp_ns - self._state_ns >= _STATE_PERIOD_NS
+        due = self._state_ns is None or newest.stamp_ns - self._state_ns >= STATE_PERIOD_NS
         if not due and not (is_newest and channel == "gnss"):
             return None
         self._track = reordering.track()

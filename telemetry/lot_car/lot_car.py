@@ -94,8 +94,9 @@ class LotCar:
         return self._source.ended
 
     def step(self, wait_s: float = 0.005) -> None:
-        """Wait a moment for a list of objects, then drive and say what is due."""
-        item: Any = self._inbox.take(wait_s)
+        """Wait for a list of objects, no longer than until samples are due; drive, and say them."""
+        due_in_ns = self._source.next_stamp_ns - self._stamp_ns(self._mono_ns())
+        item: Any = self._inbox.take(min(wait_s, max(0.0, due_in_ns * 1e-9)))
         while item is not None:
             for _, message in self._inwards.take(item):
                 self._hear(message, item.received_wall_ns)
@@ -103,14 +104,16 @@ class LotCar:
         now_ns = self._mono_ns()
         if now_ns - self._heard_mono_ns > _FORGETS_NS:
             self._source.see((), stamp_ns=self._source.first_stamp_ns)
-        until_ns = self._source.first_stamp_ns + now_ns - self._began_mono_ns
-        for channel, sample in self._source.advance(until_ns):
+        for channel, sample in self._source.advance(self._stamp_ns(now_ns)):
             stamp_ns = sample.stamp_ns + self._later_ns
             for row, payload in self._voice.say(
                 channel, msgspec.structs.replace(sample, stamp_ns=stamp_ns)
             ):
                 self._sender.put(OutRow(topic=row.topic, type=row.type, source="state"), payload)
         self._watch()
+
+    def _stamp_ns(self, mono_ns: int) -> int:
+        return self._source.first_stamp_ns + mono_ns - self._began_mono_ns
 
     def report(self) -> LotReport:
         """Return what it came to so far."""

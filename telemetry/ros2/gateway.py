@@ -100,7 +100,8 @@ class Gateway:
         )
         self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
         self._merged = MergedObjects(mapping.merged, frame=drive_frame)
-        self._inbox, self._views = Mailbox(2048), Mailbox(256)
+        self._inbox = Mailbox(2048)
+        self._views = Mailbox(256, nudges=self._inbox)
         self._orders: Orders | None = None
         self._logged_gate = self.gate.state
         self._out.warm_up()
@@ -112,7 +113,7 @@ class Gateway:
         log.info("towards the vehicle: %s", self.gate.why)
 
     def step(self, wait_s: float = 0.005) -> None:
-        """Wait a moment for samples, then pass on what has come from either side."""
+        """Wait a moment for anything, then pass on what has come from either side."""
         arrived: Any = self._inbox.take(wait_s)
         for left in reversed(range(_PORTION)):
             self._take_orders()

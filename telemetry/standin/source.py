@@ -93,6 +93,11 @@ class StandinSource:
         self._driver.held = held
 
     @property
+    def next_stamp_ns(self) -> int:
+        """When the next samples may be due."""
+        return START_STAMP_NS + self._tick * _TICK_NS
+
+    @property
     def ahead(self) -> Hindrance | None:
         """Who is in the way now."""
         return self._driver.ahead
@@ -115,8 +120,7 @@ class StandinSource:
 
     def advance(self, until_stamp_ns: int) -> Iterator[tuple[str, Any]]:
         """Simulate up to and including the stamp; yield every sample once, in stamp order."""
-        while not self.ended and START_STAMP_NS + self._tick * _TICK_NS <= until_stamp_ns:
-            stamp_ns = START_STAMP_NS + self._tick * _TICK_NS
+        while not self.ended and (stamp_ns := self.next_stamp_ns) <= until_stamp_ns:
             motion = self._car.motion()
             if self._path.altitude_m is not None:
                 s_m = self._driver.s_m

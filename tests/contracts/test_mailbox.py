@@ -94,6 +94,37 @@ def test_nothing_gathers_while_an_answer_waits_and_samples_do_for_so_long_alone(
     assert time.monotonic() - began_s < DEADLINE_S
 
 
+def test_who_waits_at_one_mailbox_goes_on_as_something_comes_to_another() -> None:
+    inbox = Mailbox(8)
+    views = Mailbox(8, nudges=inbox)
+    went_on = threading.Event()
+
+    def wait() -> None:
+        assert inbox.take(DEADLINE_S) is None
+        went_on.set()
+
+    reader = threading.Thread(target=wait)
+    reader.start()
+    views.put(received())
+    assert went_on.wait(DEADLINE_S / 2)
+    reader.join(DEADLINE_S)
+    assert (len(inbox), len(views)) == (0, 1)
+    began_s = time.monotonic()
+    assert inbox.take(0.02) is None, "a nudge counts once"
+    assert time.monotonic() - began_s > 0.019
+
+
+def test_a_nudge_before_the_wait_counts_and_keeps_nothing_back() -> None:
+    mailbox = Mailbox(8)
+    mailbox.nudge()
+    began_s = time.monotonic()
+    assert mailbox.take(DEADLINE_S) is None
+    assert time.monotonic() - began_s < DEADLINE_S / 2
+    mailbox.put("sample")
+    mailbox.nudge()
+    assert mailbox.take(DEADLINE_S) == "sample"
+
+
 def test_take_waits_for_the_next_item() -> None:
     mailbox = Mailbox(1)
     reader_ready = threading.Event()

@@ -22,6 +22,10 @@ from tests.telemetry.lot_car.test_braking import ANCHOR, MAPPING
 
 DATA = os.environ.get("FORETWIN_DATA", "")
 ATTEMPTS = 4
+BUSY_S = 10.0
+"""More than processes wait for one another on two cores that have nothing else to do: 7 to 10 s."""
+LATEST_MS = 50.0
+"""From a state to the objects at the driving stack, in 95 of 100 lists."""
 LOT = """
 fence = [[52.47435, 13.38700], [52.47495, 13.41900], [52.47330, 13.41910], [52.47270, 13.38710]]
 [lot]
@@ -85,8 +89,7 @@ def test_it_stands_before_a_pedestrian_whom_only_the_world_holds(
 ) -> None:
     """Anew where a busy machine halted somebody for 150 ms: that shuts the gate, rightly.
 
-    The latency that is printed is that of the state, by its stamp, and of the way from there on; it
-    is no limit here, since it is more than 50 ms at its 95th percentile on two cores.
+    The latency runs from the stamp of the state that a list is of to the list's arrival.
     """
     if not DATA:
         pytest.skip("FORETWIN_DATA names no folder of real maps")
@@ -96,8 +99,11 @@ def test_it_stands_before_a_pedestrian_whom_only_the_world_holds(
         with on_the_lot(folder, dialect=dialect, objects=objects) as (report, log, kept_s):
             print(dialect, report, f"kept waiting {kept_s:.2f} s")
             # The gate shuts in the end in any case: the car's process ends before the drive.
-            if report["stood_before_m"] is None and "shut: " in log and kept_s > 1.0:
+            shut = report["stood_before_m"] is None and "shut: " in log
+            late = report["latency_ms_p95"] is None or report["latency_ms_p95"] >= LATEST_MS
+            if (shut and kept_s > 1.0) or (late and kept_s > BUSY_S):
                 continue
+            assert report["latency_ms_p95"] < LATEST_MS
             assert report["brakes"] == ["pedestrian"]
             assert report["stood_before_m"] == pytest.approx(2.0, abs=1.0)
             return

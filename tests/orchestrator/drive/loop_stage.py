@@ -66,6 +66,7 @@ class Conductor:
         settled_s: float = 0.0,
         received: bool = False,
         wants_rounds: bool = True,
+        towards_vehicle: bool = False,
     ) -> None:
         self._received = received
         """Whether a state counts as received when it came, not when it is handled."""
@@ -74,7 +75,8 @@ class Conductor:
         self._handling = handling
         self._open_until_s: float | None = None
         config = SimpleNamespace(rate_hz=rate_hz, speed=1.0, vehicle_id="car")
-        self.plan, self.bus = SimpleNamespace(config=config), MemoryBus()
+        self.plan = SimpleNamespace(config=config, towards_vehicle=towards_vehicle)
+        self.bus = MemoryBus()
         self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
         self.intake = SimpleNamespace(states=0, latest=None, end=None)
         self._settled_s = settled_s

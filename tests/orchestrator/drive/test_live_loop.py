@@ -165,6 +165,24 @@ def test_messages_are_gathered_and_no_round_waits_for_it(driven: Any) -> None:
     assert conductor.started_s[:20] == pytest.approx([k / 2 for k in range(20)], abs=0.0031)
 
 
+@pytest.mark.parametrize(("towards_vehicle", "oldest_s"), [(True, 0.0011), (False, 0.0411)])
+def test_a_state_of_a_car_that_is_shown_things_waits_for_no_portion(
+    driven: Any, towards_vehicle: bool, oldest_s: float
+) -> None:
+    came_s = [*every(0.02, 5.0), 5.0]
+    ages_s: list[float] = []
+    conductor = driven(
+        states_s=came_s[:-1], end_s=5.0, towards_vehicle=towards_vehicle, wants_rounds=False,
+        handling=lambda at_s: ages_s.append(at_s - came_s[len(ages_s)]),
+    )  # fmt: skip
+    assert max(ages_s) < oldest_s
+    assert towards_vehicle or max(ages_s) > 0.019
+    gathered_s = [length_s for length_s in conductor.mailbox.gathered_s if length_s]
+    # What comes between two states comes in a portion all the same.
+    assert sum(gathered_s) > 4.0
+    assert len(gathered_s) <= (250 if towards_vehicle else 130) + 50
+
+
 @pytest.fixture
 def turns(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What a loop does in turn: its turns, with their seconds, and the items that it takes."""

@@ -242,6 +242,21 @@ def test_without_a_word_it_stands_and_says_its_samples():
     assert meeting.gateway.report()["in"]["gnss"] == pytest.approx(20, abs=1)
 
 
+def test_it_says_its_samples_as_they_are_due_not_as_its_turn_ends():
+    meeting = Meeting("ros2dds", "PredictedObjects", ahead_m=15.0)
+    waited_s: list[float] = []
+
+    def take(timeout_s: float = 0.0) -> None:
+        waited_s.append(timeout_s)
+        meeting.wire.now_ns += round(timeout_s * S)
+
+    meeting.car._inbox.take = take  # type: ignore[method-assign]
+    meeting.wire.now_ns += 3 * MS
+    for _ in range(4):
+        meeting.car.step()
+    assert waited_s == pytest.approx([0.0, 0.002, 0.005, 0.005])
+
+
 def test_a_mapping_that_sends_the_car_no_objects_is_refused():
     text = MAPPING.format(dialect="ros2dds", objects="PredictedObjects", lat=52.5, lon=13.4)
     mapping = parse_mapping(text, name="m.toml")
