@@ -16,15 +16,20 @@ from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo
 from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.orchestrator.record.recorded_messages import OBJECTS, STATES, recorded_messages
 from foretwin.orchestrator.record.run_folder import VEHICLES
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.occurred.scene import Detected, DrivenMotion, even_motion
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.logs.log import Log
 from foretwin.telemetry.logs.road_users import RoadUserTrack, detections_of, log_of_detections
 
 _WORLDS = "worlds"
+_EVERY_NS = 100_000_000
+"""Motion is looked at ten times a second."""
+_StatesAndObjects = tuple[list[VehicleState], list[RoadUsers]]
 
 
 class DriveRead(NamedTuple):
@@ -53,17 +58,14 @@ def read_run(run: Path) -> DriveRead:
         raise FileNotFoundError(f"run {run}: no {recording.name} in it")
     vehicle = _vehicle(run)
     log = open_log(recording)
-    estimator = estimator_of(log.info, vehicle)
-    states: list[VehicleState] = []
-    seen, told = [], []
-    for channel, message in log.samples():
-        if isinstance(message, RoadUsers):
-            told.append(message.stamp_ns)
-            real = tuple(user for user in message.users if not user.virtual)
-            seen.append(detections_of(RoadUsers(stamp_ns=message.stamp_ns, users=real)))
-        state = estimator.handle(channel, message)
-        if state is not None:
-            states.append(state)
+    states, objects = _as_recorded(recording) or _estimated(log, vehicle)
+    told = [message.stamp_ns for message in objects]
+    seen = [
+        detections_of(
+            RoadUsers(stamp_ns=one.stamp_ns, users=tuple(u for u in one.users if not u.virtual))
+        )
+        for one in objects
+    ]
     headed = [state for state in states if state.yaw_valid]
     if len(headed) < 2:
         raise UserError(f"{recording}: the heading is never known, so nothing can be recognised")
@@ -78,6 +80,28 @@ def read_run(run: Path) -> DriveRead:
         worlds=tuple(_worlds(run / _WORLDS)),
         vehicle=vehicle,
     )
+
+
+def _as_recorded(recording: Path) -> _StatesAndObjects | None:
+    """Return states as they were estimated then and what was detected; None without states."""
+    states = list(recorded_messages(recording, STATES, VehicleState, every_ns=_EVERY_NS))
+    if len(states) < 2:
+        return None
+    return states, list(recorded_messages(recording, OBJECTS, RoadUsers))
+
+
+def _estimated(log: Log, vehicle: VehicleParameters) -> _StatesAndObjects:
+    """Return states as they are estimated now from all sensors, and what was detected."""
+    estimator = estimator_of(log.info, vehicle)
+    states: list[VehicleState] = []
+    objects = []
+    for channel, message in log.samples():
+        if isinstance(message, RoadUsers):
+            objects.append(message)
+        state = estimator.handle(channel, message)
+        if state is not None:
+            states.append(state)
+    return states, objects
 
 
 def motion_in(frame: LocalFrame, states: Iterable[VehicleState]) -> DrivenMotion:
@@ -98,7 +122,9 @@ def motion_in(frame: LocalFrame, states: Iterable[VehicleState]) -> DrivenMotion
     ).T
     stamps = np.array([state.stamp_ns for state in kept], dtype=np.int64)
     fresh = np.concatenate([[True], np.diff(stamps) > 0])
-    xy = np.asarray(local_from_geo(frame, lat, lon))
+    # What the map moved a position by is no motion of the car.
+    moved_m = np.array([s.map_shift_m or (0.0, 0.0) for s in kept])
+    xy = np.asarray(local_from_geo(frame, lat, lon)) - moved_m
     local_yaw = np.asarray(local_from_geo_yaw(frame, yaw, lat, lon))
     columns = (column[fresh] for column in (xy, local_yaw, speed, accel, rate))
     return even_motion(stamps[fresh], *columns)

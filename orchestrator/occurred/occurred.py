@@ -39,7 +39,7 @@ def occurred_in(run: Path) -> Occurred:
     """Return what occurred in a run's drive.
 
     Raises FileNotFoundError for a folder that is none of a run, UserError for a run that goes on
-    or holds no motion. Some seconds for each minute of a drive: its sensors are estimated again.
+    or holds no motion.
     """
     return occurred_of(read_run(run), gaps=kept_rows(run / RESULTS, "gaps"))
 

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.segments import segments_of
-from foretwin.telemetry.logs.log import LogError
-from foretwin.telemetry.logs.mcap_records import BROKEN, read_contents, records
-from foretwin.telemetry.ros_messages.parts import STRING, typestore
+from foretwin.orchestrator.record.recorded_messages import STATES, recorded_messages
 
-_STATES = "/foretwin/state_json"
 _EVERY_NS = 100_000_000
 """What is drawn and asked for speeds needs no more."""
 
@@ -46,7 +40,7 @@ def driven_track(first: Path, *, start_stamp_ns: int | None) -> CarTrack | None:
     Drive time begins at `start_stamp_ns`, or with the first state. What cannot be read is passed
     by.
     """
-    states = [state for part in segments_of(first) for state in _states(part)]
+    states = list(recorded_messages(first, STATES, VehicleState, every_ns=_EVERY_NS))
     if len(states) < 2:
         return None
     stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)
@@ -58,15 +52,3 @@ def driven_track(first: Path, *, start_stamp_ns: int | None) -> CarTrack | None:
         np.array([s.speed_mps for s in states])[order],
         (stamps[order] - start_ns) / 1e9,
     )
-
-
-def _states(part: Path) -> Iterator[VehicleState]:
-    decoder, read = msgspec.json.Decoder(VehicleState), typestore().deserialize_cdr
-    last_ns: int | None = None
-    try:
-        for record in records(part, read_contents(part), {_STATES}):
-            if last_ns is None or not 0 <= record.log_time_ns - last_ns < _EVERY_NS:
-                last_ns = record.log_time_ns
-                yield decoder.decode(read(record.data, STRING).data)
-    except (LogError, OSError, msgspec.DecodeError, *BROKEN):
-        return

@@ -15,7 +15,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.record.played_again import play_again
+from foretwin.orchestrator.record.played_again import Prepared, play_again, prepared_for
 from foretwin.orchestrator.record.recorded_jobs import recorded_future
 
 _POINT_EVERY_S = 0.5
@@ -46,13 +46,15 @@ def replayed(folder: Path, rows: Sequence[Mapping[str, Any]]) -> ReplayedRound:
     """Play the jobs of futures again, each once; `rows` are rows of the table of futures."""
     seen: list[SeenFuture] = []
     missing, vehicle = "", None
+    ground: Prepared | None = None
     wanted = [row for row in rows if row["valid"] and row["trajectory_sha256"]]
     differ = 0
     for job_sha256 in dict.fromkeys(row["job_sha256"] for row in wanted):
         mine = [row for row in wanted if row["job_sha256"] == job_sha256]
         try:
             recorded = recorded_future(folder, mine[0]["future_id"])
-            result, hashes = play_again(recorded)
+            ground = ground or prepared_for(recorded)
+            result, hashes = play_again(recorded, on=ground)
         except (UserError, OSError, SchemaMismatch, ValueError) as error:
             missing = " ".join(str(error).split())
             continue
@@ -70,6 +72,8 @@ def replayed(folder: Path, rows: Sequence[Mapping[str, Any]]) -> ReplayedRound:
             seen.append(
                 SeenFuture(row, states[::every, :2], None if met is None else met[::every], touch)
             )
+    if ground is not None:
+        ground.stage.close()
     if differ and not missing:
         missing = f"{differ} of them come to another hash here and are not drawn"
     return ReplayedRound(tuple(seen), missing, vehicle)
