@@ -49,6 +49,8 @@ class LiveVehicle(OtherVehicleSource):
         """How its clock stands to ours."""
         self.between: ClockApart | None = THE_SAME if own_clock is None else None
         """How the car's stamps stand to its own."""
+        self.found = self.between
+        """What was found of it last, also after it has left."""
         self._own_clock = own_clock
         self._id, self._vehicle = vehicle_id, vehicle
         self._ask_info, self._tell = ask_info, tell
@@ -138,7 +140,7 @@ class LiveVehicle(OtherVehicleSource):
         if own is None or theirs is None:
             self._heard.clear()  # when it was nobody can say
             return []
-        self.between = found = between(own, theirs)
+        self.between = self.found = found = between(own, theirs)
         if self._heard and not self._clock_reported:
             self._clock_reported = True
             self._tell(Notice("info", f"{self._id}: {found.text}"))

@@ -145,7 +145,7 @@ class OtherVehicleFeed:
         return {
             name: {"behind_car_s": found.later_ns / 1e9, "std_s": found.std_s, "how": found.how}
             for name, source in self._live.items()
-            if (found := source.between) is not None
+            if (found := source.found) is not None
         }
 
     def _ask_info(self, vehicle_id: str) -> None:

@@ -77,7 +77,7 @@ class PacketLink:
         self.router = self.endpoint = f"tcp/{subnet}.1:{free_port()}"
         self.prefix = ("nsenter", "-t", str(network), "-n")
         self._chance = random.Random(seed)
-        self._loss, self._delay_s = 0.0, 0.0
+        self.loss, self.delay_s = 0.0, 0.0
         self._over = threading.Event()
         self._ends = [_tun(f"{name}a"), _tun(f"{name}b")]
         self.host = f"{subnet}.1"
@@ -88,13 +88,13 @@ class PacketLink:
 
     def befall(self, what: str) -> bool:
         """See Link."""
-        self._loss = {"cut": 1.0, "loss": LOSS}.get(what, self._loss)
-        self._delay_s = DELAY_S if what == "delay" else self._delay_s
+        self.loss = {"cut": 1.0, "loss": LOSS}.get(what, self.loss)
+        self.delay_s = DELAY_S if what == "delay" else self.delay_s
         return True
 
     def mend(self) -> None:
         """See Link."""
-        self._loss = self._delay_s = 0.0
+        self.loss = self.delay_s = 0.0
 
     def close(self) -> None:
         """Take the devices away."""
@@ -111,9 +111,9 @@ class PacketLink:
             for end in select.select(self._ends, [], [], min(due_s, 0.1))[0]:
                 with contextlib.suppress(OSError):
                     packet = os.read(end, _MTU + 100)
-                    if self._chance.random() >= self._loss:
+                    if self._chance.random() >= self.loss:
                         far = self._ends[1 - self._ends.index(end)]
-                        at_s = time.monotonic() + self._delay_s
+                        at_s = time.monotonic() + self.delay_s
                         heapq.heappush(waiting, (at_s, next(numbers), far, packet))
             while waiting and waiting[0][0] <= time.monotonic():
                 _, _, far, packet = heapq.heappop(waiting)

@@ -51,13 +51,13 @@ def clear_cases(count: int, *, seed: int) -> list[tuple[Drive, Drive, Met]]:
         if co_located(CAR, a, VAN, b, from_s=BEGINS_S, to_s=0.0).least_m < 20.0:
             continue  # they met before, while estimators and clocks settled
         truth = co_located(CAR, a, VAN, b)
-        grown = co_located(CAR, a, _narrower(VAN, WITHIN_M), b)
+        grown = co_located(CAR, a, narrower(VAN, WITHIN_M), b)
         if truth.least_m < 9.0 and (truth.least_m > WITHIN_M or grown.touched):
             cases.append((a, b, truth))
     return cases
 
 
-def _narrower(vehicle: VehicleParameters, by_m: float) -> VehicleParameters:
+def narrower(vehicle: VehicleParameters, by_m: float) -> VehicleParameters:
     return msgspec.structs.replace(
         vehicle,
         length_m=Parameter(vehicle.length_m.value - 2 * by_m),
