@@ -41,11 +41,11 @@ from foretwin.telemetry.ros2.mapping import read_mapping
 STANDIN = "telemetry.standin"
 TOLD_S = 20.0
 """So long may what is missing stay away: a clock that is known, or the drive's own car."""
-NO_SEAT_S = 5.0
+NO_SEAT_S = 10.0
 """So long it may be until a drive that has begun answers."""
 LEAST_M = 5.0
 """A stand-in's path is longer."""
-ASK_EVERY_S, ANSWER_S = 1.0, 4.0
+ASK_EVERY_S, ANSWER_S = 1.0, 10.0
 _LOOK_S = 0.05
 
 
@@ -185,7 +185,7 @@ def _process(
             mapping=mapping.text,
             mapping_name=mapping.name,
             drive_frame=frame,
-            fence=anchor.fence,
+            listens_only=True,  # the keys of what moves a car stay with the drive
         )
         return _Row("telemetry.ros2"), setup
     path_file = folder / "path.json"

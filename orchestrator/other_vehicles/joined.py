@@ -33,7 +33,8 @@ class JoinedVehicles:
     ) -> JoinReply:
         """Return whether it may speak; `source` is None before the car's own clock is known."""
         seat = self._seats.get(vehicle_id)
-        if seat is not None and now_s - seat.asked_s > SEAT_S:
+        mine = seat is not None and seat.instance == asked.instance
+        if seat is not None and not mine and now_s - seat.asked_s > SEAT_S:
             seat = None
         if trouble := self._trouble(vehicle_id, asked, seat):
             return JoinReply(refused=trouble)

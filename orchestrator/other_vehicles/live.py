@@ -79,7 +79,8 @@ class LiveVehicle(OtherVehicleSource):
         self._heard.clear()
 
     def look(self, now_s: float) -> None:
-        """Tell once where nothing comes any more, by our monotonic clock."""
+        """Tell once where nothing came until `now_s`, by our monotonic clock, and until then all
+        was taken."""
         silent = self._heard_s is not None and now_s - self._heard_s > SILENT_S
         if silent and not (self._silent or self.over):
             self._silent = True

@@ -111,21 +111,15 @@ class OtherVehicleFeed:
 
     @property
     def _asked(self) -> dict[str, VehicleClock]:
-        """The clocks that must be known: of live vehicles with one of their own, and the car's."""
-        foreign = {
-            name: source.clock
-            for name, source in self._live.items()
-            if source.between is not THE_SAME
-        }
-        return foreign | {self._context.plan.config.vehicle_id: self._own_clock} if foreign else {}
+        """The clocks of who is asked: of live vehicles, and the car's where there are any."""
+        live = {name: source.clock for name, source in self._live.items()}
+        return live | {self._context.plan.config.vehicle_id: self._own_clock} if live else {}
 
     def look(self, now_s: float) -> None:
         """Ask for the time on board where that is due by our monotonic clock; call it often."""
         if now_s < self._ask_at_s:
             return
         self._ask_at_s = now_s + ASK_EVERY_S
-        for source in self._live.values():
-            source.look(now_s)
         bus, mailbox = self._context.bus, self._context.mailbox
         for name in self._asked:
             asked = name, round(now_s * 1e9)
@@ -136,6 +130,8 @@ class OtherVehicleFeed:
     def take_time(self, reply: Reply) -> None:
         """Take an answer to what time it is on board; who does not answer is judged by samples."""
         vehicle_id, asked_ns = reply.tag
+        for source in self._live.values():  # what came before this answer was taken before it
+            source.look(reply.received_mono_ns / 1e9)
         clock = self._asked.get(vehicle_id)
         if reply.message is not None and clock is not None:
             clock.answered(asked_ns, reply.received_mono_ns, reply.message.stamp_ns)

@@ -226,7 +226,7 @@ class Gateway:
                 self._send("twin", lambda _: self._out.twin(mirror))
                 if self._mapping.mirrored:
                     self._objects(lambda: self._mirrored.users(mirror))
-            case (drive.RoadUsers() as users) | drive.OthersAround(users=users):
+            case drive.RoadUsers() as users:
                 self._objects(lambda: users)
             case Event() | gap.GapAlarm() | gap.Verdict() as finding:
                 self._diagnostics.take(finding)

@@ -110,10 +110,7 @@ class Mapping(
     def vehicle_channels(self) -> tuple[str, ...]:
         """Channels of the vehicle's estimate from which something goes out."""
         wanted = self.sources & {"state", "clock", "merged_objects"}
-        return (
-            *(("state",) if wanted or self.placed or self.mirrored else ()),
-            *(("surroundings",) if self.sources & set(SHOWS_VIRTUAL) else ()),
-        )
+        return ("state",) if wanted or self.placed or self.mirrored else ()
 
     @property
     def run_channels(self) -> tuple[str, ...]:

@@ -76,6 +76,9 @@ def test_a_second_one_waits_until_the_first_has_left_or_fallen_silent(door: Door
     door.ask("a", leaves=True)
     assert not door.ask("b").refused
     door.now_s += SEAT_S + 0.1
+    assert not door.ask("b").refused, "nobody else has come"
+    assert door.told == ["van joins", "van has left", "van joins"]
+    door.now_s += SEAT_S + 0.1
     assert not door.ask("c").refused
     assert door.ask("b").refused
 

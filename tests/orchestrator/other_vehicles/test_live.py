@@ -9,8 +9,9 @@ import pytest
 
 from foretwin.contracts.drive import DriveEnd, RoadUser
 from foretwin.contracts.frames import local_from_geo
-from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.mailbox import Mailbox, Reply
 from foretwin.orchestrator.config import OtherVehicleConfig
+from foretwin.orchestrator.other_vehicles.vehicles import OtherVehicleFeed
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from tests.contracts.memory_bus import MemoryBus
@@ -49,12 +50,17 @@ def x_of_user(user: RoadUser) -> float:
     return float(local_from_geo(FRAME, user.position.lat_deg, user.position.lon_deg)[0])
 
 
+def answered(beside: OtherVehicleFeed, at_s: float) -> None:
+    """Let the question for the time that is asked every second be answered, by nobody."""
+    beside.take_time(Reply("vehicle_clock", ("ego", 0), None, "no answer", round(at_s * 1e9)))
+
+
 def test_who_falls_silent_is_told_of_once_and_again_when_it_was_heard(tmp_path: Path) -> None:
     beside, _ = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
     on_the_bus(beside, from_s=0.0, to_s=1.0)
     now_s = time.monotonic()
     for later_s in (1.0, 3.0, 5.0):
-        beside.look(now_s + later_s)
+        answered(beside, now_s + later_s)
     assert TOLD == ["van is heard", "van is silent: gone until it is heard again"]
     on_the_bus(beside, from_s=1.0, to_s=2.0)
     assert TOLD[2:] == ["van is heard again"]
@@ -67,7 +73,7 @@ def test_who_has_said_that_it_is_over_is_not_called_silent(tmp_path: Path) -> No
     bus.subscribe("end", box, vehicle="van")
     bus.publish("end", DriveEnd(stamp_ns=START_NS, published={}), vehicle="van")
     beside.take_sample("van", box.take())
-    beside.look(time.monotonic() + 9.0)
+    answered(beside, time.monotonic() + 9.0)
     assert TOLD == ["van is heard"]
 
 
