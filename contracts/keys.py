@@ -68,6 +68,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     (_VEHICLE, RECORDED, _ORCHESTRATOR): {
         "state": Channel(drive.VehicleState, 50, "estimated state"),
     },
+    (_VEHICLE, WATCH, _CAR): {
+        "real_cloud": Channel(point_cloud.PointCloud, 10, "what a lidar of the car measured"),
+    },
     (_VEHICLE, LIVE, _CAR): {
         "route": Channel(drive.RouteToGoal, 1, "where the ADS goes"),
     },

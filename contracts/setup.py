@@ -12,6 +12,7 @@ from foretwin.contracts.fleet import MachineInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.layout import Layout
 from foretwin.contracts.planner_link import PlannerJoined
+from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.ports import WEB_PORT
 from foretwin.contracts.process_setup import BusSetup as BusSetup
 from foretwin.contracts.process_setup import ProcessSetup as ProcessSetup
@@ -78,6 +79,8 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Of a car on a lot: its topics live there, the run in the World."""
     fence: tuple[tuple[float, float], ...] = ()
     """Of the lot, corners in degrees; outside, nothing goes to the car."""
+    mounts: tuple[tuple[str, Mount], ...] = ()
+    """Where sensors sit on the car in the World, by their names: those whose clouds pass."""
     listens_only: bool = False
     """Of a vehicle beside the car: nothing goes out to it, whatever the mapping says."""
 
@@ -137,8 +140,9 @@ class TrafficSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     seed: int
 
 
-SensorSees = Literal["world", "users"]
-"""What rays of a virtual sensor meet: the World and the road users in it, or these alone."""
+SensorSees = Literal["world", "users", "real"]
+"""What rays of a virtual sensor meet: the World and the road users in it, or these alone; or what a
+sensor of the car has measured, into which these are put."""
 
 
 class SensorSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

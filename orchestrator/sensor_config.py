@@ -13,4 +13,5 @@ class SensorConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     file: str
     """A sensor file or the name of a bundled one, such as `vlp_16`."""
     sees: SensorSees = "world"
-    """The World and its virtual road users, or these alone (users), for a real cloud."""
+    """The World and its virtual road users, these alone (users), or a real cloud of the car, into
+    which they are put (real)."""

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 from foretwin.contracts import drive
 from foretwin.contracts.anchor import Anchor, AnchorLine
 from foretwin.contracts.frames import GeoPoint, GeoPose
+from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.towards_vehicle import VehicleCommand
 
 Message = TypeVar("Message", bound=msgspec.Struct)
@@ -85,6 +86,8 @@ def _from_lot(anchor: Anchor, message: Any) -> Any:
                 for one in (message.start, message.goal)
             )
             return replace(message, start=start, goal=goal)
+        case PointCloud():
+            return _cloud(message, scale, side)
     return message
 
 
@@ -106,6 +109,8 @@ def _from_world(anchor: Anchor, message: Any) -> Any:
             )
         case drive.RoadUsers():
             return _users(message, anchor.lot_from_world, scale)
+        case PointCloud():
+            return _cloud(message, scale, side)
         case VehicleCommand():
             return replace(
                 message,
@@ -129,6 +134,13 @@ def _users(message: drive.RoadUsers, move: _Move, scale: float) -> drive.RoadUse
         )
 
     return replace(message, users=tuple(map(moved, message.users)))
+
+
+def _cloud(message: PointCloud, scale: float, side: float) -> PointCloud:
+    """The same in a sensor's axes: those of a mirrored car's sensor are mirrored with it."""
+    points = message.points.copy()
+    points[:, :3] *= (scale, scale * side, scale)
+    return replace(message, points=points)
 
 
 def _steered(side: float, message: Any) -> Any:

@@ -52,8 +52,7 @@ _MakesSetup = Callable[[DrivePlan, str], ProcessSetup]
 
 
 class ProcessRow(NamedTuple):
-    """One kind of process: its module below `foretwin`, when it runs, how many, what follows from
-    its death."""
+    """A kind of process: module below `foretwin`, when it runs, how many, what its death does."""
 
     name: str
     module: str
@@ -200,6 +199,7 @@ def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
         vehicle=plan.vehicle,
         anchor=plan.lot,
         fence=() if plan.anchor is None else plan.anchor.fence,
+        mounts=sensors.mounts(plan.sensors),
     )
 
 
@@ -275,9 +275,9 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     """
     if row.name == ROUTER and plan.config.lock_step:
         return row._replace(when_dead="end_drive")
-    if row.name in (TUNING, sensors.SENSORS, RECORDER, VIEWER, COPILOT) and plan.config.lock_step:
-        return row._replace(when_dead="report")
-    return row
+    may_fall = (TUNING, sensors.SENSORS, RECORDER, VIEWER, COPILOT)
+    in_lock_step = row.name in may_fall and plan.config.lock_step
+    return row._replace(when_dead="report") if in_lock_step else row
 
 
 def rows_by_id(plan: DrivePlan) -> dict[str, ProcessRow]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.setup import SensorSetup, SensorsSetup
 from foretwin.orchestrator.drive.watcher_setups import WATCHERS
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.sensor_config import SensorConfig
 from foretwin.sim_worker.sensors.sensor_file import sensor_of, sensor_text
+from foretwin.telemetry.ros2.mapping import MappingError, MappingFile
 
 SENSORS, MODULE = "sensors", "sim_worker.sensors.process"
 TOLD_WORLDS = (*WATCHERS, SENSORS)
@@ -20,6 +22,31 @@ def read_sensor(config: SensorConfig) -> SensorSetup:
     text, name = sensor_text(config.file)
     sensor_of(text, name)
     return SensorSetup(text=text, name=name, sees=config.sees)
+
+
+def mounts(sensors: tuple[SensorSetup, ...]) -> tuple[tuple[str, Mount], ...]:
+    """Return where sensors sit, by their names."""
+    files = (sensor_of(one.text, one.name) for one in sensors)
+    return tuple((file.name, file.mount) for file in files)
+
+
+def check_clouds(sensors: tuple[SensorSetup, ...], ros2: MappingFile | None) -> None:
+    """Raise MappingError where a mapping passes clouds of no sensor of the drive, or of two."""
+    if ros2 is None:
+        return
+    told = [(sensor_of(one.text, one.name).name, one.sees) for one in sensors]
+    mapping = ros2.mapping
+    wanted = [(row.topic, row.sensor, "") for row in mapping.outwards if row.sensor]
+    wanted += [(row.topic, row.sensor, "real") for row in mapping.inwards if row.sensor]
+    for topic, sensor, how in wanted:
+        found = [name for name, sees in told if name == sensor and how in ("", sees)]
+        if len(found) != 1:
+            that = "of that name" + (how and f' with sees = "{how}"')
+            known = ", ".join(sorted({name for name, _ in told})) or "none"
+            raise MappingError(
+                f"{ros2.name}: topic {topic}: sensor {sensor!r}: {len(found)} [[sensors]] {that}, "
+                f"one is needed; names are {known}"
+            )
 
 
 def made(plan: DrivePlan, base: dict[str, Any]) -> SensorsSetup:

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32, Flags, Indices
-from foretwin.sim_worker.sensors.lidar import LidarScan, base_from_mount, origin_m
+from foretwin.contracts.point_cloud import mount_from_base_cloud
+from foretwin.sim_worker.sensors.lidar import LidarScan
 from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile
 
 
@@ -30,8 +31,8 @@ def merge(real: Array32, virtual: LidarScan) -> Array32:
 def _rays_of(points: Array32, sensor: SensorFile) -> tuple[Indices, Indices, Array, Flags]:
     """Return azimuth and ring of the ray nearest to each point (N,), its range, and whether the
     sensor looks there at all."""
-    lidar, mount = sensor.lidar, sensor.mount
-    seen = (points[:, :3].astype(np.float64) - origin_m(mount)) @ base_from_mount(mount)
+    lidar = sensor.lidar
+    seen = mount_from_base_cloud(points.astype(np.float64), sensor.mount)[:, :3]
     range_m = np.linalg.norm(seen, axis=1)
     azimuth = np.arctan2(seen[:, 1], seen[:, 0])
     turned = (-azimuth if lidar.turns == "clockwise" else azimuth) + math.pi

@@ -11,11 +11,11 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32, Indices
 from foretwin.contracts.frames import LocalPose
-from foretwin.contracts.point_cloud import POINT_COLUMNS
+from foretwin.contracts.point_cloud import POINT_COLUMNS, Mount, base_from_mount, origin_m
 from foretwin.geometry.constant_turn import constant_turn_rate
 from foretwin.sim_worker.sensors.materials import back_scatter
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayHits, RayWorld
-from foretwin.sim_worker.sensors.sensor_file import Lidar, Mount, SensorFile
+from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile
 
 _STEP_M = 0.02
 """Rays of one instant begin at one point: sensor and road users have moved by at most half of this
@@ -91,6 +91,12 @@ def scan(
     )
 
 
+def moved(motion: BaseMotion, time_s: float) -> BaseMotion:
+    """Return where base_link is so long after, or before, a motion began."""
+    x_m, y_m, yaw = (float(one[0]) for one in _moved(motion, np.array([time_s])))
+    return motion._replace(pose=LocalPose(x_m, y_m, yaw))
+
+
 def at_begin(points: Array32, motion: BaseMotion) -> Array32:
     """Return a cloud (N, 6) with all points in base_link as the turn began: without its skew."""
     time_s = points[:, 5].astype(np.float64)
@@ -106,24 +112,6 @@ def azimuths_rad(lidar: Lidar) -> Array:
     """Return (A,) where firings of a turn point in the sensor's plane, from its x axis."""
     turned = 2.0 * math.pi * np.arange(lidar.azimuths) / lidar.azimuths - math.pi
     return -turned if lidar.turns == "clockwise" else turned
-
-
-def base_from_mount(mount: Mount) -> Array:
-    """Return (3, 3) what turns the sensor's axes into those of base_link (roll, pitch, yaw)."""
-    yaw, pitch, roll = map(math.radians, (mount.yaw_deg, mount.pitch_deg, mount.roll_deg))
-    (cy, sy), (cp, sp), (cr, sr) = ((math.cos(a), math.sin(a)) for a in (yaw, pitch, roll))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def origin_m(mount: Mount) -> Array:
-    """Return (3,) where a sensor is in base_link."""
-    return np.array([mount.forward_m, mount.left_m, mount.up_m])
 
 
 def base_from_rays(lidar: Lidar, mount: Mount) -> Array:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.drive import RoadUsers, VehicleState
+from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import SensorsSetup
@@ -16,8 +17,8 @@ from foretwin.sim_worker.sensors.sensor_file import sensor_of
 from foretwin.sim_worker.sensors.virtual_sensors import VirtualSensors
 from foretwin.sim_worker.world_file import load_world
 
-_DEPTH, _STATES = 64, 8
-"""Of states few: who falls behind leaves out turns, and tells none that are old."""
+_DEPTH, _LIVE = 64, 32
+"""States and real clouds of half a second: who falls behind longer has nothing to tell of them."""
 _IDLE_S = 0.2
 
 log = logging.getLogger("sim_worker.sensors")
@@ -35,21 +36,35 @@ class SensorsProcess:
         self._sensors = VirtualSensors(
             [(sensor_of(one.text, one.name), one.sees) for one in setup.sensors], seed=setup.seed
         )
-        self.mailbox = Mailbox(_STATES, when_full="block" if setup.bus.lossless else "drop_oldest")
+        self.mailbox = Mailbox(_LIVE, when_full="block" if setup.bus.lossless else "drop_oldest")
         # Apart from the states, which must not push out the one word on the World.
         self.news = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
         bus.subscribe("active_world", self.news, run=setup.run_id)
         for channel in ("virtual_traffic", "virtual_objects"):
             bus.subscribe(channel, self.news, run=setup.run_id)
         bus.subscribe("state", self.mailbox, vehicle=setup.vehicle_id)
+        if any(one.sees == "real" for one in setup.sensors):
+            bus.subscribe("real_cloud", self.mailbox, vehicle=setup.vehicle_id)
 
     def step(self, wait_s: float = _IDLE_S) -> None:
-        """Take what has come, or wait a moment for it; never raises."""
+        """Take all that has come, or wait a moment for it, and measure what is due; never raises.
+
+        Of turns that are over by now the newest is measured, the others are passed over.
+        """
         item = self.mailbox.take(wait_s)
         while (one := self.news.take()) is not None:
             self._handle(one)
-        if item is not None:
+        while item is not None:
             self._handle(item)
+            item = self.mailbox.take()
+        for cloud in self._sensors.measured():
+            self._bus.publish("point_cloud", cloud, run=self._run_id)
+            self.told += 1
+
+    @property
+    def passed_over(self) -> int:
+        """Turns of which nothing was told so far."""
+        return self._sensors.passed_over.total()
 
     def _handle(self, item: object) -> None:
         if not isinstance(item, Received):
@@ -57,9 +72,9 @@ class SensorsProcess:
         with passed_over_where_unfit(item, refusals=self._refusals, log=log):
             match item.message():
                 case VehicleState() as state:
-                    for cloud in self._sensors.take_state(state):
-                        self._bus.publish("point_cloud", cloud, run=self._run_id)
-                        self.told += 1
+                    self._sensors.take_state(state)
+                case PointCloud() as real:
+                    self._sensors.take_real(real)
                 case RoadUsers() as users:
                     self._sensors.take_users(users)
                 case ActiveWorld(world_id=world_id):
@@ -73,7 +88,7 @@ def serve(setup: SensorsSetup, bus: Bus, life: ProcessLife) -> None:
     life.ready()
     while not life.over:
         process.step()
-    log.info("told %d clouds, passed over %d states", process.told, process.mailbox.dropped)
+    log.info("told %d clouds, passed over %d turns", process.told, process.passed_over)
 
 
 if __name__ == "__main__":

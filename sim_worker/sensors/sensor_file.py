@@ -13,12 +13,11 @@ import msgspec
 
 from foretwin.contracts.errors import MissingFileError
 from foretwin.contracts.numbers import Range
+from foretwin.contracts.point_cloud import MOST_RAYS, Mount
 from foretwin.contracts.toml_file import parse_toml, toml_text
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "vlp_16.toml"
-MOST_RAYS = 262_144
-"""Of one turn: twice the largest of the market, 128 rings of 1,024 azimuths."""
 RANGES: Mapping[str, Range] = MappingProxyType(
     {
         "azimuths": Range(1, MOST_RAYS),
@@ -32,23 +31,6 @@ RANGES: Mapping[str, Range] = MappingProxyType(
     }
 )
 """What the numbers of a lidar may be."""
-
-
-class Mount(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where a sensor sits on the car, from base_link: the rear axle's middle on the ground."""
-
-    forward_m: float = 1.4
-    """Ahead of the rear axle: 1.4 is above the middle of a compact car's roof."""
-    left_m: float = 0.0
-    """To the left of the middle."""
-    up_m: float = 1.9
-    """Above the ground."""
-    yaw_deg: float = 0.0
-    """Turned to the left."""
-    pitch_deg: float = 0.0
-    """Nose down."""
-    roll_deg: float = 0.0
-    """Left side up."""
 
 
 class Lidar(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

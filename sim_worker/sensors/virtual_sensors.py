@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter, deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
@@ -12,14 +14,17 @@ from foretwin.contracts.frames import LocalFrame, local_pose
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.setup import SensorSees
 from foretwin.contracts.world import World
-from foretwin.sim_worker.sensors.lidar import BaseMotion, scan
+from foretwin.sim_worker.sensors.cloud_merge import merge
+from foretwin.sim_worker.sensors.lidar import BaseMotion, LidarScan, moved, scan
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld, boxes_of
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
 LIVES_NS = 500_000_000
 """A road user of whom nothing was said for so long is gone, as for the gateway."""
-_LATE_TURNS = 3.0
-"""A turn that lasts so many times too long had no states: it is begun anew."""
+_LATE_TURNS = 3
+"""Who hears nothing for longer was not driving: turns of that time are not missed."""
+_STATES = 32
+"""So many are kept, to know where the car was as a real turn began: over half a second."""
 
 
 class _LastWord(NamedTuple):
@@ -27,9 +32,11 @@ class _LastWord(NamedTuple):
     user: RoadUser
 
 
-class _BegunTurn(NamedTuple):
-    """As it began: the car, and who was known to be there."""
+class _Turn(NamedTuple):
+    """One that began: the first state in it, and who was known to be there."""
 
+    number: int
+    begun_ns: int
     state: VehicleState
     said: tuple[_LastWord, ...]
 
@@ -37,17 +44,23 @@ class _BegunTurn(NamedTuple):
 class VirtualSensors:
     """Measures turn after turn; a turn is told when it is over, with what was known as it began.
 
-    A sensor that sees the World measures nothing while there is none. The same input and seed give
-    the same clouds, whenever the first state came.
+    Turns begin at whole periods of the car's clock, whenever the first state came: the same input
+    and seed give the same clouds. Who is asked late measures the newest turn alone and counts the
+    others. A sensor that sees the World measures nothing while there is none.
     """
 
     def __init__(self, sensors: Sequence[tuple[SensorFile, SensorSees]], *, seed: int = 0) -> None:
         self._sensors, self._seed = tuple(sensors), seed
-        self._turns: dict[int, _BegunTurn] = {}
+        self._turns: dict[int, _Turn] = {}
+        self._due: dict[int, _Turn] = {}
+        self._real: dict[int, PointCloud] = {}
         self._said: dict[str, _LastWord] = {}
+        self._states: deque[VehicleState] = deque(maxlen=_STATES)
         self._world: World | None = None
         self._rays: RayWorld | None = None
         self._no_world = RayWorld()
+        self.passed_over: Counter[str] = Counter()
+        """By sensor, turns of which nothing was told."""
 
     def use_world(self, world: World | None) -> None:
         """Look into another World from now on, or into none."""
@@ -60,47 +73,77 @@ class VirtualSensors:
             if known is None or users.stamp_ns >= known.stamp_ns:
                 self._said[user.user_id] = _LastWord(users.stamp_ns, user)
 
-    def take_state(self, state: VehicleState) -> list[PointCloud]:
-        """Return the clouds of turns that are over by now."""
+    def take_state(self, state: VehicleState) -> None:
+        """Take where the car is: turns that are over by then are due."""
         self._said = {
             name: one
             for name, one in self._said.items()
             if abs(state.stamp_ns - one.stamp_ns) <= LIVES_NS
         }
-        found = []
-        for number, (sensor, sees) in enumerate(self._sensors):
-            turn = self._turns.get(number)
-            lasted = -1.0
-            if turn is not None:
-                period_ns = 1e9 / sensor.lidar.rate_hz
-                lasted = (state.stamp_ns - turn.state.stamp_ns) / period_ns
-                if 0.0 <= lasted < 1.0:
-                    continue
-            if turn is not None and 1.0 <= lasted <= _LATE_TURNS:
-                found += self._measured(number, sensor, sees, turn)
-            self._turns[number] = _BegunTurn(state, tuple(self._said.values()))
+        self._states.append(state)
+        for place, (sensor, sees) in enumerate(self._sensors):
+            if sees == "real":
+                continue
+            period_ns = round(1e9 / sensor.lidar.rate_hz)
+            number = state.stamp_ns // period_ns
+            turn = self._turns.get(place)
+            if turn is not None and turn.number == number:
+                continue
+            self._turns[place] = _Turn(
+                number, number * period_ns, state, tuple(self._said.values())
+            )
+            if turn is None or not 0 < number - turn.number <= _LATE_TURNS:
+                self._due.pop(place, None)
+                continue
+            self.passed_over[sensor.name] += (place in self._due) + number - turn.number - 1
+            self._due[place] = turn
+
+    def measured(self) -> list[PointCloud]:
+        """Return the clouds that are due."""
+        real, self._real, due, self._due = self._real, {}, self._due, {}
+        found = [self._merged(place, cloud) for place, cloud in real.items()]
+        for place, turn in due.items():
+            sensor, sees = self._sensors[place]
+            rays = self._rays if sees == "world" else self._no_world
+            if rays is not None and turn.state.yaw_valid:
+                points = self._scan(rays, place, turn).points
+                found.append(PointCloud(stamp_ns=turn.begun_ns, points=points, sensor=sensor.name))
         return found
 
-    def _measured(
-        self, number: int, sensor: SensorFile, sees: SensorSees, turn: _BegunTurn
-    ) -> list[PointCloud]:
+    def take_real(self, cloud: PointCloud) -> None:
+        """Take a turn of the car's own sensor, into which the road users are to be put."""
+        for place, (sensor, sees) in enumerate(self._sensors):
+            if sees == "real" and sensor.name == cloud.sensor:
+                self.passed_over[sensor.name] += place in self._real
+                self._real[place] = cloud
+
+    def _merged(self, place: int, cloud: PointCloud) -> PointCloud:
+        """As it came where nobody is, or it is not known where the car was."""
+
+        def away_ns(state: VehicleState) -> int:
+            return abs(state.stamp_ns - cloud.stamp_ns)
+
+        state = min(self._states, key=away_ns, default=None)
+        if not self._said or state is None or not state.yaw_valid or away_ns(state) > LIVES_NS:
+            return cloud
+        turn = _Turn(0, cloud.stamp_ns, state, tuple(self._said.values()))
+        virtual = self._scan(self._no_world, place, turn)
+        return msgspec.structs.replace(cloud, points=merge(cloud.points, virtual))
+
+    def _scan(self, rays: RayWorld, place: int, turn: _Turn) -> LidarScan:
         state = turn.state
-        rays = self._rays if sees == "world" else self._no_world
-        if rays is None or not state.yaw_valid:
-            return []
         frame = LocalFrame(state.position) if self._world is None else self._world.frame
         pose = local_pose(frame, state.position, state.yaw_rad)
         motion = BaseMotion(pose, state.speed_mps, state.yaw_rate_radps)
-        boxes = _boxes_at(frame, turn)
-        seed = (self._seed, number, abs(state.stamp_ns))
-        points = scan(rays, sensor, motion, boxes, seed=seed).points
-        return [PointCloud(stamp_ns=state.stamp_ns, points=points, sensor=sensor.name)]
+        motion = moved(motion, (turn.begun_ns - state.stamp_ns) * 1e-9)
+        seed = (self._seed, place, abs(turn.begun_ns))
+        return scan(rays, self._sensors[place][0], motion, _boxes_at(frame, turn), seed=seed)
 
 
-def _boxes_at(frame: LocalFrame, turn: _BegunTurn) -> MovingBoxes:
+def _boxes_at(frame: LocalFrame, turn: _Turn) -> MovingBoxes:
     """Return the road users where they are as a turn begins: they have driven straight on."""
     boxes = boxes_of(frame, [one.user for one in turn.said])
-    ages_s = np.array([turn.state.stamp_ns - one.stamp_ns for one in turn.said]) * 1e-9
+    ages_s = np.array([turn.begun_ns - one.stamp_ns for one in turn.said]) * 1e-9
     way_m = (boxes.speed_mps * ages_s)[:, None]
     along = np.stack([np.cos(boxes.yaw_rad), np.sin(boxes.yaw_rad)], axis=1)
     return boxes._replace(xy_m=boxes.xy_m + way_m * along)

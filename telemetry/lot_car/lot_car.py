@@ -76,7 +76,7 @@ class LotCar:
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         heard = msgspec.structs.replace(mapping, inwards=(heard_objects(mapping),), outwards=())
         self._inwards, self._inbox = Inwards(heard), Mailbox(64)
-        for key, history in self._inwards.key_expressions():
+        for key, history, _ in self._inwards.key_expressions():
             foreign.subscribe(key, self._inbox, history=history)
         self._began_mono_ns = mono_ns()
         # The stand-in's own time begins at a fixed day; here it is that of the machine.

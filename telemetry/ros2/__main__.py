@@ -49,6 +49,7 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
             car=setup.vehicle,
             anchor=setup.anchor,
             guard=lot_guard(setup),
+            mounts=dict(setup.mounts),
             refusals=life.refusals,
         )
         life.ready()

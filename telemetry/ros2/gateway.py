@@ -9,22 +9,23 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
 from foretwin.contracts import drive, gap
 from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request
-from foretwin.contracts.foreign_bus import ForeignBus
+from foretwin.contracts.foreign_bus import Arrived, ForeignBus
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import Refused
+from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.simulation import Event, MirrorSample
 from foretwin.contracts.towards_vehicle import Authority, OrderKeys, VehicleCommand
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.ros2.cadence import Cadence
 from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
+from foretwin.telemetry.ros2.gated_sender import GatedSender
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.lot_guard import LotGuard
@@ -33,7 +34,7 @@ from foretwin.telemetry.ros2.merged_objects import MergedObjects
 from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
 from foretwin.telemetry.ros2.orders import Orders
 from foretwin.telemetry.ros2.outwards import Outwards
-from foretwin.telemetry.ros2.rows import OutRow, Source
+from foretwin.telemetry.ros2.rows import OutRow
 from foretwin.telemetry.ros2.safety import VehicleGate
 from foretwin.telemetry.ros2.sender import RosSender
 from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
@@ -43,6 +44,8 @@ _PORTION = 16
 _DIAGNOSTICS_NS = 1_000_000_000
 _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
+_CLOUDS = 8
+"""So many wait, the newest: one is a megabyte."""
 _STATE_EVERY_NS = 20_000_000
 _OBJECTS_EVERY_NS = 100_000_000
 _ROUTE_EVERY_NS = 1_000_000_000
@@ -67,6 +70,7 @@ class Gateway:
         car: VehicleParameters | None = None,
         anchor: Anchor | None = None,
         guard: LotGuard | None = None,
+        mounts: Mounts = NO_MOUNTS,
         refusals: Refusals | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
@@ -76,37 +80,43 @@ class Gateway:
         `order_keys` say whose orders count: without them none does, and nothing goes towards the
         vehicle. `car` gives the size of the car's own twin, where that goes out. With an `anchor`
         the car's topics live on its lot, and all that is said on `bus` in the World; `guard` knows
-        the lot's fence, and shuts the gate.
+        the lot's fence, and shuts the gate. `mounts` say where sensors sit whose clouds pass.
         """
         self._mapping, self._bus, self._foreign = mapping, bus, foreign
         self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
         self._guard = guard
-        self.inwards = Inwards(mapping, anchor)
+        self.inwards = Inwards(mapping, anchor, mounts)
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
-        self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id, anchor=anchor)
+        self._out = Outwards(
+            mapping, drive_frame=drive_frame, vehicle_id=vehicle_id, anchor=anchor, mounts=mounts
+        )
         limits = mapping.towards_vehicle
         self.gate = VehicleGate(
             limits, config_on=limits.enabled, flag_on=flag_on, trouble=self._lot_trouble
         )
-        self.held: Counter[str] = Counter()
-        """By topic, messages towards the vehicle that were not sent."""
         self._virtual = VirtualObjects(at_most=limits.max_objects, placed=mapping.placed)
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
+        self._gated = GatedSender(
+            self._sender, self.gate,
+            foreign=foreign, max_rate_hz=limits.max_rate_hz, mono_ns=mono_ns,
+        )  # fmt: skip
+        self._send, self.held = self._gated.send, self._gated.held
+        """By topic, messages towards the vehicle that were not sent."""
         self.refusals = Refusals() if refusals is None else refusals
         """Of what came from the run's side."""
-        alt_m = self._out.ground_alt_m
         self._mirrored = MirroredObjects(
-            mapping.mirrored, car=car, drive_frame=drive_frame, alt_m=alt_m
+            mapping.mirrored, car=car, drive_frame=drive_frame, alt_m=self._out.ground_alt_m
         )
         self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
         self._merged = MergedObjects(mapping.merged, frame=drive_frame)
         self._inbox = Mailbox(2048)
         self._views = Mailbox(256, nudges=self._inbox)
+        self._clouds = Mailbox(_CLOUDS, nudges=self._inbox)
         self._orders: Orders | None = None
         self._logged_gate = self.gate.state
         self._out.warm_up()
-        for key, history in self.inwards.key_expressions():
-            foreign.subscribe(key, self._inbox, history=history)
+        for key, history, bulky in self.inwards.key_expressions():
+            foreign.subscribe(key, self._clouds if bulky else self._inbox, history=history)
         bus.serve("info", self._views, vehicle=vehicle_id)
         self._listen(run_id, order_keys)
         self._sender.announce(mapping.announced(towards_vehicle=self.gate.state != "off"))
@@ -119,17 +129,14 @@ class Gateway:
             self._take_orders()
             if arrived is None:
                 break
-            for channel, message in self.inwards.take(arrived):
-                if isinstance(message, drive.RoadUsers):
-                    self._send_merged(message)
-                self._bus.publish(channel, message, vehicle=self._vehicle_id)
+            self._take_in(arrived)
             arrived = self._inbox.take() if left else None
-        for _ in range(_PORTION):
-            item = self._views.take()
-            if item is None:
-                break
-            self._pass_on(item)
-            self._take_orders()
+        for waiting in (self._clouds, self._views):
+            for _ in range(_PORTION):
+                if (item := waiting.take()) is None:
+                    break
+                self._pass_on(item)
+                self._take_orders()
         if self.inwards.route is not None and self._due("route", _ROUTE_EVERY_NS):
             self._bus.publish("route", self.inwards.route, vehicle=self._vehicle_id)
         self.introduction.answer(now_ns=self._mono_ns())
@@ -151,6 +158,7 @@ class Gateway:
                 "samples": self._inbox.dropped,
                 "words": words,
                 "views": self._views.dropped,
+                "clouds": self._clouds.dropped,
             },
         }
 
@@ -163,7 +171,8 @@ class Gateway:
         for channel in self._mapping.vehicle_channels or (("state",) if self._guard else ()):
             self._bus.subscribe(channel, self._views, vehicle=self._vehicle_id)
         for channel in self._mapping.run_channels:
-            self._bus.subscribe(channel, self._views, run=run_id)
+            views = self._clouds if channel == "point_cloud" else self._views
+            self._bus.subscribe(channel, views, run=run_id)
 
     def _take_orders(self) -> None:
         """Take the orders that have come, then look whether the gate may stay open."""
@@ -205,11 +214,20 @@ class Gateway:
                 self.held[row.topic] += 1
             else:
                 stamp_ns = self._wall_ns()
-                self._put(row, self._out.command(admitted, row.type, stamp_ns=stamp_ns))
+                self._gated.put(row, self._out.command(admitted, row.type, stamp_ns=stamp_ns))
+
+    def _take_in(self, arrived: Arrived) -> None:
+        for channel, message in self.inwards.take(arrived):
+            if isinstance(message, drive.RoadUsers):
+                self._send_merged(message)
+            self._bus.publish(channel, message, vehicle=self._vehicle_id)
 
     def _pass_on(self, item: Any) -> None:
         if isinstance(item, Request):
             self.introduction.take(item, now_ns=self._mono_ns())
+            return
+        if isinstance(item, Arrived):
+            self._take_in(item)
             return
         match self._decoded(item):
             case drive.VehicleState() as state:
@@ -217,17 +235,20 @@ class Gateway:
                     self._guard.take_state(self._out.on_lot(state), now_ns=self._mono_ns())
                 self._mirrored.take_state(state.stamp_ns)
                 self._merged.take_state(state)
-                every_ns, stamp_ns = _STATE_EVERY_NS, state.stamp_ns
-                self._send("state", lambda _: self._out.state(state), every_ns=every_ns)
-                self._send("clock", lambda _: self._out.clock(stamp_ns), every_ns=every_ns)
+                out, stamp_ns, often = self._out, state.stamp_ns, _STATE_EVERY_NS
+                self._send(out.rows("state"), lambda _: out.state(state), every_ns=often)
+                self._send(out.rows("clock"), lambda _: out.clock(stamp_ns), every_ns=often)
                 if self._virtual.has_own and self._due("virtual objects", _OBJECTS_EVERY_NS):
                     self._objects(lambda: self._virtual.own(state.stamp_ns))
             case MirrorSample() as mirror:
-                self._send("twin", lambda _: self._out.twin(mirror))
+                self._send(self._out.rows("twin"), lambda _: self._out.twin(mirror))
                 if self._mapping.mirrored:
                     self._objects(lambda: self._mirrored.users(mirror))
             case drive.RoadUsers() as users:
                 self._objects(lambda: users)
+            case PointCloud() as cloud:
+                rows = self._out.rows("point_cloud", cloud.sensor)
+                self._send(rows, lambda row: self._cloud(cloud, row))
             case Event() | gap.GapAlarm() | gap.Verdict() as finding:
                 self._diagnostics.take(finding)
 
@@ -253,7 +274,13 @@ class Gateway:
                 self.inwards.injected.note(self._out.on_lot(meant))
             return self._out.objects(meant, row.type)
 
-        self._send("virtual_objects", payload)
+        self._send(self._out.rows("virtual_objects"), payload)
+
+    def _cloud(self, cloud: PointCloud, row: OutRow) -> bytes:
+        if row.towards_vehicle:
+            within = self._virtual.at(cloud.stamp_ns, now_ns=self._mono_ns())
+            self.inwards.injected.note_cloud(cloud.stamp_ns, self._out.on_lot(within))
+        return self._out.cloud(cloud, row)
 
     def _send_merged(self, real: drive.RoadUsers) -> None:
         """Send what the car says that it sees, at once, with what is virtual beside it."""
@@ -264,37 +291,11 @@ class Gateway:
             self.inwards.injected.note(self._out.on_lot(one.virtual))
             return self._out.merged(one, row.type)
 
-        self._send("merged_objects", payload)
-
-    def _send(
-        self, source: Source, payload: Callable[[OutRow], bytes], *, every_ns: int = 0
-    ) -> None:
-        """Send on the rows of a source; towards the vehicle only through the gate, at its rate."""
-        for row in self._out.rows(source):
-            now_ns, least_ns = self._mono_ns(), every_ns
-            if row.towards_vehicle:
-                least_ns = max(every_ns, int(1e9 / self._mapping.towards_vehicle.max_rate_hz))
-                if self.gate.look(now_ns=now_ns, link_up=self._foreign.connected) != "open":
-                    self.held[row.topic] += 1
-                    continue
-            if not self._due(row.topic, least_ns):
-                continue
-            try:
-                self._put(row, payload(row))
-            except Exception as error:  # no message may end the gateway
-                # A stamp that no ROS time holds, a number that 32 bits do not.
-                self.held[f"{row.topic}: {type(error).__name__}"] += 1
-
-    def _put(self, row: OutRow, payload: bytes) -> None:
-        """The only way out; refuses once more what must not leave."""
-        if row.towards_vehicle and self.gate.state != "open":
-            self.held[row.topic] += 1
-            return
-        self._sender.put(row, payload)
+        self._send(self._out.rows("merged_objects"), payload)
 
     def _diagnose(self) -> None:
         if not self._due("diagnostics", _DIAGNOSTICS_NS):
             return
         levels = self._diagnostics.levels(self.report(), gate=self.gate)
         stamp_ns = self._wall_ns()
-        self._send("diagnostics", lambda _: self._out.diagnostics(stamp_ns, levels))
+        self._send(self._out.rows("diagnostics"), lambda _: self._out.diagnostics(stamp_ns, levels))

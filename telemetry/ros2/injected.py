@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -17,6 +19,13 @@ _REMEMBERED_NS = 2_000_000_000
 """So long one is looked for by its place, where a list says no ids: perception holds a track of
 what it does not see any more about as long."""
 _SAME_PLACE_M, _SAME_SIZE_M, _SAME_SPEED_MPS = 0.5, 0.01, 0.1
+_MOST_CLOUDS = 64
+
+
+class _Shown(NamedTuple):
+    stamp_ns: int
+    user: RoadUser
+    in_cloud: bool
 
 
 class Injected:
@@ -24,9 +33,21 @@ class Injected:
 
     def __init__(self) -> None:
         self._uuids: dict[str, str] = {}
-        self._shown: dict[str, tuple[int, RoadUser]] = {}
+        self._shown: dict[str, _Shown] = {}
+        self._clouds: dict[int, None] = {}
 
-    def note(self, sent: RoadUsers) -> None:
+    def note_cloud(self, sent_stamp_ns: int, within: RoadUsers) -> None:
+        """Take a cloud that goes out, and who is in it."""
+        self.note(within, in_cloud=True)
+        self._clouds[sent_stamp_ns] = None
+        if len(self._clouds) > _MOST_CLOUDS:
+            del self._clouds[next(iter(self._clouds))]
+
+    def is_shown_cloud(self, stamp_ns: int) -> bool:
+        """Whether a cloud comes back: stacks keep the stamp, whatever they do with the points."""
+        return stamp_ns in self._clouds
+
+    def note(self, sent: RoadUsers, *, in_cloud: bool = False) -> None:
         """Take what goes out."""
         for user in sent.users:
             if not user.virtual:
@@ -34,17 +55,19 @@ class Injected:
             if (uuid := self._uuids.get(user.user_id)) is None:
                 uuid = bytes(uuid_from(user).uuid).hex()
                 self._uuids[user.user_id] = uuid
-            self._shown.pop(uuid, None)
-            self._shown[uuid] = (sent.stamp_ns, user)
+            before = self._shown.pop(uuid, None)
+            in_cloud = in_cloud or (before is not None and before.in_cloud)
+            self._shown[uuid] = _Shown(sent.stamp_ns, user, in_cloud)
             if len(self._shown) > _MOST:
-                _, gone = self._shown.pop(next(iter(self._shown)))
-                self._uuids.pop(gone.user_id, None)
+                gone = self._shown.pop(next(iter(self._shown)))
+                self._uuids.pop(gone.user.user_id, None)
 
     def without(self, seen: RoadUsers) -> RoadUsers:
         """Return what the car sees that was not shown to it.
 
         It is known by its UUID; in a list without ids, whose own are numbers, by its place at that
-        time, size and speed.
+        time, size and speed. Whoever was shown as points gets its id and size from the stack's own
+        perception: it is known by where it is, and so is what is real within its outline.
         """
         if not self._shown:
             return seen
@@ -54,14 +77,27 @@ class Injected:
     def _is_shown(self, user: RoadUser, stamp_ns: int) -> bool:
         if user.user_id in self._shown:
             return True
-        return user.user_id.isdecimal() and any(
-            _is_same(user, one) for one in self._around(stamp_ns)
+        numbered = user.user_id.isdecimal()
+        return any(
+            (numbered and _is_same(user, one)) or (in_cloud and _is_within(user, one))
+            for one, in_cloud in self._around(stamp_ns)
         )
 
-    def _around(self, stamp_ns: int) -> Iterator[RoadUser]:
-        for shown_ns, user in self._shown.values():
+    def _around(self, stamp_ns: int) -> Iterator[tuple[RoadUser, bool]]:
+        for shown_ns, user, in_cloud in self._shown.values():
             if abs(stamp_ns - shown_ns) <= _REMEMBERED_NS:
-                yield moved(user, user.speed_mps * (stamp_ns - shown_ns) * 1e-9)
+                yield moved(user, user.speed_mps * (stamp_ns - shown_ns) * 1e-9), in_cloud
+
+
+def _is_within(seen: RoadUser, shown: RoadUser) -> bool:
+    """Whether the middle of what is seen lies in the outline of what was shown, or nearly."""
+    x_m, y_m, _ = local_pose(LocalFrame(shown.position), seen.position, 0.0)
+    cos, sin = math.cos(shown.yaw_rad), math.sin(shown.yaw_rad)
+    ahead_m, aside_m = abs(cos * x_m + sin * y_m), abs(cos * y_m - sin * x_m)
+    return (
+        ahead_m <= 0.5 * shown.length_m + _SAME_PLACE_M
+        and aside_m <= 0.5 * shown.width_m + _SAME_PLACE_M
+    )
 
 
 def _is_same(seen: RoadUser, shown: RoadUser) -> bool:

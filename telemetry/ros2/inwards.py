@@ -12,6 +12,7 @@ from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.guard import Refused, admit
 from foretwin.contracts.numbering import Numberings
+from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud, base_from_mount_cloud
 from foretwin.telemetry.anchored import world_from_lot_message
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
@@ -19,10 +20,18 @@ from foretwin.telemetry.ros2.injected import Injected
 from foretwin.telemetry.ros2.mapping import Mapping
 from foretwin.telemetry.ros2.merged_objects import HeardObjects
 from foretwin.telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
-from foretwin.telemetry.ros2.rows import InRow
+from foretwin.telemetry.ros2.rows import REAL_CLOUD, InRow
+from foretwin.telemetry.ros_messages.clouds import cloud_of
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, UnusableError, channel_of, stamp_of
 from foretwin.telemetry.ros_messages.motion import route_from_lanelets
-from foretwin.telemetry.ros_messages.parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
+from foretwin.telemetry.ros_messages.parts import (
+    BASE_FRAME,
+    CLOCK,
+    LANELET_ROUTE,
+    POINT_CLOUD2,
+    TF,
+    typestore,
+)
 from foretwin.telemetry.ros_messages.status import StatusJoiner
 from foretwin.telemetry.ros_messages.transforms import TransformTree
 
@@ -34,6 +43,8 @@ class Wanted(NamedTuple):
 
     key: str
     history: bool
+    bulky: bool = False
+    """Clouds, which wait apart: few, and the newest."""
 
 
 class Inwards:
@@ -42,8 +53,13 @@ class Inwards:
     `counts` holds samples by channel, `unused` what was left out by topic and reason.
     """
 
-    def __init__(self, mapping: Mapping, anchor: Anchor | None = None) -> None:
-        self._mapping, self.anchor = mapping, anchor
+    def __init__(
+        self,
+        mapping: Mapping,
+        anchor: Anchor | None = None,
+        mounts: Mounts = NO_MOUNTS,
+    ) -> None:
+        self._mapping, self.anchor, self._mounts = mapping, anchor, mounts
         self._rows = {row.topic: row for row in mapping.inwards}
         self._by_bridge_key = {
             bridge_key(row.topic, namespace=mapping.namespace): row for row in mapping.inwards
@@ -70,10 +86,13 @@ class Inwards:
     def key_expressions(self) -> list[Wanted]:
         """Return what to subscribe to; of rmw_zenoh with any type and hash."""
         if self._mapping.dialect == "ros2dds":
-            return [Wanted(key, row.is_latched) for key, row in self._by_bridge_key.items()]
+            return [
+                Wanted(key, row.is_latched, row.type == POINT_CLOUD2)
+                for key, row in self._by_bridge_key.items()
+            ]
         domain = self._mapping.domain
         return [
-            Wanted(rmw_any_type_key(topic, domain=domain), row.is_latched)
+            Wanted(rmw_any_type_key(topic, domain=domain), row.is_latched, row.type == POINT_CLOUD2)
             for topic, row in self._rows.items()
         ]
 
@@ -153,10 +172,12 @@ class Inwards:
             route = route_from_lanelets(ros, self._mapping.map_frame)
             self.route = world_from_lot_message(self.anchor, route)
             return [("route", self.route)]
-        how = FOREIGN[row.type]
         stamp_ns = arrived.received_wall_ns
         if row.stamp == "header":
             stamp_ns = stamp_of(ros) or stamp_ns
+        if row.type == POINT_CLOUD2:
+            return [(REAL_CLOUD, self._cloud(row, ros, stamp_ns))]
+        how = FOREIGN[row.type]
         if "objects" in how.channels:
             self.objects = HeardObjects(ros)
         if "gnss" in how.channels:
@@ -176,6 +197,18 @@ class Inwards:
             samples.append((channel, world_from_lot_message(self.anchor, message)))
             self.counts[channel] += 1
         return samples
+
+    def _cloud(self, row: InRow, ros: Any, stamp_ns: int) -> PointCloud:
+        if (mount := self._mounts.get(row.sensor)) is None:
+            raise UnusableError(f"no sensor {row.sensor!r} in the drive")
+        cloud = cloud_of(ros, stamp_ns, sensor=row.sensor)
+        if self.injected.is_shown_cloud(cloud.stamp_ns):
+            raise UnusableError("a cloud that we have sent")
+        cloud = world_from_lot_message(self.anchor, cloud)
+        self.counts[REAL_CLOUD] += 1
+        if str(ros.header.frame_id).lstrip("/") == BASE_FRAME:
+            return cloud
+        return msgspec.structs.replace(cloud, points=base_from_mount_cloud(cloud.points, mount))
 
     def _without_ours(self, message: drive.RoadUsers, row: InRow) -> drive.RoadUsers:
         real = self.injected.without(message)

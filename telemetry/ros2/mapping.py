@@ -22,7 +22,7 @@ from foretwin.contracts.toml_file import parse_toml, toml_text
 from foretwin.telemetry.mixed.merge import MergeRules
 from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect
-from foretwin.telemetry.ros2.rows import SHOWS_VIRTUAL, InRow, OutRow, Source
+from foretwin.telemetry.ros2.rows import INJECTS, SHOWS_VIRTUAL, InRow, OutRow, Source
 from foretwin.telemetry.ros2.safety import CommandLimits
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
 from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
@@ -118,7 +118,8 @@ class Mapping(
         sources = self.sources
         return (
             *(("mirror",) if "twin" in sources or self.mirrored else ()),
-            *(("virtual_objects", "virtual_traffic") if sources & set(SHOWS_VIRTUAL) else ()),
+            *(("virtual_objects", "virtual_traffic") if sources & set(INJECTS) else ()),
+            *(("point_cloud",) if "point_cloud" in sources else ()),
             *(("event", "gap_alarm", "verdict") if "diagnostics" in sources else ()),
         )
 
@@ -228,7 +229,7 @@ def _check_alone(
 
 def _check_no_echo(row: OutRow, mapping: Mapping) -> None:
     """Refuse what would come back as real, and a merged list of which the real half lacks."""
-    if row.source in SHOWS_VIRTUAL and any(row.topic == one.topic for one in mapping.inwards):
+    if row.source in INJECTS and any(row.topic == one.topic for one in mapping.inwards):
         raise ValueError(f"topic {row.topic} is listened to: what goes out would come back as real")
     if row.source != "merged_objects":
         return

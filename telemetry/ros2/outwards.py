@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import msgspec
+
 from foretwin.contracts import drive
 from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.frames import LocalFrame, geo_pose
+from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud, mount_from_base_cloud
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.telemetry.anchored import Message, lot_from_world_message
@@ -14,6 +17,7 @@ from foretwin.telemetry.ros2.mapping import Mapping
 from foretwin.telemetry.ros2.merged_objects import MergedList
 from foretwin.telemetry.ros2.rows import DIAGNOSTICS, OutRow, Source
 from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.clouds import cloud_from
 from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
 from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import CERTAIN, FROM_USERS, joined
@@ -46,8 +50,9 @@ class Outwards:
         drive_frame: LocalFrame,
         vehicle_id: str,
         anchor: Anchor | None = None,
+        mounts: Mounts = NO_MOUNTS,
     ) -> None:
-        self._rows = mapping.outwards
+        self._rows, self._mounts = mapping.outwards, mounts
         self._map = mapping.map_frame
         self._drive_frame, self._anchor = drive_frame, anchor
         self._car_frame = drive_frame if anchor is None else anchor.lot.frame
@@ -56,9 +61,9 @@ class Outwards:
         self.ground_alt_m = ground.origin.alt_m
         """Of the World, where nothing says more."""
 
-    def rows(self, source: Source) -> list[OutRow]:
-        """Return the rows that carry a source."""
-        return [row for row in self._rows if row.source == source]
+    def rows(self, source: Source, sensor: str = "") -> list[OutRow]:
+        """Return the rows that carry a source, of clouds those of one sensor."""
+        return [row for row in self._rows if row.source == source and row.sensor == sensor]
 
     def warm_up(self) -> None:
         """Compile the types that go out: tens of milliseconds, which no first message waits for."""
@@ -102,6 +107,15 @@ class Outwards:
         assert self._map is not None  # the mapping asks for it
         ours = FROM_USERS[kind](self.on_lot(one.virtual), self._map, one.spread)
         return _cdr(joined(one.real.ros, ours, without=one.without), kind)
+
+    def cloud(self, message: PointCloud, row: OutRow) -> bytes:
+        """Return a PointCloud2; raises KeyError where it is not known where its sensor sits."""
+        if row.frame:
+            points = mount_from_base_cloud(message.points, self._mounts[row.sensor])
+            message = msgspec.structs.replace(message, points=points)
+        frame_id = row.frame or parts.BASE_FRAME
+        ros = cloud_from(self.on_lot(message), layout=row.layout, frame_id=frame_id)
+        return _cdr(ros, row.type)
 
     def clock(self, stamp_ns: int) -> bytes:
         """Return a Clock."""

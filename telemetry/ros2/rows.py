@@ -10,26 +10,36 @@ from foretwin.contracts.did_you_mean import one_of
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.names import check_topic, dds_type
 from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.clouds import Layout
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 Source = Literal[
-    "state", "twin", "virtual_objects", "merged_objects", "diagnostics", "clock", "vehicle_command"
-]
+    "state", "twin", "virtual_objects", "merged_objects", "point_cloud", "diagnostics", "clock",
+    "vehicle_command",
+]  # fmt: skip
 _OBJECTS = (parts.PREDICTED_OBJECTS, parts.DETECTED_OBJECTS, parts.TRACKED_OBJECTS)
 _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
     "state": (parts.ODOMETRY,),
     "twin": (parts.ODOMETRY,),
     "virtual_objects": _OBJECTS,
     "merged_objects": _OBJECTS,
+    "point_cloud": (parts.POINT_CLOUD2,),
     "diagnostics": (DIAGNOSTICS,),
     "clock": (parts.CLOCK,),
     "vehicle_command": (parts.CONTROL, parts.ACKERMANN),
 }
 SHOWS_VIRTUAL: tuple[Source, ...] = ("virtual_objects", "merged_objects")
-CHANNEL_OF_OTHERS = {parts.TF: "transforms", parts.CLOCK: "clock", parts.LANELET_ROUTE: "route"}
+INJECTS: tuple[Source, ...] = (*SHOWS_VIRTUAL, "point_cloud")
+REAL_CLOUD = "real_cloud"
+CHANNEL_OF_OTHERS = {
+    parts.TF: "transforms",
+    parts.CLOCK: "clock",
+    parts.LANELET_ROUTE: "route",
+    parts.POINT_CLOUD2: REAL_CLOUD,
+}
 """Types that are taken in but are no samples of the vehicle's telemetry."""
 
 
@@ -52,6 +62,8 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Of a speed."""
     axes: Literal["forward_left_up", "forward_right_down"] = "forward_left_up"
     """Of an Imu."""
+    sensor: str = ""
+    """Of a cloud: the name of the sensor among the drive's [[sensors]] that it is put in for."""
 
     def validate(self) -> None:
         """Raise ValueError naming the key at fault."""
@@ -74,6 +86,8 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             raise ValueError(f"speed_unit: not of channel {self.channel!r}")
         if self.axes != "forward_left_up" and self.channel != "imu":
             raise ValueError(f"axes: not of channel {self.channel!r}")
+        if bool(self.sensor) != (self.channel == REAL_CLOUD):
+            raise ValueError(f"sensor {self.sensor!r}: of channel {REAL_CLOUD!r}, and of it alone")
 
     @property
     def is_latched(self) -> bool:
@@ -95,6 +109,12 @@ class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Its ROS type."""
     source: Source
     """What is told on it."""
+    sensor: str = ""
+    """Of clouds: the name of the sensor among the drive's [[sensors]] whose they are."""
+    frame: str = ""
+    """Of clouds: how the car's transforms call the sensor's own frame; empty: in base_link."""
+    layout: Layout = "velodyne"
+    """Of clouds: fields x y z intensity ring time (velodyne), or PointXYZIRCAEDT (autoware)."""
 
     def validate(self) -> None:
         """Raise ValueError naming the key at fault."""
@@ -104,6 +124,11 @@ class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
                 f"type {self.type!r}: {self.source} goes out as "
                 f"{' or '.join(_TYPES_OF_SOURCE[self.source])}"
             )
+        of_clouds = self.source == "point_cloud"
+        if bool(self.sensor) != of_clouds:
+            raise ValueError(f"sensor {self.sensor!r}: of source 'point_cloud', and of it alone")
+        if not of_clouds and (self.frame or self.layout != "velodyne"):
+            raise ValueError("frame, layout: of source 'point_cloud' alone")
 
     @property
     def towards_vehicle(self) -> bool:

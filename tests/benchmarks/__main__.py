@@ -28,6 +28,7 @@ BENCHMARKS = (
     "full_scene",
     "live_metrics",
     "merged_objects",
+    "merged_clouds",
     "metadrive",
     "gym_steps",
     "world_from_open_map",

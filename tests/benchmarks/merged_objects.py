@@ -81,9 +81,9 @@ def _taken(
         begun_s = time.monotonic()
         stamp_ns = time.time_ns()
         if bus is not None:
-            bus.publish("virtual_objects", _crowd(stamp_ns, VIRTUAL, virtual=True), run="r")
+            bus.publish("virtual_objects", crowd(stamp_ns, VIRTUAL, virtual=True), run="r")
             time.sleep(PERIOD_S / 2.0)
-        ros = predicted_from_users(_crowd(stamp_ns, REAL, virtual=False), FRAME, CERTAIN)
+        ros = predicted_from_users(crowd(stamp_ns, REAL, virtual=False), FRAME, CERTAIN)
         data = bytes(typestore().serialize_cdr(ros, PREDICTED_OBJECTS))
         put_s = time.perf_counter()
         car.put(f"0/perception/real/{_TYPE}/RIHS01_x", data, attached(number))
@@ -97,7 +97,7 @@ def _taken(
     return taken
 
 
-def _crowd(stamp_ns: int, count: int, *, virtual: bool) -> RoadUsers:
+def crowd(stamp_ns: int, count: int, *, virtual: bool) -> RoadUsers:
     """Return walkers and cars all around, virtual ones between the real ones."""
     rng = np.random.default_rng(int(virtual))
     users = []

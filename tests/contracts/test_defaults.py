@@ -54,6 +54,7 @@ LISTED: dict[str, dict[str, Any]] = {
     "Connection": {"control": "none"},
     "DriveEnd": {"reason": "end of source"},
     "EgoPart": {"turn": "straight", "speed_mps": 8.33},
+    "Mount": {"forward_m": 1.4, "up_m": 1.9},
     "FollowLimits": {
         "accel_mps2": 1.0, "jerk_mps3": 2.0, "yaw_accel_radps2": 0.3, "yaw_jerk_radps3": 0.6,
         "reach_m": 20.0,

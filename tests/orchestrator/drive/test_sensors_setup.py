@@ -10,12 +10,19 @@ import pytest
 from foretwin.contracts.access import may_say
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import CHANNELS
-from foretwin.contracts.setup import SensorsSetup
+from foretwin.contracts.setup import SensorSees, SensorsSetup
 from foretwin.orchestrator.config_file import load_config
 from foretwin.orchestrator.drive.processes import PROCESSES, expected_ids, member, row_of
-from foretwin.orchestrator.drive.sensors_setup import SENSORS, TOLD_WORLDS, read_sensor
+from foretwin.orchestrator.drive.sensors_setup import (
+    SENSORS,
+    TOLD_WORLDS,
+    check_clouds,
+    mounts,
+    read_sensor,
+)
 from foretwin.orchestrator.sensor_config import SensorConfig
 from foretwin.sim_worker.sensors.sensor_file import load_sensor, sensor_of
+from foretwin.telemetry.ros2.mapping import MappingError, MappingFile, parse_mapping
 from tests.orchestrator.trip import town_plan
 
 COVERS = ("foretwin.orchestrator.sensor_config",)
@@ -46,3 +53,38 @@ def test_settings_name_sensors(tmp_path: Path) -> None:
     assert config.sensors == (SensorConfig(file="vlp_16"), SensorConfig(file="x", sees="users"))
     with pytest.raises(UserError, match="no bundled sensor of that name"):
         read_sensor(config.sensors[1])
+
+
+TOPIC = """dialect = "ros2dds"
+[[{way}]]
+topic = "/x/points"
+type = "sensor_msgs/msg/PointCloud2"
+{kind}
+sensor = "vlp_16"
+"""
+
+
+@pytest.mark.parametrize(
+    ("way", "sees", "right"),
+    [
+        ("out", ("world",), True),
+        ("out", ("world", "users"), False),
+        ("out", (), False),
+        ("in", ("world",), False),
+        ("in", ("world", "real"), True),
+    ],
+)
+def test_a_mapping_passes_clouds_of_one_sensor(
+    way: str, sees: tuple[SensorSees, ...], right: bool
+) -> None:
+    kind = 'source = "point_cloud"' if way == "out" else 'channel = "real_cloud"'
+    text = TOPIC.format(way=way, kind=kind)
+    ros2 = MappingFile("m.toml", text, parse_mapping(text, name="m.toml"))
+    sensors = tuple(read_sensor(SensorConfig(file="vlp_16", sees=one)) for one in sees)
+    check_clouds(sensors, None)
+    if right:
+        check_clouds(sensors, ros2)
+        assert dict(mounts(sensors)) == {"vlp_16": load_sensor("vlp_16").mount}
+        return
+    with pytest.raises(MappingError, match=r"m.toml: topic /x/points: sensor 'vlp_16': . "):
+        check_clouds(sensors, ros2)

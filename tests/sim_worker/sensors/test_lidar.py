@@ -10,19 +10,18 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalPose
+from foretwin.contracts.point_cloud import Mount, base_from_mount, origin_m
 from foretwin.sim_worker.sensors.lidar import (
     BaseMotion,
     LidarScan,
     at_begin,
     azimuths_rad,
-    base_from_mount,
     base_from_rays,
-    origin_m,
     scan,
 )
 from foretwin.sim_worker.sensors.materials import back_scatter, reflectivity_of
 from foretwin.sim_worker.sensors.ray_world import NO_BODIES, MovingBoxes, RayWorld
-from foretwin.sim_worker.sensors.sensor_file import Lidar, Mount, SensorFile, load_sensor
+from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile, load_sensor
 from tests.sim_worker.places import box, crossroads
 
 COVERS = ("foretwin.sim_worker.sensors.materials",)

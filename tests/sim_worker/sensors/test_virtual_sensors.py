@@ -22,8 +22,11 @@ def driven(
 ) -> list[PointCloud]:
     """Stand at the origin, a state each 20 ms."""
     stamps = range(from_ms, until_ms + 1, every_ms)
-    states = (state_at(0.0, 0.0, speed=0.0, stamp_ns=one * MS) for one in stamps)
-    return [cloud for state in states for cloud in sensors.take_state(state)]
+    clouds = []
+    for stamp in stamps:
+        sensors.take_state(state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp * MS))
+        clouds += sensors.measured()
+    return clouds
 
 
 def users(stamp_ms: int, *names: str, x: float = 10.0, speed_mps: float = 0.0) -> RoadUsers:
@@ -98,8 +101,9 @@ def test_without_a_heading_nothing_is_measured() -> None:
     sensors = VirtualSensors([(exact(), "world")])
     sensors.use_world(TOWN)
     blind = [state_at(0.0, 0.0, stamp_ns=k * 50 * MS) for k in range(4)]
-    states = [msgspec.structs.replace(one, yaw_valid=False) for one in blind]
-    assert [cloud for state in states for cloud in sensors.take_state(state)] == []
+    for one in blind:
+        sensors.take_state(msgspec.structs.replace(one, yaw_valid=False))
+        assert sensors.measured() == []
 
 
 def test_the_same_drive_and_seed_give_the_same_noise() -> None:
@@ -112,3 +116,53 @@ def test_the_same_drive_and_seed_give_the_same_noise() -> None:
     assert all(np.array_equal(a.points, b.points) for a, b in zip(first, again, strict=True))
     assert not np.array_equal(first[0].points[:, :3], other[0].points[:, :3])
     assert not np.array_equal(first[0].points[:, :3], first[1].points[:, :3])
+
+
+def test_turns_begin_at_whole_periods_however_the_states_come() -> None:
+    """States of 33 Hz, none at a turn's beginning: the car drives on from where it was."""
+    sensors = VirtualSensors([(exact(), "world")])
+    sensors.use_world(TOWN)
+    clouds = []
+    for k in range(32):
+        stamp_ns = k * 30 * MS + 7 * MS
+        sensors.take_state(state_at(10.0 * stamp_ns * 1e-9, 0.0, speed=10.0, stamp_ns=stamp_ns))
+        clouds += sensors.measured()
+
+    assert [cloud.stamp_ns // MS for cloud in clouds] == list(range(0, 900, 100))
+    # Ahead is seen half a turn after it began.
+    wanted = [18.0 - 10.0 * (0.1 * k + 0.05) for k in range(9)]
+    assert [ahead_m(cloud) for cloud in clouds] == pytest.approx(wanted, abs=0.02)
+    assert not sensors.passed_over.total()
+
+
+def test_who_is_asked_late_measures_the_newest_turn_and_counts_the_others() -> None:
+    sensors = VirtualSensors([(exact(), "users"), (exact(), "world")])
+    sensors.use_world(TOWN)
+    for stamp_ms in range(0, 400, 20):
+        sensors.take_state(state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ms * MS))
+
+    assert [cloud.stamp_ns // MS for cloud in sensors.measured()] == [200, 200]
+    assert sensors.passed_over == {"exact": 4}
+    assert sensors.measured() == []
+    # States that are missing: of two turns it is not known how they began.
+    sensors.take_state(state_at(0.0, 0.0, speed=0.0, stamp_ns=620 * MS))
+    assert [cloud.stamp_ns // MS for cloud in sensors.measured()] == [300, 300]
+    assert sensors.passed_over == {"exact": 8}
+
+
+def test_road_users_are_put_into_the_clouds_of_the_cars_own_sensor() -> None:
+    sensors = VirtualSensors([(exact(), "real")])
+    sensors.take_users(users(0, "van"))
+    assert driven(sensors, 300) == [], "it has no turns of its own"
+    wall = np.array([[18.0, 0.0, 1.5, 1.0, 2.0, 0.05]], np.float32)
+    for stamp_ms, sensor in ((150, "exact"), (100, "exact"), (100, "other")):
+        sensors.take_real(PointCloud(stamp_ns=stamp_ms * MS, points=wall, sensor=sensor))
+    (merged,) = sensors.measured()
+
+    assert (merged.stamp_ns, merged.sensor) == (100 * MS, "exact")
+    assert len(merged.points) > 40
+    assert ahead_m(merged) == pytest.approx(7.0, abs=1e-3)
+    assert sensors.passed_over == {"exact": 1}
+    late = PointCloud(stamp_ns=2000 * MS, points=wall, sensor="exact")
+    sensors.take_real(late)
+    assert sensors.measured() == [late], "as it came where it is not known where the car was"

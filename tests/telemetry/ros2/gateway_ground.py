@@ -13,6 +13,7 @@ from typing import Any
 from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
 from foretwin.telemetry.ros_messages.parts import ros_message, typestore
 from tests.telemetry.ros2.order_side import OrderSide
@@ -153,11 +154,11 @@ class RecordingForeign:
         self.attachments: list[bytes | None] = []
         self.tokens: list[str] = []
         self.subscribed: list[str] = []
-        self.inbox: Mailbox | None = None
+        self.inboxes: dict[str, Mailbox] = {}
 
     def subscribe(self, key: str, mailbox: Mailbox, *, history: bool = False) -> None:
         self.subscribed.append(f"{key} with history" if history else key)
-        self.inbox = mailbox
+        self.inboxes[key.removesuffix("*/*")] = mailbox
 
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         self.put_keys.append(key)
@@ -171,8 +172,10 @@ class RecordingForeign:
         raise AssertionError("the gateway watches no tokens")
 
     def arrive(self, key: str, payload: bytes, *, mono_ns: int, seq: int = 1) -> None:
-        assert self.inbox is not None
-        self.inbox.put(Arrived(key, payload, attached(seq), mono_ns, 10**18))
+        assert self.inboxes
+        known = (box for begin, box in self.inboxes.items() if key.startswith(begin))
+        inbox = next(known, next(iter(self.inboxes.values())))
+        inbox.put(Arrived(key, payload, attached(seq), mono_ns, 10**18))
 
     def on(self, topic: str) -> list[bytes]:
         """Return the payloads that were put on a topic."""
@@ -182,7 +185,12 @@ class RecordingForeign:
 
 @contextlib.contextmanager
 def gateway_process(
-    folder: Path, *, run_endpoint: str, mapping: str, flag: bool
+    folder: Path,
+    *,
+    run_endpoint: str,
+    mapping: str,
+    flag: bool,
+    mounts: tuple[tuple[str, Mount], ...] = (),
 ) -> Iterator[subprocess.Popen[str]]:
     file = folder / "ros2.json"
     setup = Ros2Setup(
@@ -196,6 +204,7 @@ def gateway_process(
         drive_frame=FRAME,
         towards_vehicle=flag,
         order_keys=OrderSide("r").keys,
+        mounts=mounts,
     )
     write_setup(setup, file)
     command = [sys.executable, "-m", "foretwin.telemetry.ros2", "--setup", str(file)]

@@ -246,6 +246,37 @@ def test_what_goes_out_is_not_listened_to(source: str) -> None:
         parse_mapping('dialect = "ros2dds"\n' + text, name="m.toml")
 
 
+CLOUDS = """dialect = "ros2dds"
+[[in]]
+topic = "/lidar/raw"
+type = "sensor_msgs/msg/PointCloud2"
+channel = "real_cloud"
+sensor = "top"
+[[out]]
+topic = "/lidar/merged"
+type = "sensor_msgs/msg/PointCloud2"
+source = "point_cloud"
+sensor = "top"
+"""
+
+
+def test_clouds_name_their_sensor_and_never_come_back() -> None:
+    mapping = parse_mapping(CLOUDS, name="m.toml")
+    assert mapping.run_channels == ("virtual_objects", "virtual_traffic", "point_cloud")
+    for wrong, said in (
+        (
+            CLOUDS.replace('channel = "real_cloud"\nsensor = "top"', 'channel = "real_cloud"'),
+            "in.*sensor",
+        ),
+        (CLOUDS.removesuffix('sensor = "top"\n'), "out.*sensor"),
+        (CLOUDS.replace("/lidar/merged", "/lidar/raw"), "would come back as real"),
+        (GOOD + 'sensor = "top"\n', "sensor"),
+        (GOOD + 'layout = "autoware"\n', "frame, layout"),
+    ):
+        with pytest.raises(MappingError, match=said):
+            parse_mapping(wrong, name="m.toml")
+
+
 def test_rules_of_the_merge_are_checked() -> None:
     with pytest.raises(MappingError, match=r"range_m 0\.0: above 0"):
         parse_mapping(GOOD + "[merged]\nrange_m = 0.0\n", name="m.toml")

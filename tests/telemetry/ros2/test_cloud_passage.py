@@ -1,0 +1,185 @@
+"""Clouds through the gateway: virtual and merged ones out, real ones in, nothing back as real."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from foretwin.contracts.anchor import Anchor, AnchorPose
+from foretwin.contracts.arrays import Array32
+from foretwin.contracts.bus import Mailbox
+from foretwin.contracts.drive import RoadUsers
+from foretwin.contracts.point_cloud import Mount, PointCloud, mount_from_base_cloud
+from foretwin.contracts.towards_vehicle import Authority
+from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.mapping import parse_mapping
+from foretwin.telemetry.ros_messages.clouds import cloud_from, cloud_of
+from foretwin.telemetry.ros_messages.objects import FROM_USERS, ObjectSpread
+from foretwin.telemetry.ros_messages.parts import POINT_CLOUD2, PREDICTED_OBJECTS, typestore
+from tests.telemetry.ros2.gateway_ground import FRAME, mapping_text
+from tests.telemetry.ros2.test_gateway import Ground
+from tests.telemetry.ros2.test_merged_objects import VAN, user
+
+S, MS = 10**9, 10**6
+MORE = """
+[[in]]
+topic = "/lidar/raw"
+type = "sensor_msgs/msg/PointCloud2"
+channel = "real_cloud"
+sensor = "top"
+[[in]]
+topic = "/perception/real"
+type = "autoware_perception_msgs/msg/PredictedObjects"
+channel = "objects"
+[[out]]
+topic = "/lidar/merged"
+type = "sensor_msgs/msg/PointCloud2"
+source = "point_cloud"
+sensor = "top"
+frame = "velodyne_top"
+layout = "autoware"
+[[out]]
+topic = "/foretwin/points"
+type = "sensor_msgs/msg/PointCloud2"
+source = "point_cloud"
+sensor = "top"
+"""
+MOUNT = Mount(forward_m=1.0, left_m=0.2, up_m=2.0, yaw_deg=90.0)
+POINTS = np.array([[6.0, 0.2, 2.0, 40.0, 3.0, 0.01], [1.0, 5.2, 1.0, 7.0, 9.0, 0.05]], np.float32)
+RAW = "0/lidar/raw/sensor_msgs::msg::dds_::PointCloud2_/RIHS01_x"
+
+
+class Passing(Ground):
+    def __init__(self, *, flag: bool = True, anchor: Anchor | None = None) -> None:
+        super().__init__(enabled=True, flag=flag, more=MORE, anchor=anchor)
+        self.gateway = Gateway(
+            parse_mapping(mapping_text(enabled=True, more=MORE), name="m.toml"),
+            bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego", drive_frame=FRAME,
+            flag_on=flag, order_keys=self.orders.keys, anchor=anchor, mounts={"top": MOUNT},
+            mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18 + self.now_ns,
+        )  # fmt: skip
+        self.real, self.objects = Mailbox(10), Mailbox(10)
+        self.bus.subscribe("real_cloud", self.real, vehicle="ego")
+        self.bus.subscribe("objects", self.objects, vehicle="ego")
+        self.goes_on()
+
+    def goes_on(self, passed_ms: float = 0.0) -> None:
+        self.now_ns += round(passed_ms * MS)
+        self.orders.say(self.bus, Authority(sent_mono_ns=self.now_ns))
+        self.step()
+
+    def told(self, points: Array32 = POINTS, stamp_ns: int = 5 * S, sensor: str = "top") -> None:
+        cloud = PointCloud(stamp_ns=stamp_ns, points=points, sensor=sensor)
+        self.bus.publish("point_cloud", cloud, run="r")
+        self.goes_on(100.0)
+
+    def hears(
+        self, points: Array32 = POINTS, *, stamp_ns: int = 5 * S, frame: str = "lidar"
+    ) -> None:
+        ros = cloud_from(PointCloud(stamp_ns=stamp_ns, points=points), frame_id=frame)
+        self.arrive(RAW, bytes(typestore().serialize_cdr(ros, POINT_CLOUD2)))
+
+    def sent(self, topic: str = "/lidar/merged") -> list[Any]:
+        return [typestore().deserialize_cdr(one, POINT_CLOUD2) for one in self.foreign.on(topic)]
+
+
+def test_a_cloud_goes_out_in_the_sensors_frame_and_in_base_link() -> None:
+    ground = Passing()
+    ground.told()
+    ground.told(sensor="another")
+    (theirs,), (ours,) = ground.sent(), ground.sent("/foretwin/points")
+
+    assert (theirs.header.frame_id, ours.header.frame_id) == ("velodyne_top", "base_link")
+    assert (theirs.point_step, ours.point_step) == (32, 22)
+    seen = cloud_of(theirs, 5 * S).points
+    # 5 m ahead of the car is 5 m to the right of a sensor that looks to the left.
+    assert seen[0] == pytest.approx([0.0, -5.0, 0.0, 40.0, 3.0, 0.01], abs=1e-5)
+    assert seen == pytest.approx(mount_from_base_cloud(POINTS, MOUNT), abs=1e-5)
+    assert cloud_of(ours, 5 * S).points == pytest.approx(POINTS)
+
+
+def test_without_the_second_switch_only_what_is_below_foretwin_goes_out() -> None:
+    ground = Passing(flag=False)
+    ground.told()
+    assert (len(ground.sent()), len(ground.sent("/foretwin/points"))) == (0, 1)
+    assert ground.gateway.held["/lidar/merged"] == 1
+
+
+def test_when_the_word_is_overdue_no_cloud_goes_to_the_vehicle() -> None:
+    ground = Passing()
+    ground.told()
+    ground.now_ns += 200 * MS
+    ground.bus.publish(
+        "point_cloud", PointCloud(stamp_ns=6 * S, points=POINTS, sensor="top"), run="r"
+    )
+    ground.step()
+    assert (len(ground.sent()), len(ground.sent("/foretwin/points"))) == (1, 2)
+
+
+def test_a_real_cloud_comes_in_base_link() -> None:
+    ground = Passing()
+    ground.hears(mount_from_base_cloud(POINTS, MOUNT))
+    ground.hears(POINTS, frame="base_link", stamp_ns=6 * S)
+    for stamp_ns in (5 * S, 6 * S):
+        item = ground.real.take()
+        assert item is not None
+        cloud = item.message()
+        assert cloud.points == pytest.approx(POINTS, abs=1e-5)
+        assert (cloud.stamp_ns, cloud.sensor) == (stamp_ns, "top")
+
+
+def test_a_car_on_a_small_mirrored_lot_has_small_mirrored_clouds() -> None:
+    lot = AnchorPose(lat_deg=52.5, lon_deg=13.4, yaw_deg=0.0)
+    ground = Passing(anchor=Anchor(lot=lot, world=lot, scale=10.0, mirrored=True))
+    ground.told()
+    (there,) = ground.sent("/foretwin/points")
+    on_lot = cloud_of(there, 5 * S).points
+    assert on_lot[:, :3] == pytest.approx(POINTS[:, :3] * (0.1, -0.1, 0.1))
+    ground.hears(cloud_of(ground.sent()[0], 0).points, stamp_ns=6 * S)
+    item = ground.real.take()
+    assert item is not None
+    assert item.message().points[:, :3] == pytest.approx(POINTS[:, :3], abs=1e-4)
+
+
+def test_a_cloud_that_was_sent_does_not_come_back_as_real() -> None:
+    ground = Passing()
+    ground.told(stamp_ns=5 * S)
+    ground.hears(POINTS * np.float32(2.0), stamp_ns=5 * S)
+    assert ground.real.take() is None
+    assert ground.gateway.inwards.unused["/lidar/raw: a cloud that we have sent"] == 1
+    ground.hears(POINTS, stamp_ns=5 * S + 1)
+    assert ground.real.take() is not None
+
+
+def test_whom_the_stack_perceives_in_our_points_is_not_real() -> None:
+    """Perception gives them ids and sizes of its own."""
+    ground = Passing()
+    van = user("ghost", 20.0, 8.0, van=True, virtual=True)
+    ground.bus.publish("virtual_objects", RoadUsers(stamp_ns=5 * S, users=(van,)), run="r")
+    ground.goes_on()
+    ground.told()
+
+    def perceived(*places: tuple[float, float]) -> int:
+        seen = [user(f"{k}" * 32, *at, van=True, virtual=False) for k, at in enumerate(places)]
+        users = RoadUsers(stamp_ns=5 * S, users=tuple(replace(one, length_m=3.7) for one in seen))
+        ros = FROM_USERS[PREDICTED_OBJECTS](users, FRAME, ObjectSpread())
+        key = "0/perception/real/autoware_perception_msgs::msg::dds_::PredictedObjects_/RIHS01_x"
+        ground.arrive(key, bytes(typestore().serialize_cdr(ros, PREDICTED_OBJECTS)))
+        item = ground.objects.take()
+        assert item is not None
+        return len(item.message().users)
+
+    # The van points to the north: 5 m along y, 2 m along x.
+    assert perceived((20.6, 10.0), (20.0, 5.5)) == 0
+    assert perceived((22.0, 8.0), (20.0, 12.0)) == 2
+    assert VAN not in ground.gateway.inwards.unused
+
+
+def test_what_no_lidar_of_the_drive_says_is_left_out() -> None:
+    ground = Passing()
+    ground.gateway.inwards._mounts = {}
+    ground.hears()
+    assert ground.gateway.inwards.unused["/lidar/raw: no sensor 'top' in the drive"] == 1
