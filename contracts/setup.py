@@ -157,6 +157,8 @@ class SensorsSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     """Measures what virtual sensors on the car would; each turn is told on `point_cloud`."""
 
     worlds_dir: str
+    turns_dir: str
+    """Where it says how many turns were told and passed over."""
     sensors: tuple[SensorSetup, ...]
     seed: int = 0
 

@@ -9,6 +9,7 @@ from typing import Literal
 from rich.status import Status
 
 from foretwin.contracts.keys import key
+from foretwin.contracts.sensor_turns import passed_over_text, read_turns
 from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.contracts.terminal import console, plain, say, visible, words
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -130,6 +131,9 @@ class ProgressLine:
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
             ahead = f"{progress.next_intersection} {progress.arrival_text}"
+        passed_over = ""
+        if conductor.plan.sensors:
+            passed_over = passed_over_text(read_turns(conductor.plan.processes_dir))
         short = f"{progress.too_slow} (machine too slow for all)  " if progress.too_slow else ""
         return (
             f"{self._open_to_all}{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}"
@@ -139,6 +143,7 @@ class ProgressLine:
             f"{f' +{far} far' if far else ''}{f' ({sick} sick)' if sick else ''}  "
             f"missed {conductor.rounds.tally.missed}  "
             f"dropped {progress.dropped}"
+            f"{f'  {passed_over}' if passed_over else ''}"
         )
 
 

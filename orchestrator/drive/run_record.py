@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.cpu_use import cpu_uses
+from foretwin.contracts.sensor_turns import read_turns
 from foretwin.contracts.tally import read_tally, tally_file
 from foretwin.contracts.versions import versions
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -65,6 +66,7 @@ def run_record(
             unseeded=tally.unseeded,
         ),
         "ledger": {"telemetry": telemetry_of(conductor), **msgspec.to_builtins(ledger)},
+        "sensor_turns": msgspec.to_builtins(read_turns(plan.processes_dir)),
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
         "comparison": conductor.rounds.comparisons.record(independent=independent),

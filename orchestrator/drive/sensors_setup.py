@@ -52,7 +52,11 @@ def check_clouds(sensors: tuple[SensorSetup, ...], ros2: MappingFile | None) -> 
 def made(plan: DrivePlan, base: dict[str, Any]) -> SensorsSetup:
     """Return how the process is set; `base` is what all processes are told."""
     return SensorsSetup(
-        **base, worlds_dir=str(plan.worlds_dir), sensors=plan.sensors, seed=plan.config.seed
+        **base,
+        worlds_dir=str(plan.worlds_dir),
+        turns_dir=str(plan.processes_dir),
+        sensors=plan.sensors,
+        seed=plan.config.seed,
     )
 
 

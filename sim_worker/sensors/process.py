@@ -10,6 +10,7 @@ from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.sensor_turns import SensorTurns, Turns, TurnsFile
 from foretwin.contracts.setup import SensorsSetup
 from foretwin.contracts.simulation import ActiveWorld
 from foretwin.sim_worker.message_loop import passed_over_where_unfit
@@ -29,8 +30,6 @@ class SensorsProcess:
 
     def __init__(self, setup: SensorsSetup, bus: Bus, *, refusals: Refusals | None = None) -> None:
         self._bus, self._run_id = bus, setup.run_id
-        self.told = 0
-        """Clouds so far."""
         self._worlds_dir = Path(setup.worlds_dir)
         self._refusals = Refusals() if refusals is None else refusals
         self._sensors = VirtualSensors(
@@ -59,12 +58,15 @@ class SensorsProcess:
             item = self.mailbox.take()
         for cloud in self._sensors.measured():
             self._bus.publish("point_cloud", cloud, run=self._run_id)
-            self.told += 1
 
     @property
-    def passed_over(self) -> int:
-        """Turns of which nothing was told so far."""
-        return self._sensors.passed_over.total()
+    def turns(self) -> Turns:
+        """What became of them so far, by sensor."""
+        told, passed_over = self._sensors.told, self._sensors.passed_over
+        return {
+            name: SensorTurns(told=told[name], passed_over=passed_over[name])
+            for name in told | passed_over
+        }
 
     def _handle(self, item: object) -> None:
         if not isinstance(item, Received):
@@ -85,10 +87,13 @@ class SensorsProcess:
 def serve(setup: SensorsSetup, bus: Bus, life: ProcessLife) -> None:
     """Measure until the run is over."""
     process = SensorsProcess(setup, bus, refusals=life.refusals)
+    file = TurnsFile(Path(setup.turns_dir))
     life.ready()
     while not life.over:
         process.step()
-    log.info("told %d clouds, passed over %d turns", process.told, process.passed_over)
+        file.look(process.turns)
+    file.write(process.turns)
+    log.info("turns: %s", process.turns)
 
 
 if __name__ == "__main__":

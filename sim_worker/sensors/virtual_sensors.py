@@ -61,6 +61,8 @@ class VirtualSensors:
         self._no_world = RayWorld()
         self.passed_over: Counter[str] = Counter()
         """By sensor, turns of which nothing was told."""
+        self.told: Counter[str] = Counter()
+        """By sensor."""
 
     def use_world(self, world: World | None) -> None:
         """Look into another World from now on, or into none."""
@@ -108,6 +110,7 @@ class VirtualSensors:
             if rays is not None and turn.state.yaw_valid:
                 points = self._scan(rays, place, turn).points
                 found.append(PointCloud(stamp_ns=turn.begun_ns, points=points, sensor=sensor.name))
+        self.told.update(cloud.sensor for cloud in found)
         return found
 
     def take_real(self, cloud: PointCloud) -> None:

@@ -62,7 +62,7 @@ def measure() -> Measurement:
     ):
         setup = SensorsSetup(
             run_id="r", process_id="sensors", vehicle_id="ego", bus=BusSetup(endpoint=run),
-            log_file=f"{folder}/sensors.jsonl", worlds_dir=folder,
+            log_file=f"{folder}/sensors.jsonl", worlds_dir=folder, turns_dir=folder,
             sensors=(SensorSetup(text=text, name=name, sees="real"),),
         )  # fmt: skip
         write_setup(setup, file := Path(folder) / "sensors.json")

@@ -10,6 +10,7 @@ from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.sensor_turns import SensorTurns
 from foretwin.contracts.setup import BusSetup, SensorSetup, SensorsSetup
 from foretwin.contracts.simulation import ActiveWorld, RunEnd
 from foretwin.sim_worker.sensors.process import SensorsProcess, serve
@@ -26,7 +27,7 @@ def setup_in(folder: Path) -> SensorsSetup:
     text, name = sensor_text("vlp_16")
     return SensorsSetup(
         run_id="r1", process_id="sensors", vehicle_id="car", bus=BusSetup(endpoint="tcp/x:1"),
-        log_file=str(folder / "log.jsonl"), worlds_dir=str(folder),
+        log_file=str(folder / "log.jsonl"), worlds_dir=str(folder), turns_dir=str(folder),
         sensors=tuple(SensorSetup(text=text, name=name, sees=sees) for sees in ("world", "users")),
     )  # fmt: skip
 
@@ -45,7 +46,7 @@ def test_clouds_come_of_the_world_in_force_and_of_both_who_say_road_users(tmp_pa
     clouds = [item.message() for item in iter(heard.take, None)]
 
     assert all(isinstance(cloud, PointCloud) for cloud in clouds)
-    assert process.told == len(clouds)
+    assert process.turns == {"vlp_16": SensorTurns(told=len(clouds))}
     whole, alone = (cloud.points for cloud in clouds)
     assert len(whole) > 5000 > len(alone) > 200
     assert 6.9 < np.abs(alone[:, 0]).min() < 7.2
@@ -72,3 +73,4 @@ def test_it_leaves_when_the_run_ends(tmp_path: Path) -> None:
     serve(setup, bus, life)
 
     assert life.over
+    assert (tmp_path / "sensors.turns").exists()
