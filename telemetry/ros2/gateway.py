@@ -44,8 +44,7 @@ _PORTION = 16
 _DIAGNOSTICS_NS = 1_000_000_000
 _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
-_CLOUDS = 8
-"""So many wait, the newest: one is a megabyte."""
+_CLOUDS = 8  # so many wait, the newest: one is a megabyte
 _STATE_EVERY_NS = 20_000_000
 _OBJECTS_EVERY_NS = 100_000_000
 _ROUTE_EVERY_NS = 1_000_000_000
