@@ -1,6 +1,7 @@
 """What processor time each process of a run takes: it says so itself, in a file beside its setup.
 
-A process that is killed has said so some seconds before; one that was started again has several.
+What it started counts with it. A process that is killed has said so some seconds before; one that
+was started again has several.
 """
 
 from __future__ import annotations
@@ -37,6 +38,29 @@ class CpuUse(msgspec.Struct, frozen=True, kw_only=True):
     lives: int
 
 
+def cpu_taken_s() -> float:
+    """Return the processor seconds of this process and of those that it has started, so far."""
+    times = os.times()
+    ended_s = times.children_user + times.children_system
+    return time.process_time() + ended_s + sum(map(_taken_s, _children()))
+
+
+def _children() -> set[int]:
+    """Return who runs, started by this process; nobody where the system does not tell."""
+    found: set[int] = set()
+    for file in Path("/proc/self/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            found.update(map(int, file.read_text().split()))
+    return found
+
+
+def _taken_s(pid: int) -> float:
+    with contextlib.suppress(OSError):
+        words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+    return 0.0
+
+
 class CpuMeter:
     """Writes what this process has taken into `folder`, now and then and at its end."""
 
@@ -48,7 +72,7 @@ class CpuMeter:
 
     def ready(self) -> None:
         """The start is over: the process can take work."""
-        self._starting_cpu_s, self._ready_s = time.process_time(), time.monotonic()
+        self._starting_cpu_s, self._ready_s = cpu_taken_s(), time.monotonic()
 
     def look(self) -> None:
         """Write where it is time to; call it often."""
@@ -57,7 +81,7 @@ class CpuMeter:
 
     def write(self) -> None:
         """Write what was taken until now; a disk that is full must not end a process."""
-        now_s, cpu_s = time.monotonic(), time.process_time()
+        now_s, cpu_s = time.monotonic(), cpu_taken_s()
         self._next_s = now_s + _EVERY_S
         ready, starting_cpu_s = self._starting_cpu_s is not None, self._starting_cpu_s or 0.0
         life = _Life(

@@ -45,6 +45,8 @@ class JobAnswer(msgspec.Struct, frozen=True, kw_only=True):
     part: FinishedPart | None = None
     leaving: bool = False
     """Its worker takes no more: it was told to end."""
+    cpu_s: float = 0.0
+    """Processor seconds that its worker has taken since it can play, with all that it started."""
 
 
 class Task(NamedTuple):

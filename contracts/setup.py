@@ -125,6 +125,8 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     commands_recorded: bool = False
     mirror_cast: MirrorCast = MirrorCast()
     threads: int = 1
+    gives_way: bool = False
+    """Whether it is the last to have a processor, from its start on."""
     planners: tuple[str, ...] = ()
     """Loaded before the first job: those of other packages live in processes of their own."""
     stacks: tuple[tuple[str, StackSetup], ...] = ()

@@ -16,6 +16,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import MAX_SEED, Range
 from foretwin.contracts.ports import metrics_place, trouble_with_bus
 from foretwin.contracts.roles import Correction, FollowLimits, Role
+from foretwin.contracts.siblings import Siblings
 from foretwin.contracts.virtual_traffic import VirtualTraffic
 from foretwin.orchestrator.keep import parse_keep
 from foretwin.orchestrator.other_vehicle_config import OtherVehicleConfig as OtherVehicleConfig
@@ -119,6 +120,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     virtual_traffic: VirtualTraffic = VirtualTraffic()
     """Road users who exist nowhere else: one going simulation around the car; see
     docs/virtual-traffic.md."""
+    siblings: Siblings = Siblings()
+    """A second engine beside MuJoCo, that plays some futures again."""
     sensors: tuple[SensorConfig, ...] = ()
     """Sensors that measure the virtual world from the car; each takes half a core."""
     view: View = "auto"
@@ -215,8 +218,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         place = trouble_with_bus(self.endpoint, insecure=self.insecure, secure=self.secure)
         yield place is None, f"{place}"
         yield self.follow.trouble() is None, f"follow: {self.follow.trouble()}"
-        traffic = self.virtual_traffic.trouble()
+        traffic, siblings = self.virtual_traffic.trouble(), self.siblings.trouble()
         yield traffic is None, f"virtual_traffic: {traffic}"
+        yield siblings is None, f"siblings: {siblings}"
         ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
         yield len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"
         waiting = self.speed != 1.0 and any(other.live for other in self.vehicles)

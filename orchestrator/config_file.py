@@ -20,11 +20,9 @@ def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
     flags = {name: value for name, value in overrides.items() if value is not None}
     if "speed" in flags:
         flags["speed"] = parse_speed(flags["speed"])
-    if "virtual_traffic" in flags:
-        flags["virtual_traffic"] = {
-            **written.get("virtual_traffic", {}),
-            "source": flags["virtual_traffic"],
-        }
+    for table, key in (("virtual_traffic", "source"), ("siblings", "engine")):
+        if table in flags:
+            flags[table] = {**written.get(table, {}), key: flags[table]}
     config = settings_of_flags(written | flags, DriveConfig, error=ConfigError)
     try:
         return config.validate()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 
 from foretwin.contracts.bus import Bus
@@ -15,8 +16,14 @@ ROLES = {
 """Module and function of each role: the mirror starts without what plays futures."""
 
 
+LAST = 19
+"""Niceness of who gives way: all else that wants a processor comes first."""
+
+
 def serve(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Do the work of the setup's role; raises ValueError naming the known ones."""
+    if setup.gives_way:
+        os.nice(LAST)
     if setup.role not in ROLES:
         raise ValueError(f"unknown role {setup.role!r}; known: {', '.join(sorted(ROLES))}")
     module, name = ROLES[setup.role]

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.spatial  # noqa: F401  A search for many points needs it: not within the first job.
 
 from foretwin.contracts.bus import Bus, Mailbox, Request
+from foretwin.contracts.cpu_use import cpu_taken_s
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.futures import EngineName, FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes, vehicle_digest
@@ -126,6 +127,7 @@ class FuturesWorker:
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
         self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
+        self._began_s = cpu_taken_s()
         self._builder: WorldBuilder | None = None
         self.stacks = {
             name: StackPlanner(
@@ -193,7 +195,7 @@ class FuturesWorker:
         prepared = self._swept.get(job.vehicle, self._stages).get(job.world_id, job.engine)
         result = self._played(job, prepared)
         if question.cells is None:
-            return JobAnswer(result=result)
+            return JobAnswer(result=result, cpu_s=cpu_taken_s() - self._began_s)
         # Parquet takes 40 MB and 0.2 s to import, and a drive's workers write none.
         from foretwin.sim_worker.futures.finished_part import finished_part
 

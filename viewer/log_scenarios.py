@@ -8,6 +8,7 @@ import rerun as rr
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.siblings import SiblingFuture
 from foretwin.contracts.side_by_side import Disagreement
 from foretwin.contracts.simulation import (
     AMBER_FROM,
@@ -52,6 +53,10 @@ def static_rows() -> list[Row]:
         ("path_offset_m", (255, 176, 66), "plan to lane centre, left +"),
     ):
         rows.append(static(f"comparison/plan/{name}", rr.SeriesLines(colors=colour, names=label)))
+    rows += [
+        static(f"siblings/apart_m/{which}", rr.SeriesLines(colors=colour, names=f"{which} future"))
+        for which, colour in (("nominal", TWIN), ("worst", CRITICAL))
+    ]
     return rows
 
 
@@ -185,6 +190,12 @@ def rows_of_comparison(comparison: Comparison, drive_ns: int) -> list[Row]:
     return [
         Row(f"{base}/{name}", drive_ns, rr.Scalars(error.ade_m)) for name, error in errors.items()
     ]
+
+
+def rows_of_sibling(one: SiblingFuture, drive_ns: int) -> list[Row]:
+    """Return how far two engines are apart in a future, at the last instant that both have."""
+    told = [m for m in (one.apart_1_s_m, one.apart_2_s_m, one.apart_4_s_m) if m is not None]
+    return [Row(f"siblings/apart_m/{one.which}", drive_ns, rr.Scalars(m)) for m in told[-1:]]
 
 
 def rows_of_plan_comparison(comparison: PlanComparison, drive_ns: int) -> list[Row]:

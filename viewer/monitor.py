@@ -71,6 +71,7 @@ class Monitor:
             "end": lambda end, ns: self._say("info", f"vehicle: {end.reason}", ns),
             "round": log_scenarios.rows_of_round,
             "comparison": log_scenarios.rows_of_comparison,
+            "sibling": log_scenarios.rows_of_sibling,
             "plan_comparison": log_scenarios.rows_of_plan_comparison,
             "disagreement": lambda one, ns: log_scenarios.rows_of_disagreement(
                 one, ns, self._frame

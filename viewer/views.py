@@ -34,6 +34,7 @@ _TITLES: dict[ViewName, str] = {
     "heading_gap": "Heading gap, deg",
     "speed_gap": "Speed gap, m/s",
     "correction": "Correction, m/s²",
+    "engines": "Engines apart, m",
     "across_after_2_s": "Across after 2 s, m",
     "along_after_2_s": "Along after 2 s, m",
     "heading_after_2_s": "Heading after 2 s, deg",
@@ -132,6 +133,7 @@ _VIEWS: dict[ViewName, Callable[[], rrb.View | rrb.Container]] = {
     ),
     "forecast": _forecast("forecast", 4),
     "short_forecast": _forecast("short_forecast", 1),
+    "engines": _curve("engines", "/siblings/apart_m", legend=True),
     "plan": _curve("plan", "/comparison/plan", legend=True),
     "steering_ratio": _curve(
         "steering_ratio", "/parameters/steering_ratio", legend=True, all_along=True

@@ -31,6 +31,7 @@ from foretwin.orchestrator.commands.cli_options import (
     ProgressTableOption,
     SecureOption,
     ServiceRoadsOption,
+    SiblingsOption,
     TracksOption,
     TuningOption,
     VehicleFileOption,
@@ -130,6 +131,7 @@ def drive(
     progress_table: ProgressTableOption = None,
     map_aiding: MapAidingOption = None,
     virtual_traffic: VirtualTrafficOption = None,
+    siblings: SiblingsOption = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web, copilot or none [default: auto]")
     ] = None,

@@ -92,6 +92,13 @@ VirtualTrafficOption = Annotated[
         help="road users who exist nowhere else: model, scenario, sumo, or off [default: off]"
     ),
 ]
+SiblingsOption = Annotated[
+    str | None,
+    typer.Option(
+        help="a second engine plays nominal and worst futures too: multibody, gazebo, or off "
+        "[default: off]"
+    ),
+]
 EndpointOption = Annotated[
     str | None,
     typer.Option(

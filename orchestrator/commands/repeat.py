@@ -14,9 +14,10 @@ from foretwin.contracts.futures import EngineName
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.record.played_again import play_again
-from foretwin.orchestrator.record.recorded_jobs import recorded_future
+from foretwin.orchestrator.record.recorded_jobs import recorded_future, recorded_sibling
 from foretwin.orchestrator.record.run_folder import REPEATED
 from foretwin.sim_worker.engines.registry import trouble_with_engine
+from foretwin.sim_worker.futures.future_rows import motion_sha256
 
 DIFFERS = 3
 
@@ -24,7 +25,8 @@ DIFFERS = 3
 def elsewhere(folder: Path, future_id: str, physics: str, *, as_json: bool) -> int:
     """Play a recorded future as it was and on another engine, and print how far apart they are.
 
-    Returns 0. Raises FileNotFoundError or UserError, in one line, where it cannot be played.
+    Returns 0, or 3 where it was played on that engine in the drive, too, and came to something else
+    there. Raises FileNotFoundError or UserError, in one line, where it cannot be played.
     """
     if physics not in (known := get_args(EngineName)):
         raise UserError(f"--physics {physics}: {', '.join(known)}")
@@ -38,19 +40,25 @@ def elsewhere(folder: Path, future_id: str, physics: str, *, as_json: bool) -> i
     row = here.future_indices.index(recorded.row.index)
     ways = [result.trajectory.states[row, :, :2] for result in (here, there)]
     apart_m = np.hypot(*(ways[0] - ways[1]).T)
+    told = recorded_sibling(folder, future_id, engine)
+    now = motion_sha256(there, row)
     collided = [bool(result.outcome.collided[row]) for result in (here, there)]
     if as_json:
         words = {"future": future_id, "engines": [recorded.job.engine, engine]}
         apart = {"end_m": float(apart_m[-1]), "most_m": float(apart_m.max())}
-        say(json.dumps(words | {"apart": apart, "collided": collided}))
-        return 0
+        hashes = {"sibling_sha256": told, "sha256": now}
+        say(json.dumps(words | {"apart": apart, "collided": collided} | hashes))
+        return 0 if told in (None, now) else DIFFERS
     said = ["collides" if one else "does not collide" for one in collided]
     say(
         f"{future_id}: {recorded.job.engine} and {engine} end {apart_m[-1]:.2f} m apart, at most "
         f"{apart_m.max():.2f} m; on {recorded.job.engine} it {said[0]}, "
         f"on {engine} it {said[1]}"
     )
-    return 0
+    if told is None:
+        return 0
+    say(f"its sibling of the drive: {'the same again' if told == now else f'differs: {told}'}")
+    return 0 if told == now else DIFFERS
 
 
 def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:

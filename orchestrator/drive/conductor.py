@@ -138,9 +138,8 @@ class Conductor:
         """Begin to estimate: what the vehicle says of itself is known."""
         self.intake.take_info(info)
         self.beside.begin(info)
-        self.rounds.start_stamp_ns = info.start_stamp_ns
+        self.rounds.start_stamp_ns = self.mission.start_stamp_ns = info.start_stamp_ns
         self.rounds.windows.antenna_known = info.body_from_antenna_m is not None
-        self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
             self.tell(unplaced(info.reference_point))
 
@@ -202,8 +201,7 @@ class Conductor:
         """Start a round that was counted as due; returns whether it did."""
         started_mono_ns = time.monotonic_ns()
         with self.rounds.tally.starting():
-            intent = self.mission.plan_round()
-            latest = self.intake.latest
+            intent, latest = self.mission.plan_round(), self.intake.latest
             if intent is None or latest is None:
                 return False
             if isinstance(intent, NotReady):
@@ -282,6 +280,7 @@ class Conductor:
 
     def _worker_up(self, process_id: str) -> None:
         """Give a worker that has the parameters in force its Worlds, and jobs."""
+        self.rounds.siblings.process_up(process_id)
         if not process_id.startswith("w"):
             return
         self.rounds.worker_up(process_id)
@@ -295,6 +294,7 @@ class Conductor:
             self.alive.discard(process_id)
             self.tuning.process_down(process_id)
             log.info("lost %s", process_id)
+            self.rounds.siblings.process_down(process_id)
             if process_id.startswith("w"):
                 self.worlds.worker_down(process_id)
                 self.rounds.worker_down(process_id)

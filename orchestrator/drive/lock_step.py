@@ -72,6 +72,7 @@ class LockStepLoop:
                 conductor.rounds.tally.due += conductor.mission.wants_rounds
                 if conductor.start_round():
                     self._wait("the round", lambda: not conductor.rounds.open)
+                    self._wait("its siblings", lambda: not conductor.rounds.siblings.waits)
                 self._wait("virtual traffic", lambda: not questions.unanswered)
             if self.stop():
                 return False

@@ -26,7 +26,7 @@ from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.campaign.joining import check_campaign
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
-from foretwin.orchestrator.drive import traffic_setup
+from foretwin.orchestrator.drive import sibling_setup, traffic_setup
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
 from foretwin.orchestrator.drive.sensors_setup import check_clouds, read_sensor
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
@@ -65,6 +65,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     except ValueError as error:
         raise ConfigError(str(error)) from error
     traffic_setup.check(config.virtual_traffic)
+    sibling_setup.check(config)
     scenarios_of(config)  # an unknown one is told before anything long begins
     read_layout(config.layout)
     cache = "the cache" if config.cache_dir is None else "cache_dir"

@@ -20,6 +20,7 @@ from foretwin.contracts.setup import (
     WorkerSetup,
 )
 from foretwin.orchestrator.drive import sensors_setup as sensors
+from foretwin.orchestrator.drive import sibling_setup as sibling
 from foretwin.orchestrator.drive import traffic_setup as traffic
 from foretwin.orchestrator.drive.watcher_setups import (
     COPILOT,
@@ -233,10 +234,9 @@ PROCESSES = (
     ProcessRow(ROUTER, "contracts.router", "restart", _router),
     ProcessRow(BUILDER, "orchestrator.worlds.builder_process", "restart", _builder, nice=10),
     ProcessRow("w", "sim_worker", "restart", _worker, how_many=lambda plan: plan.config.workers),
+    ProcessRow(sibling.SIBLING, "sim_worker", "restart", _made_by(sibling.made), 19, sibling.runs),
     ProcessRow(MIRROR, "sim_worker", "restart", _worker),
-    ProcessRow(
-        traffic.TRAFFIC, traffic.MODULE, "restart", _made_by(traffic.made), runs=traffic.runs
-    ),
+    ProcessRow(traffic.TRAFFIC, traffic.MODULE, "restart", _made_by(traffic.made), 0, traffic.runs),
     ProcessRow(TUNING, "sim_worker.analysis.process", "restart", _tuning, nice=10, runs=_tunes),
     ProcessRow(sensors.SENSORS, sensors.MODULE, "restart", _made_by(sensors.made), 5, sensors.runs),
     ProcessRow(RECORDER, "telemetry.processes.recorder", "restart", _made_by(recorder_setup)),

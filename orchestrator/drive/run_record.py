@@ -73,6 +73,7 @@ def run_record(
         "calibration": conductor.rounds.forecast_count.record(),
         "plan_comparison": conductor.rounds.plans.record(),
         "side_by_side": conductor.ads.record(),
+        "siblings": conductor.rounds.siblings.count.record(plan.config.siblings),
         "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),
         "processor": msgspec.to_builtins(cpu_uses(plan.processes_dir)),
         "orchestrator": {"restarts": len(ended_by), "ended_by": list(ended_by)},

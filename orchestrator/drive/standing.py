@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import pickle
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,6 +52,7 @@ class RoundsStanding:
     sickness: Sickness
     failed_jobs: int
     off_lanes_rounds: int
+    siblings_dropped: Counter[str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,6 +143,7 @@ def standing_of(
                 sickness=dispatch.sickness,
                 failed_jobs=rounds.failed_jobs,
                 off_lanes_rounds=rounds.futures.off_lanes_rounds,
+                siblings_dropped=rounds.siblings.count.dropped,
             ),
             heard=heard,
             roles=conductor.roles.roles,
@@ -225,6 +228,8 @@ def _go_on_with_rounds(conductor: Conductor, standing: RoundsStanding, results: 
     rounds, counts = conductor.rounds, counted_in_tables(results)
     rounds.futures, rounds.comparisons, rounds.plans = counts[:3]
     rounds.forecast_count = counts.forecasts
+    rounds.siblings.count = counts.siblings
+    rounds.siblings.count.dropped = standing.siblings_dropped
     rounds.futures.off_lanes_rounds = standing.off_lanes_rounds
     rounds.windows.go_on(kept_windows(results).windows, conductor.worlds.world)
     rounds.next_round_id = max(standing.next_round_id, counts.last_round_id + 1)

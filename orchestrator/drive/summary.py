@@ -7,7 +7,9 @@ from typing import Any
 
 from foretwin.contracts.terminal import plain
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines
+from foretwin.orchestrator.record.sibling_count import sibling_lines
 from foretwin.orchestrator.record.whereabouts import junction_name
+from foretwin.orchestrator.rounds.siblings import SIBLING
 from foretwin.orchestrator.tuning.words import summary_lines
 
 DISAGREEMENTS_SHOWN = 12
@@ -80,10 +82,17 @@ def summary_text(record: dict[str, object]) -> str:
         lines.append("  the car's position came from GNSS and the map")
     lines += side_by_side_lines(record.get("side_by_side"), junctions)
     lines += agreement_lines(record.get("agreement"), junctions)  # type: ignore[arg-type]
+    lines += sibling_lines(record.get("siblings"), _share_of_core(record))  # type: ignore[arg-type]
     lines += summary_lines(record["tuning"], junctions)  # type: ignore[arg-type]
     lines += _free_twin_lines(record.get("free_twin"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join(plain(line) for line in (*lines, attribution))
+
+
+def _share_of_core(record: dict[str, Any]) -> float | None:
+    """Return what the second engine's process took of a core while it could play."""
+    share: float | None = record.get("processor", {}).get(SIBLING, {}).get("share_of_core")
+    return share
 
 
 def _free_twin_lines(free_twin: dict[str, int] | None) -> list[str]:

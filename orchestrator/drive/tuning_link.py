@@ -11,6 +11,7 @@ from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.processes import MIRROR, TUNING
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.rounds.runner import RoundRunner
+from foretwin.orchestrator.rounds.siblings import SIBLING
 from foretwin.orchestrator.tuning.findings import Findings
 from foretwin.orchestrator.tuning.parameter_versions import (
     ParameterVersions,
@@ -99,9 +100,10 @@ class TuningLink:
         return awaited
 
     def _expect_no_watcher(self) -> None:
-        """Live, let no round wait for a process that only watches: it may be seconds behind."""
+        """Live, let no round wait for who only watches or gives way: it may be seconds late."""
         if not self._config.lock_step:
             self.parameters.answered(TUNING)
+            self.parameters.answered(SIBLING)
 
     def process_down(self, process_id: str) -> None:
         """Wait no more for a process that is gone."""
@@ -138,7 +140,7 @@ class TuningLink:
             self.parameters.apply(found)
 
     def _simulates(self, process_id: str) -> bool:
-        return process_id in (MIRROR, TUNING) or process_id.startswith("w")
+        return process_id in (MIRROR, TUNING, SIBLING) or process_id.startswith("w")
 
     def _ask(self, process_id: str, message: UseVehicle) -> None:
         self._context.request(

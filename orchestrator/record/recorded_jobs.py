@@ -13,15 +13,16 @@ import pyarrow.compute as pc
 from foretwin.contracts.arithmetic import arithmetic_sha256
 from foretwin.contracts.codec import SchemaMismatch, read_message
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import Job
+from foretwin.contracts.futures import EngineName, Job
 from foretwin.contracts.job_identity import future_id, job_from_bytes, vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.versions import processor, versions
 from foretwin.contracts.world import World
 from foretwin.contracts.world_identity import with_id
+from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.result_files import check_result_schema, opened
 from foretwin.orchestrator.record.run_folder import VEHICLES, table_at
-from foretwin.orchestrator.record.run_state import check_finished
+from foretwin.orchestrator.record.run_state import RESULTS, check_finished
 from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.sim_worker.world_file import load_world
 
@@ -92,6 +93,14 @@ def recorded_future(folder: Path, wanted: str) -> RecordedFuture:
     except SchemaMismatch as error:
         raise UserError(str(error)) from error
     return RecordedFuture(row, job, world, vehicle)
+
+
+def recorded_sibling(folder: Path, wanted: str, engine: EngineName) -> str | None:
+    """Return the hash of a future's motion on another engine in the drive; None where it was not
+    played there."""
+    rows = kept_rows(folder / RESULTS, "siblings", "future_id", "engine", "motion_sha256")
+    found = (row for row in rows if (row["future_id"], row["engine"]) == (wanted, engine))
+    return next((str(row["motion_sha256"]) for row in found), None)
 
 
 def kept_world(folder: Path, world_id: str) -> World:

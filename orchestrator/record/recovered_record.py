@@ -12,6 +12,7 @@ import msgspec
 from foretwin.contracts.cpu_use import cpu_uses
 from foretwin.contracts.running import RunningMeans
 from foretwin.contracts.segments import DRIVE_FILE
+from foretwin.contracts.siblings import Siblings
 from foretwin.contracts.tally import tally_file
 from foretwin.orchestrator.record.bookkeeping import (
     ComparisonCount,
@@ -25,6 +26,7 @@ from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.ledger import JobsLedger, RoundsLedger
 from foretwin.orchestrator.record.refused_elsewhere import refused_elsewhere
 from foretwin.orchestrator.record.run_state import PROCESSES, RESULTS
+from foretwin.orchestrator.record.sibling_count import SiblingCount
 from foretwin.orchestrator.record.so_far import read_so_far
 from foretwin.orchestrator.record.telemetry_ledger import telemetry_ledger
 from foretwin.orchestrator.record.visited import visited_junctions
@@ -50,6 +52,7 @@ class TableCounts(NamedTuple):
     comparisons: ComparisonCount
     plans: PlanCount
     forecasts: ForecastCount
+    siblings: SiblingCount
     last_round_id: int = -1
     last_round_s: float | None = None
 
@@ -69,7 +72,11 @@ def counted_in_tables(results: Path) -> TableCounts:
     rounds = kept_rows(results, "rounds")
     for row in rounds:
         futures.take_row(row)
+    siblings = SiblingCount()
+    for row in kept_rows(results, "siblings"):
+        siblings.take(row)
     for row in kept_rows(results, "comparisons"):
+        siblings.take_error(row["round_id"], row["horizon_s"], row["nominal_fde_m"])
         errors = (row[f"{name}_ade_m"] for name in _BASELINES)
         comparisons.errors[row["horizon_s"]].take((next(errors), next(errors), next(errors)))
         if (weighted := row.get("weighted_ade_m")) is not None:  # none of an older foretwin
@@ -80,7 +87,7 @@ def counted_in_tables(results: Path) -> TableCounts:
     counted = PlanCount(RunningMeans([row[name] for name in columns] for row in plans))
     forecasts = ForecastCount()
     forecasts.take_rows(kept_rows(results, "forecasts"))
-    return TableCounts(futures, comparisons, counted, forecasts, *last)
+    return TableCounts(futures, comparisons, counted, forecasts, siblings, *last)
 
 
 def recovered_record(
@@ -129,6 +136,8 @@ def _told_by_tables(run: Path, said: Mapping[str, Any]) -> dict[str, Any]:
         told["plan_comparison"] = counts.plans.record()
     if "forecasts.parquet" not in gone and counts.forecasts.rows.count:
         told["calibration"] = counts.forecasts.record()
+    chosen = ((said.get("config") or {}).get("siblings")) or {}
+    told["siblings"] = counts.siblings.record(msgspec.convert(chosen, Siblings))
     if "junctions.parquet" not in gone:
         told["intersections"] = visited_junctions(results).records
     mirror = kept_rows(results, "mirror", "independent")

@@ -17,6 +17,7 @@ from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.gap import GapSample
 from foretwin.contracts.marks import EventMark
 from foretwin.contracts.roles import VehicleEncounter
+from foretwin.contracts.siblings import SiblingFuture
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.contracts.simulation import (
     Comparison,
@@ -74,17 +75,16 @@ _COLUMNS = {
         + " flip_along_fails:str flip_across_fails:str flip_both_fails:str"
     ),
     "windows": columns("round_id:int stamp_ns:int world_id:str vehicle:str window:bytes"),
+    "siblings": columns_of(SiblingFuture),
     "mirror": columns_of(MirrorSample, MIRROR),
     "mirrored": {"stamp_ns": int, **columns_of(MirroredVehicle, MIRRORED)},
     "touches": columns("stamp_ns:int one:str other:str"),
     "encounters": columns_of(VehicleEncounter),
     "changes": columns("stamp_ns:int asked_stamp_ns:int key:str before:str value:str"),
     "parameters": {"version": int, **columns_of(ParameterChange, PARAMETER)},
-    "identifications": {
-        **columns("stamp_ns:int from_stamp_ns:int"),
-        **columns_of(ParameterEstimate),
-        "taken": bool,
-    },
+    "identifications": columns("stamp_ns:int from_stamp_ns:int")
+    | columns_of(ParameterEstimate)
+    | {"taken": bool},
     "gaps": columns_of(GapSample, GAP),
     "verdicts": columns(
         "stamp_ns:int since_stamp_ns:int culprit:str cause:str text:str evidence:str "

@@ -26,6 +26,7 @@ _ROWS = {
     "driven_segments": "a stretch between two takeovers",
     "agreement": "one window that was simulated and then driven, judged",
     "windows": "one window, with all that judging it needs",
+    "siblings": "a future of a round on a second engine, beside the same one on MuJoCo",
     "mirror": "the real car, its twin, shadow and ghost at one instant, and the gap between them",
     "mirrored": "a vehicle beside the car at one instant",
     "touches": "two who began to touch in the mirror",
@@ -189,6 +190,22 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "uncertain_m": "of that distance: one standard deviation, from both positions and clocks, "
         "and the bound of who was reckoned then",
         "touched": "whether their outlines overlapped",
+    },
+    "siblings": {
+        "engine": "whose physics moved the car the second time",
+        "which": "nominal or worst: of the round's, the future of the highest criticality",
+        "future_id": "the round's future, in the table of futures",
+        **{
+            f"apart_{after}_s_m": f"distance of both engines' cars after {after} s"
+            for after in (1, 2, 4)
+        },
+        "heading_rad": "second engine's heading minus MuJoCo's, at the last of these instants",
+        "collided": "whether the car collides on MuJoCo",
+        "sibling_collided": "whether it collides on the second engine",
+        "matters": "whether the co-pilot was to know that engines disagree",
+        "cpu_seconds": "what the second engine's process took for it, of one core",
+        "took_s": "from the question to its answer",
+        "motion_sha256": "hash of the second engine's motion, which foretwin repeat finds again",
     },
     "changes": {
         "asked_stamp_ns": "when it was asked for",

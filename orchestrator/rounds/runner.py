@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -30,6 +29,7 @@ from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.rounds.news import RoundNews
 from foretwin.orchestrator.rounds.pace import Pace, Played, RoundPace
 from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
+from foretwin.orchestrator.rounds.siblings import SIBLING, SiblingRounds
 from foretwin.orchestrator.rounds.views import place_of, round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
 from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
@@ -67,13 +67,10 @@ class RoundRunner:
         self.dispatcher = BusDispatcher(
             context.bus, context.mailbox, run_id=plan.run_id, expected=self._expected
         )
-        self.tally = RoundTally()
-        self.futures = FuturesCount()
-        self.comparisons = ComparisonCount()
-        self.plans = PlanCount()
+        self.tally, self.futures = RoundTally(), FuturesCount()
+        self.comparisons, self.plans = ComparisonCount(), PlanCount()
         self.rtf: dict[str, float] = {}
-        self.failed_jobs = 0
-        self.start_stamp_ns = 0
+        self.next_round_id = self.failed_jobs = self.start_stamp_ns = 0
         self._context, self._plan = context, plan
         self._tables = context.tables
         self.on_other: Callable[[Answer], None] = lambda _: None  # of a task that is no round's
@@ -89,9 +86,9 @@ class RoundRunner:
             least=plan.config.fewest_futures,
             period_s=1.0 / plan.config.rate_hz,
         )
-        self.next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
         self._news = RoundNews(context.tell)
+        self.siblings = SiblingRounds(context)
         self.forecast_count = ForecastCount()
         self.progress = None
         if plan.progress is not None:
@@ -150,7 +147,7 @@ class RoundRunner:
             for named in order.recorded:
                 self._take(self.dispatcher.without_takers(named.sha256))
         for order in self.open.orders:
-            if _took_s(order) > GIVEN_UP_AFTER_S:
+            if order.age_s > GIVEN_UP_AFTER_S:
                 self.open.drop()
                 self._fail(order, f"not complete within {GIVEN_UP_AFTER_S:g} s")
 
@@ -183,6 +180,9 @@ class RoundRunner:
     def reply(self, reply: Reply) -> None:
         """Take a worker's answer; one that does not fit its job counts as refused."""
         worker_id, task = reply.tag
+        if worker_id == SIBLING:
+            self.siblings.reply(reply)
+            return
         if reply.message is not None:
             misfit = self.open.misfit(task.key, reply.message.result)
             if misfit:
@@ -217,7 +217,7 @@ class RoundRunner:
         for named in order.recorded:
             self.dispatcher.cancel(named.sha256)
         pace = self._seeds.pop(order.round_id).pace
-        if _took_s(order) >= GIVEN_UP_AFTER_S:
+        if order.age_s >= GIVEN_UP_AFTER_S:
             self._take_time(pace, math.inf)
 
     @traced("comparisons due")
@@ -273,6 +273,7 @@ class RoundRunner:
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._open_comparisons.take_round(done, world.frame, seed.state, futures.likelihood)
             self.windows.take_round(done, seed.intent.path, world)
+            self.siblings.take_round(done, futures, rows)
             self._keep_plan(
                 done, plan_compared(done, seed.plan, seed.state, seed.intent.path, world)
             )
@@ -292,9 +293,6 @@ class RoundRunner:
 
     def _keep(self, comparison: Comparison) -> None:
         self.comparisons.take(comparison)
+        self.siblings.take_comparison(comparison)
         self._tables.add("comparisons", [row_of(comparison)])
         self._context.publish("comparison", comparison)
-
-
-def _took_s(order: RoundOrder) -> float:
-    return (time.monotonic_ns() - order.started_mono_ns) * 1e-9

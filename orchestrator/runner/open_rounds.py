@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -45,6 +46,11 @@ class RoundOrder:
     def due_s(self) -> float | None:
         """When it is late, on the monotonic clock."""
         return None if self.deadline_mono_ns is None else self.deadline_mono_ns / 1e9
+
+    @property
+    def age_s(self) -> float:
+        """How long ago it was started."""
+        return (time.monotonic_ns() - self.started_mono_ns) * 1e-9
 
     @property
     def tasks(self) -> tuple[Task, ...]:
@@ -140,14 +146,15 @@ class OpenRounds:
         for order in self._orders.values():
             for job, named in zip(order.jobs, order.recorded, strict=True):
                 if named.sha256 == key:
-                    return _misfit(job, result)
+                    return misfit_of(job, result)
         return "" if result is not None else "rows where trajectories were asked for"
 
     def _close(self, order: RoundOrder) -> None:
         del self._orders[order.round_id], self._results[order.round_id]
 
 
-def _misfit(job: Job, result: FuturesResult | None) -> str:
+def misfit_of(job: Job, result: FuturesResult | None) -> str:
+    """Return why a result is not that of a job, in words; empty where it is."""
     if result is None:
         return "rows where trajectories were asked for"
     played = result.future_indices + tuple(index for index, _ in result.unplaced)

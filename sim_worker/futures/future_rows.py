@@ -93,6 +93,18 @@ _OF_JOB = ("round_id", "job_index", "world_id", "vehicle_version", "seed", "hori
 _OF_ACCIDENT = ("time_s", "angle_rad", "closing_mps", "ego_delta_v_mps", "user_delta_v_mps")
 
 
+def motion_sha256(result: FuturesResult, place: int) -> str:
+    """Return a hash of how the car and all others move in a future, by its place in its result.
+
+    It is that of the future in any job: places of road users whom only others of its job have are
+    left out.
+    """
+    states, users = result.trajectory.states[place], result.road_users.poses[place]
+    there = users[:, ~np.isnan(users[:, :, 0]).all(axis=0)]
+    moved = np.ascontiguousarray(states).tobytes() + np.ascontiguousarray(there).tobytes()
+    return hashlib.sha256(moved).hexdigest()
+
+
 def _job_columns(job: Job, future: Future, job_sha256: str) -> Row:
     return {
         **{name: getattr(job, name) for name in _OF_JOB},

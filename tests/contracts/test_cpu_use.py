@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts import cpu_use
-from foretwin.contracts.cpu_use import CpuMeter, cpu_uses
+from foretwin.contracts.cpu_use import CpuMeter, cpu_taken_s, cpu_uses
 
 BURNS = """
 import sys, time
@@ -62,7 +62,7 @@ def test_each_process_is_known_with_all_its_lives(tmp_path: Path) -> None:
 def test_the_share_is_that_since_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = {"wall_s": 100.0, "cpu_s": 3.004}
     monkeypatch.setattr(cpu_use.time, "monotonic", lambda: clock["wall_s"])
-    monkeypatch.setattr(cpu_use.time, "process_time", lambda: clock["cpu_s"])
+    monkeypatch.setattr(cpu_use, "cpu_taken_s", lambda: clock["cpu_s"])
     meter = CpuMeter(tmp_path, "viewer")
     meter.write()
     assert cpu_uses(tmp_path)["viewer"].share_of_core is None
@@ -100,3 +100,17 @@ def test_what_is_damaged_is_passed_over(tmp_path: Path) -> None:
     (tmp_path / "w1-7.cpu").write_bytes(b"")
     CpuMeter(tmp_path, "w0").write()
     assert list(cpu_uses(tmp_path)) == ["w0"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="nobody tells of those that still run")
+def test_what_a_process_started_counts_with_it() -> None:
+    burns = "import time\nwhile time.process_time() < 0.3: pass\nprint(1, flush=True)\ninput()"
+    before_s = cpu_taken_s()
+    with subprocess.Popen(
+        [sys.executable, "-c", burns], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"1\n"
+        assert cpu_taken_s() - before_s >= 0.25, "while it runs"
+        process.communicate(b"\n")
+    assert cpu_taken_s() - before_s >= 0.25, "once it has ended"

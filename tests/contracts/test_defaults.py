@@ -25,6 +25,7 @@ from foretwin.contracts import (
     scenario,
     segments,
     setup,
+    siblings,
     simulation,
     tally,
     towards_vehicle,
@@ -81,6 +82,7 @@ LISTED: dict[str, dict[str, Any]] = {
     "Roll": {"most_bytes": 67_108_864, "most_s": 3600.0},
     "Scenario": {"horizon_s": 8.0, "lead_time_s": 4.0, "samples": 1},
     "SensorSetup": {"sees": "world"},
+    "Siblings": {"engine": "off", "share": 0.2},
     "StackSetup": {"instances": 1, "answer_within_s": 60.0, "start_within_s": 120.0},
     "StandinSetup": {"speed": 1.0},
     "Tally": {"part": 1},
@@ -103,7 +105,8 @@ LISTED: dict[str, dict[str, Any]] = {
 """Of faults those that are neutral are listed in the table of numbers."""
 FILES = (campaign, credentials, process_setup, roles, scenario, segments, setup, vehicle)
 MESSAGES = (
-    drive, futures, gap, numbering, parts, placement, planner_link, runner, simulation, tally,
+    drive, futures, gap, numbering, parts, placement, planner_link, runner, siblings, simulation,
+    tally,
     towards_vehicle, tuning, world,
 )  # fmt: skip
 KINDS = sorted(

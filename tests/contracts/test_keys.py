@@ -78,7 +78,7 @@ def test_how_often_each_is_said() -> None:
         },
         8: {"comparison"},
         5: {"progress"},
-        4: {"gap"},
+        4: {"gap", "sibling"},
         2: {"use_course", "job", "round", "plan_comparison", "worker_status"},
         1: {"signals", "route", "clock", "vehicle_clock", "join"},
         0.2: {"identification"},

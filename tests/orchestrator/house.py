@@ -155,6 +155,8 @@ class Worker(Process):
         """What its planners say of each future."""
         self.spoil: Callable[[FuturesResult], FuturesResult] = lambda result: result
         """What a sick worker makes of its results."""
+        self.cpu_s = 0.0
+        """What it says that it has taken until now."""
         self.diverges = False
         """Whether its simulations end in numbers that are none."""
         super().__init__(plan, bus, worker_id, ("prepare", "job"), at_once=at_once)
@@ -178,7 +180,7 @@ class Worker(Process):
         if self.diverges:
             futures.trajectory.states[:, 1:] = np.nan
             futures.outcome.valid[:] = False
-        request.reply(JobAnswer(result=self.spoil(futures)))
+        request.reply(JobAnswer(result=self.spoil(futures), cpu_s=self.cpu_s))
 
 
 class House:

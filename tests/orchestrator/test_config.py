@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.siblings import Siblings
 from foretwin.orchestrator.config import ConfigError, DriveConfig
 from foretwin.orchestrator.config_file import load_config, parse_speed
 
@@ -142,3 +143,11 @@ def test_no_file_can_hold_the_command_lines_switch_towards_the_vehicle(tmp_path:
     file.write_text('source = "live"\nros2 = "autoware"\ntowards_vehicle = true\n')
     with pytest.raises(ConfigError, match="towards_vehicle: on the command line alone"):
         load_config(file, {"towards_vehicle": True})
+
+
+def test_a_flag_names_the_engine_of_siblings_and_the_file_its_share(tmp_path: Path) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text("[siblings]\nshare = 0.05\n")
+    config = load_config(file, {"siblings": "multibody"})
+    assert config.siblings == Siblings(engine="multibody", share=0.05)
+    assert load_config(None, {}).siblings == Siblings(engine="off")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import msgspec
@@ -33,6 +34,15 @@ def test_the_role_of_the_setup_is_served(monkeypatch: pytest.MonkeyPatch) -> Non
     life = ProcessLife(SETUP, bus)
     serve(SETUP, bus, life)
     assert served == [(SETUP, bus, life)]
+
+
+def test_who_gives_way_does_so_before_it_loads_anything(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[object] = []
+    monkeypatch.setattr(os, "nice", done.append)
+    monkeypatch.setattr(worker, "serve_futures", lambda *_: done.append("served"))
+    gives_way, bus = msgspec.structs.replace(SETUP, gives_way=True), MemoryBus()
+    serve(gives_way, bus, ProcessLife(gives_way, bus))
+    assert done == [19, "served"]
 
 
 def test_an_unknown_role_names_the_known_ones() -> None:

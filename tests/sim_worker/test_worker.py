@@ -102,8 +102,11 @@ def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
     prepared = asked(served, "prepare", PrepareRequest(world_id="crossroads"))
     assert (prepared.world_id, prepared.worker_id) == ("crossroads", "w0")
     question = job(plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
-    result = asked(served, "job", request(question)).result
+    answer = asked(served, "job", request(question))
+    result = answer.result
     assert result.worker_id == "w0"
+    again = asked(served, "job", request(question))
+    assert 0.0 < answer.cpu_s < again.cpu_s - 0.5 * result.cpu_seconds
     here = run_job(question, BatchSimulation(crossroads(), CAR, nsim=32))
     assert result_digest(result) == result_digest(here)
 

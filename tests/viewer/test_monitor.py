@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.siblings import SiblingFuture
 from foretwin.contracts.side_by_side import Disagreement
 from foretwin.contracts.simulation import (
     AMBER_FROM,
@@ -265,3 +266,20 @@ def test_threats_say_who_comes_from_where_how_likely_and_when() -> None:
         shown.positions.as_arrow_array().to_pylist(), [[20.0, 0.0, 1.2]] * 2, atol=1e-5
     )
     assert not len(Shown(rows_of_round(round_of(), 0))["world/futures/threats"].labels)
+
+
+def test_how_far_engines_are_apart_is_a_curve_for_each_future() -> None:
+    monitor = monitor_of()
+    one = SiblingFuture(
+        round_id=1, stamp_ns=scene.state_at(7.0).stamp_ns, engine="multibody", which="worst",
+        future_id="a-3", apart_1_s_m=0.1, apart_2_s_m=0.2, apart_4_s_m=None, heading_rad=0.0,
+        collided=False, sibling_collided=False, matters=False, cpu_seconds=0.1, took_s=0.2,
+        motion_sha256="",
+    )  # fmt: skip
+    shown = Shown(monitor.handle("sibling", one))
+    scalars = shown["siblings/apart_m/worst"].scalars.as_arrow_array().to_pylist()
+    assert scalars == [0.2], "the last that both have"
+    nowhere = msgspec.structs.replace(one, apart_1_s_m=None, apart_2_s_m=None)
+    assert monitor.handle("sibling", nowhere) == []
+    opening = [row.path for row in monitor.opening()]
+    assert {"siblings/apart_m/nominal", "siblings/apart_m/worst"} <= set(opening)

@@ -8,12 +8,14 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.codec import write_message
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep
+from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_folder import REPEATED
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
@@ -227,3 +229,24 @@ def test_on_another_engine_it_says_how_far_apart_they_are(
     assert _said(capsys).endswith("--physics mojuco: mujoco, multibody, gazebo, carla\n")
     assert run(["repeat", str(swept), future_id, "--physics", "carla"]) == 2
     assert "needs CARLA's Python package" in _said(capsys)
+
+
+def test_what_it_came_to_as_a_sibling_in_the_drive_is_compared(
+    copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future_id = _rows(copied)[0]["future_id"]
+    asked = ["repeat", str(copied), future_id, "--physics", "multibody"]
+    assert run([*asked, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["sibling_sha256"] is None
+    (copied / "results").mkdir()
+    sibling = {"future_id": future_id, "engine": "multibody", "motion_sha256": said["sha256"]}
+    for row, code, words in (
+        (sibling, 0, "its sibling of the drive: the same again"),
+        (sibling | {"motion_sha256": "0" * 64}, 3, "its sibling of the drive: differs: 000"),
+        (sibling | {"engine": "gazebo"}, 0, "does not collide"),
+    ):
+        rows = pa.Table.from_pylist([row], schema=TABLES["siblings"])
+        pq.write_table(rows, copied / "results" / "siblings.parquet")
+        assert run(asked) == code
+        assert words in capsys.readouterr().out

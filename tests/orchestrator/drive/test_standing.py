@@ -52,6 +52,7 @@ def killed(folder: Path, *, open_round: bool = True, crashed: bool = False) -> T
     watched = watch()
     watched.troubles.append("w1 ended")
     watched.given_up.add("w1")
+    first.conductor.rounds.siblings.count.dropped["late"] += 2
     left = standing_of(first.conductor, watched, grid=GRID, heard=heard_of(first.conductor))
     first.tables.leave()
     second = House(folder, at_once=True, plan=first.plan)
@@ -152,6 +153,7 @@ def test_what_else_was_known_is_known_again(twice: Twice) -> None:
     second = twice.second.conductor
     assert twice.watch.troubles == ["w1 ended"]
     assert twice.watch.given_up == {"w1"}
+    assert second.rounds.siblings.count.dropped == {"late": 2}
     assert twice.standing.grid == GRID
     assert second.intake.counts.received == twice.first.conductor.intake.counts.received > 0
     assert second.mission.way.place.s_m == twice.first.mission.way.place.s_m > 0.0

@@ -13,6 +13,8 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.tally import read_tally, tally_file, write_tally
 from foretwin.orchestrator.commands.recover import ledger_lines
 from foretwin.orchestrator.record.recovery import recover
+from foretwin.orchestrator.record.results import TABLES
+from foretwin.orchestrator.record.run_streams import RunStreams
 from foretwin.orchestrator.record.so_far import (
     SO_FAR,
     forget_so_far,
@@ -25,6 +27,7 @@ from tests.orchestrator.record.ended_badly import ROUNDS, killed_run
 
 COVERS = ("foretwin.orchestrator.record.so_far",)
 
+BASELINES = "nominal", "constant_velocity", "constant_turn_rate"
 LEDGER = {
     "telemetry": {"published": 3, "recorded": 3, "lost": 0},
     "rounds": {"due": 4, "run": 1, "missed": 1, "spared": 0, "unseeded": 0, "given_up": 0},
@@ -158,3 +161,26 @@ def test_where_old_parts_are_gone_what_was_said_of_all_of_them_counts(tmp_path: 
     assert record["futures"] == SAID["futures"]
     assert record["ledger"]["rounds"] == LEDGER["rounds"] | {"given_up": 2}
     assert record["kept"]["removed"]["rounds.parquet"]["parts"] == 1
+
+
+def test_siblings_are_counted_from_their_table(tmp_path: Path) -> None:
+    run = killed_run(tmp_path / "run")
+    streams = RunStreams(run / "results", {n: TABLES[n] for n in ("siblings", "comparisons")})
+    rows = [
+        {"round_id": number, "which": "nominal", "apart_4_s_m": 0.1 * number, "matters": False,
+         "collided": False, "sibling_collided": False, "cpu_seconds": 0.1}
+        for number in range(3)
+    ]  # fmt: skip
+    streams.take("siblings", rows)
+    errors = dict.fromkeys((f"{name}_ade_m" for name in BASELINES), 1.0)
+    driven = [
+        {"round_id": n, "horizon_s": 4.0, "nominal_fde_m": 2.0 - n} | errors for n in (0, 1, 2)
+    ]
+    streams.take("comparisons", driven)
+    streams.write(sync=True)
+    streams.close()
+    config = {"futures": 12, "keep": None, "siblings": {"engine": "multibody", "share": 0.2}}
+    write_so_far(run, so_far_bytes(SAID | {"config": config}, {}))
+    recover(run)
+    told = record_of(run)["siblings"]
+    assert (told["rounds"], told["with_reality"]) == (3, {"count": 3, "rank_correlation": -1.0})

@@ -10,7 +10,12 @@ import numpy as np
 from foretwin.contracts.futures import Future, SeenRoadUser
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.future_rows import FUTURE_COLUMNS, future_rows, road_user_names
+from foretwin.sim_worker.futures.future_rows import (
+    FUTURE_COLUMNS,
+    future_rows,
+    motion_sha256,
+    road_user_names,
+)
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, happening, job
@@ -53,3 +58,16 @@ def test_without_a_result_rows_hold_what_was_asked() -> None:
     (row,) = future_rows(job((happening(0, "scp"),)), None, job_sha256="0" * 64)
     assert (row["scenario"], row["failure"]) == ("scp", "")
     assert "collided" not in row
+
+
+def test_the_hash_of_a_motion_is_that_of_the_future_in_any_job() -> None:
+    alone, crossed = Future(index=5, name="alone"), happening(2, "scp")
+    stage = BatchSimulation(crossroads(), load_vehicle(), nsim=2)
+    both = run_job(job((crossed, alone)), stage)
+    one = run_job(job((alone,)), stage)
+    assert both.road_users.poses.shape[2] > one.road_users.poses.shape[2]
+    assert motion_sha256(both, 1) == motion_sha256(one, 0) != motion_sha256(both, 0)
+    one.trajectory.states[0, -1, 0] += 1e-3
+    assert motion_sha256(one, 0) != motion_sha256(both, 1)
+    both.road_users.poses[0, 0, 0, 0] += 1e-3
+    assert motion_sha256(both, 0) != motion_sha256(run_job(job((crossed,)), stage), 0)
