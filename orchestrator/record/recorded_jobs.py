@@ -134,7 +134,8 @@ def _file_of(table: Path, column: str, value: str) -> Path:
         try:
             with opened(path) as file:
                 check_result_schema(path, file.schema_arrow)
-                if pc.any(pc.equal(file.read([column])[column], value)).as_py():
+                # Ids are; Arrow takes no text that is not Unicode.
+                if value.isascii() and pc.any(pc.equal(file.read([column])[column], value)).as_py():
                     return path
         except UserError as error:
             unread = unread or error
