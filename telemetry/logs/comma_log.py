@@ -8,8 +8,9 @@ and gyroscope are in the sensor's axes, which openpilot's locationd turns by (-z
 device's forward, right, down; the device's tilt against the car is left in. An accuracy is taken as
 one standard deviation on each axis, as the schema presumes.
 
-A qlog holds every tenth message or so. No real log could be had: files that Cap'n Proto's own
-library wrote with openpilot's schemas are read (tests/data/comma).
+A qlog holds every tenth message or so, and its two sensors seldom together: what is told of one
+alone is counted as left out. Files that Cap'n Proto's own library wrote with openpilot's schemas
+are read (tests/data/comma); of real logs one qlog of a parked car could be had, without positions.
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ _INDICATORS: dict[tuple[bool, bool], drive.Indicator] = {
 }  # fmt: skip
 _WINDOW_NS = 1_000_000_000
 _FRESH_NS = 100_000_000
+_NO_ACCELERATION = "gyroscope without accelerometer"
 _MOST_NS = int(MOST_TIME_S * 1e9)
 _DAMAGED = (MessageError, OSError, EOFError, ValueError)
 
@@ -146,7 +148,7 @@ def _samples(path: Path, outside: bool, skipped: Counter[str]) -> Iterator[Sampl
                     if kind == _ACCELERATION:
                         accel = (stamp_ns, _in_the_cars_axes(reading))
                     elif kind in (_GYRO, _GYRO_UNCALIBRATED):
-                        yield from _imu(stamp_ns, accel, _in_the_cars_axes(reading))
+                        yield from _imu(stamp_ns, accel, _in_the_cars_axes(reading), skipped)
         except MessageError:
             skipped[UNREADABLE_ROW] += 1
 
@@ -159,12 +161,17 @@ def _readings(event: Struct, which: int) -> list[Struct]:
 
 
 def _imu(
-    stamp_ns: int, accel: tuple[int, drive.Vector3] | None, rate_radps: drive.Vector3
+    stamp_ns: int,
+    accel: tuple[int, drive.Vector3] | None,
+    rate_radps: drive.Vector3,
+    skipped: Counter[str],
 ) -> Iterator[Sample]:
     """Yield the gyroscope's sample with the accelerometer's last, where that is fresh."""
-    if accel is not None and stamp_ns - accel[0] <= _FRESH_NS:
-        sample = drive.ImuSample(stamp_ns=stamp_ns, accel_mps2=accel[1], rate_radps=rate_radps)
-        yield "imu", sample
+    if accel is None or stamp_ns - accel[0] > _FRESH_NS:
+        skipped[_NO_ACCELERATION] += 1
+        return
+    sample = drive.ImuSample(stamp_ns=stamp_ns, accel_mps2=accel[1], rate_radps=rate_radps)
+    yield "imu", sample
 
 
 def _gps(event: Struct, stamp_ns: int, skipped: Counter[str]) -> Iterator[Sample]:

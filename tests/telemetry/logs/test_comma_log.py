@@ -51,6 +51,14 @@ def test_units_signs_and_axes() -> None:
     assert shown.found["imu"][0].accel_mps2[1] > 0.0  # a turn to the left pushes to the left
 
 
+def test_a_gyroscope_alone_is_counted_and_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In qlogs of real cars the accelerometer is told at other times than the gyroscope."""
+    monkeypatch.setattr("foretwin.telemetry.logs.comma_log._FRESH_NS", -1)
+    log = open_log(LOGS / "before--qlog.bz2")
+    assert "imu" not in by_channel(log)
+    assert log.skipped == {"gyroscope without accelerometer": 400}
+
+
 def test_messages_of_2018() -> None:
     found = by_channel(open_log(LOGS / "before--qlog.bz2"))
     assert {channel: len(said) for channel, said in found.items()} == {
