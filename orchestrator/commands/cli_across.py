@@ -70,6 +70,9 @@ def compare(
             "McNemar p < 0.05",
         ),
     ] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="runs, sweeps: measures whose change may be chance, too")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="all of it as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="drives: folder for a picture")] = None,
     declaration: FirstDeclarationOption = None,
@@ -86,11 +89,18 @@ def compare(
 
         refuse_for_runs(first, second, of_drives=(out, declaration, other_declaration))
         code = compare_runs(
-            first, second, planners=planners, as_json=as_json, fail_on_worse=fail_on_worse
+            first,
+            second,
+            planners=planners,
+            every=every,
+            as_json=as_json,
+            fail_on_worse=fail_on_worse,
         )
         raise typer.Exit(code)
-    if planners is not None or fail_on_worse:
-        raise UserError(f"{first}, {second}: --planners and --fail-on-worse are for runs or sweeps")
+    if planners is not None or fail_on_worse or every:
+        raise UserError(
+            f"{first}, {second}: --planners, --fail-on-worse and --all are for runs or sweeps"
+        )
     from foretwin.orchestrator.commands.compare import compare as compare_drives
 
     compare_drives(

@@ -20,12 +20,19 @@ _MOST_LISTED = 12
 
 
 def compare_runs(
-    first: Path, second: Path, *, planners: str | None, as_json: bool, fail_on_worse: bool
+    first: Path,
+    second: Path,
+    *,
+    planners: str | None,
+    every: bool = False,
+    as_json: bool,
+    fail_on_worse: bool,
 ) -> int:
     """Print what changed from one run or sweep to another; returns 0, or where it is asked 3 if
     significantly more cases newly fail than were fixed.
 
-    `planners` names one for each side, with a comma between. Raises UserError in one line.
+    `planners` names one for each side, with a comma between; with `every` measures are listed whose
+    change may be chance. Raises UserError in one line.
     """
     of_first, of_second = _planners(planners)
     if first.resolve() == second.resolve() and of_first == of_second:
@@ -35,7 +42,7 @@ def compare_runs(
     if as_json:
         print_json({**found, "judged": judged})
     else:
-        for line in change_lines(found):
+        for line in change_lines(found, every=every):
             say(plain(line))
         for line in difference_lines(judged)[2:] if judged else ():
             say(plain(line))
@@ -77,8 +84,8 @@ def _judged(first: Path, second: Path) -> dict[str, Any] | None:
         return None
 
 
-def change_lines(found: dict[str, Any]) -> Iterator[str]:
-    """Yield what changed, as text."""
+def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]:
+    """Yield what changed, as text; with `every` also what may be chance."""
     for name, side in (("A", found["first"]), ("B", found["second"])):
         who = ", ".join(side["planners"])
         yield f"{name}: {side['folder']} ({side['futures']} futures of {who})"
@@ -103,7 +110,7 @@ def change_lines(found: dict[str, Any]) -> Iterator[str]:
     )
     if failing["change"] is not None:
         yield f"change of the share: {_interval(failing['change'], 100.0)} %"
-    yield from _measure_lines(found["measures"])
+    yield from _measure_lines(found["measures"], every=every)
     yield from _place_lines(found["places"])
     for name, side in (("newly failing", "second"), ("fixed", "second")):
         cases = found[name.replace(" ", "_")]
@@ -114,17 +121,27 @@ def change_lines(found: dict[str, Any]) -> Iterator[str]:
             yield f"{name}: {len(cases) - _MOST_LISTED} more: --json"
 
 
-def _measure_lines(rows: list[dict[str, Any]]) -> Iterator[str]:
-    changed = [row for row in rows if row["change"]["mean"] != 0.0]
-    if changed:
+def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
+    """Yield the measures that changed, the surest first."""
+    changed = sorted((row for row in rows if row["change"]["mean"] != 0.0), key=_doubt)
+    sure = [row for row in changed if _doubt(row) < LEVEL]
+    shown = changed if every else sure
+    if shown:
         yield f"{'measure':<40}{'A':>10}{'B':>10}  {'B minus A, 95 %':<40}p adjusted"
-    for row in changed:
+    for row in shown:
         p_value = "" if row["p_adjusted"] is None else f"{row['p_adjusted']:.3g}"
         name = row["measure"] if row["unit"] == "1" else f"{row['measure']} ({row['unit']})"
         yield (
             f"{name:<40}{row['first']:>10.4g}{row['second']:>10.4g}  "
             f"{_interval(row['change'], 1.0):<40}{p_value:<10}{row['word']}"
         )
+    if len(shown) < len(changed):
+        count = len(changed) - len(shown)
+        yield f"{count} {'measure' if count == 1 else 'measures'} changed not significantly: --all"
+
+
+def _doubt(row: dict[str, Any]) -> float:
+    return 1.0 if row["p_adjusted"] is None else float(row["p_adjusted"])
 
 
 def _place_lines(rows: list[dict[str, Any]]) -> Iterator[str]:

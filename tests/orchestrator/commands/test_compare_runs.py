@@ -36,6 +36,24 @@ def test_what_changed_is_said_with_how_sure_it_is_and_how_to_see_it(
     assert "seed: None → 4" in said
 
 
+def test_changes_that_may_be_chance_are_counted_and_listed_with_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = str(sweep_of(tmp_path / "before", [case(n, min_clearance_m=1.0) for n in range(28)]))
+    rows = [case(n, min_clearance_m=1.1 if n % 7 % 2 else 0.91) for n in range(28)]
+    second = str(sweep_of(tmp_path / "after", rows, seed=4))
+
+    assert command(["compare", first, second]) == 0
+    short = capsys.readouterr().out
+    assert command(["compare", first, second, "--all"]) == 0
+    whole = capsys.readouterr().out
+
+    assert "1 measure changed not significantly: --all" in short
+    assert "min_clearance_m (m)" not in short
+    assert "min_clearance_m (m)" in whole
+    assert "--all" not in whole
+
+
 def test_exit_code_3_is_for_those_who_ask(
     sweeps: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -55,7 +73,7 @@ def test_exit_code_3_is_for_those_who_ask(
         (["A", "LOG"], "is neither a run nor a sweep"),
         (["A", "nowhere"], "nowhere: no such folder"),
         (["A", "B", "--out", "here"], "--out and declarations are for recorded drives"),
-        (["LOG", "LOG", "--fail-on-worse"], "--planners and --fail-on-worse are for runs"),
+        (["LOG", "LOG", "--fail-on-worse"], "--fail-on-worse and --all are for runs"),
     ],
 )
 def test_what_cannot_be_compared_is_one_line(

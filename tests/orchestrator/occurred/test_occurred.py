@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foretwin.contracts.drive import RoadUser, RoadUsers
-from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.orchestrator.occurred.drive_read import motion_in
 from foretwin.orchestrator.occurred.occurred import occurred_in
 from tests.orchestrator.recorded_runs import write_run
 from tests.sim_worker.scenarios.worlds import cross
@@ -81,3 +82,20 @@ def test_a_car_that_tells_of_nobody_is_said_to(tmp_path: Path) -> None:
 def test_a_folder_of_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"no drive\.mcap"):
         occurred_in(tmp_path)
+
+
+def test_what_the_map_moved_a_position_by_is_no_motion() -> None:
+    frame = LocalFrame(GeoPoint(52.5, 13.4))
+    states = [
+        VehicleState(
+            vehicle_id="ego", stamp_ns=n * 100_000_000, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
+            speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
+            map_shift_m=None if n < 5 else (3.0, -2.0),
+        )
+        for n in range(10)
+    ]  # fmt: skip
+
+    motion = motion_in(frame, states)
+
+    assert motion.xy_m[0] == pytest.approx([0.0, 0.0], abs=0.01)
+    assert motion.xy_m[-1] == pytest.approx([-3.0, 2.0], abs=0.01)
