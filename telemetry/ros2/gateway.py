@@ -189,8 +189,8 @@ class Gateway:
                 self._take_back()
 
     def _lot_trouble(self, now_ns: int) -> str | None:
-        guard, heard_ns = self._guard, self.inwards.heard_mono_ns
-        return None if guard is None else guard.trouble(now_ns, heard_ns=heard_ns)
+        guard, car = self._guard, self.inwards
+        return guard and guard.trouble(now_ns, heard_ns=car.heard_mono_ns, fix=car.fix)
 
     def _take_back(self) -> None:
         """Say once that nobody is there, to who was told otherwise; afterwards all is silent."""

@@ -10,6 +10,7 @@ import msgspec
 from foretwin.contracts import drive
 from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.foreign_bus import Arrived
+from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused, admit
 from foretwin.contracts.numbering import Numberings
 from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud, base_from_mount_cloud
@@ -74,6 +75,8 @@ class Inwards:
         """What the car was shown: not taken for real where it says so itself."""
         self.heard_mono_ns = 0
         """When the newest sample of the car came."""
+        self.fix: GeoPoint | None = None
+        """The car's newest position, as it came."""
         self.first_stamp_ns: int | None = None
         self.tire_angle_rad: float | None = None
         """The newest measured angle at the tyres."""
@@ -222,6 +225,8 @@ class Inwards:
         self.heard_mono_ns = arrived.received_mono_ns
         if self.first_stamp_ns is None:
             self.first_stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        if isinstance(message, drive.GnssFix):
+            self.fix = message.position
         if isinstance(message, drive.SteeringSample) and message.tire_angle_rad is not None:
             self.tire_angle_rad = message.tire_angle_rad
             self.tire_angle_mono_ns = arrived.received_mono_ns

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 
 REACTION_S = 2.5
 """Of whoever takes over, until the brake acts: AASHTO, A Policy on Geometric Design of Highways and
@@ -21,6 +21,10 @@ BRAKING_MPS2 = 3.4
 """With which whoever takes over stops: the same, comfortable for most drivers."""
 STALE_NS = 150_000_000
 """Nothing is known of a car of which nothing new was heard for so long, or of its state."""
+
+APART_M = 5.0
+"""A position may lie so far from the state, beside the car's own reach: 0.3 s at 15 m/s, or what a
+receiver without corrections is off. Beyond, one of the two is wrong. Chosen."""
 
 
 def margin_m(speed_mps: float) -> float:
@@ -49,10 +53,11 @@ class LotGuard:
         if self._state is None or state.stamp_ns != self._state.stamp_ns:
             self._state, self._state_ns = state, now_ns
 
-    def trouble(self, now_ns: int, *, heard_ns: int) -> str | None:
+    def trouble(self, now_ns: int, *, heard_ns: int, fix: GeoPoint | None = None) -> str | None:
         """Return why nothing may go to the car now, None where it may.
 
-        `heard_ns` is when the car itself was heard of last.
+        `heard_ns` is when the car itself was heard of last, `fix` its newest position as it came,
+        which an estimate that takes it for a false one keeps out of the state.
         """
         state = self._state
         if state is None or now_ns - self._state_ns > STALE_NS:
@@ -61,12 +66,18 @@ class LotGuard:
             return f"nothing heard of the car for {STALE_NS / 1e6:.0f} ms"
         if "gnss" in state.stale:
             return "the car's positions are overdue"
-        at = state.position
-        x_m, y_m = local_from_geo(self._frame, at.lat_deg, at.lon_deg).tolist()
-        place = shapely.Point(x_m, y_m) if math.isfinite(x_m + y_m) else shapely.Point()
+        place = self._place(state.position)
         if not self._fence.contains(place):
             return "the car is outside its fence"
+        if fix is not None and not (apart_m := place.distance(self._place(fix))) <= (
+            APART_M + self._reach_m
+        ):
+            return f"the car's position is {apart_m:.1f} m apart from its estimated state"
         left_m = self._edge.distance(place) - self._reach_m
         if not left_m >= (needed_m := margin_m(state.speed_mps)):
             return f"the fence is {left_m:.1f} m off, {needed_m:.1f} m are needed at this speed"
         return None
+
+    def _place(self, at: GeoPoint) -> shapely.Point:
+        x_m, y_m = local_from_geo(self._frame, at.lat_deg, at.lon_deg).tolist()
+        return shapely.Point(x_m, y_m) if math.isfinite(x_m + y_m) else shapely.Point()

@@ -109,6 +109,7 @@ class Lot:
         self.ground = Ground(enabled=True, flag=True, anchor=PLAIN, guard=guard, more=SEEN)
         self.x_m, self.y_m, self.speed_mps, self.stale = 0.0, 0.0, 5.0, ()
         self.says, self.states, self.clock_stands, self.authority = True, True, False, True
+        self.leap_m = 0.0
         self._stamp_ns = 5 * S
         self._tick = 0
 
@@ -124,6 +125,10 @@ class Lot:
                 self.ground.foreign.arrive(
                     STEERING_KEY + "RIHS01_x", payload, mono_ns=self.ground.now_ns
                 )
+            if self.says and self._tick % 10 == 0:
+                at = geo_pose(PLAIN.lot.frame, self.x_m, self.y_m + self.leap_m, 0.0).position
+                payload = fix(self._stamp_ns, at.lat_deg, at.lon_deg)
+                self.ground.foreign.arrive(FIX_KEY, payload, mono_ns=self.ground.now_ns)
             if self.states and self._tick % 2 == 0:
                 self.ground.bus.publish("state", self._state(), vehicle="ego")
             if self.authority and self._tick % 5 == 0:
@@ -172,6 +177,7 @@ BREACHES: dict[str, dict[str, Any]] = {
     "no sample any more": {"says": False},
     "neither": {"states": False, "says": False},
     "a clock that stands": {"clock_stands": True},
+    "a position that leaps": {"leap_m": 12.0},
     "positions overdue": {"stale": ("gnss",)},
     "positions and all overdue": {"stale": ("gnss", "imu", "speed")},
     "nobody in charge": {"authority": False},

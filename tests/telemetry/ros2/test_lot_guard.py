@@ -74,6 +74,15 @@ def test_a_car_that_was_never_heard_of_is_shown_nothing():
     assert guard().trouble(S, heard_ns=S) is not None
 
 
+def test_a_position_that_the_estimate_does_not_follow_is_trouble():
+    one = guard(reach_m=4.0)
+    one.take_state(state(0.0), now_ns=S)
+    for apart_m, fine in ((8.9, True), (9.1, False), (300.0, False)):
+        fix = GeoPoint(*degrees(0.0, apart_m))
+        assert (one.trouble(S, heard_ns=S, fix=fix) is None) == fine
+    assert one.trouble(S, heard_ns=S, fix=GeoPoint(math.nan, 13.4)) is not None
+
+
 def test_what_is_old_says_nothing():
     inside = state(0.0)
     assert trouble(inside, after_ns=150 * MS) is None
