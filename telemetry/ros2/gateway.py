@@ -190,7 +190,7 @@ class Gateway:
 
     def _lot_trouble(self, now_ns: int) -> str | None:
         guard, car = self._guard, self.inwards
-        return guard and guard.trouble(now_ns, heard_ns=car.heard_mono_ns, fix=car.fix)
+        return guard.trouble(now_ns, heard_ns=car.heard_mono_ns, fix=car.fix) if guard else None
 
     def _take_back(self) -> None:
         """Say once that nobody is there, to who was told otherwise; afterwards all is silent."""
