@@ -16,6 +16,7 @@ from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
 from foretwin.viewer.legend import legend_rows
 from foretwin.viewer.log_drive import DriveLog
+from foretwin.viewer.log_point_cloud import PointCloudLog
 from foretwin.viewer.log_roads import rows_of_roads
 from foretwin.viewer.log_run import RunLog, rows_of_event
 from foretwin.viewer.log_tuning import TuningLog
@@ -78,6 +79,7 @@ class Monitor:
             ),
             "mirror": self._drive.mirror,
             "virtual_traffic": VirtualTrafficLog(drive_frame).rows,
+            "point_cloud": PointCloudLog().rows,
             "active_world": self._active_world,
             "world": self._world,
             "worker_status": self._run.worker,

@@ -10,8 +10,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
 
 _CONCRETE, _ASPHALT, _TREE, _WOOD, _HEDGE, _METAL = 0.24, 0.17, 0.60, 0.25, 0.30, 0.40
-"""Shares at 900 nm as RIEGL's data sheets (such as of the LD90-3) list them: smooth concrete,
-asphalt with pebbles, deciduous trees, clean rough wood, conifers; painted metal is chosen."""
+"""Shares at 900 nm as RIEGL's data sheets (such as of the LD90-3) list them, from memory and not
+compared with one: smooth concrete, asphalt with pebbles, deciduous trees, clean rough wood,
+conifers; painted metal is chosen."""
 REFLECTIVITY: dict[str, float] = {
     "ground": _ASPHALT, "building": _CONCRETE, "roofs": _CONCRETE, "tree": _TREE, "lamp": _METAL,
     "pole": _METAL, "bollard": _METAL, "block": _CONCRETE, "wall": _CONCRETE, "fence": _WOOD,

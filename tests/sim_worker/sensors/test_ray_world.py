@@ -77,3 +77,15 @@ def test_roofs_and_islands_are_met_as_well() -> None:
     met = [rays.look(top, down, time_s=0.0, range_m=100.0).distance_m[0] for top in tops]
 
     assert [50.0 - m for m in met] == pytest.approx([8.0, 5.0, 0.12, 1.0], abs=0.02)
+
+
+def test_the_ground_is_met_from_above_alone_and_within_the_world() -> None:
+    world = RayWorld(crossroads())
+    down, up = np.array([[0.0, 0.0, -1.0]]), np.array([[0.0, 0.0, 1.0]])
+
+    def met_m(z: float, way: np.ndarray, x: float = 0.0) -> float:
+        found = world.look(np.array([x, 0.0, z]), way, time_s=0.0, range_m=50.0)
+        return float(found.distance_m[0])
+
+    assert (met_m(1.0, down), met_m(0.0, down)) == (pytest.approx(1.0), 0.0)
+    assert met_m(-1.0, up) == met_m(-1.0, down) == met_m(1.0, down, x=1e4) == np.inf
