@@ -19,6 +19,7 @@ from foretwin.sim_worker.virtual_traffic.model import ModelTraffic
 from foretwin.sim_worker.virtual_traffic.source import TrafficSource
 from foretwin.sim_worker.virtual_traffic.staged import ScenarioTraffic
 from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, net_of
+from foretwin.sim_worker.virtual_traffic.sumo_lights import groups_of_signals
 from foretwin.sim_worker.world_file import load_world
 
 _DEPTH = 4096
@@ -70,8 +71,10 @@ def _source(setup: TrafficSetup) -> TrafficSource:
         case "sumo":
             assert chosen.network is not None
             folder = Path(setup.worlds_dir).parent / "processes"
-            net = net_of(Path(chosen.network), folder)
-            return SumoTraffic(vehicle, net, count=chosen.count, seed=seed)
+            network = Path(chosen.network)
+            net = net_of(network, folder)
+            group_of = {} if net == network else groups_of_signals(network)
+            return SumoTraffic(vehicle, net, count=chosen.count, seed=seed, group_of=group_of)
         case _:
             return ModelTraffic(vehicle, count=chosen.count, seed=seed)
 

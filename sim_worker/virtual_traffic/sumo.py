@@ -27,6 +27,7 @@ from foretwin.sim_worker.driver_model import EMERGENCY_DECEL_MPS2
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.sim_worker.virtual_traffic.source import STEP_S, VirtualUser
+from foretwin.sim_worker.virtual_traffic.sumo_lights import SumoLights
 
 NEEDS_SUMO = "virtual_traffic: source sumo needs SUMO: pip install 'foretwin[sumo]'"
 _CAR = "car-itself"
@@ -84,8 +85,19 @@ def net_of(network: Path, folder: Path) -> Path:
 class SumoTraffic:
     """`count` vehicles of SUMO in a district around a car; see TrafficSource."""
 
-    def __init__(self, vehicle: VehicleParameters, net: Path, *, count: int, seed: int) -> None:
-        """Raises UserError without SUMO, or for a network without a place on Earth."""
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        net: Path,
+        *,
+        count: int,
+        seed: int,
+        group_of: Mapping[str, str] | None = None,
+    ) -> None:
+        """`group_of` says the World's group of lights of each signal that the network names.
+
+        Raises UserError without SUMO, or for a network without a place on Earth.
+        """
         if not is_there():
             raise UserError(NEEDS_SUMO)
         self._sumo: Any = import_module("libsumo")
@@ -107,6 +119,7 @@ class SumoTraffic:
         }
         given = [text for name, value in options.items() for text in (f"--{name}", str(value))]
         self._sumo.start(["sumo", *given])
+        self._lights = SumoLights(self._sumo, group_of or {})
         self._make_types(length, vehicle.width_m.value)
         edges = [one for one in self._sumo.edge.getIDList() if not one.startswith(":")]
         self._edges = [one for one in sorted(edges) if self._is_for_cars(one)]
@@ -150,7 +163,7 @@ class SumoTraffic:
     def step(
         self, car: Array, *, time_s: float, colours: Mapping[str, SignalColour]
     ) -> tuple[VirtualUser, ...]:
-        """Move on; lights are SUMO's own. See TrafficSource."""
+        """Move on; lights that no `colours` name are SUMO's own. See TrafficSource."""
         vehicles = self._sumo.vehicle
         x, y, yaw, speed = car[:4].tolist()
         ahead_m = self._front_m * np.array([np.cos(yaw), np.sin(yaw)])
@@ -160,6 +173,7 @@ class SumoTraffic:
             self._lead_on()
         vehicles.moveToXY(_CAR, "", -1, *front.tolist(), 90.0 - np.degrees(yaw), keepRoute=2)
         vehicles.setSpeed(_CAR, max(speed, 0.0))
+        self._lights.show(colours)
         self._sumo.simulationStep()
         self._steps += 1
         found = vehicles.getAllSubscriptionResults()

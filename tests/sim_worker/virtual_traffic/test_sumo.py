@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.virtual_traffic.source import STEP_S
 from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, is_there, net_of
+from foretwin.sim_worker.virtual_traffic.sumo_lights import groups_of_signals
 from foretwin.world_gen.export.opendrive import write_opendrive
-from tests.sim_worker.places import crossroads
+from tests.orchestrator.trip import town_world
 from tests.sim_worker.virtual_traffic.motions import played, still, tracks
 
 
@@ -28,7 +31,7 @@ def test_without_sumo_one_line_says_what_to_install(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
 def test_vehicles_drive_on_the_network_of_our_own_export(tmp_path: Path) -> None:
-    write_opendrive(crossroads(), tmp_path / "a.xodr")
+    write_opendrive(town_world("n44"), tmp_path / "a.xodr")
     traffic = SumoTraffic(load_vehicle(), net_of(tmp_path / "a.xodr", tmp_path), count=4, seed=1)
     try:
         scenes = list(played(traffic, still(20.0, 20.0), from_s=0.0, to_s=20.0))
@@ -38,3 +41,28 @@ def test_vehicles_drive_on_the_network_of_our_own_export(tmp_path: Path) -> None
     for track in tracks(scenes).values():
         along = np.abs(np.diff(track.rows[:, 3])) / 0.05
         assert along.max(initial=0.0) <= 7.6
+
+
+@pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
+def test_who_is_close_to_a_light_brakes_in_the_step_in_which_it_turns_red(tmp_path: Path) -> None:
+    network = tmp_path / "a.xodr"
+    write_opendrive(town_world("n44"), network)
+    net, group_of = net_of(network, tmp_path), groups_of_signals(network)
+
+    def speeds(*, red_from: int, steps: int) -> list[dict[str, float]]:
+        traffic = SumoTraffic(load_vehicle(), net, count=12, seed=3, group_of=group_of)
+        row, found = np.zeros(8), []
+        row[:2] = 300.0
+        try:
+            for step in range(steps):
+                shown: SignalColour = "red" if step >= red_from else "green"
+                colours = dict.fromkeys(group_of.values(), shown)
+                users = traffic.step(row, time_s=step * STEP_S, colours=colours)
+                found.append({one.user_id: one.speed_mps for one in users})
+        finally:
+            traffic.close()
+        return found
+
+    green, flipped = speeds(red_from=999, steps=161), speeds(red_from=160, steps=161)
+    assert flipped[:160] == green[:160]
+    assert any(flipped[160][name] < speed - 0.1 for name, speed in green[160].items())
