@@ -43,7 +43,7 @@ from foretwin.orchestrator.commands.cli_secure import doctor
 from foretwin.orchestrator.commands.cli_secure import secure as secure_commands
 from foretwin.orchestrator.commands.cli_set import set_value
 from foretwin.orchestrator.commands.cli_standin import anchor as anchor_poses
-from foretwin.orchestrator.commands.cli_standin import standin
+from foretwin.orchestrator.commands.cli_standin import lights, standin
 from foretwin.orchestrator.commands.cli_sweep import sweep
 from foretwin.orchestrator.commands.cli_tracks import tracks as tracks_commands
 from foretwin.orchestrator.commands.cli_view import LayoutOption
@@ -255,6 +255,7 @@ for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, wor
 
 app.command("config")(config_files)
 app.command("anchor")(anchor_poses)
+app.command()(lights)
 app.command("set")(set_value)
 app.add_typer(secure_commands, name="secure")
 

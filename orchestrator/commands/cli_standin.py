@@ -26,6 +26,21 @@ def anchor(
     show_anchors(map_file, at=at, before_m=before_m)
 
 
+def lights(
+    exports: Annotated[
+        list[Path],
+        typer.Argument(metavar="EXPORT", help="one World as Lanelet2 (.osm), OpenDRIVE (.xodr)"),
+    ],
+) -> None:
+    """Print by which numbers exports of a World know its lights, as [[light]] rows of a mapping.
+
+    Example: foretwin lights town.osm town.xodr
+    """
+    from foretwin.orchestrator.commands.lights import show_lights
+
+    show_lights(exports)
+
+
 def standin(
     ros2: Annotated[
         Path, typer.Option(help="mapping of its ROS 2 topics, TOML, as foretwin drive reads it")

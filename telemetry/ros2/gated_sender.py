@@ -31,7 +31,11 @@ class GatedSender:
         self.held: Counter[str] = Counter()
 
     def send(
-        self, rows: Iterable[OutRow], payload: Callable[[OutRow], bytes], *, every_ns: int = 0
+        self,
+        rows: Iterable[OutRow],
+        payload: Callable[[OutRow], bytes | None],
+        *,
+        every_ns: int = 0,
     ) -> None:
         """Send on rows; towards the vehicle only through the gate, at its rate."""
         for row in rows:
@@ -50,8 +54,10 @@ class GatedSender:
                 # A stamp that no ROS time holds, a number that 32 bits do not.
                 self.held[f"{row.topic}: {type(error).__name__}"] += 1
 
-    def put(self, row: OutRow, payload: bytes) -> None:
-        """Send one message; refuses once more what must not leave."""
+    def put(self, row: OutRow, payload: bytes | None) -> None:
+        """Send one message, if any; refuses once more what must not leave."""
+        if payload is None:
+            return
         if row.towards_vehicle and self._gate.state != "open":
             self.held[row.topic] += 1
             return

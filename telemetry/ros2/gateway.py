@@ -18,6 +18,7 @@ from foretwin.contracts.bus import Bus, Mailbox, Received, Request
 from foretwin.contracts.foreign_bus import Arrived, ForeignBus
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import Refused
+from foretwin.contracts.lights import ShownLights
 from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.simulation import Event, MirrorSample
@@ -34,20 +35,18 @@ from foretwin.telemetry.ros2.merged_objects import MergedObjects
 from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
 from foretwin.telemetry.ros2.orders import Orders
 from foretwin.telemetry.ros2.outwards import Outwards
-from foretwin.telemetry.ros2.rows import OutRow
+from foretwin.telemetry.ros2.rows import SHOWS_LIGHTS, OutRow, Source
 from foretwin.telemetry.ros2.safety import VehicleGate
 from foretwin.telemetry.ros2.sender import RosSender
 from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 
 _PORTION = 16
 """So many samples at most between two looks at the orchestrator's orders."""
-_DIAGNOSTICS_NS = 1_000_000_000
+_DIAGNOSTICS_NS = _ROUTE_EVERY_NS = 1_000_000_000
 _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
 _CLOUDS = 8  # so many wait, the newest: one is a megabyte
-_STATE_EVERY_NS = 20_000_000
-_OBJECTS_EVERY_NS = 100_000_000
-_ROUTE_EVERY_NS = 1_000_000_000
+_STATE_EVERY_NS, _OBJECTS_EVERY_NS = 20_000_000, 100_000_000
 
 log = logging.getLogger("foretwin.telemetry.ros2")
 
@@ -103,9 +102,8 @@ class Gateway:
         """By topic, messages towards the vehicle that were not sent."""
         self.refusals = Refusals() if refusals is None else refusals
         """Of what came from the run's side."""
-        self._mirrored = MirroredObjects(
-            mapping.mirrored, car=car, drive_frame=drive_frame, alt_m=self._out.ground_alt_m
-        )
+        named, alt_m = mapping.mirrored, self._out.ground_alt_m
+        self._mirrored = MirroredObjects(named, car=car, drive_frame=drive_frame, alt_m=alt_m)
         self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
         self._merged = MergedObjects(mapping.merged, frame=drive_frame)
         self._inbox = Mailbox(2048)
@@ -144,6 +142,7 @@ class Gateway:
     def report(self) -> dict[str, dict[str, int]]:
         """Return all counts: what came in, what was left out, what was sent, bounded and held."""
         words = 0 if self._orders is None else self._orders.dropped
+        samples, views, clouds = (b.dropped for b in (self._inbox, self._views, self._clouds))
         return {
             "in": dict(self.inwards.counts),
             "unused": dict(self.inwards.unused),
@@ -153,12 +152,7 @@ class Gateway:
             "refused": self.refusals.counts(),
             "merged": dict(+self._merged.counts),
             "gate": dict(self.gate.counts),
-            "dropped": {
-                "samples": self._inbox.dropped,
-                "words": words,
-                "views": self._views.dropped,
-                "clouds": self._clouds.dropped,
-            },
+            "dropped": {"samples": samples, "words": words, "views": views, "clouds": clouds},
         }
 
     def _listen(self, run_id: str, order_keys: OrderKeys | None) -> None:
@@ -194,14 +188,17 @@ class Gateway:
 
     def _take_back(self) -> None:
         """Say once that nobody is there, to who was told otherwise; afterwards all is silent."""
-        for row in self._out.rows("virtual_objects"):
+        last: dict[Source, Callable[[OutRow], bytes]] = {
+            "virtual_objects": lambda row: self._out.objects(self._virtual.nobody(), row.type),
+            "lights": lambda row: self.inwards.lights.nothing(row, stamp_ns=self._wall_ns()),
+        }
+        for row in (row for source in last for row in self._out.rows(source)):
             if row.towards_vehicle and self._sender.sent[row.topic]:
-                self._sender.put(row, self._out.objects(self._virtual.nobody(), row.type))
+                self._sender.put(row, last[row.source](row))
 
     def _command(self, message: VehicleCommand) -> None:
-        now_ns = self._mono_ns()
-        measured_ago_ns = now_ns - self.inwards.tire_angle_mono_ns
-        known = measured_ago_ns <= _MEASURED_WITHIN_NS
+        now_ns, stamp_ns = self._mono_ns(), self._wall_ns()
+        known = now_ns - self.inwards.tire_angle_mono_ns <= _MEASURED_WITHIN_NS
         admitted = self.gate.admit(
             self._out.on_lot(message),
             now_ns=now_ns,
@@ -212,7 +209,6 @@ class Gateway:
             if admitted is None:
                 self.held[row.topic] += 1
             else:
-                stamp_ns = self._wall_ns()
                 self._gated.put(row, self._out.command(admitted, row.type, stamp_ns=stamp_ns))
 
     def _take_in(self, arrived: Arrived) -> None:
@@ -243,6 +239,10 @@ class Gateway:
                 self._send(self._out.rows("twin"), lambda _: self._out.twin(mirror))
                 if self._mapping.mirrored:
                     self._objects(lambda: self._mirrored.users(mirror))
+            case ShownLights() as shown:
+                self.inwards.lights.take(shown, wall_ns=self._wall_ns(), mono_ns=self._mono_ns())
+                for source in SHOWS_LIGHTS:
+                    self._send(self._out.rows(source), self.inwards.lights.payload)
             case drive.RoadUsers() as users:
                 self._objects(lambda: users)
             case PointCloud() as cloud:
@@ -295,6 +295,6 @@ class Gateway:
     def _diagnose(self) -> None:
         if not self._due("diagnostics", _DIAGNOSTICS_NS):
             return
-        levels = self._diagnostics.levels(self.report(), gate=self.gate)
-        stamp_ns = self._wall_ns()
+        stamp_ns, report = self._wall_ns(), self.report()
+        levels = self._diagnostics.levels(report, gate=self.gate)
         self._send(self._out.rows("diagnostics"), lambda _: self._out.diagnostics(stamp_ns, levels))

@@ -18,6 +18,7 @@ from foretwin.telemetry.anchored import world_from_lot_message
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
 from foretwin.telemetry.ros2.injected import Injected
+from foretwin.telemetry.ros2.lights import LightExchange
 from foretwin.telemetry.ros2.mapping import Mapping
 from foretwin.telemetry.ros2.merged_objects import HeardObjects
 from foretwin.telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
@@ -30,6 +31,7 @@ from foretwin.telemetry.ros_messages.parts import (
     CLOCK,
     LANELET_ROUTE,
     POINT_CLOUD2,
+    STRING,
     TF,
     typestore,
 )
@@ -73,6 +75,8 @@ class Inwards:
         self._numbers = Numberings()
         self.injected = Injected()
         """What the car was shown: not taken for real where it says so itself."""
+        self.lights = LightExchange(mapping.lights)
+        """Which lights go out and come in, under their groups' names in the World."""
         self.heard_mono_ns = 0
         """When the newest sample of the car came."""
         self.fix: GeoPoint | None = None
@@ -175,6 +179,12 @@ class Inwards:
             route = route_from_lanelets(ros, self._mapping.map_frame)
             self.route = world_from_lot_message(self.anchor, route)
             return [("route", self.route)]
+        if row.type == STRING:
+            try:
+                states = self.lights.from_spat(ros.data, arrived.received_wall_ns)
+            except ValueError as error:
+                raise UnusableError("no SPAT as JSON") from error
+            return [one for state in states for one in self._light(state, row, arrived)]
         stamp_ns = arrived.received_wall_ns
         if row.stamp == "header":
             stamp_ns = stamp_of(ros) or stamp_ns
@@ -189,6 +199,9 @@ class Inwards:
         for message in how.read(ros, stamp_ns, self._mapping.map_frame):
             if isinstance(message, drive.VehicleStatus):
                 message = self._joiner.join(message)
+            if isinstance(message, drive.SignalState):
+                samples += self._light(self.lights.in_world(message), row, arrived)
+                continue
             message = _in_our_units(message, row)
             message, left_out = admit(message, where=row.topic)
             if isinstance(message, drive.RoadUsers):
@@ -212,6 +225,17 @@ class Inwards:
         if str(ros.header.frame_id).lstrip("/") == BASE_FRAME:
             return cloud
         return msgspec.structs.replace(cloud, points=base_from_mount_cloud(cloud.points, mount))
+
+    def _light(self, heard: drive.SignalState, row: InRow, arrived: Arrived) -> Samples:
+        """Return a light that was heard, unless it only says again what was said of it."""
+        if self.lights.is_echo(heard, mono_ns=arrived.received_mono_ns):
+            self.unused[f"{row.topic}: lights that show what we have said of them"] += 1
+            return []
+        message, _ = admit(heard, where=row.topic)
+        if row.type != STRING:  # V2X is no word of the car
+            self._note(message, arrived)
+        self.counts["signals"] += 1
+        return [("signals", message)]
 
     def _without_ours(self, message: drive.RoadUsers, row: InRow) -> drive.RoadUsers:
         real = self.injected.without(message)

@@ -1,7 +1,8 @@
 """Which ROS topics become which channels, and back: one TOML file, checked into a frozen struct.
 
 `[[in]]` rows: topic, type, channel, units and axes that differ from ROS's. `[[out]]` rows: topic,
-type, source. `[[virtual]]` rows: road users that do not exist. Whatever a vehicle's software might
+type, source. `[[virtual]]` rows: road users that do not exist. `[[light]]` rows: by which numbers
+others know the World's lights. Whatever a vehicle's software might
 obey, that is commands, and any topic outside /foretwin/, counts as towards the vehicle: see
 `OutRow.towards_vehicle`.
 """
@@ -20,9 +21,17 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.ports import trouble_with_endpoint
 from foretwin.contracts.toml_file import parse_toml, toml_text
 from foretwin.telemetry.mixed.merge import MergeRules
+from foretwin.telemetry.ros2.lights import LightIds
 from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect
-from foretwin.telemetry.ros2.rows import INJECTS, SHOWS_VIRTUAL, InRow, OutRow, Source
+from foretwin.telemetry.ros2.rows import (
+    INJECTS,
+    SHOWS_LIGHTS,
+    SHOWS_VIRTUAL,
+    InRow,
+    OutRow,
+    Source,
+)
 from foretwin.telemetry.ros2.safety import CommandLimits
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
 from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
@@ -59,7 +68,13 @@ class Mapping(
     frozen=True,
     kw_only=True,
     forbid_unknown_fields=True,
-    rename={"inwards": "in", "outwards": "out", "map_place": "map", "placed": "virtual"},
+    rename={
+        "inwards": "in",
+        "outwards": "out",
+        "map_place": "map",
+        "placed": "virtual",
+        "lights": "light",
+    },
 ):
     """The whole file."""
 
@@ -81,6 +96,8 @@ class Mapping(
     """Topics that are published."""
     placed: tuple[PlacedObject, ...] = ()
     """Virtual road users that the gateway itself says."""
+    lights: tuple[LightIds, ...] = ()
+    """By which numbers others know the World's lights."""
     mirrored: Mirrored = Mirrored()
     """Vehicles of the mirror that go out among the virtual objects."""
     merged: MergeRules = MergeRules()
@@ -120,6 +137,7 @@ class Mapping(
             *(("mirror",) if "twin" in sources or self.mirrored else ()),
             *(("virtual_objects", "virtual_traffic") if sources & set(INJECTS) else ()),
             *(("point_cloud",) if "point_cloud" in sources else ()),
+            *(("lights",) if sources & set(SHOWS_LIGHTS) else ()),
             *(("event", "gap_alarm", "verdict") if "diagnostics" in sources else ()),
         )
 
@@ -155,10 +173,11 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     except ValueError as error:
         raise file.wrong(error) from error
     seen: dict[str, str] = {}
-    tables: tuple[tuple[str, tuple[InRow | OutRow | PlacedObject, ...]], ...] = (
+    tables: tuple[tuple[str, tuple[_Row, ...]], ...] = (
         ("in", mapping.inwards),
         ("out", mapping.outwards),
         ("virtual", mapping.placed),
+        ("light", mapping.lights),
     )
     for header, rows in tables:
         for index, row in enumerate(rows):
@@ -202,14 +221,17 @@ def _check_mirrored(mapping: Mapping) -> None:
         )
 
 
-def _check_alone(
-    row: InRow | OutRow | PlacedObject, seen: dict[str, str], mapping: Mapping
-) -> None:
+_Row = InRow | OutRow | PlacedObject | LightIds
+
+
+def _check_alone(row: _Row, seen: dict[str, str], mapping: Mapping) -> None:
     """Refuse two topics for one stream, what stands twice, and objects that cannot go out."""
     if isinstance(row, PlacedObject):
         if not any(one.source in SHOWS_VIRTUAL for one in mapping.outwards):
             raise ValueError('without an [[out]] of source "virtual_objects" it goes nowhere')
         keys, first = {f"virtual {row.user_id}": f"id {row.user_id!r}"}, row.user_id
+    elif isinstance(row, LightIds):
+        keys, first = {f"light {name}": name for name in row.known_as}, row.group
     elif isinstance(row, InRow):
         keys, first = (
             {f"in {row.topic}": f"topic {row.topic}", row.stream: f"stream {row.stream}"},
@@ -229,8 +251,11 @@ def _check_alone(
 
 def _check_no_echo(row: OutRow, mapping: Mapping) -> None:
     """Refuse what would come back as real, and a merged list of which the real half lacks."""
-    if row.source in INJECTS and any(row.topic == one.topic for one in mapping.inwards):
+    shows = row.source in (*INJECTS, *SHOWS_LIGHTS)
+    if shows and any(row.topic == one.topic for one in mapping.inwards):
         raise ValueError(f"topic {row.topic} is listened to: what goes out would come back as real")
+    if row.source in SHOWS_LIGHTS and not mapping.lights:
+        raise ValueError("lights go out by the numbers of [[light]] rows: foretwin lights")
     if row.source != "merged_objects":
         return
     if not any(one.type == row.type for one in mapping.inwards):

@@ -17,8 +17,8 @@ from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 Source = Literal[
-    "state", "twin", "virtual_objects", "merged_objects", "point_cloud", "diagnostics", "clock",
-    "vehicle_command",
+    "state", "twin", "virtual_objects", "merged_objects", "point_cloud", "lights", "spat",
+    "diagnostics", "clock", "vehicle_command",
 ]  # fmt: skip
 _OBJECTS = (parts.PREDICTED_OBJECTS, parts.DETECTED_OBJECTS, parts.TRACKED_OBJECTS)
 _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
@@ -27,6 +27,8 @@ _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
     "virtual_objects": _OBJECTS,
     "merged_objects": _OBJECTS,
     "point_cloud": (parts.POINT_CLOUD2,),
+    "lights": (parts.TRAFFIC_LIGHTS, parts.TRAFFIC_SIGNALS),
+    "spat": (parts.STRING,),
     "diagnostics": (DIAGNOSTICS,),
     "clock": (parts.CLOCK,),
     "vehicle_command": (parts.CONTROL, parts.ACKERMANN),
@@ -34,13 +36,15 @@ _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
 SHOWS_VIRTUAL: tuple[Source, ...] = ("virtual_objects", "merged_objects")
 INJECTS: tuple[Source, ...] = (*SHOWS_VIRTUAL, "point_cloud")
 REAL_CLOUD = "real_cloud"
+SHOWS_LIGHTS: tuple[Source, ...] = ("lights", "spat")
 CHANNEL_OF_OTHERS = {
     parts.TF: "transforms",
     parts.CLOCK: "clock",
     parts.LANELET_ROUTE: "route",
     parts.POINT_CLOUD2: REAL_CLOUD,
+    parts.STRING: "signals",
 }
-"""Types that are taken in but are no samples of the vehicle's telemetry."""
+"""Types that are taken in but are no samples of the vehicle's telemetry, and SPAT as JSON."""
 
 
 class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

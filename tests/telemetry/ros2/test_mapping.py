@@ -157,7 +157,8 @@ def test_what_is_left_out_of_a_mapping() -> None:
         msgspec.structs.replace(mapping, inwards=(), outwards=(), towards_vehicle=TowardsVehicle())
     ) == {
         "dialect": "rmw_zenoh", "endpoint": None, "domain": 0, "namespace": "/", "antenna_m": None,
-        "map_place": None, "inwards": (), "outwards": (), "placed": (), "mirrored": Mirrored(),
+        "map_place": None, "inwards": (), "outwards": (), "placed": (), "lights": (),
+        "mirrored": Mirrored(),
         "merged": MergeRules(), "towards_vehicle": TowardsVehicle(),
     }  # fmt: skip
     assert (mapping.towards_vehicle.enabled, mapping.towards_vehicle.max_objects) == (False, 64)
