@@ -14,6 +14,12 @@ TrafficSource = Literal["off", "model", "scenario", "sumo"]
 MOST_COUNT = 500
 """Road users of one going simulation; a message may hold ten times as many."""
 
+VIRTUAL_ROAD_USER = (
+    "stamp_ns:int user_id:str kind:str lat_deg:float lon_deg:float yaw_rad:float speed_mps:float "
+    "length_m:float width_m:float"
+)
+"""Columns of the table that says where virtual road users were."""
+
 
 class VirtualTraffic(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Road users of one going simulation around the car, who exist nowhere else."""

@@ -60,12 +60,7 @@ def read_run(run: Path) -> DriveRead:
     log = open_log(recording)
     states, objects = _as_recorded(recording) or _estimated(log, vehicle)
     told = [message.stamp_ns for message in objects]
-    seen = [
-        detections_of(
-            RoadUsers(stamp_ns=one.stamp_ns, users=tuple(u for u in one.users if not u.virtual))
-        )
-        for one in objects
-    ]
+    seen = [detections_of(one) for one in objects]
     headed = [state for state in states if state.yaw_valid]
     if len(headed) < 2:
         raise UserError(f"{recording}: the heading is never known, so nothing can be recognised")

@@ -29,6 +29,7 @@ from foretwin.contracts.simulation import (
 )
 from foretwin.contracts.trace import span, traced
 from foretwin.contracts.tuning import ParameterChange, ParameterEstimate
+from foretwin.contracts.virtual_traffic import VIRTUAL_ROAD_USER
 from foretwin.orchestrator.keep import Keep
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import sync_folder
@@ -61,11 +62,9 @@ _COLUMNS = {
     "plan_comparisons": columns_of(PlanComparison, PLAN)
     | columns_of(HorizonError)
     | {"path_offset_m": float},
-    "disagreements": {
-        **columns_of(Disagreement, "vehicle_id segment aspect kind stamp_ns end_stamp_ns"),
-        **columns("duration_s:float lat_deg:float lon_deg:float"),
-        **columns_of(Disagreement, "junction_id route_m lateral_m along_m speed_mps"),
-    },
+    "disagreements": columns_of(Disagreement, "vehicle_id segment aspect kind stamp_ns")
+    | columns("end_stamp_ns:int duration_s:float lat_deg:float lon_deg:float")
+    | columns_of(Disagreement, "junction_id route_m lateral_m along_m speed_mps"),
     "driven_segments": columns_of(DrivenSegment),
     "agreement": columns(
         "round_id:int stamp_ns:int drive_time_s:float intersection_id:str outcome:str "
@@ -78,6 +77,7 @@ _COLUMNS = {
     "siblings": columns_of(SiblingFuture),
     "mirror": columns_of(MirrorSample, MIRROR),
     "mirrored": {"stamp_ns": int, **columns_of(MirroredVehicle, MIRRORED)},
+    "virtual_road_users": columns(VIRTUAL_ROAD_USER),
     "touches": columns("stamp_ns:int one:str other:str"),
     "encounters": columns_of(VehicleEncounter),
     "changes": columns("stamp_ns:int asked_stamp_ns:int key:str before:str value:str"),

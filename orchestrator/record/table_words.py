@@ -29,6 +29,7 @@ _ROWS = {
     "siblings": "a future of a round on a second engine, beside the same one on MuJoCo",
     "mirror": "the real car, its twin, shadow and ghost at one instant, and the gap between them",
     "mirrored": "a vehicle beside the car at one instant",
+    "virtual_road_users": "a road user of virtual traffic at one instant, which nobody real met",
     "touches": "two who began to touch in the mirror",
     "encounters": "two vehicles that came within 10 m of each other, as they were measured",
     "changes": "a change that an operator asked for",
@@ -179,6 +180,16 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "mirrored": {
         **each_of(OF_A_PLACE, {"real_": "where it was measured", "shown_": "it in its role"}),
         **_CORRECTIONS,
+    },
+    "virtual_road_users": {
+        "user_id": "its id; futures that met it name it as `seen` and this id",
+        "kind": "what it is",
+        "lat_deg": "where the middle of its box was",
+        "lon_deg": "where the middle of its box was",
+        "yaw_rad": "its heading, from true east",
+        "speed_mps": "its speed",
+        "length_m": "its length",
+        "width_m": "its width",
     },
     "touches": {"one": "a vehicle's id", "other": "whom it touched; world is what stands"},
     "encounters": {

@@ -31,7 +31,11 @@ def occurred_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Chapter
     except (UserError, OSError) as error:
         why = "nothing is recorded" if isinstance(error, OSError) else str(error).split(": ", 1)[-1]
         return _chapter((Prose(f"What occurred cannot be told: {why}."),))
-    return told_of(found, run.start_stamp_ns, passed)
+    chapter = told_of(found, run.start_stamp_ns, passed)
+    if most := (run.record.get("virtual_traffic") or {}).get("most_users"):
+        said = f"Virtual traffic, {plural(most, 'road user')} at most, counts for nothing here."
+        chapter = chapter._replace(blocks=(*chapter.blocks, Prose(said, "quiet")))
+    return chapter
 
 
 def told_of(found: Occurred, start_ns: int, passed: Sequence[JunctionPassed]) -> Chapter:

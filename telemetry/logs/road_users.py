@@ -118,7 +118,7 @@ def log_of_detections(
 
 
 def detections_of(message: RoadUsers) -> tuple[int, list[Detection]]:
-    """Return what a car said of those around it."""
+    """Return what a car said of those who are really around it: virtual ones count for nothing."""
     return message.stamp_ns, [
         Detection(
             user.user_id,
@@ -131,6 +131,7 @@ def detections_of(message: RoadUsers) -> tuple[int, list[Detection]]:
             width_m=user.width_m,
         )
         for user in message.users
+        if not user.virtual
     ]
 
 

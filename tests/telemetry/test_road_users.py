@@ -6,6 +6,7 @@ import json
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -19,7 +20,7 @@ from foretwin.contracts.frames import (
     wrap_angle,
 )
 from foretwin.telemetry.logs import LogError, open_road_users
-from foretwin.telemetry.logs.road_users import RoadUserTrack
+from foretwin.telemetry.logs.road_users import RoadUserTrack, detections_of
 from foretwin.telemetry.logs.write_mcap import create
 
 COVERS = (
@@ -100,6 +101,16 @@ def test_noise_between_samples_of_almost_one_time_is_no_jump(tmp_path: Path) -> 
     (track,) = open_road_users(_written(tmp_path, instants)).tracks
     assert np.flatnonzero(track.gone_after).tolist() == [10]
     assert track.speed_mps == pytest.approx(np.full(11, 10.0), abs=1.0)
+
+
+def test_what_was_virtual_was_not_there() -> None:
+    real = RoadUser(
+        user_id="u", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=9.0,
+        length_m=4.5, width_m=1.8,
+    )  # fmt: skip
+    virtual = msgspec.structs.replace(real, user_id="v", virtual=True)
+    stamp_ns, said = detections_of(RoadUsers(stamp_ns=7, users=(virtual, real)))
+    assert (stamp_ns, [one.user_id for one in said]) == (7, ["u"])
 
 
 def test_what_a_car_detected_is_in_its_recording(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ _SAID = {
     "windows": "what that was judged from",
     "mirror": "car, twin, shadow and ghost at an instant ([roles](roles.md))",
     "mirrored": "the same of another vehicle",
+    "virtual_road_users": "a road user of [virtual traffic](virtual-traffic.md) at an instant",
     "touches": "a vehicle of the mirror that touches another",
     "encounters": "two vehicles that came near each other ([roles](roles.md))",
     "changes": "a change of the running drive by `foretwin set`",

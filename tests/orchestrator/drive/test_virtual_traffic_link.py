@@ -7,13 +7,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
+import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import Job
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Request
 from foretwin.contracts.virtual_traffic import TrafficCourse, VirtualTraffic
+from foretwin.orchestrator.drive.virtual_traffic_link import MOST_RECORDED
 from foretwin.orchestrator.runtime_configuration.handler import RefusedError
 from tests.orchestrator.house import House, Process
 
@@ -162,3 +165,37 @@ def test_the_record_says_how_steady_it_was(house: House) -> None:
         heard(house, later_ns=k * STEP_NS)
     record = house.conductor.traffic.record()
     assert record == {"messages": 4, "most_users": 1, "rate_hz": 10.0, "missed": 3}
+
+
+def test_where_they_were_is_recorded_five_times_a_second(house: House) -> None:
+    house.drive(20)
+    said = [heard(house, later_ns=k * STEP_NS) for k in (0, 1, 3, 4, 5, 8, 2)]
+    house.tables.close()
+    rows = pq.read_table(house.plan.folder / "results" / "virtual_road_users.parquet").to_pylist()
+    # A clock that steps back begins anew.
+    assert [row["stamp_ns"] for row in rows] == [said[k].stamp_ns for k in (0, 3, 5, 6)]
+    user = said[0].users[0]
+    assert rows[0] == {
+        "stamp_ns": said[0].stamp_ns, "user_id": "virtual-1", "kind": "car",
+        "lat_deg": user.position.lat_deg, "lon_deg": user.position.lon_deg, "yaw_rad": 0.0,
+        "speed_mps": 5.0, "length_m": 4.5, "width_m": 1.8,
+    }  # fmt: skip
+
+
+def test_of_a_crowd_the_nearest_are_recorded(house: House) -> None:
+    house.drive(20)
+    latest = house.conductor.intake.latest
+    assert latest is not None
+    at = latest.state.position
+    crowd = tuple(
+        RoadUser(
+            user_id=f"virtual-{k}", kind="car", yaw_rad=0.0, speed_mps=0.0, length_m=4.5,
+            width_m=1.8, virtual=True, position=GeoPoint(at.lat_deg + 1e-5 * (200 - k), at.lon_deg),
+        )
+        for k in range(200)
+    )  # fmt: skip
+    house.conductor.traffic.take(RoadUsers(stamp_ns=latest.state.stamp_ns, users=crowd))
+    house.tables.close()
+    table = pq.read_table(house.plan.folder / "results" / "virtual_road_users.parquet")
+    names = [f"virtual-{k}" for k in range(200 - MOST_RECORDED, 200)]
+    assert table["user_id"].to_pylist() == names

@@ -10,7 +10,12 @@ from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.occurred_part import occurred_part, told_of
 from foretwin.orchestrator.report.passages import passages
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
-from tests.orchestrator.report.told_runs import START_NS, run_of_nothing, told_run
+from tests.orchestrator.report.told_runs import (
+    START_NS,
+    run_of_nothing,
+    run_without_junctions,
+    told_run,
+)
 
 
 def test_scenarios_stand_by_time_with_their_junction(tmp_path: Path) -> None:
@@ -44,3 +49,12 @@ def test_a_run_without_a_recording_says_why_nothing_is_told(tmp_path: Path) -> N
     (said,) = chapter.blocks
     assert isinstance(said, Prose)
     assert said.text.startswith("What occurred cannot be told")
+
+
+def test_virtual_traffic_is_named_as_nobody_that_was_met(tmp_path: Path) -> None:
+    run = RunMaterial(run_without_junctions(tmp_path))
+    assert "irtual" not in str(occurred_part(run, []).blocks)
+    run.record["virtual_traffic"] = {"most_users": 20}
+    said = occurred_part(run, []).blocks[-1]
+    assert isinstance(said, Prose)
+    assert said.text == "Virtual traffic, 20 road users at most, counts for nothing here."
