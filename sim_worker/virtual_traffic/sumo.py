@@ -126,6 +126,11 @@ class SumoTraffic:
         if len(self._edges) < 2:
             raise UserError(f"{net}: holds no two edges for cars")
         shapes = [np.array(self._sumo.lane.getShape(f"{one}_0")) for one in self._edges]
+        # Of a vehicle longer than the edge that it begins on SUMO tells an angle turned round.
+        longest_m = max(KINDS[kind].length_m for kind, _, _ in _CLASSES)
+        self._holds = np.array(
+            [self._sumo.lane.getLength(f"{one}_0") >= longest_m for one in self._edges]
+        )
         self._ends_m = np.array([(shape[0], shape[-1]) for shape in shapes])
         self._sumo.route.add(_CAR, [self._edges[0]])
         self._sumo.vehicle.add(_CAR, _CAR, typeID=_CAR)
@@ -207,7 +212,7 @@ class SumoTraffic:
         there = set(sumo.vehicle.getIDList()) | set(sumo.simulation.getPendingVehicles())
         missing = self._count - len(there - {_CAR})
         away_m = np.hypot(*(self._ends_m - car_m).transpose(2, 0, 1)).min(axis=1)
-        fits = np.flatnonzero(away_m > (_FIRST_M if begins else _UNSEEN_M))
+        fits = np.flatnonzero(self._holds & (away_m > (_FIRST_M if begins else _UNSEEN_M)))
         kinds, _, shares = zip(*_CLASSES, strict=True)
         for _ in range(3 * missing if begins else min(missing, 3)):
             if missing <= 0 or not len(fits):

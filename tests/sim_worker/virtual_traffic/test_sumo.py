@@ -15,7 +15,8 @@ from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, is_there, net_
 from foretwin.sim_worker.virtual_traffic.sumo_lights import groups_of_signals
 from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.orchestrator.trip import town_world
-from tests.sim_worker.virtual_traffic.motions import played, still, tracks
+from tests.sim_worker.scenarios.worlds import cross
+from tests.sim_worker.virtual_traffic.motions import G_MPS2, played, still, tracks
 
 
 def test_a_network_of_sumo_is_taken_as_it_is(tmp_path: Path) -> None:
@@ -31,7 +32,7 @@ def test_without_sumo_one_line_says_what_to_install(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
 def test_vehicles_drive_on_the_network_of_our_own_export(tmp_path: Path) -> None:
-    write_opendrive(town_world("n44"), tmp_path / "a.xodr")
+    write_opendrive(cross(), tmp_path / "a.xodr")
     traffic = SumoTraffic(load_vehicle(), net_of(tmp_path / "a.xodr", tmp_path), count=4, seed=1)
     try:
         scenes = list(played(traffic, still(20.0, 20.0), from_s=0.0, to_s=20.0))
@@ -66,3 +67,25 @@ def test_who_is_close_to_a_light_brakes_in_the_step_in_which_it_turns_red(tmp_pa
     green, flipped = speeds(red_from=999, steps=161), speeds(red_from=160, steps=161)
     assert flipped[:160] == green[:160]
     assert any(flipped[160][name] < speed - 0.1 for name, speed in green[160].items())
+
+
+def district(tmp_path: Path) -> SumoTraffic:
+    write_opendrive(cross(), tmp_path / "a.xodr")
+    net = net_of(tmp_path / "a.xodr", tmp_path)
+    return SumoTraffic(load_vehicle(), net, count=6, seed=3)
+
+
+@pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
+def test_the_same_seed_beside_the_same_car_is_the_same_traffic(tmp_path: Path) -> None:
+    told = []
+    for _ in range(2):
+        traffic = district(tmp_path)
+        car = lambda now_s: (-60.0 + 5.0 * now_s, -1.75, 0.0, 5.0)  # noqa: E731
+        try:
+            told.append(list(played(traffic, car, from_s=0.0, to_s=15.0)))
+        finally:
+            traffic.close()
+    assert told[0] == told[1]
+    found = tracks(told[0])
+    assert found
+    assert max(track.worst_mps2() for track in found.values()) < 0.8 * G_MPS2
