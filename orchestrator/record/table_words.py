@@ -184,8 +184,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "virtual_road_users": {
         "user_id": "its id; futures that met it name it as `seen` and this id",
         "kind": "what it is",
-        "lat_deg": "where the middle of its box was",
-        "lon_deg": "where the middle of its box was",
+        **dict.fromkeys(("lat_deg", "lon_deg"), "where the middle of its box was"),
         "yaw_rad": "its heading, from true east",
         "speed_mps": "its speed",
         "length_m": "its length",

@@ -25,6 +25,7 @@ _SAID = {
     "driven_segments": "a stretch that one of them drove",
     "agreement": "a window judged as simulated and as driven",
     "windows": "what that was judged from",
+    "siblings": "a future that a second engine played as well ([engines](engines.md))",
     "mirror": "car, twin, shadow and ghost at an instant ([roles](roles.md))",
     "mirrored": "the same of another vehicle",
     "virtual_road_users": "a road user of [virtual traffic](virtual-traffic.md) at an instant",
