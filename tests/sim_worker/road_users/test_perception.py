@@ -27,13 +27,18 @@ LEAD = Player("lead", "car", EGO_PATH, 40.0, 5.0)
 
 
 def sight(
-    *players: Player, walls: OpaqueGrid | None = None, **faults: float
+    *players: Player,
+    beside: tuple[Player, ...] | None = None,
+    walls: OpaqueGrid | None = None,
+    **faults: float,
 ) -> tuple[Sight, Traffic]:
-    cast = casting([players], ego_path=EGO_PATH)
+    """One future, and another with those `beside`."""
+    casts = [players] if beside is None else [players, beside]
+    cast = casting(casts, ego_path=EGO_PATH)
     table = PathTable(cast.paths)
     rules = JunctionRules(None).between([()] * len(cast.paths))
     traffic = Traffic(cast.crowd, table, rules, cast.paces)
-    columns = {name: np.zeros(1) for name in PerceptionFaults._fields}
+    columns = {name: np.zeros(len(casts)) for name in PerceptionFaults._fields}
     columns |= {name: np.array([value]) for name, value in faults.items()}
     faulty = PerceptionFaults(**columns)
     eyes = Sight(traffic, table.along(EGO_PATH), CAR, faulty, tick_s=0.05, walls=walls)
@@ -61,6 +66,9 @@ def test_a_wall_hides_whom_the_map_knows_but_not_whom_the_car_perceives() -> Non
     found = eyes.look(0, traffic, np.array([[0.0, 0.0]]))
     assert np.isfinite(found.arc_m).tolist() == [[True, False]]
     assert np.isfinite(eyes.look(2, traffic, np.array([[21.0, 0.0]])).arc_m).all()
+    eyes, traffic = sight(walker, beside=(perceived,), walls=WALL)
+    both = eyes.look(0, traffic, np.zeros((2, 2)))
+    assert np.isfinite(both.arc_m).tolist() == [[False], [True]]
     alone, traffic = sight(perceived, walls=WALL)
     assert not alone.needs_eyes
 
