@@ -117,13 +117,15 @@ def sibling_lines(found: Mapping[str, Any] | None, share_of_core: float | None) 
     core = "" if share_of_core is None else f", {share_of_core:.1%} of a core"
     line = f"  {engine} played {found['rounds']} rounds beside MuJoCo{core}"
     if found["apart_m_p50"] is not None:
-        real = found["with_reality"]
-        correlation = real["rank_correlation"]
-        said = "nothing" if correlation is None else f"a rank correlation of {correlation:.2f}"
         line += (
             f": nominal futures {found['apart_m_p50']:.2f} m apart after {HORIZON_S:g} s (95 % "
             f"within {found['apart_m_p95']:.2f} m), {differ} of {found['futures']} futures collide "
-            f"on one engine alone; how far they are apart goes with the error against the drive by "
-            f"{said} ({real['count']} rounds)"
+            "on one engine alone"
+        )
+    real = found["with_reality"]
+    if (correlation := real["rank_correlation"]) is not None:
+        line += (
+            "; how far they are apart goes with the error against the drive by a rank correlation "
+            f"of {correlation:.2f} ({real['count']} rounds)"
         )
     return [line]

@@ -65,6 +65,10 @@ def test_the_summary_says_it_in_one_sentence() -> None:
         "  multibody played 0 rounds beside MuJoCo"
     ]
     assert sibling_lines(None, 0.5) == []
+    few = SiblingCount()
+    few.take(row(0, 0.1))
+    (line,) = sibling_lines(few.record(CHOSEN), None)
+    assert line.endswith("0 of 1 futures collide on one engine alone"), "one round says nothing"
 
 
 def test_an_answer_may_come_after_the_drive_has_shown_the_error() -> None:
