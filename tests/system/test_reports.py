@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
-from tests.system.foretwin_command import environment, foretwin
+from tests.system.foretwin_command import REPOSITORY, environment, foretwin
 
+DRAWN_TOWN = REPOSITORY / "orchestrator" / "embedded" / "drawn_town.osm"
 pytestmark = [pytest.mark.judge, pytest.mark.timeout(1800)]
 SWEEP = """
 sample = 2
@@ -66,7 +67,8 @@ def test_all_that_the_report_of_a_real_drive_offers_holds(tmp_path: Path, data_d
 
 
 def test_all_that_the_reports_of_a_sweep_and_of_two_runs_offer_holds(tmp_path: Path) -> None:
-    (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
+    spec = f'map = "{DRAWN_TOWN}"\n{SWEEP}'
+    (tmp_path / "sweep.toml").write_text(spec, encoding="utf-8")
     asked(tmp_path, "sweep", "sweep.toml", "--out", "sweep")
     short = "--speed", "max", "--end", "20", "--futures", "16"
     one, two = (foretwin(tmp_path / name, *short).run for name in ("one", "two"))
