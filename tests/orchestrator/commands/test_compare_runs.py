@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.orchestrator.commands.cli import run as command
+from foretwin.orchestrator.commands.compare_runs import _measure_lines
 from tests.orchestrator.across.test_changes import case, sweep_of
 
 
@@ -52,6 +53,19 @@ def test_changes_that_may_be_chance_are_counted_and_listed_with_all(
     assert "min_clearance_m (m)" not in short
     assert "min_clearance_m (m)" in whole
     assert "--all" not in whole
+
+
+def test_what_is_surest_stands_first() -> None:
+    change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
+    rows = [
+        {"measure": name, "unit": "m", "first": 0.0, "second": 1.0, "change": change,
+         "word": "worse", "p_adjusted": p_value}
+        for name, p_value in (("a", 0.04), ("b", None), ("c", 0.001))
+    ]  # fmt: skip
+
+    lines = list(_measure_lines(rows, every=True))
+
+    assert [line[0] for line in lines[1:]] == ["c", "a", "b"]
 
 
 def test_exit_code_3_is_for_those_who_ask(

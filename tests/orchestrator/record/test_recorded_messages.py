@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
+
 from foretwin.contracts.drive import GnssFix, RoadUsers, VehicleInfo, VehicleState
 from foretwin.contracts.frames import GeoPoint
 from foretwin.orchestrator.record.recorded_messages import OBJECTS, STATES, recorded_messages
@@ -41,6 +43,16 @@ def test_states_are_read_as_they_were_estimated_and_thinned(tmp_path: Path) -> N
     ]
     thinned = recorded_messages(file, STATES, VehicleState, every_ns=100_000_000)
     assert [one.stamp_ns for one in thinned] == [n * 100_000_000 for n in range(5)]
+
+
+def test_what_the_guard_refuses_is_passed_by(tmp_path: Path) -> None:
+    file = tmp_path / "drive.mcap"
+    odd = msgspec.structs.replace(state(1), position=GeoPoint(952.5, 13.4))
+    with create(file, info=INFO) as writer:
+        for one in (state(0), odd, state(2)):
+            writer.add("state", one)
+
+    assert list(recorded_messages(file, STATES, VehicleState)) == [state(0), state(2)]
 
 
 def test_another_topic_has_its_own_messages_and_a_missing_file_none(tmp_path: Path) -> None:
