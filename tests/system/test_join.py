@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +141,14 @@ def test_cars_that_join_brake_for_one_another_and_leave(tmp_path: Path) -> None:
             chain = orchestrator_pid(run), mine["router"], mine["vehicle"], ahead.pid, behind.pid
             with ZenohBus(running_drive(run).bus(WATCH)) as bus, kept_waiting(*chain) as kept:
                 speeds = Speeds(run, bus)
-                wait_for(lambda: speeds.slowed("ego", "behind"), "both to brake", within_s=90.0)
+                begun_s = time.monotonic()
+                wait_for(
+                    lambda: speeds.slowed("ego", "behind") or time.monotonic() - begun_s > 60.0,
+                    "both to brake", within_s=90.0,
+                )  # fmt: skip
+            if not speeds.slowed("ego", "behind"):
+                assert kept.seconds > HINDERED_S, "they did not brake, though they could run"
+                pytest.skip(f"the machine kept somebody waiting for {kept.seconds:.1f} s")
             twice = join(tmp_path, "ahead")
             _, said = twice.communicate(timeout=60.0)
             assert (twice.returncode, said) == (
