@@ -160,8 +160,8 @@ class OthersAround(msgspec.Struct, frozen=True, kw_only=True):
     on."""
 
     users: RoadUsers
-    known_for_s: float
-    """So long after its stamp each of them is within a metre of where that leads."""
+    known_for_s: tuple[float, ...]
+    """Of each: so long after the stamp it is within a metre of where that leads."""
 
 
 class SignalState(msgspec.Struct, frozen=True, kw_only=True):

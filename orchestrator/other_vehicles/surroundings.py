@@ -53,5 +53,5 @@ def surroundings(others: Iterable[Measured], *, stamp_ns: int, later_ns: int) ->
             stamp_ns=stamp_ns - later_ns,
             users=tuple(msgspec.structs.replace(user, virtual=True) for user in users),
         ),
-        known_for_s=min((left_s for _, left_s in known), default=0.0),
+        known_for_s=tuple(left_s for _, left_s in known),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from foretwin.contracts.anchor import Anchor
@@ -60,7 +60,8 @@ class StandinSource:
         self._tick = 0
         self._last_tick = None if end_s is None else round(end_s / STEP_S)
         self._users: tuple[RoadUser, ...] = ()
-        self._seen_ns, self._known_for_s = START_STAMP_NS, math.inf
+        self._seen_ns = START_STAMP_NS
+        self._known_for_s: Sequence[float] = ()
         self._anchor, self._lights = anchor, ShownLights(stamp_ns=0, world_id=None)
         self.first_stamp_ns = START_STAMP_NS
         self.ended = False
@@ -77,11 +78,12 @@ class StandinSource:
         )
 
     def see(
-        self, users: tuple[RoadUser, ...], *, stamp_ns: int, known_for_s: float = math.inf
+        self, users: tuple[RoadUser, ...], *, stamp_ns: int, known_for_s: Sequence[float] = ()
     ) -> None:
         """Take who is there at a stamp: the driver brakes for whom it finds in its way, and forgets
-        them `known_for_s` after it."""
-        self._users, self._seen_ns, self._known_for_s = users, stamp_ns, known_for_s
+        each of them `known_for_s` after it, where that is given."""
+        self._users, self._seen_ns = users, stamp_ns
+        self._known_for_s = known_for_s or (math.inf,) * len(users)
 
     def heed(self, lights: ShownLights) -> None:
         """Take what lights of the World show: the driver stands before those that let nobody pass,
@@ -129,7 +131,8 @@ class StandinSource:
                 )
             if self._tick % _CONTROL_TICKS == 0:
                 age_s = (stamp_ns - self._seen_ns) * 1e-9
-                users = self._users if age_s <= self._known_for_s else ()
+                left = zip(self._users, self._known_for_s, strict=True)
+                users = [user for user, known_s in left if age_s <= known_s]
                 self._driver.ahead = hindrance(self._path, self._driver.s_m, users, age_s=age_s)
                 fresh = stamp_ns - self._lights.stamp_ns <= STALE_NS
                 self._driver.lights = (

@@ -184,7 +184,7 @@ def test_it_forgets_whom_it_was_told_of_once_nobody_can_say_where_they_are(
         user_id="second", kind="car", position=place.position, yaw_rad=place.yaw_rad,
         speed_mps=0.0, length_m=4.5, width_m=1.6,
     )  # fmt: skip
-    source.see((car,), stamp_ns=source.first_stamp_ns, known_for_s=known_for_s)
+    source.see((car,), stamp_ns=source.first_stamp_ns, known_for_s=(known_for_s,))
     for _ in source.advance(source.first_stamp_ns + 1_000_000_000):
         pass
     assert (source.ahead is not None) == seen

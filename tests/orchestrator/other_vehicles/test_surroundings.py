@@ -28,7 +28,7 @@ def test_they_are_reckoned_to_one_stamp_by_the_clock_of_who_is_told() -> None:
     told = surroundings([Measured(STATE, CAR)], stamp_ns=STATE.stamp_ns + 10**8, later_ns=-(10**9))
     (user,) = told.users.users
     assert told.users.stamp_ns == STATE.stamp_ns + 10**8 + 10**9
-    assert told.known_for_s == pytest.approx(reckoned_for_s(CAR) - 0.1)
+    assert told.known_for_s == pytest.approx((reckoned_for_s(CAR) - 0.1,))
     x_m, _ = local_from_geo(LocalFrame(ORIGIN), user.position.lat_deg, user.position.lon_deg)
     assert x_m == pytest.approx(1.0 + box_centre_from_base_m(CAR), abs=1e-6)
     assert user.virtual
@@ -37,7 +37,7 @@ def test_they_are_reckoned_to_one_stamp_by_the_clock_of_who_is_told() -> None:
 def test_who_is_not_known_to_a_metre_any_more_is_left_out() -> None:
     late_ns = STATE.stamp_ns + round(1.01e9 * reckoned_for_s(CAR))
     told = surroundings([Measured(STATE, CAR)], stamp_ns=late_ns, later_ns=0)
-    assert (told.users.users, told.known_for_s) == ((), 0.0)
+    assert (told.users.users, told.known_for_s) == ((), ())
 
 
 @given(
@@ -51,7 +51,7 @@ def test_whatever_its_driver_does_it_is_within_a_metre_of_straight_on(
     state = msgspec.structs.replace(STATE, speed_mps=speed_mps)
     told = surroundings([Measured(state, CAR)], stamp_ns=state.stamp_ns, later_ns=0)
     grip = CAR.friction.value * GRAVITY_MPS2 / max(1.0, np.hypot(along, turns))
-    time_s = share * told.known_for_s
+    time_s = share * told.known_for_s[0]
     ((x_m, y_m, _),) = constant_turn_rate(
         np.zeros(3), speed_mps=speed_mps, accel_mps2=min(along * grip, 0.0),
         yaw_rate_radps=turns * grip / speed_mps, time_s=np.array([time_s]),

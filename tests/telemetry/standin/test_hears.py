@@ -46,7 +46,7 @@ def test_it_sees_others_where_they_are_on_its_lot(
     )  # fmt: skip
 
     def one_step(process: VehicleProcess) -> None:
-        told = OthersAround(users=RoadUsers(stamp_ns=7, users=(user,)), known_for_s=0.3)
+        told = OthersAround(users=RoadUsers(stamp_ns=7, users=(user,)), known_for_s=(0.3,))
         bus.publish("surroundings", told, vehicle="second")
         process.step()
 
@@ -60,6 +60,6 @@ def test_it_sees_others_where_they_are_on_its_lot(
     assert local_pose(LOT.frame, there.position, there.yaw_rad) == pytest.approx(
         (0.0, 0.0, LOT.yaw_rad), abs=1e-6
     )
-    assert when == {"stamp_ns": 7, "known_for_s": 0.3}
+    assert when == {"stamp_ns": 7, "known_for_s": (0.3,)}
     # What lights show is stamped by the clock of the drive's own car.
     assert bool(bus.mailboxes("lights")) != beside
