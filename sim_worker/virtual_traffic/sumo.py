@@ -236,7 +236,8 @@ class SumoTraffic:
         """Give those who are nearly there somewhere else to go: nobody vanishes on the road."""
         vehicles = self._sumo.vehicle
         found = vehicles.getAllSubscriptionResults()
-        for name in sorted(found):
+        # Results of the last step still tell of who left in it.
+        for name in sorted(found.keys() & set(vehicles.getIDList())):
             index = found[name][_INDEX]
             if found[name][_ROAD].startswith(":"):
                 continue  # Within a junction it is decided where it goes.
