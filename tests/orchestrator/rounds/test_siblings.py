@@ -87,6 +87,7 @@ def test_nominal_and_worst_future_are_played_a_second_time(house: SiblingHouse) 
     assert job.engine == "multibody"
     assert job.futures[0].index == 0
     assert 1 <= len(job.futures) <= 2
+    assert (job.metrics, job.accidents) == ((), False), "they cost, and change no motion"
     assert {one.id for one in job.scenarios} == {one.scenario_id for one in job.futures} - {""}
     house.second.answer_one(question)
     house.settle()
