@@ -56,7 +56,7 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
     assert {name for name, value in record.items() if value is None} | {
         "futures.missed_rounds", "futures.spared_rounds", "futures.unseeded_rounds",
         "futures.off_lanes_rounds", "ledger.telemetry", "ledger.rounds", "ledger.jobs",
-    } == unknown | {"agreement"}  # fmt: skip
+    } == unknown | {"agreement", "siblings"}  # fmt: skip
     assert {n: value for n, value in record.items() if value is not None} == {
         "run_id": "r1",
         "exit": "recovered",
