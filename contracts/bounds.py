@@ -80,6 +80,7 @@ SHAPES: dict[type[msgspec.Struct], dict[str, str]] = {
     drive.PlannedTrajectory: dict.fromkeys(
         ("time_from_stamp_s", "lat_deg", "lon_deg", "yaw_rad", "speed_mps"), "N"
     ),
+    drive.OthersAround: {"users.users": "N", "known_for_s": "N"},
     futures.FuturesResult: {
         "future_indices": "S",
         "left_out": "S",

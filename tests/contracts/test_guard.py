@@ -17,6 +17,7 @@ from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import (
     GnssFix,
     ImuSample,
+    OthersAround,
     PlannedTrajectory,
     RoadUser,
     RoadUsers,
@@ -72,6 +73,13 @@ def test_arrays_that_belong_together_have_one_length() -> None:
     assert why(plan(yaw_rad=np.ones(3))) == "PlannedTrajectory: yaw_rad of another shape"
     assert why(plan(lat_deg=np.ones((4, 1)))) == "PlannedTrajectory: lat_deg of another shape"
     assert admit(plan(**{name: np.ones(0) for name in SHAPES[PlannedTrajectory]}), where=KEY)
+
+
+def test_of_each_of_those_around_it_is_said_how_long_it_is_known() -> None:
+    users = RoadUsers(stamp_ns=1, users=(user(), user(user_id="8")))
+    reason = "OthersAround: known_for_s of another shape"
+    assert why(OthersAround(users=users, known_for_s=(1.0,))) == reason
+    assert admit(OthersAround(users=users, known_for_s=(1.0, 0.5)), where=KEY)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
