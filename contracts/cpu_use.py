@@ -1,7 +1,7 @@
 """What processor time each process of a run takes: it says so itself, in a file beside its setup.
 
-What it started counts with it. A process that is killed has said so some seconds before; one that
-was started again has several.
+What it started counts with it, but for who starts those that say so themselves. A process that is
+killed has said so some seconds before; one that was started again has several.
 """
 
 from __future__ import annotations
@@ -62,9 +62,13 @@ def _taken_s(pid: int) -> float:
 
 
 class CpuMeter:
-    """Writes what this process has taken into `folder`, now and then and at its end."""
+    """Writes what this process has taken into `folder`, now and then and at its end.
 
-    def __init__(self, folder: Path, process_id: str) -> None:
+    `alone` leaves out what it started: for the one who starts processes with meters of their own.
+    """
+
+    def __init__(self, folder: Path, process_id: str, *, alone: bool = False) -> None:
+        self._alone = alone
         self._file = folder / f"{process_id}-{os.getpid()}{_SUFFIX}"
         self._starting_cpu_s: float | None = None
         self._ready_s = 0.0
@@ -72,7 +76,7 @@ class CpuMeter:
 
     def ready(self) -> None:
         """The start is over: the process can take work."""
-        self._starting_cpu_s, self._ready_s = cpu_taken_s(), time.monotonic()
+        self._starting_cpu_s, self._ready_s = self._taken_s(), time.monotonic()
 
     def look(self) -> None:
         """Write where it is time to; call it often."""
@@ -81,7 +85,7 @@ class CpuMeter:
 
     def write(self) -> None:
         """Write what was taken until now; a disk that is full must not end a process."""
-        now_s, cpu_s = time.monotonic(), cpu_taken_s()
+        now_s, cpu_s = time.monotonic(), self._taken_s()
         self._next_s = now_s + _EVERY_S
         ready, starting_cpu_s = self._starting_cpu_s is not None, self._starting_cpu_s or 0.0
         life = _Life(
@@ -92,6 +96,9 @@ class CpuMeter:
         with contextlib.suppress(OSError):
             # One write of the same length each time: who reads meanwhile sees no half of it.
             self._file.write_bytes(msgspec.json.encode(life).ljust(160) + b"\n")
+
+    def _taken_s(self) -> float:
+        return time.process_time() if self._alone else cpu_taken_s()
 
 
 def cpu_uses(folder: Path) -> dict[str, CpuUse]:

@@ -67,7 +67,7 @@ class Foreground:
         self._supervisor = Supervisor(self._launch)
         self._interruption = Interruption()
         self._began_s = time.monotonic()
-        self._meter = CpuMeter(plan.processes_dir, SUPERVISOR)
+        self._meter = CpuMeter(plan.processes_dir, SUPERVISOR, alone=True)
         self._standing = b""
         self._refusal: Refusal | None = None
         self._ended_by: list[str] = []

@@ -103,7 +103,7 @@ def test_what_is_damaged_is_passed_over(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="nobody tells of those that still run")
-def test_what_a_process_started_counts_with_it() -> None:
+def test_what_a_process_started_counts_with_it_unless_it_says_so_itself(tmp_path: Path) -> None:
     burns = "import time\nwhile time.process_time() < 0.3: pass\nprint(1, flush=True)\ninput()"
     before_s = cpu_taken_s()
     with subprocess.Popen(
@@ -112,5 +112,9 @@ def test_what_a_process_started_counts_with_it() -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == b"1\n"
         assert cpu_taken_s() - before_s >= 0.25, "while it runs"
+        own_s = time.process_time()
+        CpuMeter(tmp_path, "supervisor", alone=True).write()
+        said_s = cpu_uses(tmp_path)["supervisor"].cpu_s
+        assert said_s == pytest.approx(own_s, abs=0.1), "said by the started one itself"
         process.communicate(b"\n")
     assert cpu_taken_s() - before_s >= 0.25, "once it has ended"
