@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.type_words import in_words
+from foretwin.contracts.type_words import dotted, in_words
 
 Settings = TypeVar("Settings", bound=msgspec.Struct)
 
@@ -21,9 +21,10 @@ def settings_of_flags(
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as wrong:
         place, text = in_words(wrong, kind, values)
-        name = str(place[0]) if place else ""
-        said = text.removeprefix(f"{name} {values.get(name)!r}")
-        raise error(f"{flag_of(name)} {values.get(name)}{said}") from wrong
+        flag, named = flag_of(str(place[0]) if place else ""), dotted(place)
+        said = text.removeprefix(named) if place and text.startswith(named) else f": {text}"
+        # A flag's text is written without the quotes that it has in a file.
+        raise error(flag + re.sub(r"^ '(\S*)'", r" \1", said)) from wrong
 
 
 class AtFault(NamedTuple):

@@ -53,8 +53,10 @@ def _numbers(file: Path) -> Iterator[tuple[str, str, int]]:
     """Yield group, key and number of all lights that a file names."""
     try:
         root = ElementTree.parse(file).getroot()
-    except (OSError, ElementTree.ParseError) as error:
-        raise UserError(f"{file}: cannot be read: {error}") from None
+    except OSError as error:
+        raise UserError(f"{file}: cannot be read: {error.strerror}") from None
+    except ElementTree.ParseError as error:
+        raise UserError(f"{file}: no XML: {error}") from None
     for relation in root.iterfind("relation"):
         group = relation.find("tag[@k='foretwin:group']")
         if group is not None:
