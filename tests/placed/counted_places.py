@@ -17,7 +17,7 @@ import shapely
 
 from tests.placed.raw_map import Plane, RawMap, RawRoad
 
-STRAIGHT_DEG, SIDE_DEG = 20.0, (65.0, 115.0)
+STRAIGHT_DEG, SIDE_DEG, BACK_DEG = 20.0, (65.0, 115.0), 150.0
 ALONE_M, REACH_M = 45.0, 70.0
 RUN_UP_S = 2.5
 EGO_OVER, OTHER_OVER = 1.1, 1.5
@@ -78,12 +78,26 @@ def counted(raw: RawMap) -> dict[str, set[int]]:
     for node in roads.plain_junctions():
         left_hand = drives_left(*roads.places[node])
         arms = roads.arms(node)
+        if not _meet(arms):
+            continue
         for id_, wanted in WANTED.items():
             if len(arms) < wanted.arms or (wanted.lights and not roads.lit(node, arms)):
                 continue
             if any(roads.free(ways) for ways in _ways(wanted, arms, left_hand)):
                 found[id_].add(node)
     return found
+
+
+def _meet(arms: list[Arm]) -> bool:
+    """Return whether ways part or join: not so where a road becomes its own two carriageways."""
+    ways = [
+        (n, k)
+        for (n, come), (k, go) in itertools.permutations(enumerate(arms), 2)
+        if come.comes_in
+        and go.goes_out
+        and abs(_between(come.bearing_deg + 180.0, go.bearing_deg)) <= BACK_DEG
+    ]
+    return any(len(set(ends)) < len(ends) for ends in zip(*ways, strict=True))
 
 
 class Found(NamedTuple):
@@ -179,12 +193,15 @@ class _Roads:
         }
 
     def plain_junctions(self) -> Iterator[int]:
-        """Yield nodes where three or four two-way or one-way roads meet, and no other near them."""
+        """Yield nodes where three or four two-way or one-way roads meet, and no other near them.
+
+        No mini-roundabouts: whoever comes there gives way as at a ring.
+        """
         nodes = sorted(self._junctions)
         tree = shapely.STRtree([shapely.Point(self._at[n]) for n in nodes])
         for place, node in enumerate(nodes):
             links = self._next[node]
-            if len(links) > 4 or node in self._barred:
+            if len(links) > 4 or node in self._barred | self._raw.mini_roundabouts:
                 continue
             if len(tree.query(tree.geometries[place], "dwithin", ALONE_M)) > 1:
                 continue
