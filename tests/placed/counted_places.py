@@ -193,15 +193,12 @@ class _Roads:
         }
 
     def plain_junctions(self) -> Iterator[int]:
-        """Yield nodes where three or four two-way or one-way roads meet, and no other near them.
-
-        No mini-roundabouts: whoever comes there gives way as at a ring.
-        """
+        """Yield nodes where three or four two-way or one-way roads meet, and no other near them."""
         nodes = sorted(self._junctions)
         tree = shapely.STRtree([shapely.Point(self._at[n]) for n in nodes])
         for place, node in enumerate(nodes):
             links = self._next[node]
-            if len(links) > 4 or node in self._barred | self._raw.mini_roundabouts:
+            if len(links) > 4 or node in self._barred:
                 continue
             if len(tree.query(tree.geometries[place], "dwithin", ALONE_M)) > 1:
                 continue

@@ -81,8 +81,6 @@ class RawMap(NamedTuple):
     """Nodes with traffic lights."""
     no_turns: tuple[dict[str, object], ...]
     """Turns that are forbidden, or the only ones: kind, from, via and to."""
-    mini_roundabouts: frozenset[int] = frozenset()
-    """Nodes that are rings as small as their crossing."""
 
 
 def read_raw(file: Path) -> RawMap:
@@ -90,11 +88,7 @@ def read_raw(file: Path) -> RawMap:
     reader = _Reader()
     reader.apply_file(str(file), locations=True, idx="flex_mem")
     return RawMap(
-        tuple(reader.roads),
-        tuple(reader.buildings),
-        frozenset(reader.lights),
-        tuple(reader.turns),
-        frozenset(reader.minis),
+        tuple(reader.roads), tuple(reader.buildings), frozenset(reader.lights), tuple(reader.turns)
     )
 
 
@@ -104,15 +98,12 @@ class _Reader(osmium.SimpleHandler):
         self.roads: list[RawRoad] = []
         self.buildings: list[shapely.Geometry] = []
         self.lights: set[int] = set()
-        self.minis: set[int] = set()
         self.turns: list[dict[str, object]] = []
         self._made = osmium.geom.WKBFactory()
 
     def node(self, node: osmium.osm.Node) -> None:
         if node.tags.get("highway") == "traffic_signals":
             self.lights.add(node.id)
-        elif node.tags.get("highway") == "mini_roundabout":
-            self.minis.add(node.id)
 
     def way(self, way: osmium.osm.Way) -> None:
         if way.tags.get("highway") not in CAR_ROADS or way.tags.get("area") == "yes":

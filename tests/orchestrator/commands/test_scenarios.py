@@ -45,9 +45,8 @@ def test_a_sound_file_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> No
     file = CATALOGUE / "cccscp.toml"
     assert run(["scenarios", "check", str(file)]) == 0
     said = capsys.readouterr().out
-    assert said == (
-        f"{file}: cccscp, Car-to-car straight crossing path: 9 cases, crossing, staggered, other\n"
-    )
+    kinds = "crossing, staggered, mini_roundabout, other"
+    assert said == f"{file}: cccscp, Car-to-car straight crossing path: 9 cases, {kinds}\n"
 
 
 def test_a_bad_file_ends_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -53,6 +53,12 @@ def test_the_catalogue_holds_what_the_field_tests() -> None:
     assert all(scenario.source and scenario.shows.endswith(".") for scenario in found.values())
 
 
+def test_what_meets_at_a_crossing_meets_at_a_mini_roundabout_too_but_for_lights() -> None:
+    kinds = {id_: scenario.where.kinds for id_, scenario in catalogue().items()}
+    crossing = {id_ for id_, admitted in kinds.items() if "crossing" in admitted}
+    assert {id_ for id_ in crossing if "mini_roundabout" not in kinds[id_]} == {"red_light"}
+
+
 def test_ccftap_has_the_protocols_nine_pairs_of_speeds() -> None:
     by_name = {number.name: number.value for number in numbers(catalogue()["ccftap"])}
     for name, kmh in (("ego", (10, 15, 20)), ("oncoming_car", (30, 45, 60))):
