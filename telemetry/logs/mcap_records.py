@@ -148,7 +148,7 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
                         message.data,
                         message.sequence,
                     )
-        except BROKEN as error:
+        except (*BROKEN, OSError) as error:  # a place before the file's begin cannot be gone to
             raise LogError(f"{path}: damaged MCAP: {type(error).__name__} {error}") from None
 
 

@@ -121,7 +121,11 @@ def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
     texts: dict[str, str] = {}
     decode = decoder(recording, known)
     for record in recording.chosen(known, Counter()):
-        texts[record.topic] = decode(record).data
+        try:
+            texts[record.topic] = decode(record).data
+        except Exception as error:  # whatever rosbags raises over broken bytes
+            what = f"{path}: its {record.topic} is damaged: {one_line(error)}"
+            raise LogError(what) from None
     return _open_own(recording, _OwnMetadata(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
 
 

@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from rosbags.interfaces.typing import Typesdict
-from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys import (
+    Stores,
+    TypesysError,
+    get_types_from_idl,
+    get_types_from_msg,
+    get_typestore,
+)
 
 from foretwin.contracts.errors import one_line
 from foretwin.telemetry.logs.log import LogError
@@ -57,9 +63,15 @@ def mcap_recording(path: Path) -> RosRecording:
 def decoder(recording: RosRecording, topics: set[str]) -> Callable[[Record], Any]:
     """Return a decoder of topics by the definitions in the file itself, else by those known here.
 
-    Raises LogError naming the topic whose definition cannot be read.
+    Raises LogError naming the topic whose definition is not there or cannot be read, and where one
+    defines a type otherwise than ROS does.
     """
-    schemas = {topic: recording.contents.schemas[topic] for topic in topics}
+    known = recording.contents.schemas
+    if undefined := sorted(topics - set(known)):
+        raise LogError(
+            f"{recording.path}: topic {undefined[0]}: the file does not say of what type"
+        )
+    schemas = {topic: known[topic] for topic in topics}
     for topic, schema in schemas.items():
         try:
             _types(schema.name, schema.encoding, schema.data)
@@ -67,7 +79,10 @@ def decoder(recording: RosRecording, topics: set[str]) -> Callable[[Record], Any
             reason = str(error) if isinstance(error, LogError) else one_line(error)
             text = f"{recording.path}: topic {topic}: unreadable definition: {reason}"
             raise LogError(text) from None
-    store = _store(frozenset((one.name, one.encoding, one.data) for one in schemas.values()))
+    try:
+        store = _store(frozenset((one.name, one.encoding, one.data) for one in schemas.values()))
+    except TypesysError as error:
+        raise LogError(f"{recording.path}: unreadable definitions: {one_line(error)}") from None
     if any(schema.encoding == ROS1 for schema in schemas.values()):
         return lambda record: store.deserialize_ros1(record.data, record.kind)
     return lambda record: store.deserialize_cdr(record.data, record.kind)

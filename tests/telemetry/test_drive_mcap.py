@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +20,12 @@ from rosbags.highlevel import AnyReader
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
-from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs import LogError, mcap_records, open_log
+from foretwin.telemetry.logs.convert import convert
 from foretwin.telemetry.logs.mcap_records import MOST_CHUNK_BYTES
+from foretwin.telemetry.logs.ros_recording import decoder, mcap_recording
 from foretwin.telemetry.logs.write_mcap import create
-from foretwin.telemetry.ros_messages.table import messages_from
+from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX, messages_from
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
 from tests.telemetry.own_recordings import message_from, read_drive
 
@@ -165,6 +169,40 @@ def test_damage_is_told(recorded: Path) -> None:
     recorded.write_bytes(data)
     with pytest.raises(LogError, match=r"drive\.mcap: damaged MCAP"):
         list(open_log(recorded).samples())
+
+
+def test_a_definition_that_is_missing_or_not_that_of_ros_is_told(recorded: Path) -> None:
+    recording = mcap_recording(recorded)
+    schemas = recording.contents.schemas
+    speed = f"{TOPIC_PREFIX}speed"
+    with pytest.raises(LogError, match=r"topic /none: the file does not say of what type"):
+        decoder(recording, {speed, "/none"})
+    other = schemas[speed].data.replace(b"uint32 nanosec", b"uint64 nanosec")
+    changed = dataclasses.replace(schemas[speed], data=other)
+    contents = recording.contents._replace(schemas={**schemas, speed: changed})
+    with pytest.raises(LogError, match=r"drive\.mcap: unreadable definitions: .*already present"):
+        decoder(dataclasses.replace(recording, contents=contents), {speed})
+
+
+def test_a_bag_of_ours_whose_account_of_itself_is_damaged_is_refused(recorded: Path) -> None:
+    path = recorded.with_name("own.bag")
+    convert(recorded, path)
+    path.write_bytes(path.read_bytes().replace(b'{"vehicle_id"', b'{"\xf5ehicle_id"'))
+    with pytest.raises(LogError, match=r"own\.bag: its /foretwin/\w+ is damaged: "):
+        open_log(path)
+
+
+def test_an_index_that_points_before_the_file_is_told(
+    recorded: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = mcap_recording(recorded)
+
+    def refuses(*_args: object, **_named: object) -> object:
+        raise OSError(22, "Invalid argument")
+
+    monkeypatch.setattr(mcap_records, "make_reader", refuses)
+    with pytest.raises(LogError, match=r"drive\.mcap: damaged MCAP: OSError"):
+        list(recording.read({f"{TOPIC_PREFIX}speed"}, Counter()))
 
 
 def test_what_is_not_a_number_is_refused_on_reading(tmp_path: Path) -> None:
