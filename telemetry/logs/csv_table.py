@@ -235,7 +235,11 @@ def _positions(path: Path, position: PositionSection, columns: dict[str, Array])
             convert = pyproj.Transformer.from_crs(position.epsg, 4326, always_xy=True)
         except pyproj.exceptions.CRSError as error:
             raise LogError(f"{path}: [position] epsg {position.epsg}: {error}") from None
-        lon_deg, lat_deg = convert.transform(columns["easting"], columns["northing"])
+        easting, northing = (
+            columns[name] / _axis_m(convert, getattr(position, name).unit)
+            for name in ("easting", "northing")
+        )
+        lon_deg, lat_deg = convert.transform(easting, northing)
     elif position.origin is not None:
         plane = LocalFrame(GeoPoint(*position.origin).validate())
         xy_m = np.stack([columns["x"], columns["y"]], axis=1)
@@ -244,6 +248,17 @@ def _positions(path: Path, position: PositionSection, columns: dict[str, Array])
         lat_deg, lon_deg = columns["latitude"], columns["longitude"]
     altitude = columns.get("altitude", np.zeros(len(lat_deg)))
     return np.stack([lat_deg, lon_deg, np.nan_to_num(altitude, nan=0.0)], axis=1)
+
+
+def _axis_m(convert: pyproj.Transformer, unit: str | None) -> float:
+    """Return the metres in a step of a projected system's axis, as a column in `unit` means it.
+
+    Systems in feet mean their own, which is 2 ppm longer in the USA: feet are handed on as such.
+    """
+    crs = convert.source_crs
+    axis_m = crs.axis_info[0].unit_conversion_factor if crs and crs.axis_info else 1.0
+    foot_m = units.LENGTH["ft"]
+    return foot_m if unit == "ft" and abs(axis_m - foot_m) < 1e-5 else axis_m
 
 
 def _true_yaw(

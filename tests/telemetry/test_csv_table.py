@@ -151,6 +151,30 @@ north = "grid"
     assert math.degrees(course) < 88.0
 
 
+@pytest.mark.parametrize(
+    ("unit", "in_feet"), [("ft", 1.0), ("m", 1200.0 / 3937.0), ("km", 1.2 / 3937.0)]
+)
+def test_a_system_that_counts_in_feet_gets_feet(tmp_path: Path, unit: str, in_feet: float) -> None:
+    # New York's plane (EPSG 2263) begins 984,250 feet of the U.S. survey west of 74° W.
+    declaration = f"""
+reference_point = "antenna"
+[time]
+column = "t"
+unit = "s"
+base = "log"
+[position]
+frame = "projected"
+epsg = 2263
+easting = {{ column = "e", unit = "{unit}" }}
+northing = {{ column = "n", unit = "{unit}" }}
+"""
+    row = f"{984_250.0 * in_feet:.9f},{200_000.0 * in_feet:.9f}"
+    path = drive(tmp_path, f"t,e,n\n0,{row}\n1,{row}\n", declaration)
+    position = channels(path)["gnss"][0].position
+    assert position.lon_deg == pytest.approx(-74.0, abs=1e-8)
+    assert position.lat_deg == pytest.approx(40.7156, abs=1e-3)
+
+
 def with_keys(section: str, *lines: str) -> str:
     return DECLARATION.replace(f"[{section}]", "\n".join((f"[{section}]", *lines)))
 
