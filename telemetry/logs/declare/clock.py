@@ -12,7 +12,7 @@ from foretwin.contracts.drive import TimeBase
 from foretwin.telemetry.logs.declare.loose_table import LooseTable
 from foretwin.telemetry.logs.units import ISO_TIME, TIME_NS
 
-_RISES = 0.97
+_RISES, _LEAST_RISES = 0.97, 0.15
 """So many steps of a clock are forwards; fewer where rows of several sensors share a stamp."""
 _STEP_S = (2e-4, 15.0)
 """Rows come so fast, in the middle."""
@@ -36,26 +36,22 @@ class ClockColumn(NamedTuple):
 def clocks_of(table: LooseTable) -> list[ClockColumn]:
     """Return what may be the rows' time, the likeliest first.
 
-    Dates, then seconds since 1970, then what rises unevenly or in parts of a unit, last what counts
-    by one. Units that fit are told apart by speeds, as places are found.
+    Dates, then seconds since 1970, then what rises unevenly or in parts of a unit, what stands for
+    rows, last what counts by one. Units that fit are told apart by speeds, as places are found.
     """
     found = []
     for name, stamps_ns in table.times.items():
         known = stamps_ns > np.iinfo(np.int64).min
         first_ns = stamps_ns[known][0]
         time_s = np.where(known, (stamps_ns - first_ns) * 1e-9, np.nan)
-        if _rises(time_s) >= 0.5:
-            found.append(
-                (
-                    0.0,
-                    ClockColumn(
-                        name, ISO_TIME, "utc", time_s, False, f"dates from {_day(first_ns)}"
-                    ),
-                )
-            )
+        rises = _rises(time_s)
+        if rises >= _LEAST_RISES:
+            said = f"dates from {_day(first_ns)}"
+            clock = ClockColumn(name, ISO_TIME, "utc", time_s, False, said)
+            found.append((2.0 * (rises < _RISES), clock))
     for name, values in table.columns.items():
         rises = _rises(values)
-        if rises < 0.5:
+        if rises < _LEAST_RISES:
             continue
         numbers = values[np.isfinite(values)]
         step = float(np.median(np.diff(numbers)[np.diff(numbers) > 0.0]))

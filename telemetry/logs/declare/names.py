@@ -22,7 +22,7 @@ FIELDS = {
 """By field of a position: what a column of it may be called, in English and German."""
 ALTITUDE = re.compile(r"alt(?!er)|h..?he|^h$|height|elev|^hgt|^z$", re.IGNORECASE)
 STD = re.compile(r"std|sigma|stdev|h_?acc|accuracy|genauigkeit|^acc$|eph$", re.IGNORECASE)
-_FEET = re.compile(r"ft\b|feet|fu.{1,2}$", re.IGNORECASE)
+FEET = re.compile(r"ft\b|feet|fu.{1,2}$", re.IGNORECASE)
 EPSG = re.compile(r"epsg\D{0,3}(\d{4,5})", re.IGNORECASE)
 ZONE = re.compile(r"(?:utm|zone)\D{0,2}(\d{1,2})\s*([C-X]?)", re.IGNORECASE)
 
@@ -32,12 +32,7 @@ def altitude_of(columns: dict[str, Array]) -> str | None:
     for name, values in columns.items():
         known = values[np.isfinite(values)]
         plausible = len(known) > 20 and known.min() > -430.0 and known.max() < 9000.0
-        if (
-            ALTITUDE.search(name)
-            and not _FEET.search(name)
-            and plausible
-            and np.ptp(known) < 2000.0
-        ):
+        if ALTITUDE.search(name) and not FEET.search(name) and plausible and np.ptp(known) < 2000.0:
             return name
     return None
 

@@ -14,6 +14,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_ecef, local_from_geo
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.declare.motion import FASTEST_MPS, GridMotion, changes, motion_of
+from foretwin.telemetry.logs.declare.names import FEET
 
 _LEAST_P90_MPS = 1.5
 """A drive is faster than that for a tenth of its time, and never faster than 90 m/s for long."""
@@ -21,6 +22,8 @@ _LEAST_WAY_M = 30.0
 _ROUGH = 1.6
 """A way from row to row is so much longer than over each fifth: positions are smooth."""
 _LEAST_CHANGES = 15
+_OWN_TIMES = 0.9
+"""So many positions have a time of their own; fewer by a clock that is too coarse for them."""
 _TOGETHER = 0.6
 """Columns of one receiver change in the same rows, of all in which one does."""
 _EVENLY = 0.9
@@ -142,23 +145,24 @@ def _ecef(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place
 
 
 def _plane(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
-    """Return readings as UTM or the like, else as metres from somewhere."""
+    """Return readings as UTM or the like, else as lengths from somewhere: feet where so called."""
     grid, near = [], []
     for east, north in itertools.permutations(columns, 2):
         rows, alike = new.common((east, north))
         if alike < _TOGETHER:
             continue
-        xy_m = np.stack([columns[east][rows], columns[north][rows]], axis=1)
+        unit = "ft" if FEET.search(east) and FEET.search(north) else "m"
+        xy_m = np.stack([columns[east][rows], columns[north][rows]], axis=1) * units.LENGTH[unit]
         if not _moves_like_a_car(time_s[rows], xy_m):
             continue
         x_m, y_m = (float(value) for value in np.median(xy_m, axis=0))
         xy_m = xy_m - (x_m, y_m)
         if _UTM_EAST_M[0] < x_m < _UTM_EAST_M[1] and _UTM_NORTH_M[0] < y_m < _UTM_NORTH_M[1]:
             fields = {"easting": east, "northing": north}
-            grid += _place("projected", fields, "m", rows, xy_m, time_s, None, alike)
+            grid += _place("projected", fields, unit, rows, xy_m, time_s, None, alike)
         else:
             fields = {"x": east, "y": north}
-            near += _place("local", fields, "m", rows, xy_m, time_s, None, alike)
+            near += _place("local", fields, unit, rows, xy_m, time_s, None, alike)
     return grid or near
 
 
@@ -205,7 +209,7 @@ def _moves_like_a_car(time_s: Array, xy_m: Array) -> bool:
     step_s = np.diff(time_s)
     step_m = np.hypot(*np.diff(xy_m, axis=0).T)
     good = step_s > 0.0
-    if good.sum() < _LEAST_CHANGES:
+    if good.sum() < _LEAST_CHANGES or good.mean() < _OWN_TIMES:
         return False
     speed = step_m[good] / step_s[good]
     fast_mps = float(np.percentile(speed, 90))

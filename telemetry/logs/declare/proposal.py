@@ -145,6 +145,10 @@ def _written(
     evidence = {"time": [_clock_said(table, clock, place)]}
     given: dict[str, Any] = {name: col(column, place.unit) for name, column in place.fields.items()}
     evidence["position"] = [_place_said(place, clock.time_s), chosen.evidence, framed]
+    if place.frame in ("projected", "local"):
+        by = "their names alone" if place.unit == "ft" else "usage alone"
+        proof = "a speed fits" if "speed.forward" in sensors.fits else "nothing else tells"
+        evidence["position"].append(f"in {place.unit} by {by}; {proof}")
     _add_named(given, evidence["position"], sections, place)
     told = new_when(
         list(place.fields.values()), table.columns, clock.time_s, sections.moves, places=True

@@ -28,3 +28,13 @@ def test_a_clock_is_found_in_its_unit(unit: str, hz: float, zero_s: float, base:
     if base == "utc":
         assert clocks_of(table)[0].unit == unit
         assert "2018-04-08" in found[unit].evidence
+
+
+def test_rows_of_several_sensors_share_a_stamp_and_come_behind_a_finer_clock() -> None:
+    shared = 8_000.0 + np.repeat(np.arange(0.0, 60.0, 0.2), 3)
+    fine = 9_000.0 + np.cumsum(np.full(len(shared), 1 / 15.0))
+    dates = np.round(shared * 1e9).astype(np.int64)
+    columns = {"shared": shared, "fine": fine, "coarse": np.floor(fine)}
+    table = LooseTable(Path("log.csv"), ",", ".", True, columns, {"date": dates}, ())
+    found = [clock.column for clock in clocks_of(table) if clock.unit in ("s", "iso8601")]
+    assert found == ["fine", "date", "shared"]

@@ -31,3 +31,10 @@ def test_latitude_and_longitude_are_of_one_receiver() -> None:
     assert ("lat of another", "lon of another") in found
     assert ("lat of one", "lon of another") not in found
     assert ("lat of another", "lon of one") not in found
+
+
+def test_positions_that_share_times_are_not_timed_by_that_clock() -> None:
+    time_s = np.arange(0.0, 200.0, 0.2)
+    columns = {"x": 8.0 * time_s + 30.0 * np.sin(time_s / 9.0), "y": 100.0 * np.sin(time_s / 20.0)}
+    assert places_of(columns, time_s)
+    assert not places_of(columns, np.floor(time_s))

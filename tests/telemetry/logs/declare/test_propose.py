@@ -26,7 +26,6 @@ COVERS = (
     "foretwin.telemetry.logs.declare.choice",
     "foretwin.telemetry.logs.declare.likeness",
     "foretwin.telemetry.logs.declare.motion",
-    "foretwin.telemetry.logs.declare.names",
     "foretwin.telemetry.logs.declare.proposal",
     "foretwin.telemetry.logs.declare.roles",
     "foretwin.telemetry.logs.declare.sections",
