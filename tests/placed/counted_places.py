@@ -17,7 +17,7 @@ import shapely
 
 from tests.placed.raw_map import Plane, RawMap, RawRoad
 
-STRAIGHT_DEG, SIDE_DEG, BACK_DEG = 20.0, (65.0, 115.0), 150.0
+STRAIGHT_DEG, SIDE_DEG = 20.0, (65.0, 115.0)
 ALONE_M, REACH_M = 45.0, 70.0
 RUN_UP_S = 2.5
 EGO_OVER, OTHER_OVER = 1.1, 1.5
@@ -78,7 +78,7 @@ def counted(raw: RawMap) -> dict[str, set[int]]:
     for node in roads.plain_junctions():
         left_hand = drives_left(*roads.places[node])
         arms = roads.arms(node)
-        if not _meet(arms):
+        if _parts_alone(arms):
             continue
         for id_, wanted in WANTED.items():
             if len(arms) < wanted.arms or (wanted.lights and not roads.lit(node, arms)):
@@ -88,16 +88,14 @@ def counted(raw: RawMap) -> dict[str, set[int]]:
     return found
 
 
-def _meet(arms: list[Arm]) -> bool:
-    """Return whether ways part or join: not so where a road becomes its own two carriageways."""
-    ways = [
-        (n, k)
-        for (n, come), (k, go) in itertools.permutations(enumerate(arms), 2)
-        if come.comes_in
-        and go.goes_out
-        and abs(_between(come.bearing_deg + 180.0, go.bearing_deg)) <= BACK_DEG
-    ]
-    return any(len(set(ends)) < len(ends) for ends in zip(*ways, strict=True))
+def _parts_alone(arms: list[Arm]) -> bool:
+    """Return whether a two-way road becomes its own two carriageways, and no other meets it."""
+    come = [arm for arm in arms if not arm.goes_out]
+    go = [arm for arm in arms if not arm.comes_in]
+    if (len(arms), len(come), len(go)) != (3, 1, 1):
+        return False
+    beside = abs(_between(come[0].bearing_deg, go[0].bearing_deg)) < 90.0
+    return beside and len({arm.road.tags.get("name") for arm in arms}) == 1
 
 
 class Found(NamedTuple):

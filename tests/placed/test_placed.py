@@ -60,17 +60,29 @@ def test_nothing_is_counted_where_a_house_stands_on_a_road_or_a_turn_is_forbidde
     assert not any(counted(barred).values())
 
 
-def test_no_junction_is_where_a_road_becomes_its_own_carriageways() -> None:
-    whole = crossing(GERMANY, maxspeed="50")
-    (lon, lat), road = GERMANY, crossing(GERMANY, arms=1, maxspeed="50").roads[0]
-    ends = {2: (lon - 0.0013, lat + 0.0001), 3: (lon - 0.0013, lat - 0.0001)}
-    for ways, meet in ((("yes", "-1"), False), (("yes", "yes"), True), (("no", "-1"), True)):
-        parts = [
-            street(i, {0: GERMANY, i: ends[i]}, maxspeed="50", oneway=way)
-            for i, way in zip(ends, ways, strict=True)
-        ]
-        here = counted(whole._replace(roads=(road, *parts)))
-        assert (0 in here["brake_fault"]) == meet, ways
+@pytest.mark.parametrize(
+    ("ways", "apart_m", "other_name", "counts"),
+    [
+        (("yes", "-1"), 22.0, "A", False),
+        (("yes", "-1"), 153.0, "A", False),  # 80° apart, around a green.
+        (("yes", "-1"), 22.0, "B", True),  # Another road, which one may turn back into.
+        (("yes", "-1"), 280.0, "A", True),  # 114° apart: one turns.
+        (("yes", "yes"), 22.0, "A", True),
+        (("no", "-1"), 22.0, "A", True),
+    ],
+)
+def test_no_junction_is_where_a_road_becomes_its_own_carriageways(
+    ways: tuple[str, str], apart_m: float, other_name: str, counts: bool
+) -> None:
+    (lon, lat), whole = GERMANY, crossing(GERMANY, arms=1, maxspeed="50", name="A")
+    half_deg = apart_m / 2.0 / 111_250.0
+    ends = {2: (lon - 0.0013, lat + half_deg), 3: (lon - 0.0013, lat - half_deg)}
+    parts = [
+        street(i, {0: GERMANY, i: ends[i]}, maxspeed="50", oneway=way, name=name)
+        for i, way, name in zip(ends, ways, ("A", other_name), strict=True)
+    ]
+    here = counted(whole._replace(roads=(*whole.roads, *parts)))
+    assert any(0 in nodes for nodes in here.values()) == counts
 
 
 def test_who_is_where_counts_by_the_side_that_is_driven_on() -> None:
