@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 
 from foretwin.contracts.toml_file import load_toml
+from foretwin.telemetry.standin.sensor_drift import Drift
 
 DEFAULT_FILE = Path(__file__).with_name("standin.toml")
 
@@ -59,7 +60,7 @@ class DriverParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 
 class SensorParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where its sensors are and how noisy; standard deviations of white noise."""
+    """Where its sensors are and how noisy: white noise as standard deviations, and drifts."""
 
     body_from_antenna_m: tuple[float, float, float]
     """From the rear axle's centre on the ground: forwards, left, up."""
@@ -75,6 +76,12 @@ class SensorParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     """Of the angle of the steering wheel."""
     speed_std_mps: float
     """Of the wheel speed."""
+    gnss_drift: Drift = Drift()
+    """Of positions, along each axis, in m."""
+    gyro_drift: Drift = Drift()
+    """Of rates, in rad/s, beside the bias of the yaw rate."""
+    accel_drift: Drift = Drift()
+    """Of specific forces, in m/s²."""
 
 
 class StandinParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

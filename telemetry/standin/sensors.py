@@ -22,6 +22,7 @@ from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.driver import PlanPoint
 from foretwin.telemetry.standin.parameters import CarParameters, SensorParameters
 from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.sensor_drift import DriftingError
 
 PERIOD_MS = {
     "imu": 10,
@@ -44,19 +45,22 @@ class Sensors:
         self._parameters = parameters
         self._car = car
         self._frame = frame
-        streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(5))
-        self._gnss, self._imu, self._speed, self._steering, self._height = streams
+        streams = [*map(np.random.default_rng, np.random.SeedSequence(seed).spawn(8))]
+        self._gnss, self._imu, self._speed, self._steering, self._height = streams[:5]
+        drifts = parameters.gnss_drift, parameters.gyro_drift, parameters.accel_drift
+        self._gnss_drift, self._gyro_drift, self._accel_drift = map(
+            DriftingError, drifts, (2, 3, 3), streams[5:]
+        )
 
     def gnss(self, stamp_ns: int, motion: CarMotion) -> GnssFix:
-        """Return the antenna's position with noise."""
+        """Return the antenna's position with noise and drift; it says its white noise alone."""
         forward, left, up = self._parameters.body_from_antenna_m
         cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
         x_m = motion.x_m + cos * forward - sin * left
         y_m = motion.y_m + sin * forward + cos * left
         std = self._parameters.gnss_std_m
-        lat, lon = geo_from_local(
-            self._frame, np.array([x_m, y_m]) + self._gnss.normal(0.0, std, 2)
-        )
+        error_m = self._gnss.normal(0.0, std, 2) + self._gnss_drift.at(stamp_ns)
+        lat, lon = geo_from_local(self._frame, np.array([x_m, y_m]) + error_m)
         height = up
         if motion.altitude_m:
             # Receivers know their height about half as well as their place.
@@ -65,10 +69,10 @@ class Sensors:
         return GnssFix(stamp_ns=stamp_ns, position=place, std_m=std)
 
     def imu(self, stamp_ns: int, motion: CarMotion) -> ImuSample:
-        """Return specific force and rates at the centre of gravity, the gyro with its bias."""
+        """Return specific force and rates at the centre of gravity, with bias and drifts."""
         given = self._parameters
-        force = self._imu.normal(0.0, given.accel_std_mps2, 3)
-        rate = self._imu.normal(0.0, given.gyro_std_radps, 3)
+        force = self._imu.normal(0.0, given.accel_std_mps2, 3) + self._accel_drift.at(stamp_ns)
+        rate = self._imu.normal(0.0, given.gyro_std_radps, 3) + self._gyro_drift.at(stamp_ns)
         return ImuSample(
             stamp_ns=stamp_ns,
             accel_mps2=(
