@@ -252,10 +252,11 @@ class RoundRunner:
         world = self._world_of(order.world_id)
         futures, rows, distinct = round_futures(done, vehicle=self._plan.vehicle.name)
         self._on_round(order.junction_id, len(rows))
-        self._tables.add("futures", rows)
+        # What others name first: the writer may write, and be killed, between any two.
         for job, recorded in zip(order.jobs, order.recorded, strict=True):
             self._tables.add("jobs", [job_row(job, recorded)])
             self._tables.add("road_users", road_user_rows(job, recorded.sha256))
+        self._tables.add("futures", rows)
         row = round_row(
             done,
             start_stamp_ns=self.start_stamp_ns,

@@ -11,6 +11,7 @@ import pytest
 
 from foretwin.contracts.simulation import Event
 from foretwin.orchestrator.record import run_folder
+from foretwin.orchestrator.record.run_streams import NAMED, Rows
 from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
@@ -59,6 +60,26 @@ def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) 
     assert (early.round_id, late.round_id) == (0, 1)
     moved = late.path.xy_m[0] - early.path.xy_m[0]
     assert np.hypot(*moved) == pytest.approx(20.0, abs=2.0)
+
+
+def test_what_a_row_names_is_handed_over_before_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    house, order = House(tmp_path), list[str]()
+    add = house.tables.add
+
+    def noted(table: str, rows: Rows) -> None:
+        order.append(table)
+        add(table, rows)
+
+    monkeypatch.setattr(house.tables, "add", noted)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.workers[0].answer_one(house.workers[0].take()[0])
+    house.work()
+    house.tables.close()
+    about = [table for table in order if table in NAMED or table == "jobs"]
+    assert about == ["jobs", "road_users", "jobs", "road_users", "futures", "rounds"]
 
 
 def test_speed_of_simulation_is_known_of_each_worker(tmp_path: Path) -> None:
