@@ -26,13 +26,14 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
     parser.add_argument("--draws", type=int, default=100, help="futures in all")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--among", action="store_true", help="only those among other road users")
     parser.add_argument("--at-once", type=int, default=2, help="processes")
     asked = parser.parse_args(arguments)
     share, more = divmod(asked.draws, len(asked.folders))
     drawn = [
         (folder, future_id)
         for number, folder in enumerate(asked.folders)
-        for future_id in draw(folder, share + (number < more), asked.seed)
+        for future_id in draw(folder, share + (number < more), asked.seed, among=asked.among)
     ]
     with ThreadPoolExecutor(asked.at_once) as pool:
         equal = list(pool.map(repeats, drawn))
@@ -40,13 +41,14 @@ def main(arguments: Sequence[str]) -> int:
     return 0 if drawn and all(equal) else DIFFERENT
 
 
-def draw(folder: Path, count: int, seed: int) -> list[str]:
-    """Draw futures that were played, out of all rounds or jobs of a folder."""
+def draw(folder: Path, count: int, seed: int, *, among: bool = False) -> list[str]:
+    """Draw futures that were played, out of all rounds or jobs of a folder; with `among` of those
+    that tell how near others came."""
     opened = open_sweep(folder) if (folder / "sweep.json").is_file() else open_run(folder)
     table = opened.table("futures")
     ids = table.column("future_id").to_pylist()
-    hashes = table.column("trajectory_sha256").to_pylist()
-    played = sorted(one for one, sha256 in zip(ids, hashes, strict=True) if sha256 is not None)
+    told = table.column("min_clearance_m" if among else "trajectory_sha256").to_pylist()
+    played = sorted(one for one, said in zip(ids, told, strict=True) if said is not None)
     return random.Random(seed).sample(played, min(count, len(played)))
 
 
