@@ -14,6 +14,7 @@ from foretwin.telemetry.logs.clock_between import clock_between
 from foretwin.telemetry.logs.columns import Stream, table_log
 from foretwin.telemetry.logs.log import Log, LogError, Sample
 from foretwin.telemetry.logs.merge import together
+from tests.telemetry.logs import merge_pairs
 from tests.telemetry.logs.declare.disguised import Drive
 
 COVERS = ("foretwin.telemetry.logs.merge",)
@@ -141,3 +142,15 @@ def test_an_empty_recording_is_refused() -> None:
     empty = Log(info=msgspec.structs.replace(full.info, source="B"), read=nothing)
     with pytest.raises(LogError, match="B: nothing to compare clocks by"):
         clock_between(full, empty)
+
+
+@pytest.mark.judge
+@pytest.mark.real_data
+@pytest.mark.usefixtures("data_dir")
+def test_of_real_pairs_no_offset_is_wrong_and_no_stranger_is_taken(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code = merge_pairs.main(["--seed", "7"])
+    table = capsys.readouterr().out
+    assert code == 0, table
+    assert table.count("r = ") >= 12
