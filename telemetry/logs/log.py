@@ -23,6 +23,8 @@ MOST_TIME_S = 4e9
 """Seconds since a start, or since 1970 until the year 2096; beyond is no time."""
 MOST_LINE = 1000
 """Characters of why a log cannot be read: libraries quote whole files."""
+LOWEST_M, HIGHEST_M = -2_000.0, 20_000.0
+"""Altitudes beyond are no car's, however bad its receiver: one number of three is damaged."""
 POSITION_NOT_FINITE = "position not finite"
 POSITION_ZERO = "position (0, 0)"
 POSITION_OFF_EARTH = "position off Earth"
@@ -118,7 +120,10 @@ def fault_of(message: msgspec.Struct) -> str | None:
     if message.stamp_ns < 0:  # type: ignore[attr-defined]
         return TIME_BEFORE_ZERO
     if isinstance(message, drive.GnssFix):
-        return fault_of_position(message.position.lat_deg, message.position.lon_deg)
+        place = message.position
+        if place.alt_m < LOWEST_M or place.alt_m > HIGHEST_M:
+            return POSITION_OFF_EARTH
+        return fault_of_position(place.lat_deg, place.lon_deg)
     if isinstance(message, _MOTION) and not is_finite(message):
         return VALUE_NOT_FINITE
     return None

@@ -12,9 +12,9 @@ Which map a scene lies on stands in nuScenes' tables (`v1.0-*/scene.json`, `log.
 folder, else in `NAME.toml`: `location = "boston-seaport"`. The maps' origins are those of the
 devkit's map_api; distances are kept in metres, where its export_poses takes the Earth for a sphere.
 
-No whole recording of it could be had. An excerpt of scene-0061, 0.42 s of a turn to the left,
-bears the description out: yaw and course are -13.4°, yaw turns by 0.128 rad/s as the rate says, the
-acceleration has gravity in it, and steering, yaw rate and the right wheel's lead go together.
+Checked on scene-0103 (tests/telemetry/motion_proof.py), 19 s in Boston: the speed is that of the
+positions (correlation 1.00, slope .97, .1 s late), the yaw rate the course's change (.99, .95,
+0 s), the yaw the course (.5° off); steering bends the course to the side that it says (.98).
 """
 
 from __future__ import annotations

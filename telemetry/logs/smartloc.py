@@ -92,14 +92,19 @@ def _read(texts: list[Path]) -> _Lines:
     for path in texts:
         for line in _lines(path):
             words = line.split(maxsplit=8)
+            if "\0" in line:  # of a disk that filled up: lines may have gone with it
+                unreadable += 1
+                continue
             if not words or words[0] not in rows:
                 continue
             try:
                 row = [float(word) for word in words[1 : 2 + _COLUMNS[words[0]]]]
             except ValueError:
                 row = []
+            # A text that was cut off ends in a number of which digits may be missing.
+            cut = len(words) == len(row) + 1 and not line[-1].isspace()
             # False for a time that is no number.
-            if len(row) > _COLUMNS[words[0]] and abs(row[0]) < MOST_TIME_S:
+            if len(row) > _COLUMNS[words[0]] and not cut and abs(row[0]) < MOST_TIME_S:
                 rows[words[0]].append(row)
             else:
                 unreadable += 1

@@ -1,9 +1,10 @@
-"""nuScenes' CAN bus expansion, written as its README describes it; no whole real one was had."""
+"""nuScenes' CAN bus expansion, written as its README describes it, and a whole scene as it is."""
 
 from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 from foretwin.telemetry.logs import Log, LogError, open_log
 from tests.telemetry.motion_proof import MotionProof
+from tests.telemetry.public_drives import public_drive
 
 START_US = 1_531_883_549_954_657
 RADIUS_M, SPEED_MPS = 60.0, 8.0
@@ -89,6 +91,28 @@ def test_the_channels_tell_of_one_motion(tmp_path: Path) -> None:
         assert proof.slope == pytest.approx(1.0, abs=0.05)
         assert abs(proof.lag_s) < 0.11
     assert abs(shown.heading_offset_deg()) < 0.2
+
+
+def test_a_whole_real_scene(tmp_path: Path) -> None:
+    """Boston, a turn to the right: 118 m by positions, 116 m by speed."""
+    folder = public_drive("nuscenes/can_bus")
+    log = open_log(folder)
+    shown = MotionProof(log)
+    for proof in (shown.of_speed(), shown.of_yaw_rate(), shown.of_heading()):
+        assert proof.correlation > 0.99
+        assert proof.slope == pytest.approx(1.0, abs=0.07)
+        assert abs(proof.lag_s) < 0.11
+    assert shown.of_acceleration().correlation > 0.98
+    assert shown.of_steering().correlation > 0.97
+    assert abs(shown.heading_offset_deg()) < 1.0
+    assert log.skipped == {}
+
+    copy = shutil.copytree(folder, tmp_path / "can_bus")
+    pose = copy / "scene-0103_pose.json"
+    pose.write_bytes(pose.read_bytes()[:100_000])
+    pose.with_name(pose.name + ".toml").write_text('location = "boston-seaport"\n')
+    with pytest.raises(LogError, match=r"scene-0103_pose\.json: no list of messages: "):
+        open_log(copy)
 
 
 def test_the_yaw_of_a_car_that_leans(tmp_path: Path) -> None:

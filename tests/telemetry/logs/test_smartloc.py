@@ -51,6 +51,32 @@ def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
     }
 
 
+def test_a_number_that_was_cut_off_is_none(tmp_path: Path) -> None:
+    for end in (" 0 0 0 0 0 0 0 0 0\n", ".1", "1", ".1 0"):
+        line = POINT.format("0.2").removesuffix(".1 0 0 0 0 0 0 0 0 0\n")
+        (tmp_path / "cut.txt").write_text(POINT.format("0") + line + end)
+        log = open_log(tmp_path / "cut.txt")
+        whole = end.count(" ") > 0
+        assert len(by_channel(log)["gnss"]) == 1 + whole
+        assert log.skipped == ({} if whole else {"unreadable row": 1})
+
+
+def test_what_a_disk_left_blank_is_counted(tmp_path: Path) -> None:
+    text = POINT.format("0") + POINT.format("0.2")[:-9] + "\0" * 99 + " 0 0\n" + POINT.format("0.8")
+    (tmp_path / "blank.txt").write_text(text)
+    log = open_log(tmp_path / "blank.txt")
+    assert len(by_channel(log)["gnss"]) == 2
+    assert log.skipped == {"unreadable row": 1}
+
+
+def test_a_position_deep_in_the_earth_is_none(tmp_path: Path) -> None:
+    text = POINT.format("0") + POINT.format("0.2").replace("5037714.1", "503771")
+    (tmp_path / "deep.txt").write_text(text)
+    log = open_log(tmp_path / "deep.txt")
+    assert len(by_channel(log)["gnss"]) == 1
+    assert log.skipped == {"position off Earth": 1}
+
+
 @pytest.mark.parametrize("packed", [False, True])
 def test_a_folder_gives_positions_and_odometry_as_one_drive(tmp_path: Path, packed: bool) -> None:
     text = ODOMETRY.format(0.0, 5.0, 0.1) + ODOMETRY.format(0.2, 5.5, -0.3)
