@@ -13,6 +13,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker import driver_model as driver
+from foretwin.sim_worker.road_users.compiled import FIELDS, find_ahead, take_nearest
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.noticed import Noticed
 from foretwin.sim_worker.road_users.path_table import PathTable
@@ -22,8 +23,6 @@ _BESIDE_M = 0.3
 _CURVE_AHEAD_M = 15.0
 _AS_FAST_MPS, _CAUGHT_UP_SHARE = 1.0, 2.0
 """Who is nearly as fast as another, and within twice the gap that it wants, follows it."""
-_ROWS_AT_ONCE = 512
-"""Whose surroundings are looked at together: they stay in the cache."""
 
 
 class Now(NamedTuple):
@@ -62,9 +61,8 @@ class LawAbiding:
         self._desired = crowd.desired_mps[s, r]
         self._keeps = np.full(len(s), np.nan)
         """Of the gap that it would keep, the share that it does; unknown until it first looks."""
-        self._parts = [
-            slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(s), _ROWS_AT_ONCE)
-        ]
+        most = len(s) * (crowd.present.shape[1] + 1)
+        self._who, self._found = np.empty(most, dtype=np.intp), np.empty((FIELDS, most))
         self._pairs: tuple[int, _Pairs] | None = None
 
     def accelerations(
@@ -164,34 +162,20 @@ class LawAbiding:
 
         Others are looked for beside the parabola that the own path bends along.
         """
-        s, crowd = self.rows, self._crowd
-        x, y, yaw = now.poses[s, self.columns].T
+        crowd = self._crowd
+        x, y, yaw = now.poses[self.rows, self.columns].T
         cos, sin = np.cos(yaw), np.sin(yaw)
-        xs, ys, yaws = (_with_ego(ego.poses[:, i], now.poses[..., i]) for i in range(3))
-        length = _with_ego(ego.length_m, crowd.length_m)
-        width = _with_ego(ego.width_m, crowd.width_m)
-        half_bend = 0.5 * bend
-        widest = 0.5 * (self._width + np.max(length + width)) + _BESIDE_M
-        mine = np.stack([x, y, cos, sin, half_bend, widest])
-        found = [_in_front(xs.T, ys.T, s, mine, part) for part in self._parts]
-        k, o = np.concatenate(found, axis=1)
-        at = s[k] * length.shape[1] + o
-        dx, dy = xs.take(at) - x[k], ys.take(at) - y[k]
-        ahead = cos[k] * dx + sin[k] * dy
-        left = cos[k] * dy - sin[k] * dx - half_bend[k] * np.square(ahead)
-        turned = yaws.take(at) - yaw[k]
-        along, across = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-        long, wide = length.take(at), width.take(at)
-        gap = ahead - self._half[k] - 0.5 * (long * along + wide * across)
-        beside = 0.5 * (self._width[k] + long * across + wide * along) + _BESIDE_M
-        in_way = (np.abs(left) < beside) & (np.square(dx) + np.square(dy) < driver.SIGHT_M**2)
-        nearest = np.full(len(s), np.inf)
-        np.minimum.at(nearest, k[in_way], gap[in_way])
-        chosen = in_way & (gap == nearest[k])
-        speeds = _with_ego(ego.speed_mps, now.speed_mps)
-        speed = np.zeros(len(s))
-        speed[k[chosen]] = speeds.take(at[chosen]) * np.cos(turned[chosen])
-        return nearest, np.maximum(speed, 0.0)
+        mine = np.stack([x, y, yaw, cos, sin, 0.5 * bend, self._width, self._half])
+        count = find_ahead(
+            self.rows, mine, ego.poses, ego.speed_mps, (ego.length_m, ego.width_m),
+            now.poses, now.speed_mps, crowd.length_m, crowd.width_m,
+            (driver.SIGHT_M, _BESIDE_M), self._who, self._found,
+        )  # fmt: skip
+        who, found = self._who[:count], self._found[:, :count]
+        gap, speed = np.full(len(x), np.inf), np.zeros(len(x))
+        turned = found[2]
+        take_nearest(who, found, np.cos(turned), np.sin(turned), mine, _BESIDE_M, gap, speed)
+        return gap, speed
 
     def _wait(self, now: Now, ego: EgoBoxes, arc: Array, speed: Array) -> Array:
         """Return how far ground lies ahead that must be left to others, else infinite."""
@@ -242,30 +226,6 @@ class LawAbiding:
         reach = np.square(speed) / (2.0 * driver.LINE_DECEL_MPS2)
         ahead = np.where(ahead > reach[:, None] - driver.LINE_GAP_M, ahead, np.inf)
         return np.asarray(ahead.min(axis=1, initial=np.inf)) - driver.LINE_GAP_M
-
-
-def _in_front(xs: Array, ys: Array, futures: Indices, mine: Array, part: slice) -> Indices:
-    """Return (2, N) pairs of a part of (K,) and of (R + 1, S) ahead of it, near its parabola.
-
-    `mine` (6, K) is x, y, cosine and sine of its yaw, half its bend, and how far beside counts.
-    All x and y come with one row for each of the others: so the inner loops are long.
-    """
-    x, y, cos, sin, half_bend, within_m = mine[:, part]
-    future = futures[part]
-    dx, dy = xs.take(future, axis=1) - x, ys.take(future, axis=1) - y
-    ahead = cos * dx
-    ahead += sin * dy
-    dy *= cos
-    dx *= sin
-    dy -= dx
-    bent = np.square(ahead, out=dx)
-    bent *= half_bend
-    dy -= bent
-    near = np.abs(dy, out=dy) < within_m
-    near &= ahead > 0.0
-    near &= ahead < driver.SIGHT_M
-    other, who = np.divmod(np.flatnonzero(near), len(x))
-    return np.stack([who + part.start, other])
 
 
 def _with_ego(ego: Array | float, others: Array) -> Array:

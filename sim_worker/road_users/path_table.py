@@ -11,6 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
 from foretwin.sim_worker.driver_model import BEND_DECEL_MPS2
+from foretwin.sim_worker.road_users.compiled import interpolate
 from foretwin.sim_worker.road_users.paces import square_bound
 
 
@@ -66,13 +67,13 @@ class PathTable:
 
     def poses(self, place: PathPlace, lateral_m: Array | None = None) -> Array:
         """Return x, y, yaw (…, 3) at places on the paths, `lateral_m` (…) to the left of them."""
-        found = self._steps.take(place.node, axis=0)
-        found *= place.share[..., None]
-        found += self._poses.take(place.node, axis=0)
+        found = np.empty((*place.node.shape, 3))
+        rows = found.reshape(-1, 3)
+        interpolate(place.node.ravel(), place.share.ravel(), self._poses, self._steps, rows)
         if lateral_m is not None:
             found[..., 0] -= np.sin(found[..., 2]) * lateral_m
             found[..., 1] += np.cos(found[..., 2]) * lateral_m
-        return np.asarray(found)
+        return found
 
     def headings(self, place: PathPlace) -> Array:
         """Return the paths' headings (…), without jumps, at places."""

@@ -11,6 +11,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
+from foretwin.sim_worker.road_users.compiled import nearest_in_way
 from foretwin.sim_worker.road_users.path_table import PathPlace, PathProjection
 from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid, hidden
 from foretwin.sim_worker.road_users.traffic import Traffic
@@ -18,7 +19,6 @@ from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 _MARGIN_M = 0.3
 """What passes the car's side by less than this is in its way."""
-_ROUNDING_M = 1e-6
 _WALLS_EVERY_S = 0.1
 """Cars see again so often whom walls hide: in that time what comes out goes on by its width."""
 
@@ -79,10 +79,6 @@ class Sight:
         self._ever_lost = bool((faults.lost_for_s > 0.0).any())
         self._all_there = traffic.replay is None and bool(crowd.present.all())
         self._beside_m = crowd.lateral_m if crowd.lateral_m.any() else None
-        self._sizes = np.stack([crowd.length_m.ravel(), crowd.width_m.ravel()])
-        half_diagonal = 0.5 * np.hypot(crowd.length_m, crowd.width_m)
-        self._at_most_aside_m = half_diagonal + (0.5 * self._width_m + _MARGIN_M + _ROUNDING_M)
-        """However it is turned, who is farther aside than this is not in the way."""
 
     def begun(self, futures: Indices, traffic: Traffic) -> Sight:
         """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
@@ -170,21 +166,14 @@ class Sight:
 
     def lead(self, seen: SeenUsers, place: FrenetPoint) -> Lead:
         """Return who is in the way of base_link at `place` (S,) on the ego's path."""
-        aside = np.abs(seen.offset_m - place.offset_m[:, None])
-        few = np.flatnonzero(aside < self._at_most_aside_m)
-        row = few // aside.shape[1]
-        turned, length, width = seen.turned_rad.take(few), *self._sizes.take(few, axis=1)
-        cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-        gap = seen.arc_m.take(few) - place.arc_m[row] - self._front_m
-        gap -= 0.5 * (length * cos + width * sin)
-        beside = 0.5 * (length * sin + width * cos + self._width_m) + _MARGIN_M
-        in_way = (aside.take(few) < beside) & (gap > -self._length_m)
-        gaps = np.full(aside.shape, np.inf)
-        gaps.put(few[in_way], gap[in_way])
-        rows, nearest = np.arange(len(gaps)), gaps.argmin(axis=1)
-        gap = gaps[rows, nearest]
-        speed = seen.speed_mps[rows, nearest] * np.cos(seen.turned_rad[rows, nearest])
-        return Lead(gap, np.where(np.isfinite(gap), speed, 0.0))
+        gap, speed = np.empty((2, len(place.arc_m)))
+        own_m = self._front_m, self._length_m, self._width_m, _MARGIN_M
+        nearest_in_way(
+            seen.arc_m, seen.offset_m, np.cos(seen.turned_rad), np.sin(seen.turned_rad),
+            seen.speed_mps, self._crowd.length_m, self._crowd.width_m,
+            place.arc_m, place.offset_m, own_m, gap, speed,
+        )  # fmt: skip
+        return Lead(gap, speed)
 
 
 def _now(traffic: Traffic) -> tuple[npt.NDArray[Any], ...]:

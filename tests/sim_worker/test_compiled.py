@@ -28,6 +28,7 @@ from foretwin.sim_worker.planners import pure_pursuit_idm as idm
 from foretwin.sim_worker.planners import registry
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.tracking import pure_pursuit, turning_speed
+from foretwin.sim_worker.road_users import compiled as compiled_leads
 from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog
@@ -49,6 +50,7 @@ KERNELS: dict[str, Any] = {
         compiled_pairs,
         compiled_touch,
         compiled_nearness,
+        compiled_leads,
     )
     for name, kernel in vars(module).items()
     if hasattr(kernel, "signatures")
@@ -87,7 +89,7 @@ def test_all_is_compiled_once_it_is_imported_and_nothing_later() -> None:
         "locate", "curve", "free_road", "forces", "ramp", "read_base", "all_sane", "cheapest_walks",
         "least_until_touch", "find_leaders", "stays_on_strips", "come_near", "least_m", "may_touch",
         "find_overlaps", "least_worst_case", "until_turning_touch", "_apart", "_arc",
-        "_relative_at",
+        "_relative_at", "find_ahead", "take_nearest", "nearest_in_way", "interpolate",
     }  # fmt: skip
     assert {name: len(found) for name, found in signatures().items()} == dict.fromkeys(KERNELS, 1)
     with pytest.raises(TypeError, match="No matching definition"):
