@@ -16,7 +16,7 @@ from foretwin.sim_worker.road_users.compiled import (
     take_nearest,
 )
 
-SIGHT_M, BESIDE_M = 60.0, 0.3
+SIGHT_M, BESIDE_M = 25.0, 0.3
 EGO_SIZE_M = (4.6, 1.9)
 FUTURES, OTHERS = 5, 7
 
@@ -41,9 +41,9 @@ def pair(driver: Array, other: Array, length_m: float, width_m: float) -> tuple[
 @pytest.mark.parametrize("seed", range(8))
 def test_the_lead_is_the_nearest_in_the_own_lane(seed: int) -> None:
     random = np.random.default_rng(seed)
-    poses = random.uniform((-40, -6, -3), (40, 6, 3), (FUTURES, OTHERS, 3))
+    poses = random.uniform((-20, -6, -3), (20, 6, 3), (FUTURES, OTHERS, 3))
     poses[0, 3] = np.nan  # absent
-    ego = random.uniform((-40, -6, -3), (40, 6, 3), (FUTURES, 3))
+    ego = random.uniform((-20, -6, -3), (20, 6, 3), (FUTURES, 3))
     speed, ego_speed = random.uniform(0, 15, (FUTURES, OTHERS)), random.uniform(0, 15, FUTURES)
     length = random.uniform(1, 8, (FUTURES, OTHERS))
     width = random.uniform(0.5, 2.5, (FUTURES, OTHERS))
@@ -80,6 +80,19 @@ def test_the_lead_is_the_nearest_in_the_own_lane(seed: int) -> None:
         followed += math.isfinite(best[0])
         assert (gap[k], lead[k]) == pytest.approx(best)
     assert 0 < followed < len(rows)
+
+
+def test_nobody_beyond_sight_is_followed_however_wide_the_way_bends() -> None:
+    mine = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.025, 2.0, 2.0]]).T
+    who, found = np.empty(2, dtype=np.intp), np.empty((FIELDS, 2))
+    for y, seen in ((14.4, 1), (15.0, 0)):
+        here, nobody = np.array([[20.5, y, 0.0]]), np.full((1, 1, 3), np.nan)
+        mine[5] = y / 20.5**2
+        one = np.ones((1, 1))
+        assert seen == find_ahead(
+            np.zeros(1, dtype=np.intp), mine, here, np.zeros(1), EGO_SIZE_M, nobody, one, one, one,
+            (SIGHT_M + 0.1, BESIDE_M), who, found,
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -69,8 +69,9 @@ def test_what_a_disk_left_blank_is_counted(tmp_path: Path) -> None:
     assert log.skipped == {"unreadable row": 1}
 
 
-def test_a_position_deep_in_the_earth_is_none(tmp_path: Path) -> None:
-    text = POINT.format("0") + POINT.format("0.2").replace("5037714.1", "503771")
+@pytest.mark.parametrize("z_m", ["503771", "5137714.1"])
+def test_a_position_deep_in_the_earth_or_in_space_is_none(tmp_path: Path, z_m: str) -> None:
+    text = POINT.format("0") + POINT.format("0.2").replace("5037714.1", z_m)
     (tmp_path / "deep.txt").write_text(text)
     log = open_log(tmp_path / "deep.txt")
     assert len(by_channel(log)["gnss"]) == 1
