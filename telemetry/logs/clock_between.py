@@ -28,7 +28,8 @@ _LEAST_LIKE, _PLAINLY, _ELSEWHERE_S = 0.6, 1.4, 5.0
 _LEAST_UNLIKE = 0.02
 """Two recordings are never more alike than that: what would be is a drive that repeats itself."""
 _MOST_STD_S = 0.1
-_STRETCH_S, _LEAST_STRETCHES = 90.0, 4
+_STRETCH_S, _LEAST_STRETCHES, _LEAST_EVEN = 90.0, 4, 3
+"""Fitted on its own; so many tell a drift, and so many that a clock runs evenly."""
 _SURE = 3.0
 _HALF = round(0.5 / GRID_S)
 """Ticks on either side over which a sensor is smoothed."""
@@ -122,13 +123,23 @@ def clock_between(first: Log, second: Log) -> ClockBetween:
             " drives that turn and brake more would tell it"
         )
     middle_s = float(np.mean(np.flatnonzero(np.isfinite(x) & np.isfinite(y)))) * GRID_S
-    drift, drift_std = _drift(y, x)
+    stretches = _stretches(y, x)
+    drift, drift_std = _drift(stretches)
     base_s = (second.info.start_stamp_ns - first.info.start_stamp_ns) * 1e-9
-    plain = abs(drift) > _SURE * drift_std
+    drift = drift if abs(drift) > _SURE * drift_std else 0.0
+    std_s = math.hypot(std_s, _unevenness_s(stretches, drift))
+    if std_s > _MOST_STD_S:
+        sure = np.hypot(stretches[1:, 2], stretches[:-1, 2])
+        where = int(np.argmax(np.abs(np.diff(stretches[:, 1])) / sure))
+        (before_s, one_s, _), (after_s, other_s, _) = stretches[where : where + 2]
+        raise LogError(
+            f"{second.info.source}: its clock does not run evenly beside {first.info.source}'s: it"
+            f" changes by {other_s - one_s:+.2f} s between {before_s:.0f} and {after_s:.0f} s into"
+            " that; if it jumps, cut it there"
+        )
     return ClockBetween(
-        base_s + late * GRID_S + shift_s, std_s, drift if plain else 0.0, drift_std,
-        middle_s, like, by, together_s,
-    )  # fmt: skip
+        base_s + late * GRID_S + shift_s, std_s, drift, drift_std, middle_s, like, by, together_s
+    )
 
 
 def signals_of(log: Log) -> dict[str, MotionSignal]:
@@ -140,10 +151,8 @@ def signals_of(log: Log) -> dict[str, MotionSignal]:
         match message:
             case drive.ImuSample(rate_radps=rate):
                 rows.setdefault("gyro", []).append((time_s, rate[2]))
-            case drive.HeadingSample(yaw_rad=yaw, yaw_rate_radps=rate):
-                rows.setdefault("heading", []).append((time_s, yaw))
-                if rate is not None:
-                    rows.setdefault("yaw rate", []).append((time_s, rate))
+            case drive.HeadingSample(yaw_rate_radps=float(rate)):
+                rows.setdefault("yaw rate", []).append((time_s, rate))
             case drive.SpeedSample(speed_mps=speed):
                 rows.setdefault("wheels", []).append((time_s, speed))
             case drive.GnssFix(position=place):
@@ -243,8 +252,8 @@ def _fitted(y: Array, x: Array) -> tuple[float, float] | None:
     return fit.shift_s, math.hypot(fit.shift_std_s, GRID_S / math.sqrt(12.0))
 
 
-def _drift(y: Array, x: Array) -> tuple[float, float]:
-    """Return in ppm how the offset grows, and the standard deviation of that."""
+def _stretches(y: Array, x: Array) -> Array:
+    """Return (N, 3): when a stretch is, the offset by it alone, and that one's deviation; in s."""
     known = np.flatnonzero(np.isfinite(y) & np.isfinite(x))
     most = int(len(known) * GRID_S // _STRETCH_S)
     rows = []
@@ -253,13 +262,32 @@ def _drift(y: Array, x: Array) -> tuple[float, float]:
         fit = _fitted(y[part], x[part])
         if fit is not None:
             rows.append((float(np.mean(stretch)) * GRID_S, *fit))
-    if len(rows) < _LEAST_STRETCHES:
+    return np.array(rows).reshape(-1, 3)
+
+
+def _unevenness_s(stretches: Array, drift_ppm: float) -> float:
+    """Return the deviation of stretches' offsets from an even clock beyond their own, 0 where there
+    are too few: by moments, as DerSimonian and Laird (1986), Meta-analysis in clinical trials."""
+    if len(stretches) < _LEAST_EVEN:
+        return 0.0
+    at_s, shift_s, std_s = stretches.T
+    weight = std_s**-2.0
+    left = shift_s - drift_ppm * 1e-6 * at_s
+    left -= np.average(left, weights=weight)
+    beyond = float(np.sum(weight * left**2)) - (len(stretches) - 1)
+    whole = float(np.sum(weight))
+    return math.sqrt(max(beyond, 0.0) / (whole - float(np.sum(weight**2)) / whole))
+
+
+def _drift(stretches: Array) -> tuple[float, float]:
+    """Return in ppm how the offset grows, and the standard deviation of that."""
+    if len(stretches) < _LEAST_STRETCHES:
         return 0.0, math.inf
-    at_s, shift_s, std_s = np.array(rows).T
+    at_s, shift_s, std_s = stretches.T
     weight = std_s**-2.0
     around = at_s - np.average(at_s, weights=weight)
     spread = float(np.sum(weight * around**2))
     slope = float(np.sum(weight * around * shift_s)) / spread
     left = shift_s - np.average(shift_s, weights=weight) - slope * around
-    scatter = max(float(np.sum(weight * left**2)) / (len(rows) - 2), 1.0)
+    scatter = max(float(np.sum(weight * left**2)) / (len(stretches) - 2), 1.0)
     return slope * 1e6, math.sqrt(scatter / spread) * 1e6

@@ -3,8 +3,9 @@
 Real drives are split: one sensor stays on its clock, another gets a clock with a drawn offset and
 drift, every n-th sample and a part of the drive. Two receivers of one car, both by UTC, are a pair
 as they are. What a sensor was late by before it was split is found and told apart: "late before".
-Drives that do not belong together have to be refused. Exit code 3 where an offset is missed by more
-than three of its standard deviations and _ROUGHLY_S, or where strangers were put together.
+Drives that do not belong together, and clocks that jump, have to be refused. Exit code 3 where an
+offset is missed by more than three of its standard deviations and _ROUGHLY_S, or where such were
+put together.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from tests.telemetry.logs.declare.disguised import Drive, drive_of
 from tests.telemetry.logs.declare.fuzz import DECLARATIONS
 
 _ROUGHLY_S = 0.1
+_TOLD_NS = 270_000_000_000
+"""Drives that last so long tell whether a clock jumps."""
 DIFFERENT = 3
 
 
@@ -102,9 +105,9 @@ def main(arguments: Sequence[str]) -> int:
             ppm = 0.0 if draw < asked.draws - 1 else float(random.choice([-150.0, 80.0, 200.0]))
             pair = made(split, drive, random, ppm=ppm)
             wrong += told(split.name, pair, late_s)
-    strangers = [*of_two_drives(drives, random), *of_two_halves(drives)]
+    strangers = [*of_two_drives(drives, random), *of_two_halves(drives), *jumped(drives)]
     refused = sum(is_refused(name, *logs) for name, *logs in strangers)
-    print(f"{refused} of {len(strangers)} pairs that do not belong together refused in a line")
+    print(f"{refused} of {len(strangers)} strangers and clocks that jump refused in a line")
     return DIFFERENT if wrong or refused < len(strangers) else 0
 
 
@@ -135,6 +138,25 @@ def of_two_halves(drives: _Drives) -> Iterator[_Strangers]:
             recording(halves[1], split.second, "B"),
         )
         yield f"{split.name}: two halves", first, second
+
+
+def jumped(drives: _Drives) -> Iterator[_Strangers]:
+    """Yield recordings of which the second's clock jumps, of drives that are long enough."""
+    for split, drive in drives:
+        stamps_ns = np.concatenate([stream.stamps_ns for stream in drive.values()])
+        if np.ptp(stamps_ns) < _TOLD_NS:
+            continue
+        for jump_s, share in ((1.0, 0.5), (1.0, 0.8), (2.0, 0.5), (2.0, 0.8)):
+            at_ns = stamps_ns.min() + share * np.ptp(stamps_ns)
+            late = {
+                name: Stream(
+                    one.stamps_ns + np.where(one.stamps_ns > at_ns, round(jump_s * 1e9), 0),
+                    one.columns,
+                )
+                for name, one in drive.items()
+            }
+            name = f"{split.name}: a jump of {jump_s} s at {share}"
+            yield name, recording(drive, split.first, "A"), recording(late, split.second, "B")
 
 
 def is_refused(name: str, first: Log, second: Log) -> bool:

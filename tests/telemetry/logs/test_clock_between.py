@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 
@@ -75,6 +76,34 @@ def test_drift_is_found_and_stamps_come_back() -> None:
     for at_s in (10.0, 450.0, 890.0):
         theirs_ns = round(at_s * 1e9 * (1.0 + 200e-6) + 50e9)
         assert back(theirs_ns) == pytest.approx(at_s * 1e9, abs=30e6)
+
+
+@pytest.mark.parametrize(("jump_s", "at_s"), [(0.5, 600.0), (1.0, 300.0), (2.0, 450.0)])
+def test_a_clock_that_jumps_is_refused_and_it_is_told_where(jump_s: float, at_s: float) -> None:
+    whole = drive(lasts_s=900.0)
+    first = recording(whole, "imu", "speed", source="A", noise=0.02)
+    late = {
+        name: Stream(
+            one.stamps_ns + np.where(one.stamps_ns > at_s * 1e9, round(jump_s * 1e9), 0),
+            one.columns,
+        )
+        for name, one in whole.items()
+    }
+    second = recording(late, "speed", source="B", offset_s=50.0, noise=0.1)
+    with pytest.raises(LogError) as caught:
+        clock_between(first, second)
+    told = re.fullmatch(
+        r"B: its clock does not run evenly beside A's: it changes by \+(\S+) s between (\d+) and"
+        r" (\d+) s into that; if it jumps, cut it there",
+        str(caught.value),
+    )
+    if told is None:  # a jump so long and early leaves two offsets that fit
+        assert jump_s == 2.0
+        assert re.match("B: (its clock cannot be told|more than one offset)", str(caught.value))
+        return
+    assert 0.3 * jump_s < float(told[1]) < 1.2 * jump_s
+    assert float(told[2]) < at_s + 90.0
+    assert float(told[3]) > at_s - 90.0
 
 
 def test_what_the_first_lacks_is_taken_on_its_clock() -> None:
