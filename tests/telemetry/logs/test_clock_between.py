@@ -72,10 +72,20 @@ def test_drift_is_found_and_stamps_come_back() -> None:
     second = recording(whole, "imu", source="B", offset_s=50.0, ppm=200.0)
     clock = clock_between(first, second)
     assert clock.drift_ppm == pytest.approx(200.0, abs=3.0 * clock.drift_std_ppm)
+    assert clock.std_s < 0.02  # a drift that was found is no unevenness
     back = clock.first_from_second(first.info.start_stamp_ns)
     for at_s in (10.0, 450.0, 890.0):
         theirs_ns = round(at_s * 1e9 * (1.0 + 200e-6) + 50e9)
         assert back(theirs_ns) == pytest.approx(at_s * 1e9, abs=30e6)
+
+
+def test_stretches_that_differ_as_their_noise_does_are_no_unevenness() -> None:
+    whole = drive(lasts_s=900.0)
+    first = recording(whole, "speed", source="A")
+    second = recording(whole, "speed", source="B", offset_s=5.0, noise=2.0)
+    clock = clock_between(first, second)
+    assert clock.offset_s == pytest.approx(5.0, abs=3.0 * clock.std_s)
+    assert clock.std_s < 0.02
 
 
 @pytest.mark.parametrize(("jump_s", "at_s"), [(0.5, 600.0), (1.0, 300.0), (2.0, 450.0)])
