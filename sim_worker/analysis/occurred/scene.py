@@ -203,7 +203,8 @@ def _course(chain: Sequence[Detected], ego: DrivenMotion) -> OtherCourse | None:
 
 def _smoothed(values: Array, over_s: float, order: int) -> Array:
     """Return values (N, ...), or a derivative, by parabolas (Savitzky and Golay 1964) as SciPy lays
-    them; scipy.signal takes half a second to import."""
+    them; scipy.signal takes half a second to import. At the ends derivatives are those of the
+    nearest whole window's middle: what a parabola adds there is noise."""
     window = min(round(over_s / STEP_S) | 1, (len(values) - 1) | 1)
     window = window if window <= len(values) else window - 2
     half = window // 2
@@ -213,7 +214,7 @@ def _smoothed(values: Array, over_s: float, order: int) -> Array:
     parabolas = windows @ fit.T
     at = np.concatenate([around[:half], np.zeros(len(parabolas)), around[half + 1 :]])
     which = np.clip(np.arange(len(values)) - half, 0, len(parabolas) - 1)
-    slopes = np.array([np.ones(len(at)), at, at**2] if order == 0 else [0.0 * at, at**0, 2.0 * at])
+    slopes = np.array([np.ones(len(at)), at, at**2] if order == 0 else [0.0 * at, at**0, 0.0 * at])
     smoothed: Array = np.einsum("n...k,kn->n...", parabolas[which], slopes)
     return smoothed / STEP_S**order
 

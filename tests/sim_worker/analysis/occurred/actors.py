@@ -19,7 +19,6 @@ from tests.sim_worker.analysis.occurred.staging import (
     Random,
     record_span,
     smooth,
-    stage_world,
     way_line,
 )
 
@@ -76,7 +75,7 @@ def crosser(
     late_s: float | None = None,
 ) -> Actor:
     """Somebody in a car who crosses the car's way a moment before or after it is there."""
-    line, _, _ = way_line(staged.plan.from_deg + from_deg, turn)
+    line, _, _ = way_line(staged.plan.world, staged.plan.from_deg + from_deg, turn)
     own, its = _cross_place(staged.line, line)
     here_s = float(np.interp(own, staged.arc_m, staged.time_s))
     apart = random.uniform(1.3, 2.2) * random.choice([-1.0, 1.0]) if late_s is None else late_s
@@ -140,7 +139,7 @@ def lead(staged: Drive, random: Random, *, name: str, cut: str = "") -> Actor | 
 def _free_side(staged: Drive) -> str:
     """The side of the other lane, by the lanes' own places."""
     xy = staged.line[40]
-    lanes = [lane for lane in stage_world().lanes if lane.role == "approach"]
+    lanes = [lane for lane in staged.plan.world.lanes if lane.role == "approach"]
     near = min(lanes, key=lambda lane: np.hypot(*(lane.centerline - xy).T).min())
     return "left" if near.left_id else "right"
 

@@ -36,6 +36,10 @@ from tests.sim_worker.analysis.occurred.staging import (
 )
 
 DRIVES, PLANS = 500, 20
+HELD_OUT = 26
+"""Seed of the series that nothing was developed on."""
+_SKEW_DEG = {18: 0.0, HELD_OUT: 15.0}
+"""Of the crossing of each series of drives, by its seed."""
 POSITION_STD_M, MISSED_SHARE, SEEN_WITHIN_M = 0.3, 0.1, 80.0
 BURST_CHANCE, BURST_S = 0.3, (0.6, 1.6)
 GHOSTS, GHOST_S, GHOST_STD_M = 2.0, (0.2, 1.0), 0.8
@@ -54,9 +58,9 @@ class Staged(NamedTuple):
 
 
 @functools.cache
-def plans() -> tuple[EgoPlan, ...]:
+def plans(series: int) -> tuple[EgoPlan, ...]:
     """Return what the stand-in drives, drawn by a seed."""
-    random = np.random.default_rng(18)
+    random = np.random.default_rng(series)
     found = []
     for seed in range(PLANS):
         turn = ("straight", "left", "right")[seed % 3]
@@ -75,16 +79,17 @@ def plans() -> tuple[EgoPlan, ...]:
                 change,
                 bool(random.random() < 0.35),
                 seed,
+                _SKEW_DEG[series],
             )
         )
     return tuple(found)
 
 
-def staged(number: int) -> Staged:
+def staged(number: int, *, series: int) -> Staged:
     """Return one of the drives; casts that are a matter of opinion are drawn again."""
-    ego = drive(plans()[number % PLANS])
+    ego = drive(plans(series)[number % PLANS])
     begin, end = record_span(ego)
-    random = np.random.default_rng([18, number])
+    random = np.random.default_rng([series, number])
     actors: list[Actor] = []
     while not actors:
         actors = _cast(ego, random)
@@ -94,7 +99,7 @@ def staged(number: int) -> Staged:
             # Who is followed may be so from the record's beginning on; all else begins in it.
             whole = begin + 1.0 < one.begin_s or (one.kind == "following" and begin <= one.begin_s)
             if not (whole and one.end_s <= end):
-                return staged(number + 100_000)
+                return staged(number + 100_000, series=series)
             labels.append(one)
     return Staged(ego, tuple(actors), tuple(labels), begin, end)
 
@@ -218,16 +223,16 @@ def _nothing(ego: Drive, random: Random, what: str) -> Actor:
 
 def _passing(ego: Drive) -> Actor:
     """Return one who comes towards the car in its own lane, beside the car's."""
-    line, _, _ = way_line(ego.plan.from_deg + 180.0, "straight")
+    line, _, _ = way_line(ego.plan.world, ego.plan.from_deg + 180.0, "straight")
     at_s = float(np.interp(ego.entry_m, ego.arc_m, ego.time_s)) + 7.0 * (ego.plan.turn == "right")
     xy = on_line(line, 130.0 + 9.0 * (ego.time_s - at_s + 1.5))
     return Actor("passing", "car", CAR_M, xy)
 
 
-def detections(one: Staged, number: int) -> list[Detected]:
+def detections(one: Staged, number: int, *, series: int) -> list[Detected]:
     """Return what a sensor makes of who was there: noise, holes, other ids after long ones, and
     things that are not there."""
-    random = np.random.default_rng([1918, number])
+    random = np.random.default_rng([1900 + series, number])
     time = one.drive.time_s
     ego = _ego_places(one.drive)
     rows = np.flatnonzero((time >= one.begin_s) & (time <= one.end_s))

@@ -31,13 +31,18 @@ Random = np.random.Generator
 
 
 @functools.cache
-def stage_world() -> World:
-    """Two lanes each way from west to east, one each way from south to north."""
-    nodes = {0: (0.0, 0.0), 1: (260.0, 0.0), 2: (0.0, 260.0), 3: (-260.0, 0.0), 4: (0.0, -260.0)}
+def stage_world(skew_deg: float, side: str = "right") -> World:
+    """Two lanes each way from west to east, one each way from south to north, leaned eastward;
+    mirrored from north to south where people drive on the left."""
+    mirror = 1.0 if side == "right" else -1.0
+    x, y = 260.0 * math.sin(math.radians(skew_deg)), 260.0 * math.cos(math.radians(skew_deg))
+    nodes = {0: (0.0, 0.0), 1: (260.0, 0.0), 2: (x, y), 3: (-260.0, 0.0), 4: (-x, -y)}
+    nodes = {node: (east, mirror * north) for node, (east, north) in nodes.items()}
     high = {"highway": "secondary", "name": "High Road", "lanes": "4", "maxspeed": "50"}
-    side = {"highway": "tertiary", "name": "Side Street", "lanes": "2", "maxspeed": "50"}
-    ways = [(11, [0, 1], high), (12, [0, 2], side), (13, [3, 0], high), (14, [4, 0], side)]
-    return world_of(drawn_map(nodes, ways), radius_m=250.0)
+    low = {"highway": "tertiary", "name": "Side Street", "lanes": "2", "maxspeed": "50"}
+    ways = [(11, [0, 1], high), (12, [0, 2], low), (13, [3, 0], high), (14, [4, 0], low)]
+    sided = [(way, members, tags | {"driving_side": side}) for way, members, tags in ways]
+    return world_of(drawn_map(nodes, sided), radius_m=250.0)
 
 
 class EgoPlan(NamedTuple):
@@ -52,6 +57,13 @@ class EgoPlan(NamedTuple):
     stops: bool = False
     """Before the junction."""
     seed: int = 0
+    skew_deg: float = 0.0
+    """Of the crossing that it drives over."""
+
+    @property
+    def world(self) -> World:
+        """What it drives through."""
+        return stage_world(self.skew_deg)
 
 
 class Drive(NamedTuple):
@@ -79,18 +91,18 @@ class Label(NamedTuple):
     end_s: float
 
 
-def way_line(from_deg: float, turn: str, *, inner: bool = True) -> tuple[Array, float, float]:
+def way_line(world: World, from_deg: float, turn: str) -> tuple[Array, float, float]:
     """Return a line through the junction, and where that begins and ends along it."""
-    network = RoadNetwork(stage_world())
+    network = RoadNetwork(world)
     turns = {"straight": "straight", "left": "across", "right": "near"}
     fits = [
         passage
-        for passage in network.passages(stage_world().intersection.id)
+        for passage in network.passages(world.intersection.id)
         if passage.turn == turns[turn]
         and abs(math.remainder(passage.entry_heading_rad - math.radians(from_deg), math.tau)) < 0.3
     ]
     assert fits, (from_deg, turn)
-    way = network.way(fits[0] if inner else fits[-1])
+    way = network.way(fits[0])
     begin, end = way.entry_m - _APPROACH_M, way.exit_m + _ONWARD_M
     arcs = np.arange(max(begin, 0.0), min(end, way.path.length_m), 0.5)
     return way.path.point_at(arcs.copy()), way.entry_m - arcs[0], way.exit_m - arcs[0]
@@ -115,7 +127,7 @@ def moved_aside(line: Array, left_m: Array) -> Array:
 @functools.cache
 def drive(plan: EgoPlan) -> Drive:
     """Let the stand-in drive a plan."""
-    line, entry, leave = way_line(plan.from_deg, plan.turn)
+    line, entry, leave = way_line(plan.world, plan.from_deg, plan.turn)
     arc = arc_lengths(line)
     change_m = 0.0
     if plan.change:
@@ -129,7 +141,7 @@ def drive(plan: EgoPlan) -> Drive:
         stop = int(np.argmin(np.abs(arc - (entry - 5.0))))
         speed[stop : stop + 3] = 0.0
     parameters = read_parameters()
-    geo = geo_from_local(stage_world().frame, line)
+    geo = geo_from_local(plan.world.frame, line)
     path = DrivenPath(geo[:, 0], geo[:, 1], speed, driver=parameters.driver)
     source = KnownStandin(path, parameters, vehicle_id="standin", seed=plan.seed, end_s=60.0)
     samples = []
@@ -142,10 +154,7 @@ def drive(plan: EgoPlan) -> Drive:
     time_s = np.arange(0.0, last_s - 0.1, _STEP_S)
     states = [source.truth(START_STAMP_NS + round(t * 1e9)) for t in time_s]
     xy = np.array(
-        [
-            local_from_geo(stage_world().frame, s.position.lat_deg, s.position.lon_deg)
-            for s in states
-        ]
+        [local_from_geo(plan.world.frame, s.position.lat_deg, s.position.lon_deg) for s in states]
     )
     middle_m = 1.3
     arcs = _along(line, xy) + middle_m

@@ -55,8 +55,22 @@ def test_courses_are_smoothed_as_scipy_does(count: int, order: int) -> None:
     xy_m = RANDOM.normal(0.0, 1.0, (count, 2))
     window = min(7, count - (count + 1) % 2)
     expected = savgol_filter(xy_m, window, 2, deriv=order, delta=0.1, axis=0)
+    if order == 1:
+        half = window // 2
+        expected[:half], expected[count - half :] = expected[half], expected[count - half - 1]
 
     assert scene._smoothed(xy_m, 0.7, order) == pytest.approx(expected, abs=1e-9)
+
+
+def test_who_stands_at_first_heads_as_it_then_drives_off() -> None:
+    time_s = np.arange(0.0, 15.0, 0.1)
+    north_m = np.maximum(time_s - 10.0, 0.0) ** 2
+    for _ in range(20):
+        noise = RANDOM.normal(0.0, 0.3, (len(time_s), 2))
+        (course,) = courses(other("a", np.stack([0.0 * time_s, north_m], axis=1) + noise))
+
+        assert course.standing[:80].all()
+        assert course.yaw_rad[:80] == pytest.approx(np.full(80, np.pi / 2.0), abs=0.8)
 
 
 def test_what_shakes_or_is_there_for_a_moment_is_nobody() -> None:
