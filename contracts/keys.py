@@ -69,6 +69,9 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     (_VEHICLE, RECORDED, _ORCHESTRATOR): {
         "state": Channel(drive.VehicleState, 50, "estimated state"),
     },
+    (_VEHICLE, RECORDED, _CAR): {
+        "injection": Channel(towards_vehicle.Injection, 5, "whether it is shown what is virtual"),
+    },
     (_VEHICLE, WATCH, _CAR): {
         "real_cloud": Channel(point_cloud.PointCloud, 10, "what a lidar of the car measured"),
     },

@@ -23,6 +23,7 @@ PAGE: dict[str, Colour] = {
     "danger": CRITICAL,
     "road-user": ROAD_USER,
     "twin": TWIN,
+    "virtual": VIRTUAL,
 }
 """What the co-pilot display takes of them, by the names of its style sheet; calm has no colour
 there, so that who cannot tell red from green misses nothing."""

@@ -74,7 +74,7 @@ class RecorderProcess:
         self._informed = False
         self._flushed_s = mono_s()
         self._stamp_ns = 0
-        for channel in (*TELEMETRY_CHANNELS, "state"):
+        for channel in (*TELEMETRY_CHANNELS, "state", "injection"):
             bus.subscribe(channel, self._messages, recover=True, vehicle=vehicle_id)
         self._publish(recording.started())
         life.ready()

@@ -27,6 +27,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.ros2.cadence import Cadence
 from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.gated_sender import GatedSender
+from foretwin.telemetry.ros2.injection import InjectionWord
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.lot_guard import LotGuard
@@ -36,7 +37,7 @@ from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
 from foretwin.telemetry.ros2.orders import Orders
 from foretwin.telemetry.ros2.outwards import Outwards
 from foretwin.telemetry.ros2.rows import SHOWS_LIGHTS, OutRow, Source
-from foretwin.telemetry.ros2.safety import VehicleGate
+from foretwin.telemetry.ros2.safety import GateTrouble, VehicleGate
 from foretwin.telemetry.ros2.sender import RosSender
 from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 
@@ -82,7 +83,6 @@ class Gateway:
         """
         self._mapping, self._bus, self._foreign = mapping, bus, foreign
         self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
-        self._guard = guard
         self.inwards = Inwards(mapping, anchor, mounts)
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
         self._out = Outwards(
@@ -92,6 +92,7 @@ class Gateway:
         self.gate = VehicleGate(
             limits, config_on=limits.enabled, flag_on=flag_on, trouble=self._lot_trouble
         )
+        self._guard, self._word = guard, InjectionWord(self.gate, guard)
         self._virtual = VirtualObjects(at_most=limits.max_objects, placed=mapping.placed)
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self._gated = GatedSender(
@@ -107,8 +108,7 @@ class Gateway:
         self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
         self._merged = MergedObjects(mapping.merged, frame=drive_frame)
         self._inbox = Mailbox(2048)
-        self._views = Mailbox(256, nudges=self._inbox)
-        self._clouds = Mailbox(_CLOUDS, nudges=self._inbox)
+        self._views, self._clouds = (Mailbox(n, nudges=self._inbox) for n in (256, _CLOUDS))
         self._orders: Orders | None = None
         self._logged_gate = self.gate.state
         self._out.warm_up()
@@ -137,6 +137,8 @@ class Gateway:
         if self.inwards.route is not None and self._due("route", _ROUTE_EVERY_NS):
             self._bus.publish("route", self.inwards.route, vehicle=self._vehicle_id)
         self.introduction.answer(now_ns=self._mono_ns())
+        if (word := self._word.news(self._mono_ns())) is not None:
+            self._bus.publish("injection", word, vehicle=self._vehicle_id)
         self._diagnose()
 
     def report(self) -> dict[str, dict[str, int]]:
@@ -182,7 +184,7 @@ class Gateway:
             if (was, self.gate.state) == ("open", "shut"):
                 self._take_back()
 
-    def _lot_trouble(self, now_ns: int) -> str | None:
+    def _lot_trouble(self, now_ns: int) -> GateTrouble | None:
         guard, car = self._guard, self.inwards
         return guard.trouble(now_ns, heard_ns=car.heard_mono_ns, fix=car.fix) if guard else None
 
@@ -218,13 +220,11 @@ class Gateway:
             self._bus.publish(channel, message, vehicle=self._vehicle_id)
 
     def _pass_on(self, item: Any) -> None:
-        if isinstance(item, Request):
-            self.introduction.take(item, now_ns=self._mono_ns())
-            return
-        if isinstance(item, Arrived):
-            self._take_in(item)
-            return
         match self._decoded(item):
+            case Request():
+                self.introduction.take(item, now_ns=self._mono_ns())
+            case Arrived():
+                self._take_in(item)
             case drive.VehicleState() as state:
                 if self._guard is not None:
                     self._guard.take_state(self._out.on_lot(state), now_ns=self._mono_ns())
@@ -253,7 +253,7 @@ class Gateway:
 
     def _decoded(self, item: Any) -> Any:
         try:
-            return item.message() if isinstance(item, Received) else None
+            return item.message() if isinstance(item, Received) else item
         except Refused as refused:
             if text := self.refusals.take(refused):
                 log.warning("%s", text)

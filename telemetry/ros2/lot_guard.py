@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.telemetry.ros2.safety import GateTrouble
 
 REACTION_S = 2.5
 """Of whoever takes over, until the brake acts: AASHTO, A Policy on Geometric Design of Highways and
@@ -31,6 +33,14 @@ def margin_m(speed_mps: float) -> float:
     """Return how far a car goes at that speed until whoever takes over has stopped it."""
     speed = abs(speed_mps)
     return speed * REACTION_S + speed * speed / (2.0 * BRAKING_MPS2)
+
+
+class FenceStanding(NamedTuple):
+    """The vehicle's time, the way to the nearest side of its fence, and what is needed."""
+
+    stamp_ns: int
+    fence_m: float
+    margin_m: float
 
 
 class LotGuard:
@@ -53,7 +63,9 @@ class LotGuard:
         if self._state is None or state.stamp_ns != self._state.stamp_ns:
             self._state, self._state_ns = state, now_ns
 
-    def trouble(self, now_ns: int, *, heard_ns: int, fix: GeoPoint | None = None) -> str | None:
+    def trouble(
+        self, now_ns: int, *, heard_ns: int, fix: GeoPoint | None = None
+    ) -> GateTrouble | None:
         """Return why nothing may go to the car now, None where it may.
 
         `heard_ns` is when the car itself was heard of last, `fix` its newest position as it came,
@@ -61,22 +73,40 @@ class LotGuard:
         """
         state = self._state
         if state is None or now_ns - self._state_ns > STALE_NS:
-            return f"no new state of the car for {STALE_NS / 1e6:.0f} ms"
+            why = f"no new state of the car for {STALE_NS / 1e6:.0f} ms"
+            return GateTrouble("state stale", why)
         if now_ns - heard_ns > STALE_NS:
-            return f"nothing heard of the car for {STALE_NS / 1e6:.0f} ms"
+            why = f"nothing heard of the car for {STALE_NS / 1e6:.0f} ms"
+            return GateTrouble("car not heard", why)
         if "gnss" in state.stale:
-            return "the car's positions are overdue"
+            return GateTrouble("positions overdue", "the car's positions are overdue")
         place = self._place(state.position)
         if not self._fence.contains(place):
-            return "the car is outside its fence"
+            return GateTrouble("outside the fence", "the car is outside its fence")
         if fix is not None and not (apart_m := place.distance(self._place(fix))) <= (
             APART_M + self._reach_m
         ):
-            return f"the car's position is {apart_m:.1f} m apart from its estimated state"
-        left_m = self._edge.distance(place) - self._reach_m
+            why = f"the car's position is {apart_m:.1f} m apart from its estimated state"
+            return GateTrouble("position apart", why)
+        left_m = self._left_m(place)
         if not left_m >= (needed_m := margin_m(state.speed_mps)):
-            return f"the fence is {left_m:.1f} m off, {needed_m:.1f} m are needed at this speed"
+            why = f"the fence is {left_m:.1f} m off, {needed_m:.1f} m are needed at this speed"
+            return GateTrouble("near the fence", why)
         return None
+
+    def standing(self, now_ns: int) -> FenceStanding | None:
+        """Return where the car stands to its fence; None before any state, or without a place."""
+        state = self._state
+        if state is None or not math.isfinite(state.speed_mps):
+            return None
+        if (place := self._place(state.position)).is_empty:
+            return None
+        stamp_ns = state.stamp_ns + now_ns - self._state_ns
+        return FenceStanding(stamp_ns, self._left_m(place), margin_m(state.speed_mps))
+
+    def _left_m(self, place: shapely.Point) -> float:
+        away_m = float(self._edge.distance(place))
+        return (away_m if self._fence.contains(place) else -away_m) - self._reach_m
 
     def _place(self, at: GeoPoint) -> shapely.Point:
         x_m, y_m = local_from_geo(self._frame, at.lat_deg, at.lon_deg).tolist()

@@ -10,18 +10,23 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from typing import Literal
+from typing import NamedTuple
 
 import msgspec
 
-from foretwin.contracts.towards_vehicle import VehicleCommand
+from foretwin.contracts.towards_vehicle import GateReason, GateState, VehicleCommand
 
 DEAD_MAN_NS = 150_000_000
 """Without a fresh word of the orchestrator for so long, nothing goes out any more."""
 _FROM_THE_FUTURE_NS = 1_000_000
 """A word sent later than now, by the same host's clock, is none."""
 
-GateState = Literal["off", "waiting", "open", "shut"]
+
+class GateTrouble(NamedTuple):
+    """What keeps the gate from opening: a word of the table, and all of it."""
+
+    reason: GateReason
+    text: str
 
 
 class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -65,15 +70,17 @@ class VehicleGate:
         *,
         config_on: bool,
         flag_on: bool,
-        trouble: Callable[[int], str | None] = lambda _: None,
+        trouble: Callable[[int], GateTrouble | None] = lambda _: None,
     ) -> None:
+        self.why: str
+        self.reason: GateReason
         self._limits, self._trouble = limits.validate(), trouble
         self._state: GateState = "waiting" if config_on and flag_on else "off"
         self._last_heartbeat_ns: int | None = None
         self._last_sent: tuple[int, VehicleCommand] | None = None
-        self.why = (
-            "both switches are on" if self._state == "waiting" else _missing_switch(config_on)
-        )
+        self.why, self.reason = "both switches are on", "no word yet"
+        if self._state == "off":
+            self.why, self.reason = _missing_switch(config_on), "switched off"
         self.counts: Counter[str] = Counter()
 
     @property
@@ -90,10 +97,10 @@ class VehicleGate:
             self.counts["word too old or not yet due"] += 1
             return
         if (trouble := self._trouble(now_ns)) is not None:
-            self.why = trouble
+            self.reason, self.why = trouble
             self.counts["word before the car is ready"] += 1
             return
-        self._state, self.why = "open", "both switches are on"
+        self._state, self.reason, self.why = "open", "well", "both switches are on"
         self._last_heartbeat_ns = max(sent_ns, self._last_heartbeat_ns or sent_ns)
 
     def look(self, *, now_ns: int, link_up: bool) -> GateState:
@@ -101,17 +108,18 @@ class VehicleGate:
         if self._state == "open":
             assert self._last_heartbeat_ns is not None
             if not link_up:
-                self.shut("the link is down")
+                self.shut(GateTrouble("link down", "the link is down"))
             elif not _is_fresh(self._last_heartbeat_ns, now_ns):
-                self.shut(f"no word of the orchestrator for {DEAD_MAN_NS / 1e6:.0f} ms")
+                why = f"no word of the orchestrator for {DEAD_MAN_NS / 1e6:.0f} ms"
+                self.shut(GateTrouble("word overdue", why))
             elif (trouble := self._trouble(now_ns)) is not None:
                 self.shut(trouble)
         return self._state
 
-    def shut(self, why: str) -> None:
+    def shut(self, trouble: GateTrouble) -> None:
         """Shut for good."""
         if self._state != "off":
-            self._state, self.why = "shut", why
+            self._state, (self.reason, self.why) = "shut", trouble
 
     def admit(
         self, command: VehicleCommand, *, now_ns: int, link_up: bool, tire_angle_rad: float | None
@@ -125,7 +133,7 @@ class VehicleGate:
             return self._held("gate " + self._state)
         numbers = (command.tire_angle_rad, command.accel_mps2, command.speed_mps)
         if not all(math.isfinite(number) for number in numbers):
-            self.shut("a command that is not finite")
+            self.shut(GateTrouble("command not finite", "a command that is not finite"))
             return self._held("not finite")
         if not _is_fresh(command.sent_mono_ns, now_ns):
             return self._held("command too old")

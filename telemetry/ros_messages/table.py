@@ -86,6 +86,7 @@ _TOPICS: dict[str, tuple[_Topic, ...]] = {
         _Topic("state", parts.ODOMETRY, motion.odometry_from_state),
         _json("state", "state_json"),
     ),
+    "injection": (_Topic("injection", STRING, json_string),),  # of that drive: never said again
     "point_cloud": (_Topic("points", parts.POINT_CLOUD2, clouds.cloud_from),),
 }
 """What stands in a file by channel: a channel without a row of its own as JSON alone."""

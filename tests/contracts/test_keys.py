@@ -77,7 +77,7 @@ def test_how_often_each_is_said() -> None:
             "real_cloud",
         },
         8: {"comparison"},
-        5: {"progress"},
+        5: {"injection", "progress"},
         4: {"gap", "sibling"},
         2: {"use_course", "job", "round", "plan_comparison", "worker_status"},
         1: {"signals", "route", "clock", "vehicle_clock", "join"},
@@ -90,7 +90,7 @@ def test_only_questions_wait_and_what_a_car_says_is_kept_for_who_missed_it() -> 
         asked = channel.reply is not None
         at_once = asked or name in ("planner_scene", "planned_motions", "planner_joined")
         assert (channel.qos.block, channel.qos.express) == (asked, at_once)
-        kept_s = 20.0 if name in (*TELEMETRY_CHANNELS, "state") else 0.0
+        kept_s = 20.0 if name in (*TELEMETRY_CHANNELS, "state", "injection") else 0.0
         assert channel.qos.kept_s == kept_s
 
 

@@ -8,12 +8,14 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.gap import Culprit, GapAlarm, Verdict
 from foretwin.contracts.simulation import Event, Progress, RoundView, WorkerStatus
 from foretwin.contracts.terminal import plain
+from foretwin.contracts.towards_vehicle import Injection
 
 Kind = Literal[
     "ended",
     "link",
     "process",
     "telemetry",
+    "injection",
     "verdict",
     "gap",
     "rounds",
@@ -23,7 +25,16 @@ Kind = Literal[
 ]
 GRAVE: tuple[Kind, ...] = ("ended", "link", "process", "telemetry")
 """Where one of these is the cause, nothing else on the display can be believed."""
-_ORDER: tuple[Kind, ...] = (*GRAVE, "verdict", "gap", "rounds", "off_map", "worker", "event")
+_ORDER: tuple[Kind, ...] = (
+    *GRAVE,
+    "injection",
+    "verdict",
+    "gap",
+    "rounds",
+    "off_map",
+    "worker",
+    "event",
+)
 
 STALE_S = 1.0
 """So old may the newest state be, as in the drive itself."""
@@ -62,6 +73,7 @@ class Alerts:
         self._gaps: dict[str, GapAlarm] = {}
         self._verdict: Verdict | None = None
         self._workers: dict[str, WorkerStatus] = {}
+        self._injection: Injection | None = None
         self._event: tuple[float, Event] | None = None
         self._ended = ""
 
@@ -102,6 +114,10 @@ class Alerts:
         """Take how a worker is."""
         self._workers[status.worker_id] = status
 
+    def injection(self, told: Injection) -> None:
+        """Take whether the car on its lot is shown what is virtual."""
+        self._injection = told
+
     def event(self, event: Event, now_s: float) -> None:
         """Take something worth telling; what is information alone is no alert."""
         if event.level != "info":
@@ -128,6 +144,9 @@ class Alerts:
             names = ", ".join(plain(one) for one in self._gone)
             found.append(Alert("process", f"process gone: {names}"))
         found += self._telemetry(now_s)
+        if self._injection is not None and self._injection.gate == "shut":
+            why = self._injection.reason
+            found.append(Alert("injection", f"virtual objects are off for good: {why}"))
         if (verdict := self.accused) is not None:
             found.append(Alert("verdict", f"verdict: {plain(verdict.text)}"))
         if self._gaps:

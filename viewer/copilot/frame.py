@@ -97,3 +97,5 @@ class PageFrame(msgspec.Struct, frozen=True, kw_only=True):
     round_age_s: float | None
     pace: str
     """How many futures are run, where the machine is too slow for all."""
+    virtual: str = ""
+    """Whether a car on a lot is shown what is virtual, and why not."""

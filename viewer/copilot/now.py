@@ -20,6 +20,7 @@ from foretwin.contracts.simulation import (
     WorldNotice,
 )
 from foretwin.contracts.terminal import plain
+from foretwin.contracts.towards_vehicle import Injection
 from foretwin.contracts.world import World
 from foretwin.viewer.copilot import words
 from foretwin.viewer.copilot.alerts import Alerts
@@ -60,6 +61,7 @@ class DriveNow:
         self._dangers: tuple[Danger, ...] = ()
         self._seen: RoadUsers | None = None
         self._lights = LightsNow()
+        self._injection: tuple[Injection | None, float] = None, 0.0
         self._active: str | None = None
         self._worlds: dict[str, str] = {}
         """World ids by junction."""
@@ -79,6 +81,7 @@ class DriveNow:
             "worker_status": lambda one, _: self.alerts.worker(one),
             "gap_alarm": lambda one, _: self.alerts.gap(one),
             "verdict": lambda one, _: self.alerts.verdict(one),
+            "injection": self._take_injection,
             "event": self.alerts.event,
             "run_end": lambda one, _: self.alerts.end("the run has ended"),
         }
@@ -101,6 +104,10 @@ class DriveNow:
     def _take_progress(self, progress: Progress, now_s: float) -> None:
         self._progress = progress
         self.alerts.progress(progress, now_s)
+
+    def _take_injection(self, told: Injection, now_s: float) -> None:
+        self._injection = told, now_s
+        self.alerts.injection(told)
 
     def _take_active(self, active: ActiveWorld, now_s: float) -> None:
         self._active = active.world_id
@@ -189,6 +196,7 @@ class DriveNow:
             marks=self.marks,
             round_age_s=age_s,
             pace="" if self._progress is None else plain(self._progress.too_slow),
+            virtual=words.virtual_objects(self._injection[0], age_s=now_s - self._injection[1]),
         )
 
     @property

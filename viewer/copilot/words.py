@@ -7,10 +7,13 @@ from typing import NamedTuple
 from foretwin.contracts.gap import Culprit, LimitedQuantity, Verdict, limits_after
 from foretwin.contracts.simulation import MirrorSample, Progress
 from foretwin.contracts.terminal import plain
+from foretwin.contracts.towards_vehicle import Injection
 from foretwin.viewer.danger import Danger
 
 FAR_S = 99.0
 """From so many seconds on minutes say more."""
+INJECTION_FOR_S = 1.0
+"""So long a word of the gate is shown: five of it are missing then."""
 _CULPRITS: dict[Culprit, str] = {
     "vehicle": "vehicle departs",
     "model": "model is off",
@@ -100,6 +103,18 @@ def _gap_text(name: LimitedQuantity, value: float) -> str:
             return f"{size * 57.29578:.0f}° {'left' if value > 0.0 else 'right'}"
         case "speed_mps":
             return f"{size * 3.6:.0f} km/h {'fast' if value > 0.0 else 'slow'}"
+
+
+def virtual_objects(told: Injection | None, *, age_s: float) -> str:
+    """Return whether the car on its lot is shown what is virtual; empty where none is on a lot."""
+    if told is None:
+        return ""
+    if age_s > INJECTION_FOR_S:
+        return "virtual objects: not known"
+    room = f"fence {told.fence_m:.0f} m off, {told.margin_m:.0f} m needed"
+    if told.gate == "open":
+        return f"virtual objects on · {room}"
+    return f"virtual objects off: {told.reason} · {room}"
 
 
 def sentence(

@@ -20,6 +20,7 @@ from foretwin.telemetry.lot_car.ros_voice import RosVoice
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.lot_guard import LotGuard
 from foretwin.telemetry.ros2.mapping import listening_only, parse_mapping
+from foretwin.telemetry.ros2.safety import GateTrouble
 from foretwin.telemetry.standin.obstacles import FRONT_M
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
@@ -212,7 +213,7 @@ def test_when_injection_ends_it_goes_on_by_what_it_sees_itself():
     meeting.go_on(7.0)
     assert meeting.car.report().stood_before_m is not None
     stood_at_m = meeting.car.report().driven_m
-    meeting.gateway.gate.shut("the test says so")
+    meeting.gateway.gate.shut(GateTrouble("link down", "the test says so"))
     meeting.go_on(4.0)
     assert meeting.car.report().driven_m > stood_at_m + 2.0
     assert meeting.gateway.report()["sent"]["/virtual/objects"] == meeting.car.report().lists

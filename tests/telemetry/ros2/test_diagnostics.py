@@ -8,7 +8,7 @@ from foretwin.contracts.gap import GapAlarm, Verdict
 from foretwin.contracts.simulation import Event
 from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.outwards import Level
-from foretwin.telemetry.ros2.safety import CommandLimits, VehicleGate
+from foretwin.telemetry.ros2.safety import CommandLimits, GateTrouble, VehicleGate
 
 
 def gate(*, on: bool = True) -> VehicleGate:
@@ -80,7 +80,7 @@ def test_counts_are_a_warning_where_there_should_be_none(part: str, level: int) 
 def test_a_gate_that_has_shut_is_an_error_and_one_that_is_off_is_none() -> None:
     shut = gate()
     shut.heartbeat(0, now_ns=0)
-    shut.shut("the link is down")
+    shut.shut(GateTrouble("link down", "the link is down"))
     assert DiagnosticLevels().levels({}, gate=shut) == [
         Level("foretwin/ros2/towards_vehicle", 2, "the link is down", {})
     ]

@@ -37,10 +37,12 @@ def state(x_m: float, y_m: float = 0.0, speed_mps: float = 0.0, **changed: Any) 
 
 
 def trouble(told: VehicleState, *, after_ns: int = 0, silent_ns: int = 0) -> str | None:
+    """Return what is wrong, in words."""
     one = guard()
     one.take_state(told, now_ns=S)
     now_ns = S + after_ns
-    return one.trouble(now_ns, heard_ns=now_ns - silent_ns)
+    found = one.trouble(now_ns, heard_ns=now_ns - silent_ns)
+    return found and found.text
 
 
 def test_the_margin_is_the_way_of_reacting_and_of_braking():

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.towards_vehicle import VehicleCommand
-from foretwin.telemetry.ros2.safety import DEAD_MAN_NS, CommandLimits, VehicleGate
+from foretwin.telemetry.ros2.safety import DEAD_MAN_NS, CommandLimits, GateTrouble, VehicleGate
 
 LIMITS = CommandLimits()
 MS = 1_000_000
@@ -41,6 +41,7 @@ def test_nothing_without_both_switches(config_on: bool, flag_on: bool) -> None:
     gate.heartbeat(0, now_ns=0)
     assert gate.state == "off"
     assert admit(gate, command(0), 0) is None
+    assert gate.reason == "switched off"
     assert "--towards-vehicle" in gate.why or "enabled" in gate.why
 
 
@@ -52,18 +53,20 @@ def test_nothing_before_the_first_word() -> None:
 
 
 def test_what_else_is_wrong_keeps_it_from_opening_and_shuts_it() -> None:
-    wrong: list[str | None] = ["the car is outside its fence"]
+    outside = GateTrouble("outside the fence", "the car is outside its fence")
+    wrong: list[GateTrouble | None] = [outside]
     gate = VehicleGate(LIMITS, config_on=True, flag_on=True, trouble=lambda _: wrong[0])
     gate.heartbeat(0, now_ns=0)
     assert (gate.state, gate.why) == ("waiting", "the car is outside its fence")
     wrong[0] = None
     gate.heartbeat(MS, now_ns=MS)
     assert (gate.look(now_ns=MS, link_up=True), gate.why) == ("open", "both switches are on")
-    wrong[0] = "the car is outside its fence"
+    assert gate.reason == "well"
+    wrong[0] = outside
     assert gate.look(now_ns=2 * MS, link_up=True) == "shut"
     wrong[0] = None
     gate.heartbeat(3 * MS, now_ns=3 * MS)
-    assert (gate.state, gate.why) == ("shut", "the car is outside its fence")
+    assert (gate.state, gate.reason, gate.why) == ("shut", *outside)
 
 
 def test_what_has_shut_stays_shut() -> None:

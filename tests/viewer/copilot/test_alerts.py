@@ -9,6 +9,7 @@ import pytest
 
 from foretwin.contracts.gap import GapAlarm
 from foretwin.contracts.simulation import Event, WorkerStatus
+from foretwin.contracts.towards_vehicle import GateReason, GateState, Injection
 from foretwin.viewer.copilot.alerts import EVENT_SHOWN_S, NO_ROUND_S, STALE_S, Alert, Alerts
 from tests.viewer.copilot.rounds import round_of
 from tests.viewer.copilot.test_words import AHEAD, verdict
@@ -46,6 +47,10 @@ def worker(state: str) -> WorkerStatus:
     return msgspec.convert({"stamp_ns": 1, "worker_id": "w1", "state": state}, WorkerStatus)
 
 
+def injection(gate: GateState, reason: GateReason = "near the fence") -> Injection:
+    return Injection(stamp_ns=1, gate=gate, reason=reason, fence_m=12.3, margin_m=29.4)
+
+
 FORCED: dict[str, tuple[Callable[[Alerts], object], Alert]] = {
     "run ended": (lambda one: one.end("the run has ended"), Alert("ended", "the run has ended")),
     "process gone": (
@@ -55,6 +60,10 @@ FORCED: dict[str, tuple[Callable[[Alerts], object], Alert]] = {
     "overdue": (
         lambda one: one.state(msgspec.structs.replace(state_at(10.0), stale=("gnss", "imu")), 10.0),
         Alert("telemetry", "telemetry overdue: gnss, imu"),
+    ),
+    "gate shut": (
+        lambda one: one.injection(injection("shut")),
+        Alert("injection", "virtual objects are off for good: near the fence"),
     ),
     "verdict": (
         lambda one: one.verdict(verdict("vehicle")),
@@ -92,6 +101,13 @@ def test_what_is_wrong_is_said_with_its_cause(kind: str) -> None:
     alerts = well()
     force(alerts)
     assert alerts.now(10.0) == [said]
+
+
+@pytest.mark.parametrize("gate", ["off", "waiting", "open"])
+def test_a_gate_that_has_not_shut_is_no_alert(gate: GateState) -> None:
+    alerts = well()
+    alerts.injection(injection(gate))
+    assert alerts.now(10.0) == []
 
 
 def test_telemetry_is_stale_after_a_second_and_the_age_is_told() -> None:

@@ -16,8 +16,10 @@ from foretwin.contracts.world import World
 from foretwin.viewer.copilot.frame import AheadFrame, AheadLight, PageFrame
 from foretwin.viewer.copilot.lights_now import LIGHT_FOR_NS
 from foretwin.viewer.copilot.now import ROUND_FOR_S, SEEN_FOR_NS, DriveNow
+from foretwin.viewer.copilot.words import INJECTION_FOR_S
 from tests.viewer import scene
 from tests.viewer.copilot.rounds import line, round_of
+from tests.viewer.copilot.test_alerts import injection
 from tests.viewer.copilot.test_right_of_way import drawn
 from tests.viewer.copilot.test_words import AHEAD
 from tests.viewer.scene import DRIVE_FRAME, START_NS, WORLD_ID, mirror_at, state_at
@@ -208,6 +210,20 @@ def test_a_light_that_is_not_heard_any_more_is_not_shown() -> None:
     drive.take("signals", SignalState(stamp_ns=stamp_ns - 1, group_id="g2", colour="green"))
     drive.take("signals", SignalState(stamp_ns=stamp_ns, group_id="g3", colour="unknown"))
     assert drive.frame().lights == {"g1": "green"}
+
+
+def test_a_car_on_a_lot_is_told_whether_it_is_shown_what_is_virtual() -> None:
+    drive = Drive()
+    drive.goes_on(10.0)
+    assert drive.frame().virtual == "", "no car on a lot"
+    drive.take("injection", injection("open", "well"))
+    assert drive.frame().virtual == "virtual objects on · fence 12 m off, 29 m needed"
+    drive.take("injection", injection("shut"))
+    frame = drive.frame()
+    off = "virtual objects off: near the fence · fence 12 m off, 29 m needed"
+    assert (frame.virtual, [one.kind for one in frame.alerts]) == (off, ["injection"])
+    drive.goes_on(10.1 + INJECTION_FOR_S)
+    assert drive.frame().virtual == "virtual objects: not known"
 
 
 def test_the_world_is_that_of_the_junction_ahead_once_it_counts() -> None:

@@ -58,6 +58,7 @@ function show(frame) {
   put("twin-text", frame.twin);
   put("twin-detail", frame.twin_detail);
   put("pace", frame.pace);
+  put("virtual", frame.virtual);
   put("marks", frame.marks ? `${frame.marks}` : "");
   put("sentence", frame.sentence);
   flipOf(ahead ? ahead.light : null);
