@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable
 
@@ -12,7 +13,8 @@ from foretwin.orchestrator.runner.dispatch import Dispatch, GivenUp
 
 NO_ANSWER = "no answer"
 """What the bus says of a question that nobody answered."""
-_FOR_EVER_S = 30 * 86_400.0
+LONGEST_S = 3600.0
+"""So long a question whose task has no limit waits for its answer, where nobody says otherwise."""
 _SILENT_S = 0.5
 """So long a worker that left a question unanswered is given nothing: if it has died, it is known
 by then, and where its connection was lost and came back, it may answer nothing in between."""
@@ -21,7 +23,8 @@ by then, and where its connection was lost and came back, it may answer nothing 
 class BusDispatcher:
     """The tasks of a run and its workers, of which it gives to those `expected` alone.
 
-    See Dispatch.
+    A task without a limit of its own is asked for again after `longest_s`: Zenoh remembers each
+    question for as long as it might wait, answered or not (0.8 kB). See Dispatch.
     """
 
     def __init__(
@@ -32,7 +35,9 @@ class BusDispatcher:
         run_id: str,
         expected: Iterable[str],
         in_flight: int = 1,
+        longest_s: float = LONGEST_S,
     ) -> None:
+        self._longest_s = longest_s
         self.dispatch = Dispatch(in_flight=in_flight)
         self.dispatch.expect(expected)
         self._bus, self._mailbox, self._run_id = bus, mailbox, run_id
@@ -108,7 +113,7 @@ class BusDispatcher:
         for worker_id, task in self.dispatch.assignments(now_s=now_s):
             sent(task.channel, task.key)
             self._given_s[worker_id, task.key] = now_s
-            until_s, _ = self._allowed.get(task.key, (now_s + _FOR_EVER_S, 0.0))
+            until_s, _ = self._allowed.get(task.key, (now_s + self._longest_s, 0.0))
             self._bus.request(
                 task.channel,
                 task.question,
@@ -131,7 +136,7 @@ class BusDispatcher:
                 return []
             self._allowed.pop(task.key, None)
             return [Answer(task, reply.message, "", worker_id, reply.received_mono_ns)]
-        until_s, within_s = self._allowed.get(task.key, (_FOR_EVER_S + time.monotonic(), 0.0))
+        until_s, within_s = self._allowed.get(task.key, (math.inf, 0.0))
         if time.monotonic() >= until_s:
             self.dispatch.unanswered(worker_id, task.key)
             self.dispatch.trust(worker_id)  # It may be slow alone.

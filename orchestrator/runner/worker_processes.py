@@ -106,6 +106,7 @@ class WorkerProcesses:
             run_id=run_id,
             expected=self._names,
             in_flight=IN_FLIGHT,
+            longest_s=(IN_FLIGHT + 1) * self._timeout_s,  # One waits behind those before it.
         )
         self._bus.watch_alive(alive_key(run=run_id, process="*"), self._mailbox)
         return self

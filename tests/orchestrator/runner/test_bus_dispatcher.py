@@ -10,7 +10,7 @@ from foretwin.contracts.bus import Mailbox, Reply, Request
 from foretwin.contracts.runner import Answer, Task
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.orchestrator.runner import bus_dispatcher
-from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
+from foretwin.orchestrator.runner.bus_dispatcher import LONGEST_S, NO_ANSWER, BusDispatcher
 from foretwin.orchestrator.runner.sickness import FIRST_PAUSE_S
 from tests.contracts.memory_bus import MemoryBus
 
@@ -144,3 +144,23 @@ def test_a_far_worker_that_answers_nothing_at_once_is_asked_once_until_it_is_hea
     far.heard("w-a-0", 0.001)
     dispatcher.give_out()
     assert isinstance(bench.mailbox.take(), Reply)
+
+
+@pytest.mark.parametrize(("given", "longest_s"), [({}, LONGEST_S), ({"longest_s": 5.0}, 5.0)])
+def test_the_bus_remembers_no_question_for_ever(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, given: dict[str, float], longest_s: float
+) -> None:
+    waits: list[float] = []
+    monkeypatch.setattr(bench.bus, "request", lambda *_, timeout_s, **__: waits.append(timeout_s))
+    asks = BusDispatcher(bench.bus, bench.mailbox, run_id="r1", expected=["w0"], **given)
+    asks.worker_up("w0")
+    asks.submit(A)
+    asks.give_out()
+    assert waits == [pytest.approx(longest_s, abs=0.02)]
+
+    (question,) = asks.dispatch.busy.values()
+    asks.reply(Reply("prepare", ("w0", question), None, NO_ANSWER, 0))
+    bench.now_s += 1.0
+    asks.give_out()
+    assert len(waits) == 2  # It is asked for again, not given up.
+    assert LONGEST_S <= 3600.0
