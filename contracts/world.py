@@ -263,5 +263,8 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     """What was guessed or left out, in words."""
     attribution: str = ATTRIBUTION
     obstacles: tuple[Obstacle, ...] = ()
+    cut_away: tuple[Area, ...] | msgspec.UnsetType = msgspec.UNSET
+    """What the map has of buildings where lanes lead, with no way through or below them: it stands
+    in nobody's way here, but no scenario is placed on it. Where there is none it is not written."""
     elevation: Elevation | msgspec.UnsetType = msgspec.UNSET
     """Where no elevation model was given, the World is flat, and this is not written."""

@@ -206,6 +206,7 @@ def _world(
         sidewalks=made.sidewalks,
         buildings=made.buildings,
         obstacles=made.obstacles,
+        cut_away=made.cut_away or msgspec.UNSET,
         notes=tuple(
             dict.fromkeys(
                 (*lanes.notes, *notes, *tracks.notes, *made.notes, *_reading_notes(osm, around))

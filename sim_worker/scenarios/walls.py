@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import shapely
 
@@ -17,12 +18,15 @@ _BELOW_M = 3.0
 """Buildings that begin higher are passed below, as is a passage. Chosen: above a lorry's 2.8 m."""
 _BESIDE_HOUSES_M = 0.75
 """Room on either side of a vehicle that drives: 0.25 m in which it moves and 0.5 m of safety (RASt
-06, 4.2). Houses that reach into lanes are cut back to these, so that they are nearer."""
+06, 4.2)."""
 
 
 class Walls:
     """An index of a World's buildings, walls, fences and hedges, which stop all; trees, posts and
-    the middles of rings stop vehicles, and who walks passes by them."""
+    the middles of rings stop vehicles, and who walks passes by them.
+
+    Houses are as the map has them, also where they were cut back for lanes.
+    """
 
     def __init__(self, world: World) -> None:
         obstacles = [shapely.Polygon(o.outline, o.holes) for o in world.obstacles]
@@ -30,6 +34,8 @@ class Walls:
         walls = [o for o, stops in zip(obstacles, stops_all, strict=True) if stops]
         low = [building for building in world.buildings if building.min_height_m < _BELOW_M]
         houses = [shapely.Polygon(building.outline, building.holes) for building in low]
+        if world.cut_away is not msgspec.UNSET:
+            houses += [shapely.Polygon(area.outline, area.holes) for area in world.cut_away]
         posts = [o for o, stops in zip(obstacles, stops_all, strict=True) if not stops]
         posts += [shapely.Polygon(i.outline, i.holes) for i in world.islands if stops_cars(i)]
         self._tree = shapely.STRtree(walls + houses)

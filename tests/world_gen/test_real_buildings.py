@@ -71,7 +71,7 @@ def _check(map_file: Path, buildings: int, *, every: int) -> None:
     found = BuildingIndex(osm).within(EVERYWHERE)
     assert len(found) >= buildings
     found = found[::every]
-    built, _ = buildings_in_frame(found, osm.frame, osm.frame, np.zeros(0, dtype=object))
+    built = buildings_in_frame(found, osm.frame, osm.frame, np.zeros(0, dtype=object)).buildings
     parts = convex_cover([(b.outline, b.holes) for b in built])
     row = {f.id: k for k, f in enumerate(found)}
     of_building = np.array([row[_footprint_id(b.id, row)] for b in built])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ from shapely import GeometryType
 
 from foretwin.contracts.beside_road import Building
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
+from foretwin.contracts.world import Area
 from foretwin.world_gen.buildings.outlines import (
     MIN_PIECE_M2,
     Indices,
@@ -25,12 +27,15 @@ from foretwin.world_gen.buildings.roofs import roof_over, roof_tags
 from foretwin.world_gen.buildings.tags import HEADROOM_M, building_extent
 from foretwin.world_gen.extent import box_deg
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.polygon_areas import GRID_M, rings_of
+from foretwin.world_gen.polygon_areas import GRID_M, areas_of, rings_of
 
 SILHOUETTE_TOLERANCE_M = 0.25
 """How far a silhouette may move from the map's outline to the parts that are run into."""
 FOOTPRINT_TOLERANCE_M = 0.05
 """The share of it that footprints take; convex parts take the rest."""
+
+_LEAST_CUT_M2 = 0.1
+"""Less of a building is no more than how its outline was drawn."""
 
 
 Polygons = npt.NDArray[np.object_]
@@ -128,23 +133,40 @@ def _distinct(rows: Indices) -> Indices:
     return np.unique(rows, return_index=True)[0]
 
 
+class StandingBuildings(NamedTuple):
+    """Buildings, what of them was cut away where no passage is, and notes."""
+
+    buildings: tuple[Building, ...] = ()
+    cut_away: tuple[Area, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
 def buildings_in_frame(
-    near: Sequence[Footprint], frame: LocalFrame, map_frame: LocalFrame, driven: Polygons
-) -> tuple[tuple[Building, ...], tuple[str, ...]]:
+    near: Sequence[Footprint],
+    frame: LocalFrame,
+    map_frame: LocalFrame,
+    driven: Polygons,
+    passages: shapely.Geometry | None = None,
+) -> StandingBuildings:
     """Return buildings in the World's frame, cut back where they stand on what is `driven`.
 
     Outlines are simplified by `FOOTPRINT_TOLERANCE_M` and written in millimetres. Lanes run
     through passages and under overhangs, and inferred lane widths can reach into a facade: a car
-    must not collide there. Notes name the buildings that were cut, and what their tags leave
-    unclear.
+    must not collide there. What is cut is told but on `passages`, ground of roads that the map
+    leads through or below buildings. Notes name the buildings that were cut, and what their tags
+    leave unclear.
     """
     if not near:
-        return (), ()
+        return StandingBuildings()
     shapes = np.array([f.polygon for f in near], dtype=object)
     moved = shapely.transform(shapes, lambda xy: target_from_source_m(frame, map_frame, xy))
     moved = shapely.simplify(moved, FOOTPRINT_TOLERANCE_M - GRID_M, preserve_topology=True)
     low = np.flatnonzero([f.min_height_m < HEADROOM_M for f in near])
-    blocked = low[_cut_back(moved, low, driven)]
+    touched, taken = _cut_back(moved, low, driven)
+    blocked = low[touched]
+    if passages is not None:
+        taken = shapely.difference(taken, passages)
+    cut_away = areas_of([near[k].id for k in blocked.tolist()], taken, smallest_m2=_LEAST_CUT_M2)
     whole = shapely.get_type_id(moved) == GeometryType.POLYGON
     owners, pieces = np.arange(len(near)), moved
     if not whole.all():
@@ -159,22 +181,30 @@ def buildings_in_frame(
     if len(blocked):
         cut = ", ".join(dict.fromkeys(near[k].id for k in blocked.tolist()))
         notes.append(f"buildings cut back where a lane passes: {cut}")
-    return buildings, tuple(notes)
+    return StandingBuildings(
+        buildings, tuple(area for found in cut_away for area in found), tuple(notes)
+    )
 
 
-def _cut_back(shapes: Polygons, chosen: Indices, driven: Polygons) -> Indices:
-    """Take what is driven out of the chosen shapes, and return which of those it touched."""
+def _cut_back(shapes: Polygons, chosen: Indices, driven: Polygons) -> tuple[Indices, Polygons]:
+    """Take what is driven out of the chosen shapes; return which of those it touched, and what was
+    taken from each."""
     if not len(driven):
-        return np.zeros(0, dtype=np.intp)
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=object)
     building, lane = shapely.STRtree(driven).query(shapes[chosen], predicate="intersects")
     touched, first = np.unique(building, return_index=True)
+    taken = np.empty(len(touched), dtype=object)
     if not len(touched):
-        return touched
-    for k, lanes in zip(touched.tolist(), np.split(lane, first[1:]), strict=True):
+        return touched, taken
+    for n, (k, lanes) in enumerate(zip(touched.tolist(), np.split(lane, first[1:]), strict=True)):
         row = chosen[k]
         shape = shapes[row] if shapes[row].is_valid else shapely.make_valid(shapes[row])
-        shapes[row] = shapely.difference(shape, shapely.union_all(driven[lanes]))
-    return touched
+        ground = shapely.union_all(driven[lanes])
+        shapes[row], taken[n] = (
+            shapely.difference(shape, ground),
+            shapely.intersection(shape, ground),
+        )
+    return touched, taken
 
 
 def _mended(

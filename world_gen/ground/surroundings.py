@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+import shapely
+
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.beside_road import Building, Obstacle
 from foretwin.contracts.world import Area
@@ -18,7 +20,11 @@ from foretwin.world_gen.junctions.map_index import MapIndex
 from foretwin.world_gen.lanes.clusters import Surroundings, in_map
 from foretwin.world_gen.lanes.lane_curves import LaneSet
 from foretwin.world_gen.roads.beside_roads import BesideRoads
+from foretwin.world_gen.roads.road_tags import below_buildings
 from foretwin.world_gen.roadside.obstacles import obstacles_in_frame
+
+_BESIDE_PASSAGE_M = 0.5
+"""Walls of passages stand beside the road in them. Chosen: RASt 06, 4.2, room of safety."""
 
 
 class Ground(NamedTuple):
@@ -33,6 +39,8 @@ class Ground(NamedTuple):
     kerbs: tuple[Array, ...] = ()
     sidewalks: tuple[Area, ...] = ()
     buildings: tuple[Building, ...] = ()
+    cut_away: tuple[Area, ...] = ()
+    """Of buildings."""
     obstacles: tuple[Obstacle, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -49,7 +57,7 @@ def ground_around(
     map_frame = index.graph.frame
     on_map = in_map(around.extent, around.frame, map_frame)
     near = index.buildings.within(on_map)
-    buildings, cut = buildings_in_frame(near, around.frame, map_frame, surface.driven)
+    standing = buildings_in_frame(near, around.frame, map_frame, surface.driven, _passages(around))
     obstacles, cut_too = obstacles_in_frame(
         index.obstacles.within(on_map),
         around.frame,
@@ -64,7 +72,19 @@ def ground_around(
         islands=(*surface.islands, *mapped),
         kerbs=surface.kerbs,
         sidewalks=sidewalk_areas(around, lanes, surface.road_surface, index.osm, beside),
-        buildings=buildings,
+        buildings=standing.buildings,
+        cut_away=standing.cut_away,
         obstacles=obstacles,
-        notes=(*cut, *cut_too),
+        notes=(*standing.notes, *cut_too),
     )
+
+
+def _passages(around: Surroundings) -> shapely.Geometry:
+    """Return the ground of roads that lead below or through buildings, as broad as these are."""
+    grounds = []
+    for index, edge in around.edges.items():
+        if below_buildings(edge.tags):
+            section = around.sections[index]
+            half_m = max(abs(section.left_m), abs(section.right_m)) + _BESIDE_PASSAGE_M
+            grounds.append(shapely.LineString(edge.xy_m).buffer(half_m, cap_style="square"))
+    return shapely.union_all(grounds)

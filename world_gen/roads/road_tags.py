@@ -138,6 +138,12 @@ def on_bridge(tags: Mapping[str, str]) -> bool:
     return tags.get("bridge", "no") != "no"
 
 
+def below_buildings(tags: Mapping[str, str]) -> bool:
+    """Tell whether the road runs below ground, or through or under what is built."""
+    told = tags.get("tunnel", "no") != "no" or tags.get("covered", "no") != "no"
+    return told or road_layer(tags) < 0
+
+
 def in_tunnel(tags: Mapping[str, str]) -> bool:
     """Tell whether the road runs below ground, which the way through a house does not."""
     return tags.get("tunnel", "no") not in ("no", "building_passage")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import Job
-from foretwin.contracts.world import World
+from foretwin.contracts.world import Area, World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.playable import job_at, places
 from foretwin.sim_worker.futures.run_job import run_job
@@ -86,6 +86,19 @@ def test_a_vehicle_needs_room_beside_houses() -> None:
     x, y = place.ego.path.point_at(np.array([place.ego.entry_m - 8.0]), 0.9 + 0.5 + 2.0)[0]
     beside = places(scenario, with_house(world, x, y), vehicle=CAR)
     assert place.name not in [one.name for one in beside.places]
+
+
+def test_nobody_is_placed_on_what_was_cut_of_a_house() -> None:
+    """The lane was cleared of it: nothing else stands near."""
+    scenario, world = catalogue()["steering_fault"], cross()
+    place = places(scenario, world, vehicle=CAR, most=1).places[0]
+    before = np.array([place.ego.entry_m - 8.0])
+    for beside_m, stays in ((0.5, False), (1.2, True)):
+        x, y = place.ego.path.point_at(before, 0.9 + beside_m + 0.7)[0]
+        away = Area(id="w20", outline=box(x, y, 0.7, 0.7).outline)
+        cleared = msgspec.structs.replace(world, cut_away=(away,))
+        found = places(scenario, cleared, vehicle=CAR)
+        assert (place.name in [one.name for one in found.places]) == stays
 
 
 def test_streets_that_are_too_short_are_no_run_up() -> None:

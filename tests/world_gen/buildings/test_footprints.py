@@ -161,7 +161,7 @@ def test_a_self_crossing_outline_becomes_its_areas_and_is_named():
     assert sum(b.polygon.area for b in found) == pytest.approx(200.0, rel=1e-3)
     assert all(b.polygon.is_valid for b in found)
     assert notes == ["way 1: building outline crosses itself; mended"]
-    buildings, told = buildings_in_frame(found, FRAME, FRAME, NOWHERE)
+    buildings, _, told = buildings_in_frame(found, FRAME, FRAME, NOWHERE)
     assert [b.id for b in buildings] == ["w1", "w1.1"]
     assert told == tuple(notes)
 
@@ -191,13 +191,25 @@ def test_a_building_is_cut_back_where_a_lane_passes():
     house = Footprint("w1", shapely.box(0.0, 0.0, 10.0, 10.0), Quantity(6.0, "default"), 0.0, False)
     arch = house._replace(id="w2", min_height_m=4.0)
     aside = shapely.box(50.0, -5.0, 53.0, 15.0)
-    assert buildings_in_frame([house], FRAME, FRAME, np.array([aside]))[1] == ()
+    assert buildings_in_frame([house], FRAME, FRAME, np.array([aside]))[1:] == ((), ())
     lane = shapely.box(4.0, -5.0, 7.0, 15.0)
-    buildings, notes = buildings_in_frame([house, arch], FRAME, FRAME, np.array([lane]))
+    buildings, cut, notes = buildings_in_frame([house, arch], FRAME, FRAME, np.array([lane]))
     assert [b.id for b in buildings] == ["w1", "w1-1", "w2"]
     assert sum(_polygon(b).area for b in buildings[:2]) == pytest.approx(70.0)
     assert _polygon(buildings[2]).area == pytest.approx(100.0)
     assert notes == ("buildings cut back where a lane passes: w1",)
+    (away,) = cut
+    assert away.id == "w1"
+    assert Polygon(away.outline).equals(shapely.box(4.0, 0.0, 7.0, 10.0))
+
+
+def test_what_is_cut_back_is_not_told_where_a_passage_leads_through():
+    house = Footprint("w1", shapely.box(0.0, 0.0, 10.0, 10.0), Quantity(6.0, "default"), 0.0, False)
+    lane = shapely.box(4.0, -5.0, 7.0, 15.0)
+    for passage, told_m2 in ((lane.buffer(0.5), []), (shapely.box(4.0, 0.0, 7.0, 6.0), [12.0])):
+        made = buildings_in_frame([house], FRAME, FRAME, np.array([lane]), passage)
+        assert [Polygon(area.outline).area for area in made.cut_away] == pytest.approx(told_m2)
+        assert sum(_polygon(b).area for b in made.buildings) == pytest.approx(70.0)
 
 
 def _polygon(building: Building) -> Polygon:
@@ -215,7 +227,7 @@ def test_a_footprint_keeps_its_silhouette(radii, east_m, yard):
     ring = np.array(radii)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     shape = Polygon(ring + east, [ring * 0.3 + east] if yard else [])
     near = [Footprint("w1", shape, Quantity(6.0, "default"), 0.0, False)]
-    buildings, _ = buildings_in_frame(near, FRAME, FRAME, NOWHERE)
+    buildings, *_ = buildings_in_frame(near, FRAME, FRAME, NOWHERE)
     kept = shapely.union_all([_polygon(b) for b in buildings])
     assert all(_polygon(b).is_valid and _polygon(b).exterior.is_ccw for b in buildings)
     assert shapely.hausdorff_distance(kept.boundary, shape.boundary) <= FOOTPRINT_TOLERANCE_M

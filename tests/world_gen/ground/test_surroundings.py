@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 import shapely
 
+from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.world import Area, World
 from tests.world_gen.drawn_maps import STREET, crossing, roundabout, world_of
 
@@ -83,3 +85,24 @@ def test_an_arm_that_is_wider_than_the_ring_does_not_pave_its_middle():
     ground = covered(world_of(roundabout()).road_surface)
     # The ring's middle line is at 15 m, and it is 4.5 m wide.
     assert ground.intersection(shapely.Point(0.0, 0.0).buffer(12.5)).area < 0.01
+
+
+def beside_a_house(**tags: str) -> World:
+    """A house that reaches 1 m into a street of these tags, whose edge is at 3 m."""
+    return world_of(
+        crossing(
+            street=STREET | tags,
+            extra_nodes={20: (30.0, -2.0), 21: (50.0, -2.0), 22: (50.0, -20.0), 23: (30.0, -20.0)},
+            extra_ways=[(20, [20, 21, 22, 23, 20], {"building": "yes", "building:levels": "2"})],
+        )
+    )
+
+
+def test_what_a_building_has_in_the_way_is_told_but_where_the_road_leads_through_it():
+    (area,) = beside_a_house().cut_away
+    assert area.id == "w20"
+    west, south, east, north = shapely.Polygon(area.outline).bounds
+    assert (west, south, east, north) == pytest.approx((30.0, -3.0, 50.0, -2.0), abs=0.05)
+    for tags in ({"covered": "yes"}, {"tunnel": "building_passage"}, {"layer": "-1"}):
+        assert beside_a_house(**tags).cut_away is msgspec.UNSET
+    assert b"cut_away" not in content_bytes(world_of(crossing()))

@@ -6,6 +6,7 @@ import pytest
 
 from foretwin.contracts.provenance import Quantity
 from foretwin.world_gen.roads.road_tags import (
+    below_buildings,
     directions,
     lane_counts,
     open_to_cars,
@@ -69,3 +70,17 @@ def test_layers() -> None:
     assert road_layer({"bridge": "yes"}) == 1
     assert road_layer({"tunnel": "yes"}) == -1
     assert road_layer({"tunnel": "building_passage", "layer": "ground"}) == 0
+
+
+@pytest.mark.parametrize(
+    ("tags", "below"),
+    [
+        ({}, False),
+        ({"tunnel": "no", "covered": "no", "layer": "1", "bridge": "yes"}, False),
+        ({"tunnel": "building_passage"}, True),
+        ({"covered": "arcade"}, True),
+        ({"layer": "-1"}, True),
+    ],
+)
+def test_what_leads_below_buildings(tags: dict[str, str], below: bool) -> None:
+    assert below_buildings(tags) == below
