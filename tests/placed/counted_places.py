@@ -18,7 +18,9 @@ import shapely
 from tests.placed.raw_map import Plane, RawMap, RawRoad
 
 STRAIGHT_DEG, SIDE_DEG = 20.0, (65.0, 115.0)
-ALONE_M, REACH_M = 45.0, 70.0
+ALONE_M, REACH_M = 25.0, 70.0
+LEAST_EXIT_M = 15.0
+BESIDE_DEG, FORK_DEG = 90.0, 30.0
 RUN_UP_S = 2.5
 EGO_OVER, OTHER_OVER = 1.1, 1.5
 HALF_ROAD_M = 3.5
@@ -78,7 +80,7 @@ def counted(raw: RawMap) -> dict[str, set[int]]:
     for node in roads.plain_junctions():
         left_hand = drives_left(*roads.places[node])
         arms = roads.arms(node)
-        if _parts_alone(arms):
+        if _roads_of(arms) < 3:
             continue
         for id_, wanted in WANTED.items():
             if len(arms) < wanted.arms or (wanted.lights and not roads.lit(node, arms)):
@@ -88,14 +90,24 @@ def counted(raw: RawMap) -> dict[str, set[int]]:
     return found
 
 
-def _parts_alone(arms: list[Arm]) -> bool:
-    """Return whether a two-way road becomes its own two carriageways, and no other meets it."""
-    come = [arm for arm in arms if not arm.goes_out]
-    go = [arm for arm in arms if not arm.comes_in]
-    if (len(arms), len(come), len(go)) != (3, 1, 1):
-        return False
-    beside = abs(_between(come[0].bearing_deg, go[0].bearing_deg)) < 90.0
-    return beside and len({arm.road.tags.get("name") for arm in arms}) == 1
+def _roads_of(arms: list[Arm]) -> int:
+    """Return how many roads meet, where two carriageways of one road that lie beside each other
+    are one, and so is a one-way road that forks into itself, or comes together again."""
+    one_way = all(arm.comes_in != arm.goes_out for arm in arms)
+    count, taken = len(arms), set[int]()
+    for (i, a), (j, b) in itertools.combinations(enumerate(arms), 2):
+        apart_deg = abs(_between(a.bearing_deg, b.bearing_deg))
+        single = a.comes_in != a.goes_out and b.comes_in != b.goes_out
+        carriageways = single and a.comes_in != b.comes_in and apart_deg < BESIDE_DEG
+        forks = one_way and a.comes_in == b.comes_in and apart_deg < FORK_DEG
+        if (carriageways or forks) and _called(a) == _called(b) and not {i, j} & taken:
+            count -= 1
+            taken |= {i, j}
+    return count
+
+
+def _called(arm: Arm) -> str | None:
+    return arm.road.tags.get("name") or arm.road.tags.get("ref")
 
 
 class Found(NamedTuple):
@@ -139,6 +151,7 @@ def _ways(wanted: Wanted, arms: list[Arm], left_hand: bool) -> Iterator[list[tup
 
 def _drivable(come: Arm, go: Arm, kmh: float, over: float) -> bool:
     long_enough = come.line.length >= RUN_UP_S * kmh / 3.6 + 15.0
+    long_enough = long_enough and go.line.length >= LEAST_EXIT_M
     return come.comes_in and go.goes_out and kmh <= over * come.limit_kmh and long_enough
 
 
@@ -246,8 +259,8 @@ def _plain(road: RawRoad) -> bool:
     """Return whether a road is an ordinary one, whose lanes no tag turns away."""
     tags = road.tags
     marked = any(name.startswith("turn:lanes") or name.startswith("change:") for name in tags)
-    odd = tags.get("junction") or tags.get("tunnel") or tags.get("bridge") or tags.get("access")
-    closed = tags.get("motor_vehicle") or tags.get("vehicle")
+    odd = tags.get("junction") or tags.get("tunnel") or tags.get("bridge")
+    closed = any(tags.get(who, "yes") != "yes" for who in ("access", "motor_vehicle", "vehicle"))
     fast = tags["highway"].startswith(("motorway", "trunk")) or tags["highway"].endswith("_link")
     return not (marked or odd or closed or fast)
 

@@ -71,10 +71,11 @@ def test_nothing_is_counted_where_a_house_stands_on_a_road_or_a_turn_is_forbidde
         (("no", "-1"), 22.0, "A", True),
     ],
 )
+@pytest.mark.parametrize("whole_name", ["A", "C"])
 def test_no_junction_is_where_a_road_becomes_its_own_carriageways(
-    ways: tuple[str, str], apart_m: float, other_name: str, counts: bool
+    ways: tuple[str, str], apart_m: float, other_name: str, counts: bool, whole_name: str
 ) -> None:
-    (lon, lat), whole = GERMANY, crossing(GERMANY, arms=1, maxspeed="50", name="A")
+    (lon, lat), whole = GERMANY, crossing(GERMANY, arms=1, maxspeed="50", name=whole_name)
     half_deg = apart_m / 2.0 / 111_250.0
     ends = {2: (lon - 0.0013, lat + half_deg), 3: (lon - 0.0013, lat - half_deg)}
     parts = [
@@ -83,6 +84,50 @@ def test_no_junction_is_where_a_road_becomes_its_own_carriageways(
     ]
     here = counted(whole._replace(roads=(*whole.roads, *parts)))
     assert any(0 in nodes for nodes in here.values()) == counts
+
+
+@pytest.mark.parametrize(
+    ("apart_m", "other_name", "counts"), [(40.0, "A", False), (40.0, "B", True), (120.0, "A", True)]
+)
+def test_no_junction_is_where_a_one_way_road_forks_into_itself(
+    apart_m: float, other_name: str, counts: bool
+) -> None:
+    """At 17° lanes part; at 43° one turns."""
+    (lon, lat), apart_deg = GERMANY, apart_m / 111_250.0
+    ends = {2: (lon - 0.0019, lat), 3: (lon - 0.0019, lat + apart_deg)}
+    for come, go in (("yes", "-1"), ("-1", "yes")):
+        whole = crossing(GERMANY, arms=1, maxspeed="50", name="A", oneway=go)
+        parts = [
+            street(i, {0: GERMANY, i: ends[i]}, maxspeed="50", oneway=come, name=name)
+            for i, name in zip(ends, ("A", other_name), strict=True)
+        ]
+        here = counted(whole._replace(roads=(*whole.roads, *parts)))
+        assert any(0 in nodes for nodes in here.values()) == counts
+
+
+def test_a_road_that_is_open_by_its_tags_counts_and_one_for_some_does_not() -> None:
+    for tag in ("access", "motor_vehicle", "vehicle"):
+        assert counted(crossing(GERMANY, maxspeed="50", **{tag: "yes"}))["scp"] == {0}
+        assert not any(counted(crossing(GERMANY, maxspeed="50", **{tag: "permit"})).values())
+
+
+@pytest.mark.parametrize(("at_m", "alone"), [(22.0, False), (30.0, True)])
+def test_another_junction_near_it_makes_one_that_is_not_plain(at_m: float, alone: bool) -> None:
+    (lon, lat), built = GERMANY, crossing(GERMANY, maxspeed="50")
+    at = (lon + at_m / (111_320.0 * np.cos(np.radians(lat))), lat)
+    east = street(1, {0: GERMANY, 9: at, 1: (lon + 0.0015, lat)}, maxspeed="50")
+    aside = street(9, {9: at, 10: (at[0], lat + 0.0009)}, maxspeed="50")
+    here = counted(built._replace(roads=(east, *built.roads[1:], aside)))
+    assert (0 in here["scp"]) == alone
+
+
+def test_nobody_drives_into_a_road_that_ends_at_once() -> None:
+    (lon, lat), built = GERMANY, crossing(GERMANY, arms=3, maxspeed="50")
+    for metres, counts in ((10.0, False), (20.0, True)):
+        south = street(3, {0: GERMANY, 3: (lon, lat - metres / 111_250.0)}, maxspeed="50")
+        here = counted(built._replace(roads=(*built.roads[:2], south)))
+        assert (here["cbta"] == {0}) == counts
+        assert here["lead_stopping"] == {0}
 
 
 def test_who_is_where_counts_by_the_side_that_is_driven_on() -> None:
