@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +13,7 @@ from foretwin.contracts.frames import LocalFrame, geo_from_local
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.compare_text import difference_lines
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.two_drives.common_stretches import LEAST_M, common_ways
 from foretwin.sim_worker.analysis.two_drives.differences import (
@@ -95,7 +95,7 @@ def compare(
         with named_in_errors(f"--out {out}"), new_files(out):
             drawn = write_plot(found.difference, out)
     if as_json:
-        say(json.dumps(as_object(found), indent=2))
+        print_json(as_object(found))
         return
     say("\n".join(difference_lines(found.difference, str(first), str(second))))
     if found.unplaced and first.resolve() != second.resolve():

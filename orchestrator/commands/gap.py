@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +28,7 @@ from foretwin.orchestrator.commands.gap_text import (
     verdict_lines,
     why_undecided,
 )
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.drive.telemetry_watch import estimate_line, estimate_object
 from foretwin.orchestrator.record.run_state import check_finished
@@ -175,7 +175,7 @@ def report_gap(
             )
     if as_json:
         scale = {} if people is None else {"against": scale_object(people)}
-        say(json.dumps(as_object(report) | scale, indent=2))
+        print_json(as_object(report) | scale)
         return
     if people is not None:
         title = f"two drives of this road, this one and {against}: what a gap is measured against"

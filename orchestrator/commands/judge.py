@@ -17,6 +17,7 @@ from foretwin.contracts.terminal import say
 from foretwin.contracts.versions import versions
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.drive import carry_out
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
@@ -71,7 +72,7 @@ def judge(
         return code
     found = difference_of(read_judged(before), read_judged(after))
     if as_json:
-        say(json.dumps(found, indent=2, ensure_ascii=False))
+        print_json(found)
     else:
         say("\n".join(difference_lines(found)))
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import get_args
 
@@ -13,6 +12,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import EngineName
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.record.played_again import play_again
 from foretwin.orchestrator.record.recorded_jobs import recorded_future, recorded_sibling
 from foretwin.orchestrator.record.run_folder import REPEATED
@@ -47,7 +47,7 @@ def elsewhere(folder: Path, future_id: str, physics: str, *, as_json: bool) -> i
         words = {"future": future_id, "engines": [recorded.job.engine, engine]}
         apart = {"end_m": float(apart_m[-1]), "most_m": float(apart_m.max())}
         hashes = {"sibling_sha256": told, "sha256": now}
-        say(json.dumps(words | {"apart": apart, "collided": collided} | hashes))
+        print_json(words | {"apart": apart, "collided": collided} | hashes)
         return 0 if told in (None, now) else DIFFERS
     said = ["collides" if one else "does not collide" for one in collided]
     say(
@@ -80,7 +80,7 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
     after = hashes[recorded.row.index]
     if as_json:
         both = {"recorded_sha256": before, "sha256": after}
-        say(json.dumps({"future": future_id, **both, "equal": before == after}))
+        print_json({"future": future_id, **both, "equal": before == after})
     elif before == after:
         say(f"{future_id}: the same again, sha256 {after}")
     else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import shutil
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.runner import Runner, answers, place_task
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.record.run_folder import SUMMARY, keep_vehicles
@@ -91,7 +91,7 @@ def merge_shards(folders: Sequence[Path], *, out: Path | None, as_json: bool = F
 def _told(out: Path, summary: dict[str, Any], *, as_json: bool) -> int:
     """Print a summary; returns the exit code that it comes to."""
     if as_json:
-        sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
+        print_json(summary)
     else:
         print_summary(out, summary)
     nothing = not summary["placed"] and (summary["jobs"] or "shard" not in summary)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.sim_worker.scenarios.drawing import draw_cases
@@ -33,6 +34,13 @@ def test_the_catalogue_is_listed_as_json(capsys: pytest.CaptureFixture[str]) -> 
     assert ccftap["actors"][0] == {
         "name": "oncoming_car", "kind": "car", "relation": "oncoming", "conduct": "heedless",
     }  # fmt: skip
+
+
+def test_what_is_not_finite_is_null_in_json(capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({"ttc_s": float("inf"), "gap_m": [float("nan"), 1.5], "street": "Königstraße"})
+    said = capsys.readouterr().out
+    assert json.loads(said) == {"ttc_s": None, "gap_m": [None, 1.5], "street": "Königstraße"}
+    assert "Königstraße" in said
 
 
 def test_the_catalogue_is_listed_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
