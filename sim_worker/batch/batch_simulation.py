@@ -19,7 +19,7 @@ from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.gravity import climb_mps2
 from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from foretwin.sim_worker.vehicle.planar import JOINTS, check_steering_delay
+from foretwin.sim_worker.vehicle.planar import JOINTS, check_steering_delay, read_delay_s
 from foretwin.sim_worker.vehicle.reference_points import cog_from_base
 from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
@@ -149,7 +149,7 @@ class BatchSimulation:
             history[:, -given.shape[1] :] = given
             self._tire_command = given[:, -1].copy()
         self._physics.history[rows, self._steer_history] = history
-        self._physics.delay[rows, self._actuators.steer] = steering_delay_s
+        self._physics.delay[rows, self._actuators.steer] = read_delay_s(steering_delay_s)
         self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
         self._steer_controls = self._controls[:, :, self._actuators.steer].T
         self._actuation = Actuation(
@@ -195,7 +195,7 @@ class BatchSimulation:
         self._heading[:, rows] = np.cos(start[:, 2]), np.sin(start[:, 2])
         self._tire_command[rows] = start[:, 6]
         self._physics.history[rows, self._steer_history] = start[:, 6:7]
-        self._physics.delay[rows, self._actuators.steer] = steering_delay_s
+        self._physics.delay[rows, self._actuators.steer] = read_delay_s(steering_delay_s)
         friction = self._friction(friction_factor)
         self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
         self._drift_m[rows] = most_drift_m(self.vehicle, friction_factor, self._box)

@@ -75,3 +75,9 @@ def time_at(line: DrivenLine, arc_m: float, speed_mps: float) -> float:
     """Return when an ego comes by an arc length; before its start it came with its speed."""
     before_m = min(arc_m - line.arc_m[0], 0.0)
     return float(np.interp(arc_m, line.arc_m, line.time_s)) + float(before_m) / speed_mps
+
+
+def arc_at(line: DrivenLine, time_s: float, speed_mps: float) -> float:
+    """Return the arc length that an ego comes by at a time: what `time_at` is told."""
+    before_s = min(time_s, 0.0)
+    return float(np.interp(time_s, line.time_s, line.arc_m)) + before_s * speed_mps

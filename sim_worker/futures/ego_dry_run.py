@@ -28,6 +28,7 @@ from foretwin.sim_worker.futures.closed_loop import drive
 from foretwin.sim_worker.futures.driven_line import (
     KEEPS_SPEED,
     DrivenLine,
+    arc_at,
     driven_lines,
     drives_as_cast,
     time_at,
@@ -160,7 +161,7 @@ def _on_lines(
                 speed = f"{3.6 * case.ego_speed_mps:.0f} km/h"
                 found[row] = _refused(case, f"no car drives the ego's bends with {speed}")
             else:
-                on_time[row] = _on_time(met, line, case.place.ego)
+                on_time[row] = _on_time(met, line, case.place.ego, tick_s=stage.control_dt_s)
     driven = {row: (case, lines[_ego(bent[row])]) for row, case in on_time.items()}
     as_driven = met_as_driven(driven, stage)
     for row, case in on_time.items():
@@ -259,25 +260,36 @@ def _drive_alone(
     return drive(scene._replace(limit_share=None), stage, ticks=ticks).states
 
 
-def _on_time(case: StagedCase, line: DrivenLine, way: Way) -> StagedCase:
+def _on_time(case: StagedCase, line: DrivenLine, way: Way, *, tick_s: float) -> StagedCase:
     """Return a case, on the ego's path `way` again, in which those who come meet the ego when it
-    really is there."""
-    met_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
-    from_s, to_s = (time_at(line, arc, case.ego_speed_mps) for arc in (case.ego_arc_m, met_m))
-    later_s = (to_s - from_s) - case.impact_time_s
+    really is there.
+
+    It begins whole control ticks from its line: a car steers into a sharp bend some centimetres
+    elsewhere where its ticks fall otherwise.
+    """
+    speed, met_m = case.ego_speed_mps, case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    from_s = round(time_at(line, case.ego_arc_m, speed) / tick_s) * tick_s
+    start_m = arc_at(line, from_s, speed)
+    later_s = time_at(line, met_m, speed) - from_s - case.impact_time_s
+    ahead_m = start_m - case.ego_arc_m
     return case._replace(
         place=case.place._replace(ego=way),
-        actors=tuple(_from_line(actor, later_s, line, way) for actor in case.actors),
+        actors=tuple(_from_line(actor, later_s, ahead_m, line, way) for actor in case.actors),
+        ego_arc_m=start_m,
         impact_time_s=case.impact_time_s + later_s,
     )
 
 
-def _from_line(actor: StagedActor, later_s: float, line: DrivenLine, way: Way) -> StagedActor:
+def _from_line(
+    actor: StagedActor, later_s: float, ahead_m: float, line: DrivenLine, way: Way
+) -> StagedActor:
+    """Return an actor so much earlier; who drives along with the ego is so far ahead as that."""
     if actor.relation not in ALONG:
         box = actor.moving(FrenetPath(actor.xy_m))
         return actor._replace(start_arc_m=float(box.arc_after(actor.start_arc_m, -later_s)))
+    along_m = ahead_m if actor.speed_mps > 0.0 else 0.0
     if actor.way != way.name:
-        return actor
-    arc = np.array([actor.start_on(line.way)])
+        return actor._replace(start_arc_m=actor.start_arc_m + along_m)
+    arc = np.array([actor.start_on(line.way) + along_m])
     place = way.path.locate(line.way.path.point_at(arc), near_arc_m=arc)
     return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))

@@ -22,6 +22,8 @@ from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
 MAX_STEERING_DELAY_S = 1.0
 """The longest delay the sample buffer of the steering actuator holds."""
+_DELAY_SLACK_S = 1e-6
+"""More than the rounding of a clock that runs for a day in steps, and less than any step."""
 
 CHASSIS = "chassis"
 TYRE_FRONT, TYRE_REAR, DRIVE, STEER = "tyre_front", "tyre_rear", "drive", "steer"
@@ -50,6 +52,15 @@ def check_steering_delay(delay_s: Array | float) -> None:
             f"steering delay {delays.max():g} s is longer than the buffer of "
             f"{MAX_STEERING_DELAY_S:g} s"
         )
+
+
+def read_delay_s(delay_s: Array | float) -> Array:
+    """Return the delay that MuJoCo is to read for a command to act after `delay_s`, in whole steps.
+
+    MuJoCo asks for the latest sample at the sum of all steps less the delay: of a delay of whole
+    steps the rounding of that sum makes one step more from 2 s to 16 s of a drive.
+    """
+    return np.maximum(np.asarray(delay_s, dtype=np.float64) - _DELAY_SLACK_S, 0.0)
 
 
 def vehicle_spec(
@@ -146,4 +157,4 @@ def _add_actuators(spec: mujoco.MjSpec, vehicle: VehicleParameters, *, timestep_
     steer.ctrllimited = True
     steer.ctrlrange = [-limit, limit]
     steer.nsample = history_samples(timestep_s)
-    steer.delay = vehicle.steering_delay_s.value
+    steer.delay = float(read_delay_s(vehicle.steering_delay_s.value))

@@ -44,6 +44,17 @@ def test_a_command_acts_after_the_delay_and_not_before(stage: BatchSimulation) -
     assert (moved > delays).all()
 
 
+def test_the_delay_is_the_same_however_long_the_car_has_driven(stage: BatchSimulation) -> None:
+    """Read at sums of steps, a delay of whole steps was one more from 2.0 s to 16 s."""
+    turned = []
+    for ticks in (2, 60, 340):
+        seed(stage, states(1, speed=8.0), delay=0.1)
+        drive(stage, ticks, tire=0.0)
+        turned.append(drive(stage, 6, tire=0.1)[0, :, 6])
+    assert turned[1] == pytest.approx(turned[0], abs=1e-6)
+    assert turned[2] == pytest.approx(turned[0], abs=1e-6)
+
+
 def test_given_history_is_replayed(stage: BatchSimulation) -> None:
     history = np.zeros((1, 40))
     history[0, 20:] = 0.1

@@ -15,7 +15,7 @@ from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.driven_line import driven_lines, time_at
+from foretwin.sim_worker.futures.driven_line import arc_at, driven_lines, time_at
 from foretwin.sim_worker.futures.ego_dry_run import (
     rehearsal_stage,
     rehearsed_cases,
@@ -155,6 +155,21 @@ def test_a_driven_line_begins_where_its_case_does() -> None:
     (line,) = driven_lines([begun], states, tick_s=0.05)
     assert line.arc_m[0] == pytest.approx(30.0, abs=1e-6)
     assert time_at(line, 30.0, 6.0) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("scenario_id", ["rtip", "cbta"])
+def test_a_case_begins_whole_ticks_from_its_line(scenario_id: str) -> None:
+    played = play(cross(), scenario_id)
+    assert played is not None
+    maker = _stage(cross().id)[1]
+    lines = {ego.speed_mps: line for kept in maker.rehearsed.values() for ego, line in kept.items()}
+    for case in played.cases:
+        line = lines[case.ego_speed_mps]
+        ticks = time_at(line, case.ego_arc_m, case.ego_speed_mps) * played.job.control_hz
+        assert ticks == pytest.approx(round(ticks), abs=1e-6)
+        arc_m = line.arc_m[len(line.arc_m) // 2]
+        since_s = time_at(line, arc_m, case.ego_speed_mps)
+        assert arc_at(line, since_s, case.ego_speed_mps) == pytest.approx(arc_m)
 
 
 def test_lorries_are_come_up_to_on_a_motorway_and_slower_cars_on_a_race_track() -> None:
