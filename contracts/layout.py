@@ -20,7 +20,7 @@ _Text = Literal["status", "legend", "futures", "verdict", "parameters", "events"
 _Process = Literal["workers", "worker_speed", "worker_memory", "how_sure"]
 _TwinGap = Literal["position_gap", "heading_gap", "speed_gap", "correction"]
 _ModelGap = Literal["across_after_2_s", "along_after_2_s", "heading_after_2_s"]
-_Forecast = Literal["forecast", "short_forecast", "plan", "engines"]
+_Forecast = Literal["forecast", "short_forecast", "plan", "engines", "lot"]
 _Parameter = Literal[
     "steering_ratio", "steering_offset", "steering_delay", "drive_gain", "brake_gain"
 ]

@@ -217,6 +217,10 @@ class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     """None is that of a drive."""
     roads: str | None = None
     """A file of the RoadsShown of the whole map and the route."""
+    anchor: Anchor | None = None
+    """Which place of the World the car's lot is."""
+    fence: tuple[tuple[float, float], ...] = ()
+    """Of that lot, as an anchor file has it."""
     title: str = "foretwin"
     attribution: str = ATTRIBUTION
     start_stamp_ns: int = 0

@@ -29,6 +29,7 @@ from foretwin.viewer.keeping_up import KeepingUp
 from foretwin.viewer.live_viewer import (
     live_viewer,
 )
+from foretwin.viewer.log_lot import rows_of_lot
 from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.rows import Row
 from foretwin.viewer.showing import show
@@ -105,6 +106,9 @@ class Recorder:
             attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
             roads=_roads(setup),
+            lot=()
+            if setup.anchor is None
+            else rows_of_lot(setup.anchor, setup.fence, drive_frame=setup.drive_frame),
             clock=None if setup.live == "none" else lambda: time.strftime("%H:%M:%S"),
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
 from foretwin.viewer.legend import legend_rows
 from foretwin.viewer.log_drive import DriveLog
+from foretwin.viewer.log_lot import rows_of_injection
 from foretwin.viewer.log_point_cloud import PointCloudLog
 from foretwin.viewer.log_roads import rows_of_roads
 from foretwin.viewer.log_run import RunLog, rows_of_event
@@ -39,9 +40,9 @@ class Monitor:
 
     `find_start` is called once, with the first stamp that is not 0, and returns the stamp of the
     drive's start: it may be known only once the vehicle speaks. What is stamped earlier, such as
-    the run's preparations, is shown at drive time 0. `load_world`
-    returns the World of an id. A message that cannot be shown becomes an event in the recording,
-    never an exception.
+    the run's preparations, is shown at drive time 0. `load_world` returns the World of
+    an id; `lot` are the rows of a car's lot. A message that cannot be shown becomes an event in
+    the recording, never an exception.
     """
 
     def __init__(
@@ -53,13 +54,14 @@ class Monitor:
         attribution: str = ATTRIBUTION,
         load_world: Callable[[str], World],
         roads: RoadsShown | None = None,
+        lot: Sequence[Row] = (),
         clock: Callable[[], str] | None = None,
     ) -> None:
         self._frame = drive_frame
         self._find_start = find_start
         self.start_ns: int | None = None
         """The stamp of the drive's start, once it is known."""
-        self._load_world, self._roads = load_world, roads
+        self._load_world, self._roads, self._lot = load_world, roads, lot
         self._drive = DriveLog(drive_frame)
         self._run = RunLog(title, attribution, clock)
         self._tuning = TuningLog()
@@ -79,6 +81,7 @@ class Monitor:
             ),
             "mirror": self._drive.mirror,
             "virtual_traffic": VirtualTrafficLog(drive_frame).rows,
+            "injection": rows_of_injection,
             "point_cloud": PointCloudLog().rows,
             "active_world": self._active_world,
             "world": self._world,
@@ -105,6 +108,7 @@ class Monitor:
             *log_tuning.static_rows(),
             *legend_rows(),
             *(() if self._roads is None else rows_of_roads(self._roads)),
+            *self._lot,
             *self._tuning.opening(),
             *self._run.static_rows(),
             self._run.first_status(),

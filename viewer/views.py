@@ -90,6 +90,15 @@ def _text(name: ViewName, origin: str, *, titlebar: bool = True) -> Callable[[],
     return lambda: rrb.TextDocumentView(origin=origin, name=title_of(name), titlebar=titlebar)
 
 
+def _lot() -> rrb.Container:
+    return rrb.Vertical(
+        rrb.TextDocumentView(origin="/lot/gate", name="Gate"),
+        _plot("/lot/room_m", "To the fence, m", legend=True),
+        row_shares=[1, 3],
+        name=title_of("lot"),
+    )
+
+
 def _forecast(name: ViewName, first_s: int) -> Callable[[], rrb.Container]:
     return lambda: rrb.Horizontal(
         *(
@@ -133,6 +142,7 @@ _VIEWS: dict[ViewName, Callable[[], rrb.View | rrb.Container]] = {
     ),
     "forecast": _forecast("forecast", 4),
     "short_forecast": _forecast("short_forecast", 1),
+    "lot": _lot,
     "engines": _curve("engines", "/siblings/apart_m", legend=True),
     "plan": _curve("plan", "/comparison/plan", legend=True),
     "steering_ratio": _curve(

@@ -38,6 +38,8 @@ def viewer_setup(plan: DrivePlan, base: dict[str, Any]) -> ViewerSetup:
         page_port=plan.page_port,
         layout=read_layout(plan.config.layout),
         roads=str(plan.roads_file),
+        anchor=plan.lot,
+        fence=() if plan.anchor is None else plan.anchor.fence,
         title=f"foretwin {plan.run_id}",
         attribution=plan.osm.attribution,
         start_stamp_ns=plan.start_stamp_ns,

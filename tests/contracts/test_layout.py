@@ -36,7 +36,7 @@ def test_a_view_behind_a_tab_can_be_opened() -> None:
     layout = read_layout("drive").opened_at("map", "plan")
     tabs = [row.tabs for column in layout.columns for row in column.rows]
     assert ("map", "intersection", "chase") in tabs
-    assert ("plan", "futures", "forecast", "how_sure", "engines") in tabs
+    assert ("plan", "futures", "forecast", "how_sure", "engines", "lot") in tabs
 
 
 def test_ones_own_is_a_file(tmp_path: Path) -> None:

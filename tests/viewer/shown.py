@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,13 @@ from foretwin.viewer.rows import Row
 from tests.viewer import scene
 
 
-def monitor_of(load_world: Any = lambda _id: scene.junction()) -> Monitor:
+def monitor_of(load_world: Any = lambda _id: scene.junction(), lot: Sequence[Row] = ()) -> Monitor:
     return Monitor(
         drive_frame=scene.DRIVE_FRAME,
         find_start=lambda _first: scene.START_NS,
         title="t",
         load_world=load_world,
+        lot=lot,
     )
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import msgspec
 
 from foretwin.contracts.anchor import Anchor
+from foretwin.contracts.anchor_file import AnchorFile
 from foretwin.contracts.credentials import make_credentials
 from foretwin.contracts.local_bus import LocalBus
 from foretwin.contracts.process_setup import BusSetup
-from foretwin.contracts.setup import CopilotSetup, WorkerSetup
+from foretwin.contracts.setup import CopilotSetup, ViewerSetup, WorkerSetup
 from foretwin.orchestrator.config import OtherVehicleConfig
 from foretwin.orchestrator.drive.processes import (
     PROCESSES,
@@ -21,7 +22,7 @@ from foretwin.orchestrator.drive.processes import (
     process_ids,
     row_of,
 )
-from foretwin.orchestrator.drive.watcher_setups import COPILOT, copilot_address
+from foretwin.orchestrator.drive.watcher_setups import COPILOT, VIEWER, copilot_address
 from foretwin.orchestrator.plan import DrivePlan, OtherVehiclePlan
 from foretwin.telemetry.ros2.mapping import MappingFile, read_mapping
 from tests.contracts.test_anchor import LOT, WORLD
@@ -91,6 +92,16 @@ def test_every_process_is_started_for_this_run_and_the_mirror_plays_no_futures(
     assert isinstance(worker, WorkerSetup)
     assert (mirror.role, worker.role, mirror.planners) == ("mirror", "futures", ())
     assert plan.config.planner in worker.planners
+
+
+def test_the_lot_of_a_car_is_drawn_with_its_fence(tmp_path: Path) -> None:
+    plan, fence = town_plan(tmp_path), ((1.0, 2.0), (1.0, 3.0), (2.0, 3.0))
+    (row,) = (row for row in PROCESSES if row.name == VIEWER)
+    for file in (AnchorFile(lot=LOT, world=WORLD, fence=fence), None):
+        setup = row.setup(replace(plan, anchor=file), VIEWER)
+        assert isinstance(setup, ViewerSetup)
+        drawn = (setup.anchor, setup.fence)
+        assert drawn == (None, ()) if file is None else drawn == (file.anchor, fence)
 
 
 def test_in_lock_step_tuning_does_not_begin_in_the_middle(tmp_path: Path) -> None:
