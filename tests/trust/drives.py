@@ -47,6 +47,17 @@ class _Public(NamedTuple):
     reference: str | None = None
 
 
+_KITTI_RAW: tuple[tuple[str, str, Split], ...] = (
+    ("hill-0086", "2011_09_26_drive_0086", "tuning"),
+    ("hill-0064", "2011_09_26_drive_0064", "tuning"),
+    ("hill-0034", "2011_09_30_drive_0034", "tuning"),
+    ("hill-0033", "2011_09_30_drive_0033", "held_out"),
+    ("hill-0087", "2011_09_26_drive_0087", "held_out"),
+    ("motorway-0042", "2011_10_03_drive_0042", "tuning"),
+    ("flat-0027", "2011_09_30_drive_0027", "held_out"),
+)
+"""Names of folders whose `oxts` is a drive with inertia, up and down the hills or not."""
+
 _MORE = {
     "chemnitz": _Public("chemnitz-city/Chemnitz_GT.txt", "tuning"),
     "boulder": _Public("boulder-rtk/boulder.csv", "tuning"),
@@ -64,10 +75,14 @@ _MORE = {
         "austin-bmw/austin.csv", "held_out", 1.0, reference="austin-bmw/austin_car_gps.csv"
     ),
     "austin-car": _Public("austin-bmw/austin_car_gps.csv", "held_out", 1.0),
+    **{
+        f"kitti-{drive}": _Public(f"kitti-raw/{folder}", split, true_heading=True)
+        for drive, folder, split in _KITTI_RAW
+    },
 }
 """libRSF's Chemnitz City and smartLoc, rtklibexplorer's drive_0708 in Boulder,
-KITTI's odometry poses, Boreas, i2Nav's awesome-gins-datasets, smartphone_driving_dataset of
-Austin."""
+KITTI's odometry poses and its OXTS recordings, Boreas, i2Nav's awesome-gins-datasets,
+smartphone_driving_dataset of Austin."""
 
 
 _ONCE_A_SECOND = ("chemnitz", "boulder", "boulder-no-std")
@@ -156,6 +171,11 @@ def further_drives(folder: Path) -> list[RealDrive]:
                 slow = partial(other_receivers.once_a_second, log)
                 found.append(
                     RealDrive(f"{name}-1hz", one.split, slow, reference, one.position_std_m)
+                )
+            if one.path.startswith("kitti-raw/"):
+                seldom = partial(other_receivers.once_a_second, log, beside=("imu",))
+                found.append(
+                    RealDrive(f"{name}-1hz-imu", one.split, seldom, reference, true_heading=True)
                 )
     return found
 

@@ -33,12 +33,14 @@ def positions_alone(log: Callable[[], Log]) -> Log:
     return _log(opened.info, [s for s in opened.samples() if s[0] == "gnss"])
 
 
-def once_a_second(log: Callable[[], Log]) -> Log:
-    """Return a log with one position a second and nothing else, as most receivers send."""
+def once_a_second(log: Callable[[], Log], *, beside: tuple[str, ...] = ()) -> Log:
+    """Return a log with one position a second, as most receivers send, and channels `beside` it."""
     opened, kept, due_ns = log(), list[Sample](), 0
     for sample in opened.samples():
         if sample[0] == "gnss" and sample[1].stamp_ns >= due_ns:
             due_ns = sample[1].stamp_ns + 990_000_000
+            kept.append(sample)
+        elif sample[0] in beside:
             kept.append(sample)
     return _log(opened.info, kept)
 

@@ -91,3 +91,25 @@ def test_an_accelerometer_that_is_mounted_askew_is_soon_seen_through() -> None:
     assert off_mps(askew, from_s=3.0) == pytest.approx(
         off_mps(drive(fix_hz=5, fix_std_m=0.1, wheels=False), from_s=3.0), abs=0.02
     )
+
+
+def test_over_hills_the_speed_between_fixes_is_as_good_as_it_says() -> None:
+    """Grades to 4 % and back within 400 m: gravity along the road is not taken for braking."""
+
+    def grade(time_s: float) -> float:
+        return 0.04 * math.sin(math.tau * MEAN_MPS * time_s / 400.0)
+
+    samples: list[Sample] = []
+    for k in range(120 * 50):
+        time_s = k / 50
+        force = (9.81 * math.sin(grade(time_s)), 0.0, 9.81)
+        stamp_ns = round(time_s * 1e9)
+        imu = ImuSample(stamp_ns=stamp_ns, accel_mps2=force, rate_radps=(0.0, 0.0, 0.0))
+        samples.append(("imu", imu))
+        if k % 50 == 0:
+            samples.append(fix(time_s, MEAN_MPS * time_s, 0.0, 0.3))
+    late = [state for state in states_of(samples) if state.stamp_ns > 20e9]
+    off = np.array([state.speed_mps - MEAN_MPS for state in late])
+    told = np.array([state.speed_std_mps for state in late])
+    assert np.sqrt(np.mean(off**2)) < 0.35
+    assert np.mean(np.abs(off) < 1.96 * told) > 0.9
