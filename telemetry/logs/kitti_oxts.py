@@ -6,8 +6,8 @@ deviation, yaw in radians counter-clockwise from east, forward speed in m/s, and
 m/s² and rates in rad/s about x forward, y left, z up. `timestamps.txt` names no zone: times count
 from the first (time base `log`).
 
-Checked on 77 rows of 2011_09_26 (tests/telemetry/motion_proof.py): speed 1.00 of the positions',
-yaw rate 1.05 of the course's change, acceleration 1.00 of the speed's, heading and course alike.
+Checked on the 2,762 rows of 2011_09_30_drive_0018 (tests/telemetry/motion_proof.py): speed 1.00 of
+the positions', yaw rate 0.99 of the course's change, heading 0.1° off the course.
 """
 
 from __future__ import annotations
