@@ -21,6 +21,7 @@ def main() -> None:
     parser.add_argument("maps", nargs="+", type=Path)
     parser.add_argument("--most", type=int, help="of a map's junctions, drawn by a seed")
     parser.add_argument("--kind", help="junctions of this kind alone, such as roundabout")
+    parser.add_argument("--counted", action="store_true", help="only where a scenario is counted")
     parser.add_argument("--part", default="1/1", help="K/N: of them, every Nth from the Kth on")
     parser.add_argument("--seed", type=int, default=7, help="of the draw")
     parser.add_argument("--cases", type=Path, help="where to write each case as a line of JSON")
@@ -30,7 +31,10 @@ def main() -> None:
     for file in given.maps:
         raw, start = read_raw(file), time.perf_counter()
         part = tuple(map(int, given.part.split("/")))
-        result = played_map(file, raw, most=given.most, seed=given.seed, kind=given.kind, part=part)
+        at = set[int]().union(*counted(raw).values()) if given.counted else None
+        result = played_map(
+            file, raw, most=given.most, seed=given.seed, kind=given.kind, part=part, at=at
+        )
         junctions = result.junctions
         took_s = time.perf_counter() - start
         placing_s = sum(j.placing_s for j in junctions)

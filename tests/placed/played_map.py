@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import time
+from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,8 +71,10 @@ def played_map(
     seed: int = 7,
     kind: str | None = None,
     part: tuple[int, ...] = (1, 1),
+    at: Collection[int] | None = None,
 ) -> PlayedMap:
-    """Place and play the catalogue on all junctions of a map, or of a kind, or `most` of them."""
+    """Place and play the catalogue on all junctions of a map, or of a kind, or `at` some nodes, or
+    `most` of them."""
     osm = read_map(file)
     graph = build_road_graph(osm)
     junctions = find_intersections(osm, graph)
@@ -79,6 +82,8 @@ def played_map(
     known = frozenset(node for junction in junctions for node in junction.summary.osm_nodes)
     if kind is not None:
         junctions = [junction for junction in junctions if junction.summary.kind == kind]
+    if at is not None:
+        junctions = [one for one in junctions if not set(at).isdisjoint(one.summary.osm_nodes)]
     if most is not None and most < len(junctions):
         junctions = tuple(random.Random(seed).sample(list(junctions), most))
     junctions = junctions[part[0] - 1 :: part[1]]
