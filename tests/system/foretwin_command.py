@@ -17,8 +17,11 @@ import pyarrow.parquet as pq
 
 from foretwin.contracts.log_file import read_log
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.system.warm_command import WarmCommand
 
 REPOSITORY = Path(__file__).parents[2]
+FRESH = ("-m", "foretwin")
+"""What a fresh interpreter is given to run, as when a user starts the command."""
 
 
 class Finished(NamedTuple):
@@ -50,20 +53,21 @@ def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
 
 @contextmanager
 def started(
-    out: Path, *arguments: str, entry: tuple[str, str] = ("-m", "foretwin")
-) -> Iterator[subprocess.Popen[str]]:
+    out: Path, *arguments: str, entry: tuple[str, str] | None = None
+) -> Iterator[subprocess.Popen[str] | WarmCommand]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
-    `entry` is what Python is given to run. One worker and no tuning unless they are asked for:
+    `entry` is what a fresh interpreter is given to run, and so are its processes; None for forks
+    of an interpreter that has imported all. One worker and no tuning unless they are asked for:
     each process takes a second of a core to start.
     """
     for option, value in (("--tuning", "off"), ("--workers", "1")):
         if option not in arguments:
             arguments = (*arguments, option, value)
-    process = subprocess.Popen(
-        [sys.executable, "-P", *entry, "drive", "--view", "none", "--out", str(out),
-         *arguments],
-        cwd=out.parent, env=environment(out.parent / "cache"), text=True,
+    words = ["drive", "--view", "none", "--out", str(out), *arguments]
+    cwd, env = out.parent, environment(out.parent / "cache")
+    process = WarmCommand(words, cwd=cwd, env=env) if entry is None else subprocess.Popen(
+        [sys.executable, "-P", *entry, *words], cwd=cwd, env=env, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     try:

@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from foretwin.orchestrator.commands.cli import run as command
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
+    FRESH,
     Finished,
     child_pids,
     is_running,
@@ -64,7 +65,8 @@ def assert_readable(run: Path) -> None:
 
 def test_who_is_killed_is_started_again_and_ctrl_c_ends_all(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE, "--workers", "2", "--tuning", "report") as process:
+    arguments = (*LIVE, "--workers", "2", "--tuning", "report")
+    with started(out, *arguments, entry=FRESH) as process:
         run = under_way(out)
         victim = child_pids(run)["w0"]
         with kept_waiting(process.pid) as kept:

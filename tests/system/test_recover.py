@@ -181,7 +181,7 @@ sys.exit(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
 def test_sigterm_and_a_closed_terminal_end_a_drive_alike(tmp_path: Path) -> None:
     left: dict[str, Any] = {}
     for name, number, entry in (
-        ("sigterm", signal.SIGTERM, ("-m", "foretwin")),
+        ("sigterm", signal.SIGTERM, None),
         ("closed", signal.SIGHUP, ("-c", ON_A_TERMINAL)),
     ):
         out = tmp_path / name / "runs"

@@ -1,0 +1,205 @@
+"""Runs the command, and the processes it starts, as forks of an interpreter that has all imported.
+
+A drive has ten processes, and importing takes most of what a short one costs. All else is as in
+fresh interpreters, in which the product starts them: `entry=FRESH` of `started` asks for these.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import functools
+import json
+import os
+import runpy
+import select
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from foretwin.contracts.setup import ProcessSetup, write_setup
+from foretwin.orchestrator.runner.supervisor import Child
+from foretwin.orchestrator.runner.warm_fork import ForkedProcess, forked
+
+REPOSITORY = Path(__file__).parents[2]
+NUMBER_BYTES = 16
+IMPORTED = (
+    "contracts.bus",
+    "orchestrator.commands.cli",
+    "orchestrator.drive.drive",
+    "orchestrator.worlds.builder_process",
+    "sim_worker.analysis.process",
+    "sim_worker.mirror.process",
+    "sim_worker.worker",
+    "telemetry.processes.recorder",
+    "telemetry.processes.replay",
+    "telemetry.standin.__main__",
+)
+"""Not the viewer's Rerun, which starts threads as it is imported."""
+
+
+class WarmCommand:
+    """A command in a fork; to be used as a subprocess.Popen whose stderr goes to its stdout."""
+
+    def __init__(self, words: list[str], *, cwd: Path, env: Mapping[str, str]) -> None:
+        there, self._code = os.pipe()[::-1]
+        out, stdout = os.pipe()[::-1]
+        self.stdout = os.fdopen(stdout, encoding="utf-8")
+        self.returncode: int | None = None
+        asked = {"words": words, "cwd": str(cwd), "env": dict(env)}
+        socket.send_fds(_interpreter(), [json.dumps(asked).encode()], [out, there])
+        os.close(out)
+        os.close(there)
+        self.pid = int(os.read(self._code, NUMBER_BYTES))
+
+    def poll(self) -> int | None:
+        """Return the exit code, None while it runs."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0.0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for the end; raises subprocess.TimeoutExpired."""
+        if self.returncode is None:
+            if not select.select([self._code], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired("foretwin", timeout or 0.0)
+            self.returncode = int(os.read(self._code, NUMBER_BYTES))
+            os.close(self._code)
+        return self.returncode
+
+    def communicate(self, *, timeout: float | None = None) -> tuple[str, None]:
+        """Wait for the end, and return what it said; raises subprocess.TimeoutExpired."""
+        said = b""
+        while select.select([self.stdout], [], [], timeout)[0]:
+            if not (part := os.read(self.stdout.fileno(), 65536)):
+                self.wait(timeout)
+                return said.decode(), None
+            said += part
+        raise subprocess.TimeoutExpired("foretwin", timeout or 0.0, said)
+
+    def send_signal(self, sig: int) -> None:
+        """Send a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, sig)
+
+    def kill(self) -> None:
+        """Kill it, unless it has ended."""
+        self.send_signal(signal.SIGKILL)
+
+
+@functools.cache
+def _interpreter() -> socket.socket:
+    """Start the interpreter that forks; it ends with the process that started it."""
+    here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.system.warm_command", str(there.fileno())],
+        cwd=REPOSITORY, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL,
+        env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+                          "MUJOCO_GL": "disable"},
+    )  # fmt: skip
+    there.close()
+    atexit.register(lambda: (here.close(), process.wait()))
+    return here
+
+
+class Forks:
+    """Starts each process of a drive as a fork of its supervisor; see FreshInterpreter."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
+        """Start a fork running `module` with `setup`."""
+        file = self._folder / f"{setup.process_id}.json"
+        write_setup(setup, file)
+        return forked(functools.partial(_be_process, module, file))
+
+
+def _be_process(module: str, file: Path) -> int:
+    os.setsid()
+    stderr = os.open(file.with_suffix(".stderr"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    _forget_signals()
+    _keep_only(stderr)
+    return _run(f"foretwin.{module}", ["--setup", str(file)])
+
+
+def _forget_signals() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def _keep_only(out: int) -> None:
+    """Let `out` be where all is said, and no other file be held: locks are the parent's alone.
+
+    Numbers stay taken: who closes a file of the parent's must close none of the child's.
+    """
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(out, 1)
+    os.dup2(out, 2)
+    for file in list(Path("/proc/self/fd").iterdir()):
+        with contextlib.suppress(OSError):
+            # What lies in /proc the child has opened itself, as it was forked.
+            if int(file.name) not in (1, 2) and not str(file.readlink()).startswith("/proc/"):
+                os.dup2(nothing, int(file.name))
+
+
+def _run(module: str, words: list[str]) -> int:
+    sys.argv = [module, *words]
+    for begun_anew in (module, f"{module}.__main__"):
+        sys.modules.pop(begun_anew, None)
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as left:
+        if isinstance(left.code, str):
+            print(left.code, file=sys.stderr)
+        return left.code if isinstance(left.code, int) else int(left.code is not None)
+    return 0
+
+
+def _be_command(asked: dict[str, Any], out: int) -> int:
+    _forget_signals()
+    _keep_only(out)
+    os.chdir(asked["cwd"])
+    os.environ.clear()
+    os.environ.update(asked["env"])
+    return _run("foretwin", asked["words"])
+
+
+def _serve(line: socket.socket) -> None:
+    """Fork a command whenever one is asked for, and tell process and exit code of each."""
+    import_module("foretwin.orchestrator.drive.foreground").FreshInterpreter = Forks
+    for name in IMPORTED:
+        import_module(f"foretwin.{name}")
+    running: dict[int, tuple[ForkedProcess, int]] = {}
+    while True:
+        ready = select.select([line, *running], [], [])[0]
+        for ended in set(ready) & set(running):
+            child, told = running.pop(ended)
+            _tell(told, child.wait())
+            os.close(told)
+        if line not in ready:
+            continue
+        asked, files, _, _ = socket.recv_fds(line, 1 << 20, 2)
+        if not asked:
+            return
+        out, told = files
+        child = forked(functools.partial(_be_command, json.loads(asked), out))
+        os.close(out)
+        _tell(told, child.pid)
+        running[child.ended] = child, told
+
+
+def _tell(pipe: int, number: int) -> None:
+    with contextlib.suppress(BrokenPipeError):
+        os.write(pipe, f"{number:{NUMBER_BYTES}}".encode())
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _serve(socket.socket(fileno=int(sys.argv[1])))
