@@ -17,7 +17,7 @@ from foretwin.contracts.drive import AdvanceRequest, DriveEnd, GnssFix
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.keys import PREFIX, TELEMETRY_CHANNELS, BusRole, alive_key, key
 from foretwin.contracts.simulation import BuildRequest, Event, RunEnd
-from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
+from foretwin.contracts.towards_vehicle import Authority, Injection, VehicleCommand
 from foretwin.contracts.tuning import SetRequest
 from foretwin.orchestrator.runtime_configuration.handler import NOT_TO_BE_SET
 
@@ -157,6 +157,13 @@ def _authority() -> bytes:
     return encode(Authority(sent_mono_ns=time.monotonic_ns()))
 
 
+def _injection() -> bytes:
+    told = Injection(
+        stamp_ns=time.time_ns(), gate="open", reason="well", fence_m=56.0, margin_m=0.0
+    )
+    return encode(told, sent_ns=time.time_ns())
+
+
 def _run_end() -> bytes:
     return encode(RunEnd(stamp_ns=0))
 
@@ -210,6 +217,10 @@ ROGUES: tuple[Rogue, ...] = (
                    _authority, f"{_RUN}/authority"),
     _breaks_a_rule("an operator commands the vehicle", "operator", "operator",
                    _command, f"{_RUN}/vehicle_command"),
+    _breaks_a_rule("an operator says that a gate is open", "operator", "operator",
+                   _injection, "vehicle/ego/injection"),
+    _breaks_a_rule("a worker says that a gate is open", "worker", "worker-w0",
+                   _injection, "vehicle/ego/injection"),
     _breaks_a_rule("the car ends the run", "car", "car-vehicle", _run_end, f"{_RUN}/run_end"),
     _breaks_a_rule("a planner ends the run", "planner", "planner", _run_end, f"{_RUN}/run_end"),
     _breaks_a_rule("a worker poses as the mirror", "worker", "worker-w0",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import pytest
@@ -13,7 +13,7 @@ from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import geo_pose
 from foretwin.contracts.simulation import PlaneState
-from foretwin.contracts.towards_vehicle import Authority
+from foretwin.contracts.towards_vehicle import Authority, GateReason
 from foretwin.telemetry.ros2.lot_guard import LotGuard
 from foretwin.telemetry.ros2.names import dds_type
 from foretwin.telemetry.ros_messages.objects import predicted_from_users
@@ -113,6 +113,11 @@ class Lot:
         self._stamp_ns = 5 * S
         self._tick = 0
 
+    def change(self, values: dict[str, Any]) -> None:
+        """Set how the car is from now on."""
+        for name, value in values.items():
+            setattr(self, name, value)
+
     def go_on(self, ticks: int = 1) -> None:
         """Let so many steps of 10 ms pass."""
         for _ in range(ticks):
@@ -159,51 +164,72 @@ WALKER = RoadUser(
     length_m=0.5, width_m=0.6, virtual=True,
 )  # fmt: skip
 
-BREACHES: dict[str, dict[str, Any]] = {
-    "over the northern fence": {"y_m": 60.5},
-    "over the southern fence": {"y_m": -61.0},
-    "over the eastern fence": {"x_m": 151.0},
-    "over the western fence": {"x_m": -150.1},
-    "over a corner": {"x_m": 150.1, "y_m": 60.1},
-    "far away": {"x_m": 5000.0},
-    "with a wheel on the fence": {"y_m": 57.0, "speed_mps": 0.0},
-    "near the northern fence": {"y_m": 45.0},
-    "near the eastern fence": {"x_m": 135.0},
-    "near the fence, backwards": {"x_m": 135.0, "speed_mps": -5.0},
-    "too fast for the lot": {"speed_mps": 14.0},
-    "much too fast": {"speed_mps": 40.0},
-    "rather fast near the fence": {"y_m": 30.0, "speed_mps": 8.0},
-    "no state any more": {"states": False},
-    "no sample any more": {"says": False},
-    "neither": {"states": False, "says": False},
-    "a clock that stands": {"clock_stands": True},
-    "a position that leaps": {"leap_m": 12.0},
-    "positions overdue": {"stale": ("gnss",)},
-    "positions and all overdue": {"stale": ("gnss", "imu", "speed")},
-    "nobody in charge": {"authority": False},
+
+class Breach(NamedTuple):
+    """Why the gate shuts, what goes wrong, and where the car is well before: from there on to near
+    the fence no position leaps."""
+
+    reason: GateReason
+    wrong: dict[str, Any]
+    before: dict[str, Any] = {}  # noqa: RUF012
+
+
+BREACHES = {
+    "over the northern fence": Breach("outside the fence", {"y_m": 60.5}),
+    "over the southern fence": Breach("outside the fence", {"y_m": -61.0}),
+    "over the eastern fence": Breach("outside the fence", {"x_m": 151.0}),
+    "over the western fence": Breach("outside the fence", {"x_m": -150.1}),
+    "over a corner": Breach("outside the fence", {"x_m": 150.1, "y_m": 60.1}),
+    "far away": Breach("outside the fence", {"x_m": 5000.0}),
+    "with a wheel on the fence": Breach(
+        "near the fence", {"y_m": 57.0}, {"y_m": 50.0, "speed_mps": 0.0}
+    ),
+    "near the northern fence": Breach("near the fence", {"y_m": 45.0}, {"y_m": 38.0}),
+    "near the eastern fence": Breach("near the fence", {"x_m": 135.0}, {"x_m": 128.0}),
+    "near the fence, backwards": Breach(
+        "near the fence", {"x_m": 135.0}, {"x_m": 128.0, "speed_mps": -5.0}
+    ),
+    "too fast for the lot": Breach("near the fence", {"speed_mps": 14.0}),
+    "much too fast": Breach("near the fence", {"speed_mps": 40.0}),
+    "rather fast near the fence": Breach("near the fence", {"speed_mps": 8.0}, {"y_m": 30.0}),
+    "no state any more": Breach("state stale", {"states": False}),
+    "no sample any more": Breach("car not heard", {"says": False}),
+    "neither": Breach("state stale", {"states": False, "says": False}),
+    "a clock that stands": Breach("state stale", {"clock_stands": True}),
+    "a position that leaps": Breach("position apart", {"leap_m": 12.0}),
+    "a position that leaps near the fence": Breach(
+        "position apart", {"leap_m": 12.0}, {"y_m": 38.0}
+    ),
+    "a position that leaps over the fence": Breach(
+        "position apart", {"leap_m": 25.0}, {"y_m": 38.0}
+    ),
+    "a state that leaps towards the fence": Breach("position apart", {"y_m": 45.0}),
+    "positions overdue": Breach("positions overdue", {"stale": ("gnss",)}),
+    "positions and all overdue": Breach("positions overdue", {"stale": ("gnss", "imu", "speed")}),
+    "nobody in charge": Breach("word overdue", {"authority": False}),
 }
 
 
 @pytest.mark.parametrize("breach", BREACHES)
 def test_a_breach_ends_with_one_empty_list_within_200_ms(breach: str) -> None:
     lot = Lot()
+    lot.change(BREACHES[breach].before)
     lot.go_on(100)
     assert lot.ground.gateway.gate.state == "open"
     assert lot.lists().count(1) >= 15, "both channels go out"
     assert lot.lists().count(0) == 0
-    for name, value in BREACHES[breach].items():
-        setattr(lot, name, value)
+    lot.change(BREACHES[breach].wrong)
     after_ms = 0
     while 0 not in lot.lists():
         lot.go_on()
         after_ms += 10
         assert after_ms < 200, f"{breach}: still told of somebody"
     assert lot.lists()[-1] == 0
+    assert lot.ground.gateway.gate.reason == BREACHES[breach].reason
     told = len(lot.lists())
     # Well again, and even so silent: only a new drive opens another gate.
-    for name, value in vars(Lot()).items():
-        if not name.startswith("_") and name != "ground":
-            setattr(lot, name, value)
+    well = vars(Lot()).items()
+    lot.change({key: one for key, one in well if not key.startswith("_") and key != "ground"})
     lot.go_on(100)
     assert (len(lot.lists()), lot.ground.gateway.gate.state) == (told, "shut")
 
