@@ -11,7 +11,9 @@ import pytest
 
 from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleInfo
 from foretwin.contracts.frames import GeoPoint
+from foretwin.orchestrator.commands import gap
 from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.commands.gap import gap_of
 from foretwin.telemetry.logs.write_mcap import create
 from foretwin.telemetry.ros_messages.table import messages_from
 from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven
@@ -101,8 +103,16 @@ def test_without_commands_and_steering_it_says_that_nobody_can_be_accused(
 
 
 def test_a_car_driven_by_hand_is_followed_at_its_measured_steering_and_speed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # The same file is told of twice, and measured once.
+    reports: list[gap.GapReport] = []
+
+    def once(*what: Any, **how: Any) -> gap.GapReport:
+        reports.extend([] if reports else [gap_of(*what, **how)])
+        return reports[0]
+
+    monkeypatch.setattr(gap, "gap_of", once)
     drive = drive_of(BY_HAND, end_s=60.0)
     file = written(tmp_path / "hand.mcap", drive.info, hand_driven(BY_HAND, Lateness(), end_s=60.0))
     assert run(["gap", str(file), "--json"]) == 0

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import clearance
-from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast, cast_all
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
@@ -21,7 +20,7 @@ from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.ways import lengthened
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.collide import actor_boxes, ego_boxes, first_collision
-from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
+from tests.sim_worker.scenarios.worlds import cross, motorway, places, race_track, ring, tee
 
 COVERS = (
     "foretwin.sim_worker.scenarios.alongside",
@@ -59,11 +58,7 @@ def check_impact(found: StagedCase) -> None:
 @pytest.mark.parametrize("id_", list(catalogue()))
 def test_the_planned_impact_happens_at_its_point(id_: str) -> None:
     scenario = catalogue()[id_]
-    found = [
-        place
-        for world in WORLDS.values()
-        for place in places(scenario, world, vehicle=VEHICLE, most=2).places
-    ]
+    found = [place for world in WORLDS.values() for place in places(scenario, world, most=2).places]
     assert found
     for place in found:
         for values in draw_cases(scenario)[::2]:
@@ -92,7 +87,7 @@ def test_impacts_happen_at_crossings_of_any_angle(
     scenario = catalogue()[id_]
     name = scenario.actors[0].name
     world = tee(tuple(10.0 * round(bearing / 10) for bearing in bearings), left_hand=left_hand)
-    found = places(scenario, world, vehicle=VEHICLE, most=1).places
+    found = places(scenario, world, most=1).places
     assume(found)
     values = {
         **draw_cases(scenario)[0],
@@ -108,7 +103,7 @@ def test_impacts_happen_at_crossings_of_any_angle(
 
 def test_cases_are_cast_together_as_they_are_one_by_one() -> None:
     scenario = catalogue()["latency"]
-    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    place = places(scenario, cross(), most=1).places[0]
     cases = draw_cases(scenario)
     together = cast_all(scenario, cases, place, vehicle=VEHICLE)
     for case, values in zip(together, cases, strict=True):
@@ -121,7 +116,7 @@ def test_cases_are_cast_together_as_they_are_one_by_one() -> None:
 
 def test_the_ego_starts_the_lead_time_before_the_impact() -> None:
     scenario = catalogue()["scp"]
-    for place in places(scenario, cross(), vehicle=VEHICLE).places:
+    for place in places(scenario, cross()).places:
         case = played(scenario, draw_cases(scenario)[0], place)
         assert case.impact_time_s == pytest.approx(scenario.lead_time_s)
         assert case.ego_speed_mps == case.values["ego.speed_mps"]
@@ -129,7 +124,7 @@ def test_the_ego_starts_the_lead_time_before_the_impact() -> None:
 
 def test_who_arrives_later_does_not_touch() -> None:
     scenario = catalogue()["scp"]
-    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    place = places(scenario, cross(), most=1).places[0]
     on_time = draw_cases(scenario)[0]
     late = {**on_time, "crossing_car.arrives_after_s": 3.0}
     case = played(scenario, late, place)
@@ -144,7 +139,7 @@ def test_who_walks_is_hidden_by_the_van_until_late() -> None:
     """The line from the ego's nose to the walker runs through the van two seconds before."""
     scenario = catalogue()["occluded_pedestrian"]
     for world in (cross(), cross(left_hand=True)):
-        for place in places(scenario, world, vehicle=VEHICLE).places:
+        for place in places(scenario, world).places:
             for values in draw_cases(scenario)[1:]:
                 case = played(scenario, values, place)
                 walker, van = case.actors
@@ -164,7 +159,7 @@ def test_who_walks_is_hidden_by_the_van_until_late() -> None:
 def test_nobody_parked_is_in_the_egos_way() -> None:
     for id_ in ("occluded_pedestrian", "reversing_parking"):
         scenario = catalogue()[id_]
-        for place in places(scenario, cross(), vehicle=VEHICLE, most=3).places:
+        for place in places(scenario, cross(), most=3).places:
             case = played(scenario, draw_cases(scenario)[0], place)
             last = place.ego.exit_m if place.reverse else case.ego_arc_m + 60.0
             time = np.arange(0.0, (last - case.ego_arc_m) / case.ego_speed_mps, 0.01)
@@ -177,7 +172,7 @@ def test_nobody_parked_is_in_the_egos_way() -> None:
 
 def test_gaps_run_from_bumper_to_bumper() -> None:
     scenario = catalogue()["overtaking_motorway"]
-    place = places(scenario, motorway(), vehicle=VEHICLE, most=1).places[0]
+    place = places(scenario, motorway(), most=1).places[0]
     case = played(scenario, draw_cases(scenario)[0], place)
     ego = ego_boxes(case, VEHICLE, np.zeros(1))
     lorry, fast = (actor_boxes(actor, np.zeros(1)) for actor in case.actors)
@@ -194,7 +189,7 @@ def test_paths_hold_everybodys_start() -> None:
     for id_, scenario in catalogue().items():
         values = draw_cases(scenario)[0]
         for world in WORLDS.values():
-            for place in places(scenario, world, vehicle=VEHICLE, cases=[values], most=1).places:
+            for place in places(scenario, world, cases=[values], most=1).places:
                 case = played(scenario, values, place)
                 assert case.ego_arc_m >= 0.0, id_
                 for actor in case.actors:
@@ -206,14 +201,14 @@ def test_somebody_off_the_road_is_refused() -> None:
         id="x", title="x", shows="x.", source="x", ego=EgoPart(speed_mps=8.0),
         actors=(ActorPart(name="van", relation="parked", conduct="parked", lateral_m=-40.0),),
     )  # fmt: skip
-    (unplaced,) = places(scenario, cross(), vehicle=VEHICLE).unplaced
+    (unplaced,) = places(scenario, cross()).unplaced
     assert unplaced.applies
     assert "van would be 40.0 m beside the ego's path, off the road" in unplaced.reason
 
 
 def test_an_impact_after_the_end_is_refused() -> None:
     scenario = catalogue()["scp"]
-    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    place = places(scenario, cross(), most=1).places[0]
     values = {**draw_cases(scenario)[0], "ego.speed_mps": 5.0}
     far = cast(scenario, values, place, vehicle=VEHICLE, ego_arc_m=0.0)
     assert isinstance(far, Unplaced)
@@ -222,7 +217,7 @@ def test_an_impact_after_the_end_is_refused() -> None:
 
 def test_a_standing_car_is_taken_to_set_off() -> None:
     scenario = catalogue()["scp"]
-    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    place = places(scenario, cross(), most=1).places[0]
     values = {**draw_cases(scenario)[0], "ego.speed_mps": 0.0}
     near = cast(scenario, values, place, vehicle=VEHICLE, ego_arc_m=place.ego.entry_m - 8.0)
     assert isinstance(near, StagedCase)
@@ -233,10 +228,7 @@ def test_a_standing_car_is_taken_to_set_off() -> None:
 def test_the_same_values_give_the_same_cast() -> None:
     scenario = catalogue()["ltap_od"]
     values = draw_cases(scenario)[1]
-    runs = [
-        played(scenario, values, places(scenario, cross(), vehicle=VEHICLE, most=1).places[0])
-        for _ in range(2)
-    ]
+    runs = [played(scenario, values, places(scenario, cross(), most=1).places[0]) for _ in range(2)]
     assert msgspec.json.encode(runs[0].actors[0].xy_m.tolist()) == msgspec.json.encode(
         runs[1].actors[0].xy_m.tolist()
     )
@@ -246,7 +238,7 @@ def test_the_same_values_give_the_same_cast() -> None:
 
 def test_nobody_begins_in_a_bend_too_tight_for_its_speed() -> None:
     scenario, world = catalogue()["scp"], cross()
-    place = places(scenario, world, vehicle=VEHICLE, most=1).places[0]
+    place = places(scenario, world, most=1).places[0]
     bend_m, entry_m, radius_m = 30.0, place.ego.entry_m, 10.0
     after = place.ego.path.pose_at(np.arange(entry_m - bend_m, place.ego.exit_m + 60.0, 1.0))
     heading = float(after.yaw_rad[0])

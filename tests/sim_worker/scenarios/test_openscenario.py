@@ -14,7 +14,6 @@ from lxml import etree
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import overlapping, separations
-from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
@@ -24,7 +23,7 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.sim_worker.scenarios.read_openscenario import ScenarioFile
-from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
+from tests.sim_worker.scenarios.worlds import cross, motorway, places, race_track, ring
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import judges_python
 from tests.world_gen.export.read_opendrive import OpenDriveFile
@@ -47,7 +46,7 @@ def cases_in(id_: str, world: World, *, most: int = 1) -> list[StagedCase]:
     cases = draw_cases(scenario)
     found = (
         cast(scenario, values, place, vehicle=VEHICLE)
-        for place in places(scenario, world, vehicle=VEHICLE, most=1).places
+        for place in places(scenario, world, most=1).places
         for values in cases[:: -(-len(cases) // most)]
     )
     return [played for played in found if isinstance(played, StagedCase)]

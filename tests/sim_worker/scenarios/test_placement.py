@@ -13,7 +13,6 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Where
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import passage_on_path
@@ -25,7 +24,7 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import box
-from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
+from tests.sim_worker.scenarios.worlds import cross, motorway, places, race_track, ring, tee
 from tests.world_gen.drawn_maps import CROSS, STREET, drawn_map, world_of
 
 COVERS = (
@@ -39,13 +38,13 @@ VEHICLE = load_vehicle()
 
 
 def placed(id_: str, world: World) -> tuple[ScenarioPlace, ...]:
-    result = places(catalogue()[id_], world, vehicle=VEHICLE)
+    result = places(catalogue()[id_], world)
     assert not result.unplaced, result.unplaced
     return result.places
 
 
 def why_not(id_: str, world: World) -> Unplaced:
-    result = places(catalogue()[id_], world, vehicle=VEHICLE)
+    result = places(catalogue()[id_], world)
     assert not result.places
     return result.unplaced[0]
 
@@ -86,7 +85,7 @@ def test_a_t_junction_takes_what_its_arms_allow() -> None:
     anywhere = Scenario(
         id="x", title="x", shows="x.", source="x", ego=crossing.ego, actors=crossing.actors
     )
-    result = places(anywhere, world, vehicle=VEHICLE)
+    result = places(anywhere, world)
     reason = "nobody can come from across straight on and meet the ego's path"
     assert result.unplaced == ((world.intersection.id, reason, False),)
 
@@ -166,17 +165,17 @@ def test_nobody_parks_where_one_who_backs_into_a_bay_would_touch_it() -> None:
         msgspec.structs.replace(part, gap_m=1.5) if part.name == "car_ahead" else part
         for part in scenario.actors
     )
-    result = places(msgspec.structs.replace(scenario, actors=tight), cross(), vehicle=VEHICLE)
+    result = places(msgspec.structs.replace(scenario, actors=tight), cross())
     assert result.unplaced[0].reason == "car_ahead would stand in the ego's way"
 
 
 def test_who_cannot_come_through_a_house_comes_along_the_road() -> None:
     scenario = catalogue()["cbta"]
-    open_ground = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    open_ground = places(scenario, cross(), most=1).places[0]
     (way,) = open_ground.actor_ways[0]
     x, y = way.path.point_at(np.array([way.entry_m - 12.0]))[0]
     built = msgspec.structs.replace(cross(), buildings=(box(x, y, 6.0, 6.0),))
-    found = places(scenario, built, vehicle=VEHICLE).places
+    found = places(scenario, built).places
     names = [place.name for place in found]
     assert open_ground.name not in names
     assert f"{open_ground.name}, along the road" in names
@@ -223,7 +222,7 @@ def test_who_joins_the_ring_enters_where_the_ego_passes() -> None:
         where=Where(kinds=("roundabout",)), ego=EgoPart(turn="straight", speed_mps=4.0),
         actors=(ActorPart(name="other", relation="joins_ring", speed_mps=6.0, impact_share=0.0),),
     )  # fmt: skip
-    result = places(scenario, ring(), vehicle=VEHICLE)
+    result = places(scenario, ring())
     assert result.places
     for place in result.places:
         assert place.actor_ways[0][0].name.split("+")[0] != place.ego.name.split("+")[0]

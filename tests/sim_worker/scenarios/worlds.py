@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 
 from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures import playable
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.scenarios.drawing import Values
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import (
@@ -22,6 +30,27 @@ from tests.world_gen.drawn_maps import (
 
 SIGNALS = {"highway": "traffic_signals"}
 ROAD = {"highway": "secondary", "name": "High Road", "lanes": "2"}
+
+
+_SCENES: dict[int, tuple[World, SceneMaker]] = {}
+
+
+def places(
+    scenario: Scenario,
+    world: World,
+    *,
+    cases: Sequence[Values] | None = None,
+    most: int | None = None,
+) -> playable.Placement:
+    """Place a scenario for the usual vehicle; what is made of a World and a vehicle is made once,
+    as where the whole catalogue is placed."""
+    _, scenes = _SCENES.setdefault(id(world), (world, SceneMaker(world)))
+    return playable.places(scenario, world, scenes=scenes, stage=_stage(), cases=cases, most=most)
+
+
+@functools.cache
+def _stage() -> BatchSimulation:
+    return rehearsal_stage(load_vehicle())
 
 
 @functools.cache

@@ -38,9 +38,9 @@ def country(lat_deg: float, lon_deg: float) -> str:
     return place_at(lat_deg, lon_deg).code
 
 
-def drawn_drive(*, lat: float = 48.1, lon: float = 11.6) -> Drive:
-    """Two and a half minutes around blocks, with stops: positions at 10 Hz and a car's sensors."""
-    time_s = np.arange(0.0, 150.0, 0.1)
+def drawn_drive(*, lat: float = 48.1, lon: float = 11.6, end_s: float = 150.0) -> Drive:
+    """Some time around blocks, with stops: positions at 10 Hz and a car's sensors."""
+    time_s = np.arange(0.0, end_s, 0.1)
     speed = np.clip(9.0 + 6.0 * np.sin(time_s / 9.0) + 3.0 * np.sin(time_s / 3.7), 0.0, None)
     turn = np.where(speed > 1.0, 0.25 * np.sin(time_s / 6.0) + 0.12 * np.sin(time_s / 2.3), 0.0)
     yaw = np.cumsum(turn) * 0.1
