@@ -80,7 +80,7 @@ def index_map(
         buildings=BuildingIndex(osm),
         beside=BesideIndex(osm),
         obstacles=ObstacleIndex(osm),
-        restrictions=read_turn_restrictions(osm),
+        restrictions=read_turn_restrictions(osm, graph),
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),
         profiles=None if dem is None else _profiles(osm, graph, car, dem),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import msgspec
 
 from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
 _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
 """The most specific word holds; one for lorries or buses alone does not, nor one at times."""
@@ -37,6 +37,8 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
     over_ways: tuple[TurnRule, ...]
     on_red: frozenset[tuple[int, int]] = frozenset()
     """Ways from and to which signs forbid the turn on red alone."""
+    impossible: tuple[TurnRule, ...] = ()
+    """What allows nothing but a way that cannot be driven from there: it does not hold."""
 
     def step_allowed(self, before: DirectedEdge, after: DirectedEdge) -> bool:
         """Return whether a car may go from one edge onto the next at their common node."""
@@ -44,6 +46,7 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
         if rules is None:
             return True
         turns_back = before.edge.index == after.edge.index and before.reverse != after.reverse
+        only: list[bool] = []
         for rule in rules:
             if rule.from_way != before.edge.way_id:
                 continue
@@ -51,9 +54,12 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
             if meant and rule.from_way == after.edge.way_id:
                 # A way that goes on beyond the node: only the word parts straight on from back.
                 meant = meant and turns_back == rule.u_turn
-            if meant != rule.only:
+            if rule.only:
+                only.append(meant)
+            elif meant:
                 return False
-        return True
+        # Two words that each allow one way alone do not close both.
+        return not only or any(only)
 
     def path_allowed(self, path: Sequence[DirectedEdge]) -> bool:
         """Return whether no restriction over via ways forbids this sequence of edges."""
@@ -69,8 +75,9 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
         return True
 
 
-def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
+def read_turn_restrictions(osm: OsmMap, graph: RoadGraph) -> TurnRestrictions:
     """Return the map's restrictions that hold for cars at all times."""
+    impossible: list[TurnRule] = []
     at_node: dict[int, list[TurnRule]] = {}
     over_ways: list[TurnRule] = []
     on_red: set[tuple[int, int]] = set()
@@ -96,9 +103,16 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
             if via_ways:
                 over_ways.append(rule)
             for node in via_nodes:
-                at_node.setdefault(node, []).append(rule)
+                leaving = graph.leaving.get(node, ())
+                if only and ends.isdisjoint(edge.edge.way_id for edge in leaving if edge.allowed):
+                    impossible.append(rule)
+                else:
+                    at_node.setdefault(node, []).append(rule)
     return TurnRestrictions(
-        {k: tuple(v) for k, v in at_node.items()}, tuple(over_ways), frozenset(on_red)
+        {k: tuple(v) for k, v in at_node.items()},
+        tuple(over_ways),
+        frozenset(on_red),
+        tuple(impossible),
     )
 
 
@@ -109,16 +123,21 @@ def _members(relation: OsmRelation, role: str, kind: str) -> list[int]:
 def restriction_notes(
     restrictions: TurnRestrictions, inner: Sequence[frozenset[int]], edges: Mapping[int, RoadEdge]
 ) -> tuple[str, ...]:
-    """Return a line for each restriction over ways that do not lie within one place.
+    """Return a line for each restriction that cannot hold, and over ways beyond one place.
 
     `inner` are the edges within each place.
     """
-    if not restrictions.over_ways:
+    if not (restrictions.over_ways or restrictions.impossible):
         return ()
     of_way: dict[int, set[int]] = {}
     for index, edge in edges.items():
         of_way.setdefault(edge.way_id, set()).add(index)
-    notes = []
+    notes = [
+        f"relation {rule.relation}: from way {rule.from_way} it allows only way "
+        f"{', '.join(map(str, sorted(rule.to_ways)))}, which cannot be driven from there; left out"
+        for rule in restrictions.impossible
+        if rule.from_way in of_way
+    ]
     for rule in restrictions.over_ways:
         if not {rule.from_way, *rule.via_ways} <= of_way.keys():
             continue

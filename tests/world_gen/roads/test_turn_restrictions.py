@@ -56,6 +56,30 @@ def test_two_ways_of_which_one_must_be_taken():
     assert _leaving_west({"restriction": "only_straight_on"}, ends=(11, 12)) == {11, 12}
 
 
+def _only(relation: int, end: int) -> tuple[int, list[tuple[str, int, str]], dict[str, str]]:
+    members = [FROM_WEST, VIA, ("w", end, "to")]
+    return relation, members, {"type": "restriction", "restriction": "only_straight_on"}
+
+
+def test_two_words_that_each_allow_one_way_alone_allow_both():
+    world = world_of(crossing(relations=[_only(1, 11), _only(2, 12)]))
+    way_of = {lane.id: lane.osm_way for lane in world.lanes}
+    ends = {way_of[c.to_lane_id] for c in world.connections if way_of[c.from_lane_id] == 13}
+    assert ends == {11, 12}
+
+
+def test_who_may_go_nowhere_but_against_a_one_way_street_goes_as_without_the_word():
+    street = {"highway": "residential", "name": "Lane", "oneway": "yes"}
+    drawn = crossing(
+        extra_nodes={20: (80.0, 80.0)}, extra_ways=[(20, [20, 0], street)], relations=[_only(7, 20)]
+    )
+    world = world_of(drawn)
+    way_of = {lane.id: lane.osm_way for lane in world.lanes}
+    ends = {way_of[c.to_lane_id] for c in world.connections if way_of[c.from_lane_id] == 13}
+    assert ends == {11, 12, 14}
+    assert [note for note in world.notes if note.startswith("relation 7: from way 13")]
+
+
 def test_a_relation_without_an_end_forbids_nothing():
     assert _leaving_west({"restriction": "no_exit"}, ends=()) == {11, 12, 14}
 
@@ -77,7 +101,7 @@ def test_a_restriction_over_ways_within_a_junction_needs_no_note():
     osm = read_map(maps / "32_restriction_via_way.osm")
     graph = build_road_graph(osm)
     (junction,) = find_intersections(osm, graph)
-    assert len(read_turn_restrictions(osm).over_ways) == 2
+    assert len(read_turn_restrictions(osm, graph).over_ways) == 2
     assert not [n for n in build_world(osm, graph, junction).notes if n.startswith("relation")]
 
 
