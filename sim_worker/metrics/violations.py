@@ -40,10 +40,12 @@ def red_light_violations(view: RolloutView) -> Measure:
         colours = _colours(view, line.group_id, time_s)
         ran = np.array([colour in STOPS for colour in colours], dtype=bool)
         if line.red_after_stop:
-            ran &= [
-                not stood_before(view.front_m[row], view.speed_mps[row], view.time_s, at_s)
-                for row, at_s in zip(future, time_s.tolist(), strict=True)
-            ]
+            crossings = zip(future, time_s.tolist(), strict=True)
+            stood = (
+                stood_before(view.front_m[row], view.speed_mps[row], view.time_s, at_s)
+                for row, at_s in crossings
+            )
+            ran &= ~np.fromiter(stood, dtype=bool, count=len(future))
         np.add.at(count, future, ran)
     return view.measure(count)
 
