@@ -67,7 +67,7 @@ def lines_to_tell(processes: Path) -> Iterator[Told]:
             line = f"refused: {text}; more of the kind are counted"
             yield Told(by_router, one.sender, one.reason, line)
         if not refused.counted_all:
-            text = f"{name} refuses more than it can count: run.json tells the least"
+            text = f"not all that {name} said of refusals could be read: run.json tells the least"
             yield Told(True, "", "more than can be counted", text)
 
 

@@ -45,7 +45,7 @@ def test_the_router_is_told_by_role_and_others_by_process(tmp_path: Path) -> Non
         "refused: ros2: run/r/authority: not signed; more of the kind are counted",
         "refused: the router did not let in somebody: no password; more of the kind are counted",
         "refused: worker-w0 may not say vehicle/ego/telemetry/speed; more of the kind are counted",
-        "router refuses more than it can count: run.json tells the least",
+        "not all that router said of refusals could be read: run.json tells the least",
     ]
 
 
