@@ -66,6 +66,7 @@ class Consistency(NamedTuple):
 
 def consistency_of(pairs: SignalPairs) -> Consistency:
     """Compare the signals of one stretch (some seconds) pair by pair."""
+    pairs = _followable(pairs)
     measured = model = angle = None
     if _varies(pairs.asked_rad) or _varies(pairs.done_rad):
         measured = delayed_line(pairs.asked_rad, pairs.done_rad)
@@ -95,6 +96,14 @@ def consistency_of(pairs: SignalPairs) -> Consistency:
         excited_s=float(pairs.excited.sum()) * PERIOD_S,
         moved_s=float(pairs.moves.sum()) * PERIOD_S,
     )
+
+
+def _followable(pairs: SignalPairs) -> SignalPairs:
+    """Leave out commands that outrun every car: behind them it has no gain, offset or delay."""
+    asked, commanded = (
+        np.where(pairs.too_fast, np.nan, angle) for angle in (pairs.asked_rad, pairs.commanded_rad)
+    )
+    return pairs._replace(asked_rad=asked, commanded_rad=commanded)
 
 
 def _varies(angle: Array) -> bool:
@@ -215,6 +224,7 @@ def began_ns(pairs: SignalPairs, seen: Consistency, evidence: str) -> int:
     The change point of Page's test (1954): where the sum of what departs beyond its allowance was
     last at its lowest.
     """
+    pairs = _followable(pairs)
     x_name, y_name, lags = next(
         row for prefix, row in _COMPARED.items() if evidence.startswith(prefix)
     )

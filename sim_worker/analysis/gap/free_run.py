@@ -5,6 +5,7 @@ Runs need not be made again: stretches overlap by most of their length.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -23,6 +24,10 @@ from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_
 
 _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
+_BEHIND_RAD = 0.012
+"""Of a tyre's angle: the least turn that steering is compared by."""
+_AT_MOST = 0.7
+"""Of the fastest: tyres that turn by more turn as fast as they can. Chosen."""
 
 
 class TireAngles(NamedTuple):
@@ -45,6 +50,27 @@ def tire_angles(record: MotionRecord, vehicle: VehicleParameters) -> TireAngles:
         column.tire_rad(record.command_wheel_rad),
     )
     return TireAngles(commanded, read(record.tire_rad, record.wheel_rad))
+
+
+def outrun(asked_rad: Array, done_rad: Array, *, fastest_radps: float) -> Flags:
+    """Return where (N,) on the grid tyres that turn as fast as they can are behind a command.
+
+    Tyres that turn slower have no such excuse, and of a command that is not known nothing is
+    behind.
+    """
+    step = fastest_radps * PERIOD_S
+    behind = np.zeros(len(asked_rad), dtype=np.bool_)
+    if not (np.abs(np.diff(asked_rad)) > step).any():
+        return behind
+    tire = math.nan
+    for k, asked in enumerate(asked_rad.tolist()):
+        if math.isfinite(tire) and math.isfinite(asked):
+            tire = min(max(asked, tire - step), tire + step)
+        else:
+            tire = asked
+        behind[k] = abs(tire - asked) > _BEHIND_RAD
+    turns = np.abs(np.gradient(done_rad)) / PERIOD_S
+    return np.asarray(behind & (turns > _AT_MOST * fastest_radps))
 
 
 class FreeRunner:

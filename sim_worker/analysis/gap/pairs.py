@@ -16,6 +16,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.sim_worker.analysis.gap.free_run import (
     FreeRunner,
     RunMemory,
+    outrun,
     start_states,
     tire_angles,
 )
@@ -84,6 +85,8 @@ class SignalPairs(NamedTuple):
     """As the model reads the command; then what its tyres do."""
     model_tire_rad: Array
     pushes: PushBlocks
+    too_fast: Flags
+    """Tyres that turn as fast as the vehicle's can are not yet where they are commanded to."""
 
     @property
     def broken(self) -> bool:
@@ -135,6 +138,7 @@ def pairs_of(
         speed_mps=speed,
         curvature_pm=np.where(moves, rate / np.maximum(speed, MOVES_MPS), np.nan),
         commanded_rad=signals.commanded_rad,
+        too_fast=outrun(asked, done, fastest_radps=runner.vehicle.max_tire_rate_radps.value),
         **sensors,
         **_runs(record, runner, memory or RunMemory()),
     )

@@ -175,8 +175,7 @@ def test_red_lets_go_who_has_stopped_before_a_turn_that_may() -> None:
     assert value(driven(1.0), "red_light_violations", plain) == 1
     assert value(driven(9.0), "red_light_violations", given) == 1  # it stood behind another car
     assert value(rollout(crossing_at(0.5)), "red_light_violations", given) == 1
-    nobody = rollout(crossing_at(60.0))
-    assert value(nobody, "red_light_violations", given) == 0
+    assert value(rollout(crossing_at(60.0)), "red_light_violations", given) == 0
 
 
 def test_a_learnt_cycle_goes_before_the_plan() -> None:

@@ -11,6 +11,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks
 from foretwin.sim_worker.analysis.gap.consistency import consistency_of
 from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
+from foretwin.sim_worker.analysis.gap.free_run import outrun
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
@@ -48,6 +49,7 @@ def turning(
         commanded_rad=asked_rad,
         model_tire_rad=shifted(asked_rad, 0.1) if model_rad is None else model_rad,
         pushes=PushBlocks(*np.zeros((6, 0))),
+        too_fast=np.zeros(len(TIME_S), dtype=np.bool_),
     )
 
 
@@ -61,6 +63,46 @@ def into_a_bend(*, offset_pm: float) -> SignalPairs:
     noise = np.random.default_rng(1).normal(0.0, 1e-4, len(TIME_S))
     asked = np.where(np.abs(model) > 1e-3, 2.6 * model, 0.0)
     return turning(real_pm=1.05 * model + offset_pm + noise, model_pm=model, asked_rad=asked)
+
+
+def hurried(*, fastest_radps: float) -> SignalPairs:
+    """A car that turns its tyres by 0.4 rad/s at most, and is asked for more than twice that."""
+    asked = 0.35 * np.sin(2.5 * TIME_S)
+    done = [asked[0]]
+    for wanted in asked[1:]:
+        done.append(np.clip(wanted, done[-1] - 0.4 * PERIOD_S, done[-1] + 0.4 * PERIOD_S))
+    curvature = np.array(done) / 2.6
+    pairs = turning(
+        real_pm=curvature, model_pm=curvature, asked_rad=asked, model_rad=np.array(done)
+    )
+    too_fast = outrun(asked, np.array(done), fastest_radps=fastest_radps)
+    return pairs._replace(done_rad=np.array(done), too_fast=too_fast)
+
+
+def test_a_car_that_steers_as_fast_as_it_can_is_not_accused_of_commands_that_are_faster() -> None:
+    assert findings_of(consistency_of(hurried(fastest_radps=0.4))) is None
+    blind = findings_of(consistency_of(hurried(fastest_radps=9.0)))
+    assert blind is not None
+    assert blind.culprit == "vehicle"
+
+
+def test_a_car_with_a_fault_is_accused_beside_commands_that_outrun_it() -> None:
+    pairs = hurried(fastest_radps=0.4)
+    slow = np.where(TIME_S < 3.0, pairs.asked_rad, 0.1 * np.sin(1.3 * TIME_S))
+    done = np.where(TIME_S < 3.0, pairs.done_rad, 0.7 * shifted(slow, 0.1))
+    too_fast = outrun(slow, done, fastest_radps=0.4)
+    pairs = pairs._replace(asked_rad=slow, commanded_rad=slow, done_rad=done, too_fast=too_fast)
+    found = findings_of(consistency_of(pairs))
+    assert found is not None
+    assert found.culprit == "vehicle"
+
+
+def test_nothing_is_behind_a_command_that_is_not_known_or_slow() -> None:
+    asked = np.array([0.0, 0.004, 0.1, 0.1, np.nan, 0.3, 0.304])
+    at_most = 0.4 * PERIOD_S * np.arange(7)
+    behind = [False, False, True, True, False, False, False]
+    assert outrun(asked, at_most, fastest_radps=0.4).tolist() == behind
+    assert not outrun(asked, 0.5 * at_most, fastest_radps=0.4).any()
 
 
 @pytest.mark.parametrize("offset_pm", [-0.003, 0.0, 0.0019, 0.003])
