@@ -17,6 +17,7 @@ from foretwin.contracts import (
     placement,
     planner_link,
     point_cloud,
+    radar_list,
     side_by_side,
     simulation,
 )
@@ -112,6 +113,7 @@ SHAPES: dict[type[msgspec.Struct], dict[str, str]] = {
         "touch_names": "C",
     },
     point_cloud.PointCloud: {"points": "N 6"},
+    radar_list.RadarList: {"returns": "N 5"},
 }  # fmt: skip
 """Arrays that belong together: equal letters are equal lengths; with ? one may be empty instead."""
 

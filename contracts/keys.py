@@ -16,6 +16,7 @@ from foretwin.contracts import (
     placement,
     planner_link,
     point_cloud,
+    radar_list,
     roles,
     runner,
     siblings,
@@ -168,6 +169,7 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     },
     (_RUN, WATCH, (Writer("worker", "sensors"),)): {
         "point_cloud": Channel(point_cloud.PointCloud, 10, "what virtual lidars measure"),
+        "radar_list": Channel(radar_list.RadarList, 20, "what virtual radars measure"),
     },
     (_RUN, WATCH, _ORCHESTRATOR): {
         "worker_status": Channel(simulation.WorkerStatus, 2, "health of the workers"),

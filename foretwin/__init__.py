@@ -48,7 +48,14 @@ if TYPE_CHECKING:
         plot_outcomes,
     )
     from foretwin.recordings import MotionArrays, Recording, open_run, open_sweep
-    from foretwin.sensing import lidar_scan, merge_clouds, road_user, save_clouds
+    from foretwin.sensing import (
+        lidar_scan,
+        merge_clouds,
+        radar_list,
+        road_user,
+        save_clouds,
+        save_radar_lists,
+    )  # fmt: skip
     from foretwin.sim_worker.gym import JunctionEnv as JunctionEnv
     from foretwin.sim_worker.gym import JunctionVectorEnv as JunctionVectorEnv
     from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView
@@ -73,7 +80,14 @@ _FROM = {
     "foretwin.orchestrator.occurred.occurred": ("occurred_in",),
     "foretwin.plots": _PLOTS,
     "foretwin.recordings": ("MotionArrays", "Recording", "open_run", "open_sweep"),
-    "foretwin.sensing": ("lidar_scan", "merge_clouds", "road_user", "save_clouds"),
+    "foretwin.sensing": (
+        "lidar_scan",
+        "merge_clouds",
+        "radar_list",
+        "road_user",
+        "save_clouds",
+        "save_radar_lists",
+    ),
     "foretwin.sim_worker.gym": ("JunctionEnv", "JunctionVectorEnv"),
     "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
     "foretwin.sim_worker.planners.one_at_a_time": ("CarView",),
@@ -102,6 +116,7 @@ __all__ += [
 ]
 __all__ += ["plot_driven", "plot_futures", "plot_gap", "plot_junction", "plot_outcomes"]
 __all__ += ["lidar_scan", "merge_clouds", "read_world", "road_user", "run_futures", "save_clouds"]
+__all__ += ["radar_list", "save_radar_lists"]
 __all__ += ["save_world", "state_on", "ways_through"]
 
 

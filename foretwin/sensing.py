@@ -1,11 +1,11 @@
-"""What a lidar would measure in a World, and real clouds with virtual bodies in them."""
+"""What sensors would measure in a World, and real clouds with virtual bodies in them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -17,10 +17,14 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_pose, local_pose
 from foretwin.contracts.numbers import MAX_SEED
 from foretwin.contracts.point_cloud import POINT_COLUMNS, PointCloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.world import World
+from foretwin.sim_worker.sensors.base_motion import BaseMotion
 from foretwin.sim_worker.sensors.cloud_merge import merge
-from foretwin.sim_worker.sensors.lidar import BaseMotion, LidarScan, scan
-from foretwin.sim_worker.sensors.ray_world import RayWorld, boxes_of
+from foretwin.sim_worker.sensors.kinds import Lidar, Radar
+from foretwin.sim_worker.sensors.lidar import LidarScan, scan
+from foretwin.sim_worker.sensors.radar import RadarReturns, detect
+from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld, boxes_of
 from foretwin.sim_worker.sensors.sensor_file import DEFAULT_FILE, SensorFile, load_sensor
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.telemetry.logs.write_mcap import create
@@ -71,16 +75,30 @@ def lidar_scan(
     With `users_alone` nothing of the World is seen: for `merge_clouds`. The same seed gives the
     same noise. Raises UserError for what is no sensor, or a state without a place.
     """
-    expect("world", world, World)
-    expect("state", state, VehicleState)
-    if not isinstance(sensor, SensorFile):
-        sensor = load_sensor(path_of("sensor", sensor))
-    users = [expect("a road user", user, RoadUser) for user in road_users]
-    pose = local_pose(world.frame, state.position.validate(), state.yaw_rad)
-    motion = BaseMotion(pose, state.speed_mps, state.yaw_rate_radps)
-    rays = RayWorld(None if users_alone else world)
     seed = whole_number("seed", seed, 0, MAX_SEED)
-    return scan(rays, sensor, motion, boxes_of(world.frame, users), seed=seed)
+    around = _around(world, state, road_users, sensor, users_alone=users_alone)
+    around.sensor.measures(Lidar)
+    return scan(around.rays, around.sensor, around.motion, around.boxes, seed=seed)
+
+
+def radar_list(
+    world: World,
+    state: VehicleState,
+    road_users: Sequence[RoadUser] = (),
+    sensor: SensorFile | Path | str = "long_range_radar",
+    *,
+    users_alone: bool = False,
+    seed: int = 0,
+) -> RadarReturns:
+    """Return what a radar on a car lists at the instant of `state` and `road_users`.
+
+    `sensor`, `users_alone`, `seed` and what is raised are as for `lidar_scan`. A road user is one
+    return, where the nearest of what is seen of it is.
+    """
+    seed = whole_number("seed", seed, 0, MAX_SEED)
+    around = _around(world, state, road_users, sensor, users_alone=users_alone)
+    around.sensor.measures(Radar)
+    return detect(around.rays, around.sensor, around.motion, around.boxes, seed=seed)
 
 
 def merge_clouds(real: Array | Array32, virtual: LidarScan) -> Array32:
@@ -99,15 +117,73 @@ def save_clouds(file: Path | str, clouds: Sequence[tuple[float, Array | Array32]
 
     Raises UserError for another shape, or where the file cannot be written.
     """
+    return _saved(
+        file,
+        "point_cloud",
+        [
+            PointCloud(stamp_ns=_stamp_ns(time_s), points=_cloud("a cloud", points))
+            for time_s, points in clouds
+        ],
+    )
+
+
+def save_radar_lists(file: Path | str, lists: Sequence[tuple[float, RadarReturns]]) -> Path:
+    """Write what radars listed, each with its seconds, as radar_msgs/RadarScan to an MCAP file.
+
+    The frame of each is called as its sensor is. Raises UserError where the file cannot be written.
+    """
+    messages = []
+    for time_s, one in lists:
+        sensor = expect("a list", one, RadarReturns).sensor
+        messages.append(
+            RadarList(
+                stamp_ns=_stamp_ns(time_s),
+                returns=one.returns,
+                sensor=sensor.name,
+                mount=sensor.mount,
+            )
+        )
+    return _saved(file, "radar_list", messages)
+
+
+class _Around(NamedTuple):
+    """What a sensor is asked with."""
+
+    rays: RayWorld
+    sensor: SensorFile
+    motion: BaseMotion
+    boxes: MovingBoxes
+
+
+def _around(
+    world: World,
+    state: VehicleState,
+    road_users: Sequence[RoadUser],
+    sensor: SensorFile | Path | str,
+    *,
+    users_alone: bool,
+) -> _Around:
+    expect("world", world, World)
+    expect("state", state, VehicleState)
+    if not isinstance(sensor, SensorFile):
+        sensor = load_sensor(path_of("sensor", sensor))
+    users = [expect("a road user", user, RoadUser) for user in road_users]
+    pose = local_pose(world.frame, state.position.validate(), state.yaw_rad)
+    motion = BaseMotion(pose, state.speed_mps, state.yaw_rate_radps)
+    rays = RayWorld(None if users_alone else world)
+    return _Around(rays, sensor, motion, boxes_of(world.frame, users))
+
+
+def _stamp_ns(time_s: float) -> int:
+    return int(number("a time", time_s) * 1e9)
+
+
+def _saved(file: Path | str, channel: str, messages: Sequence[PointCloud | RadarList]) -> Path:
     file = path_of("file", file)
-    messages = [
-        PointCloud(stamp_ns=int(number("a time", time_s) * 1e9), points=_cloud("a cloud", points))
-        for time_s, points in clouds
-    ]
     with files_told(file), create(file) as writer:
         for message in messages:
             try:
-                writer.add("point_cloud", message)
+                writer.add(channel, message)
             except ValueError as error:
                 raise UserError(f"{file}: {error}") from error
     if writer.error is not None:

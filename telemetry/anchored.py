@@ -17,6 +17,7 @@ from foretwin.contracts import drive
 from foretwin.contracts.anchor import Anchor, AnchorLine
 from foretwin.contracts.frames import GeoPoint, GeoPose
 from foretwin.contracts.point_cloud import PointCloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.towards_vehicle import VehicleCommand
 
 Message = TypeVar("Message", bound=msgspec.Struct)
@@ -111,6 +112,8 @@ def _from_world(anchor: Anchor, message: Any) -> Any:
             return _users(message, anchor.lot_from_world, scale)
         case PointCloud():
             return _cloud(message, scale, side)
+        case RadarList():
+            return _radar_list(message, scale, side)
         case VehicleCommand():
             return replace(
                 message,
@@ -141,6 +144,25 @@ def _cloud(message: PointCloud, scale: float, side: float) -> PointCloud:
     points = message.points.copy()
     points[:, :3] *= (scale, scale * side, scale)
     return replace(message, points=points)
+
+
+def _radar_list(message: RadarList, scale: float, side: float) -> RadarList:
+    """The same in a sensor's own axes, which go with the car: heights and sizes stay in proportion,
+    amplitudes as they are."""
+    factors = (scale, side, 1.0, scale, 1.0)
+    mount = message.mount
+    return replace(
+        message,
+        returns=(message.returns * factors).astype(message.returns.dtype),
+        mount=replace(
+            mount,
+            forward_m=scale * mount.forward_m,
+            left_m=scale * side * mount.left_m,
+            up_m=scale * mount.up_m,
+            yaw_deg=side * mount.yaw_deg,
+            roll_deg=side * mount.roll_deg,
+        ),
+    )
 
 
 def _steered(side: float, message: Any) -> Any:

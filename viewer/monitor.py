@@ -18,6 +18,7 @@ from foretwin.viewer.legend import legend_rows
 from foretwin.viewer.log_drive import DriveLog
 from foretwin.viewer.log_lot import rows_of_injection
 from foretwin.viewer.log_point_cloud import PointCloudLog
+from foretwin.viewer.log_radar_list import rows_of_radar_list
 from foretwin.viewer.log_roads import rows_of_roads
 from foretwin.viewer.log_run import RunLog, rows_of_event
 from foretwin.viewer.log_tuning import TuningLog
@@ -83,6 +84,7 @@ class Monitor:
             "virtual_traffic": VirtualTrafficLog(drive_frame).rows,
             "injection": rows_of_injection,
             "point_cloud": PointCloudLog().rows,
+            "radar_list": rows_of_radar_list,
             "active_world": self._active_world,
             "world": self._world,
             "worker_status": self._run.worker,

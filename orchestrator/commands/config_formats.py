@@ -24,9 +24,10 @@ from foretwin.orchestrator.config_file import load_config
 from foretwin.orchestrator.sweep.spec import SweepSpec, load_spec
 from foretwin.orchestrator.worlds import overpass
 from foretwin.sim_worker.scenarios.reading import CATALOGUE, read_scenario
+from foretwin.sim_worker.sensors.kinds import RANGES as SENSOR_KIND_RANGES
 from foretwin.sim_worker.sensors.sensor_file import DEFAULT_FILE as SENSOR_FILE
-from foretwin.sim_worker.sensors.sensor_file import RANGES as LIDAR_RANGES
-from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile, load_sensor
+from foretwin.sim_worker.sensors.sensor_file import RANGES as SENSOR_RANGES
+from foretwin.sim_worker.sensors.sensor_file import SensorFile, load_sensor
 from foretwin.sim_worker.vehicle.parameters import DEFAULT_FILE as VEHICLE_FILE
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
@@ -42,7 +43,12 @@ _BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
 RANGES: Mapping[tuple[type, str], Range] = {
     **{(config.DriveConfig, name): one for name, one in config.RANGES.items()},
     **{(overpass.OverpassConfig, name): one for name, one in overpass.RANGES.items()},
-    **{(Lidar, name): one for name, one in LIDAR_RANGES.items()},
+    **{(SensorFile, name): one for name, one in SENSOR_RANGES.items()},
+    **{
+        (kind, name): one
+        for kind, ranges in SENSOR_KIND_RANGES.items()
+        for name, one in ranges.items()
+    },
     **{(VehicleParameters, name): Range(*ends) for name, ends in PLAUSIBLE.items()},
     **{
         (part, name): row.range

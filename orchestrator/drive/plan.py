@@ -28,7 +28,7 @@ from foretwin.orchestrator.campaign.joining import check_campaign
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
 from foretwin.orchestrator.drive import sibling_setup, traffic_setup
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
-from foretwin.orchestrator.drive.sensors_setup import check_clouds, read_sensor
+from foretwin.orchestrator.drive.sensors_setup import check_measured, read_sensor
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 from foretwin.orchestrator.forecast.progress_model import progress_of
 from foretwin.orchestrator.plan import DriveInputs, DrivePlan, OtherVehiclePlan
@@ -81,7 +81,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         raise ConfigError(f"--anchor {config.anchor}: --towards-vehicle needs its fence")
     ros2 = read_ros2(config)
     sensors = tuple(map(read_sensor, config.sensors))
-    check_clouds(sensors, ros2)
+    check_measured(sensors, ros2)
     if config.secure is not None and config.endpoint is not None:
         check_campaign(Path(config.secure), config.endpoint, car=starts_a_car(config))
     map_file = Path(config.map) if config.map else MAP_FILE

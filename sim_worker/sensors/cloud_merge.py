@@ -8,8 +8,9 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32, Flags, Indices
 from foretwin.contracts.point_cloud import mount_from_base_cloud
+from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.lidar import LidarScan
-from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile
+from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
 
 def merge(real: Array32, virtual: LidarScan) -> Array32:
@@ -31,7 +32,7 @@ def merge(real: Array32, virtual: LidarScan) -> Array32:
 def _rays_of(points: Array32, sensor: SensorFile) -> tuple[Indices, Indices, Array, Flags]:
     """Return azimuth and ring of the ray nearest to each point (N,), its range, and whether the
     sensor looks there at all."""
-    lidar = sensor.lidar
+    lidar = sensor.measures(Lidar)
     seen = mount_from_base_cloud(points.astype(np.float64), sensor.mount)[:, :3]
     range_m = np.linalg.norm(seen, axis=1)
     azimuth = np.arctan2(seen[:, 1], seen[:, 0])

@@ -12,22 +12,15 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Array32, Indices
 from foretwin.contracts.frames import LocalPose
 from foretwin.contracts.point_cloud import POINT_COLUMNS, Mount, base_from_mount, origin_m
-from foretwin.geometry.constant_turn import constant_turn_rate
+from foretwin.sim_worker.sensors.base_motion import BaseMotion, poses_after
+from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.materials import back_scatter
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayHits, RayWorld
-from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile
+from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
 _STEP_M = 0.02
 """Rays of one instant begin at one point: sensor and road users have moved by at most half of this
 from there, less than lidars measure."""
-
-
-class BaseMotion(NamedTuple):
-    """Where base_link is as a turn begins, in the World's frame, and how it goes on."""
-
-    pose: LocalPose
-    speed_mps: float = 0.0
-    yaw_rate_radps: float = 0.0
 
 
 class LidarScan(NamedTuple):
@@ -46,7 +39,7 @@ class LidarScan(NamedTuple):
     @property
     def points(self) -> Array32:
         """The cloud (N, 6), `POINT_COLUMNS`, of what came back."""
-        lidar = self.sensor.lidar
+        lidar = self.sensor.measures(Lidar)
         column, ring = np.nonzero(np.isfinite(self.range_m))
         ways = base_from_rays(lidar, self.sensor.mount)[column, ring]
         found = np.empty((len(column), len(POINT_COLUMNS)), dtype=np.float32)
@@ -71,7 +64,7 @@ def scan(
     `seen_to_m`: light falls with the square of the distance (Wagner, 2010, Radiometric calibration
     of small-footprint full-waveform airborne laser scanner measurements, equation 1).
     """
-    lidar = sensor.lidar
+    lidar = sensor.measures(Lidar)
     rays.set_bodies(bodies)
     hits = _turn(rays, sensor, motion, bodies)
     shape = lidar.azimuths, len(lidar.elevation_deg)
@@ -91,16 +84,10 @@ def scan(
     )
 
 
-def moved(motion: BaseMotion, time_s: float) -> BaseMotion:
-    """Return where base_link is so long after, or before, a motion began."""
-    x_m, y_m, yaw = (float(one[0]) for one in _moved(motion, np.array([time_s])))
-    return motion._replace(pose=LocalPose(x_m, y_m, yaw))
-
-
 def at_begin(points: Array32, motion: BaseMotion) -> Array32:
     """Return a cloud (N, 6) with all points in base_link as the turn began: without its skew."""
     time_s = points[:, 5].astype(np.float64)
-    x_m, y_m, yaw = _moved(motion._replace(pose=LocalPose(0.0, 0.0, 0.0)), time_s)
+    x_m, y_m, yaw = poses_after(motion._replace(pose=LocalPose(0.0, 0.0, 0.0)), time_s)
     cos, sin = np.cos(yaw), np.sin(yaw)
     found = points.copy()
     found[:, 0] = x_m + cos * points[:, 0] - sin * points[:, 1]
@@ -125,9 +112,9 @@ def base_from_rays(lidar: Lidar, mount: Mount) -> Array:
 
 def _turn(rays: RayWorld, sensor: SensorFile, motion: BaseMotion, bodies: MovingBoxes) -> RayHits:
     """Return what the rays of a turn meet (A · R,), the car and all bodies moving meanwhile."""
-    lidar, lever_m = sensor.lidar, origin_m(sensor.mount)
+    lidar, lever_m = sensor.measures(Lidar), origin_m(sensor.mount)
     time_s = np.arange(lidar.azimuths) / (lidar.azimuths * lidar.rate_hz)
-    x_m, y_m, yaw = _moved(motion, time_s)
+    x_m, y_m, yaw = poses_after(motion, time_s)
     cos, sin = np.cos(yaw), np.sin(yaw)
     ways = base_from_rays(lidar, sensor.mount)
     world = ways.copy()
@@ -151,14 +138,3 @@ def _turn(rays: RayWorld, sensor: SensorFile, motion: BaseMotion, bodies: Moving
         part = world[begin:end].reshape(-1, 3)
         found.append(rays.look(origin, part, time_s=time_s[k], range_m=lidar.max_range_m))
     return RayHits(*map(np.concatenate, zip(*found, strict=True)))
-
-
-def _moved(motion: BaseMotion, time_s: Array) -> tuple[Array, Array, Array]:
-    """Return x, y and yaw (N,) after times (N,) with steady speed and yaw rate."""
-    poses = constant_turn_rate(
-        np.array([motion.pose.x_m, motion.pose.y_m, motion.pose.yaw_rad]),
-        speed_mps=motion.speed_mps,
-        yaw_rate_radps=motion.yaw_rate_radps,
-        time_s=time_s,
-    )
-    return poses[:, 0], poses[:, 1], poses[:, 2]

@@ -1,4 +1,4 @@
-"""How much light of a lidar comes back from what stands in a World."""
+"""How much of a lidar's light, and of a radar's waves, comes back from what is in a World."""
 
 from __future__ import annotations
 
@@ -26,6 +26,18 @@ OF_ROAD_USERS: dict[RoadUserKind, float] = {"pedestrian": 0.3, "bicycle": 0.3}
 _ROUGHNESS_RAD = math.radians(30.0)
 """Of all surfaces, chosen. With it pavement is seen to a quarter of the range of cars; a smooth one
 (0) would be seen to an eighth, and data sheets say two fifths (HDL-64E: 50 against 120 m)."""
+
+RCS_DBSM: dict[RoadUserKind, float] = {
+    "pedestrian": -5.0, "bicycle": 0.0, "motorcycle": 5.0, "car": 10.0, "unknown": 10.0,
+    "van": 13.0, "lorry": 20.0, "bus": 20.0, "tram": 20.0,
+}  # fmt: skip
+"""Mean radar cross sections at 77 GHz, over all sides: chosen within what is published (people some
+-10 to 0, cars 5 to 20, lorries above), from memory. 3GPP TR 22.837 takes a car for 10."""
+
+
+def rcs_m2_of(kind: RoadUserKind) -> float:
+    """Return the mean radar cross section of a road user."""
+    return float(10.0 ** (RCS_DBSM[kind] / 10.0))
 
 
 def reflectivity_of(kind: RoadUserKind) -> float:

@@ -9,6 +9,7 @@ from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.sensor_turns import SensorTurns, Turns, TurnsFile
 from foretwin.contracts.setup import SensorsSetup
@@ -21,6 +22,8 @@ from foretwin.sim_worker.world_file import load_world
 _DEPTH, _LIVE = 64, 32
 """States and real clouds of half a second: who falls behind longer has nothing to tell of them."""
 _IDLE_S = 0.2
+CHANNEL_OF = {PointCloud: "point_cloud", RadarList: "radar_list"}
+"""By what a turn gave."""
 
 log = logging.getLogger("sim_worker.sensors")
 
@@ -56,8 +59,8 @@ class SensorsProcess:
         while item is not None:
             self._handle(item)
             item = self.mailbox.take()
-        for cloud in self._sensors.measured():
-            self._bus.publish("point_cloud", cloud, run=self._run_id)
+        for one in self._sensors.measured():
+            self._bus.publish(CHANNEL_OF[type(one)], one, run=self._run_id)
 
     @property
     def turns(self) -> Turns:

@@ -17,6 +17,7 @@ from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.materials import (
     OTHER_REFLECTIVITY,
     REFLECTIVITY,
+    rcs_m2_of,
     reflectivity_of,
 )
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
@@ -36,6 +37,8 @@ class MovingBoxes(NamedTuple):
     size_m: Array
     speed_mps: Array
     reflectivity: Array
+    rcs_m2: Array
+    """Radar cross sections (B,)."""
 
 
 def boxes_of(frame: LocalFrame, users: Sequence[RoadUser]) -> MovingBoxes:
@@ -50,10 +53,11 @@ def boxes_of(frame: LocalFrame, users: Sequence[RoadUser]) -> MovingBoxes:
         size_m=np.array(sizes, dtype=np.float64).reshape(-1, 3),
         speed_mps=np.array([user.speed_mps for user in users]),
         reflectivity=np.array([reflectivity_of(user.kind) for user in users]),
+        rcs_m2=np.array([rcs_m2_of(user.kind) for user in users]),
     )
 
 
-NO_BODIES = MovingBoxes(*(np.zeros(shape) for shape in ((0, 2), 0, (0, 3), 0, 0)))
+NO_BODIES = MovingBoxes(*(np.zeros(shape) for shape in ((0, 2), 0, (0, 3), 0, 0, 0)))
 
 
 class RayHits(NamedTuple):

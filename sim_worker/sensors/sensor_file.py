@@ -2,65 +2,27 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal
+from typing import TypeVar
 
 import msgspec
 
-from foretwin.contracts.errors import MissingFileError
-from foretwin.contracts.numbers import Range
-from foretwin.contracts.point_cloud import MOST_RAYS, Mount
+from foretwin.contracts.errors import MissingFileError, UserError
+from foretwin.contracts.numbers import MAX_SEED, Range
+from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.toml_file import parse_toml, toml_text
+from foretwin.sim_worker.sensors.kinds import KINDS, Kind, Lidar, Radar, check_kind
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "vlp_16.toml"
-RANGES: Mapping[str, Range] = MappingProxyType(
-    {
-        "azimuths": Range(1, MOST_RAYS),
-        "rate_hz": Range(0.1, 100.0),
-        "min_range_m": Range(0.0, 2000.0),
-        "max_range_m": Range(0.1, 2000.0),
-        "seen_to_m": Range(0.1, 2000.0),
-        "seen_reflectivity": Range(0.001, 1.0),
-        "range_std_m": Range(0.0, 10.0),
-        "dropout": Range(0.0, 1.0),
-    }
-)
-"""What the numbers of a lidar may be."""
-
-
-class Lidar(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lidar that turns: its rings, its azimuths, how far and how well it measures."""
-
-    elevation_deg: tuple[float, ...]
-    """Of each ring above the sensor's own plane, from the lowest ring on."""
-    azimuths: int
-    """Firings of each ring in one turn."""
-    rate_hz: float = 10.0
-    """Turns in a second."""
-    turns: Literal["clockwise", "counter_clockwise"] = "clockwise"
-    """Seen from above; a turn begins to the rear."""
-    min_range_m: float = 0.5
-    """Nothing nearer is measured."""
-    max_range_m: float
-    """Nothing farther is measured, however bright."""
-    seen_to_m: float
-    """How far a surface of `seen_reflectivity`, struck squarely, is still seen; darker or more
-    slanting ones less far, by the square root."""
-    seen_reflectivity: float = 0.8
-    """Share of the light that that surface gives back."""
-    range_std_m: float
-    """Of ranges: one standard deviation of white noise."""
-    dropout: float = 0.0
-    """Share of firings that are lost, evenly at random."""
+RANGES = {"delay_s": Range(0.0, 10.0), "seed": Range(0, MAX_SEED)}
+"""What the numbers that all kinds share may be."""
+_K = TypeVar("_K", bound=Kind)
 
 
 class SensorFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The whole file."""
+    """The whole file: what all kinds share, and one table that says what is measured."""
 
     name: str
     """Of the sensor; what it measures is told under it."""
@@ -68,8 +30,35 @@ class SensorFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Where the numbers come from."""
     mount: Mount = Mount()
     """Where it sits."""
-    lidar: Lidar
-    """What it measures."""
+    delay_s: float = 0.0
+    """So long after it is over a turn is told; its stamp stays."""
+    seed: int = 0
+    """Added to the drive's: two sensors of one kind have noise of their own in any case."""
+    lidar: Lidar | None = None
+    """It is a lidar."""
+    radar: Radar | None = None
+    """It is a radar."""
+
+    @property
+    def kind(self) -> Kind:
+        """What it measures; raises ValueError where that is nothing, or more than one thing."""
+        told = [one for one in (self.lidar, self.radar) if one is not None]
+        if len(told) != 1:
+            raise ValueError(f"{len(told)} of {', '.join(KINDS)}: a sensor has one of these tables")
+        return told[0]
+
+    @property
+    def kind_name(self) -> str:
+        """The name of that table."""
+        return next(name for name, kind in KINDS.items() if isinstance(self.kind, kind))
+
+    def measures(self, kind: type[_K]) -> _K:
+        """Return what it measures; raises UserError where it is of another kind."""
+        found = self.kind
+        if not isinstance(found, kind):
+            wanted = next(name for name, one in KINDS.items() if one is kind)
+            raise UserError(f"sensor {self.name}: a {self.kind_name}, and a {wanted} is needed")
+        return found
 
 
 def bundled_sensors() -> tuple[str, ...]:
@@ -109,21 +98,13 @@ def sensor_of(text: str, name: str) -> SensorFile:
 
 def check_sensor(sensor: SensorFile) -> None:
     """Raise ValueError naming the first key that no sensor has so."""
-    lidar = sensor.lidar
-    for owner, table in (("mount", sensor.mount), ("lidar", lidar)):
+    kind = sensor.kind
+    for owner, table in (("", sensor), ("mount.", sensor.mount), (f"{sensor.kind_name}.", kind)):
         for key in table.__struct_fields__:
             value = getattr(table, key)
             if isinstance(value, float) and not math.isfinite(value):
-                raise ValueError(f"{owner}.{key} {value}: a finite number")
-    elevations = lidar.elevation_deg
-    if not elevations or not all(-90.0 < one < 90.0 for one in elevations):
-        raise ValueError("lidar.elevation_deg: one or more angles between -90 and 90")
-    if any(b <= a for a, b in itertools.pairwise(elevations)):
-        raise ValueError("lidar.elevation_deg: from the lowest ring to the highest")
-    if lidar.azimuths * len(elevations) > MOST_RAYS:
-        raise ValueError(f"lidar.azimuths {lidar.azimuths}: at most {MOST_RAYS} rays in a turn")
+                raise ValueError(f"{owner}{key} {value}: a finite number")
     for key, allowed in RANGES.items():
-        if not allowed.admits(getattr(lidar, key)):
-            raise ValueError(f"lidar.{key} {getattr(lidar, key):g}: {allowed}")
-    if lidar.min_range_m >= lidar.max_range_m:
-        raise ValueError(f"lidar.min_range_m {lidar.min_range_m:g}: below lidar.max_range_m")
+        if not allowed.admits(getattr(sensor, key)):
+            raise ValueError(f"{key} {getattr(sensor, key):g}: {allowed}")
+    check_kind(sensor.kind_name, kind)

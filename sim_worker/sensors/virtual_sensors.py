@@ -1,4 +1,4 @@
-"""Sensors of a car that drives: states and road users in, a cloud out each time a turn is over."""
+"""Sensors of a car that drives: states and road users in, what is measured out, turn by turn."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ import numpy as np
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_pose
 from foretwin.contracts.point_cloud import PointCloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.setup import SensorSees
 from foretwin.contracts.world import World
+from foretwin.sim_worker.sensors.base_motion import BaseMotion, moved
 from foretwin.sim_worker.sensors.cloud_merge import merge
-from foretwin.sim_worker.sensors.lidar import BaseMotion, LidarScan, moved, scan
+from foretwin.sim_worker.sensors.kinds import Lidar
+from foretwin.sim_worker.sensors.lidar import LidarScan, scan
+from foretwin.sim_worker.sensors.radar import detect
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld, boxes_of
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
@@ -41,17 +45,23 @@ class _Turn(NamedTuple):
     said: tuple[_LastWord, ...]
 
 
+Measured = PointCloud | RadarList
+"""What a turn gives: of a lidar, of a radar."""
+
+
 class VirtualSensors:
     """Measures turn after turn; a turn is told when it is over, with what was known as it began.
 
     Turns begin at whole periods of the car's clock, whenever the first state came: the same input
     and seed give the same clouds. Who is asked late measures the newest turn alone and counts the
-    others. A sensor that sees the World measures nothing while there is none.
+    others. A sensor that sees the World measures nothing while there is none. One with a delay is
+    asked for its turns so much later.
     """
 
     def __init__(self, sensors: Sequence[tuple[SensorFile, SensorSees]], *, seed: int = 0) -> None:
         self._sensors, self._seed = tuple(sensors), seed
         self._turns: dict[int, _Turn] = {}
+        self._over: dict[int, deque[_Turn]] = {}
         self._due: dict[int, _Turn] = {}
         self._real: dict[int, PointCloud] = {}
         self._said: dict[str, _LastWord] = {}
@@ -84,33 +94,37 @@ class VirtualSensors:
         }
         self._states.append(state)
         for place, (sensor, sees) in enumerate(self._sensors):
-            if sees == "real":
-                continue
-            period_ns = round(1e9 / sensor.lidar.rate_hz)
-            number = state.stamp_ns // period_ns
-            turn = self._turns.get(place)
-            if turn is not None and turn.number == number:
-                continue
-            self._turns[place] = _Turn(
-                number, number * period_ns, state, tuple(self._said.values())
-            )
-            if turn is None or not 0 < number - turn.number <= _LATE_TURNS:
-                self._due.pop(place, None)
-                continue
-            self.passed_over[sensor.name] += (place in self._due) + number - turn.number - 1
-            self._due[place] = turn
+            if sees != "real":
+                self._take_turn(place, sensor, state)
 
-    def measured(self) -> list[PointCloud]:
-        """Return the clouds that are due."""
+    def _take_turn(self, place: int, sensor: SensorFile, state: VehicleState) -> None:
+        """Begin a turn where it is time to, and see which of those before are to be told."""
+        period_ns = round(1e9 / sensor.kind.rate_hz)
+        number = state.stamp_ns // period_ns
+        turn, over = self._turns.get(place), self._over.setdefault(place, deque())
+        if turn is None or turn.number != number:
+            said = tuple(self._said.values())
+            self._turns[place] = _Turn(number, number * period_ns, state, said)
+            if turn is not None and 0 < number - turn.number <= _LATE_TURNS:
+                self.passed_over[sensor.name] += number - turn.number - 1
+                over.append(turn)
+            else:
+                self._due.pop(place, None)
+                over.clear()
+        told_ns = state.stamp_ns - period_ns - round(sensor.delay_s * 1e9)
+        while over and over[0].begun_ns <= told_ns:
+            self.passed_over[sensor.name] += place in self._due
+            self._due[place] = over.popleft()
+
+    def measured(self) -> list[Measured]:
+        """Return what is due."""
         real, self._real, due, self._due = self._real, {}, self._due, {}
-        found = [self._merged(place, cloud) for place, cloud in real.items()]
+        found: list[Measured] = [self._merged(place, cloud) for place, cloud in real.items()]
         for place, turn in due.items():
-            sensor, sees = self._sensors[place]
-            rays = self._rays if sees == "world" else self._no_world
+            rays = self._rays if self._sensors[place][1] == "world" else self._no_world
             if rays is not None and turn.state.yaw_valid:
-                points = self._scan(rays, place, turn).points
-                found.append(PointCloud(stamp_ns=turn.begun_ns, points=points, sensor=sensor.name))
-        self.told.update(cloud.sensor for cloud in found)
+                found.append(self._measure(rays, place, turn))
+        self.told.update(one.sensor for one in found)
         return found
 
     def take_real(self, cloud: PointCloud) -> None:
@@ -133,14 +147,30 @@ class VirtualSensors:
         virtual = self._scan(self._no_world, place, turn)
         return msgspec.structs.replace(cloud, points=merge(cloud.points, virtual))
 
+    def _measure(self, rays: RayWorld, place: int, turn: _Turn) -> Measured:
+        sensor = self._sensors[place][0]
+        if isinstance(sensor.kind, Lidar):
+            points = self._scan(rays, place, turn).points
+            return PointCloud(stamp_ns=turn.begun_ns, points=points, sensor=sensor.name)
+        motion, boxes, seed = self._begun(place, turn)
+        returns = detect(rays, sensor, motion, boxes, seed=seed).returns
+        return RadarList(
+            stamp_ns=turn.begun_ns, returns=returns, sensor=sensor.name, mount=sensor.mount
+        )
+
     def _scan(self, rays: RayWorld, place: int, turn: _Turn) -> LidarScan:
+        motion, boxes, seed = self._begun(place, turn)
+        return scan(rays, self._sensors[place][0], motion, boxes, seed=seed)
+
+    def _begun(self, place: int, turn: _Turn) -> tuple[BaseMotion, MovingBoxes, tuple[int, ...]]:
+        """Return how the car and all others were as a turn began, and the seed of its noise."""
         state = turn.state
         frame = LocalFrame(state.position) if self._world is None else self._world.frame
         pose = local_pose(frame, state.position, state.yaw_rad)
         motion = BaseMotion(pose, state.speed_mps, state.yaw_rate_radps)
         motion = moved(motion, (turn.begun_ns - state.stamp_ns) * 1e-9)
-        seed = (self._seed, place, abs(turn.begun_ns))
-        return scan(rays, self._sensors[place][0], motion, _boxes_at(frame, turn), seed=seed)
+        seed = self._seed + self._sensors[place][0].seed, place, abs(turn.begun_ns)
+        return motion, _boxes_at(frame, turn), seed
 
 
 def _boxes_at(frame: LocalFrame, turn: _Turn) -> MovingBoxes:

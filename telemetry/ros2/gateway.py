@@ -20,6 +20,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.lights import ShownLights
 from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.simulation import Event, MirrorSample
 from foretwin.contracts.towards_vehicle import Authority, OrderKeys, VehicleCommand
@@ -245,9 +246,8 @@ class Gateway:
                     self._send(self._out.rows(source), self.inwards.lights.payload)
             case drive.RoadUsers() as users:
                 self._objects(lambda: users)
-            case PointCloud() as cloud:
-                rows = self._out.rows("point_cloud", cloud.sensor)
-                self._send(rows, lambda row: self._cloud(cloud, row))
+            case PointCloud() | RadarList() as one:
+                self._send(self._out.rows_of(one), lambda row: self._measured(one, row))
             case Event() | gap.GapAlarm() | gap.Verdict() as finding:
                 self._diagnostics.take(finding)
 
@@ -275,11 +275,11 @@ class Gateway:
 
         self._send(self._out.rows("virtual_objects"), payload)
 
-    def _cloud(self, cloud: PointCloud, row: OutRow) -> bytes:
+    def _measured(self, one: PointCloud | RadarList, row: OutRow) -> bytes:
         if row.towards_vehicle:
-            within = self._virtual.at(cloud.stamp_ns, now_ns=self._mono_ns())
-            self.inwards.injected.note_cloud(cloud.stamp_ns, self._out.on_lot(within))
-        return self._out.cloud(cloud, row)
+            within = self._virtual.at(one.stamp_ns, now_ns=self._mono_ns())
+            self.inwards.injected.note_measured(one.stamp_ns, self._out.on_lot(within))
+        return self._out.measured(one, row)
 
     def _send_merged(self, real: drive.RoadUsers) -> None:
         """Send what the car says that it sees, at once, with what is virtual beside it."""

@@ -25,7 +25,7 @@ _MOST_CLOUDS = 64
 class _Shown(NamedTuple):
     stamp_ns: int
     user: RoadUser
-    in_cloud: bool
+    measured: bool
 
 
 class Injected:
@@ -36,9 +36,9 @@ class Injected:
         self._shown: dict[str, _Shown] = {}
         self._clouds: dict[int, None] = {}
 
-    def note_cloud(self, sent_stamp_ns: int, within: RoadUsers) -> None:
-        """Take a cloud that goes out, and who is in it."""
-        self.note(within, in_cloud=True)
+    def note_measured(self, sent_stamp_ns: int, within: RoadUsers) -> None:
+        """Take a cloud or a radar's list that goes out, and who is in it."""
+        self.note(within, measured=True)
         self._clouds[sent_stamp_ns] = None
         if len(self._clouds) > _MOST_CLOUDS:
             del self._clouds[next(iter(self._clouds))]
@@ -47,7 +47,7 @@ class Injected:
         """Whether a cloud comes back: stacks keep the stamp, whatever they do with the points."""
         return stamp_ns in self._clouds
 
-    def note(self, sent: RoadUsers, *, in_cloud: bool = False) -> None:
+    def note(self, sent: RoadUsers, *, measured: bool = False) -> None:
         """Take what goes out."""
         for user in sent.users:
             if not user.virtual:
@@ -56,8 +56,8 @@ class Injected:
                 uuid = bytes(uuid_from(user).uuid).hex()
                 self._uuids[user.user_id] = uuid
             before = self._shown.pop(uuid, None)
-            in_cloud = in_cloud or (before is not None and before.in_cloud)
-            self._shown[uuid] = _Shown(sent.stamp_ns, user, in_cloud)
+            measured = measured or (before is not None and before.measured)
+            self._shown[uuid] = _Shown(sent.stamp_ns, user, measured)
             if len(self._shown) > _MOST:
                 gone = self._shown.pop(next(iter(self._shown)))
                 self._uuids.pop(gone.user.user_id, None)
@@ -79,14 +79,14 @@ class Injected:
             return True
         numbered = user.user_id.isdecimal()
         return any(
-            (numbered and _is_same(user, one)) or (in_cloud and _is_within(user, one))
-            for one, in_cloud in self._around(stamp_ns)
+            (numbered and _is_same(user, one)) or (measured and _is_within(user, one))
+            for one, measured in self._around(stamp_ns)
         )
 
     def _around(self, stamp_ns: int) -> Iterator[tuple[RoadUser, bool]]:
-        for shown_ns, user, in_cloud in self._shown.values():
+        for shown_ns, user, measured in self._shown.values():
             if abs(stamp_ns - shown_ns) <= _REMEMBERED_NS:
-                yield moved(user, user.speed_mps * (stamp_ns - shown_ns) * 1e-9), in_cloud
+                yield moved(user, user.speed_mps * (stamp_ns - shown_ns) * 1e-9), measured
 
 
 def _is_within(seen: RoadUser, shown: RoadUser) -> bool:

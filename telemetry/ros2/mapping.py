@@ -26,6 +26,7 @@ from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect
 from foretwin.telemetry.ros2.rows import (
     INJECTS,
+    OF_SENSORS,
     SHOWS_LIGHTS,
     SHOWS_VIRTUAL,
     InRow,
@@ -136,7 +137,7 @@ class Mapping(
         return (
             *(("mirror",) if "twin" in sources or self.mirrored else ()),
             *(("virtual_objects", "virtual_traffic") if sources & set(INJECTS) else ()),
-            *(("point_cloud",) if "point_cloud" in sources else ()),
+            *(one for one in OF_SENSORS if one in sources),
             *(("lights",) if sources & set(SHOWS_LIGHTS) else ()),
             *(("event", "gap_alarm", "verdict") if "diagnostics" in sources else ()),
         )

@@ -10,6 +10,7 @@ from foretwin.contracts import drive
 from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud, mount_from_base_cloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.telemetry.anchored import Message, lot_from_world_message
@@ -22,6 +23,7 @@ from foretwin.telemetry.ros_messages.commands import ackermann_from_command, con
 from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import CERTAIN, FROM_USERS, joined
 from foretwin.telemetry.ros_messages.parts import ros_message
+from foretwin.telemetry.ros_messages.radars import radar_scan_from
 
 DRIVE_FRAME = "foretwin_drive"
 """The frame of what goes out where the mapping does not place `map`: the drive's own plane."""
@@ -62,7 +64,7 @@ class Outwards:
         """Of the World, where nothing says more."""
 
     def rows(self, source: Source, sensor: str = "") -> list[OutRow]:
-        """Return the rows that carry a source, of clouds those of one sensor."""
+        """Return the rows that carry a source, of what sensors measure those of one sensor."""
         return [row for row in self._rows if row.source == source and row.sensor == sensor]
 
     def warm_up(self) -> None:
@@ -108,8 +110,16 @@ class Outwards:
         ours = FROM_USERS[kind](self.on_lot(one.virtual), self._map, one.spread)
         return _cdr(joined(one.real.ros, ours, without=one.without), kind)
 
-    def cloud(self, message: PointCloud, row: OutRow) -> bytes:
-        """Return a PointCloud2; raises KeyError where it is not known where its sensor sits."""
+    def rows_of(self, one: PointCloud | RadarList) -> list[OutRow]:
+        """Return the rows that carry what a sensor has measured."""
+        source: Source = "point_cloud" if isinstance(one, PointCloud) else "radar_list"
+        return self.rows(source, one.sensor)
+
+    def measured(self, message: PointCloud | RadarList, row: OutRow) -> bytes:
+        """Return a PointCloud2 or a RadarScan; raises KeyError where it is not known where the
+        sensor of a cloud sits."""
+        if isinstance(message, RadarList):
+            return _cdr(radar_scan_from(self.on_lot(message), frame_id=row.frame), row.type)
         if row.frame:
             points = mount_from_base_cloud(message.points, self._mounts[row.sensor])
             message = msgspec.structs.replace(message, points=points)

@@ -17,8 +17,8 @@ from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 Source = Literal[
-    "state", "twin", "virtual_objects", "merged_objects", "point_cloud", "lights", "spat",
-    "diagnostics", "clock", "vehicle_command",
+    "state", "twin", "virtual_objects", "merged_objects", "point_cloud", "radar_list", "lights",
+    "spat", "diagnostics", "clock", "vehicle_command",
 ]  # fmt: skip
 _OBJECTS = (parts.PREDICTED_OBJECTS, parts.DETECTED_OBJECTS, parts.TRACKED_OBJECTS)
 _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
@@ -27,6 +27,7 @@ _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
     "virtual_objects": _OBJECTS,
     "merged_objects": _OBJECTS,
     "point_cloud": (parts.POINT_CLOUD2,),
+    "radar_list": (parts.RADAR_SCAN,),
     "lights": (parts.TRAFFIC_LIGHTS, parts.TRAFFIC_SIGNALS),
     "spat": (parts.STRING,),
     "diagnostics": (DIAGNOSTICS,),
@@ -34,7 +35,8 @@ _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
     "vehicle_command": (parts.CONTROL, parts.ACKERMANN),
 }
 SHOWS_VIRTUAL: tuple[Source, ...] = ("virtual_objects", "merged_objects")
-INJECTS: tuple[Source, ...] = (*SHOWS_VIRTUAL, "point_cloud")
+OF_SENSORS: tuple[Source, ...] = ("point_cloud", "radar_list")
+INJECTS: tuple[Source, ...] = (*SHOWS_VIRTUAL, *OF_SENSORS)
 REAL_CLOUD = "real_cloud"
 SHOWS_LIGHTS: tuple[Source, ...] = ("lights", "spat")
 CHANNEL_OF_OTHERS = {
@@ -114,9 +116,10 @@ class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     source: Source
     """What is told on it."""
     sensor: str = ""
-    """Of clouds: the name of the sensor among the drive's [[sensors]] whose they are."""
+    """Of clouds and radar lists: the sensor of that name among the drive's [[sensors]]."""
     frame: str = ""
-    """Of clouds: how the car's transforms call the sensor's own frame; empty: in base_link."""
+    """Of clouds and radar lists: how the car's transforms call the sensor's own frame; empty: in
+    base_link, where a radar list cannot be."""
     layout: Layout = "velodyne"
     """Of clouds: fields x y z intensity ring time (velodyne), or PointXYZIRCAEDT (autoware)."""
 
@@ -128,11 +131,17 @@ class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
                 f"type {self.type!r}: {self.source} goes out as "
                 f"{' or '.join(_TYPES_OF_SOURCE[self.source])}"
             )
-        of_clouds = self.source == "point_cloud"
-        if bool(self.sensor) != of_clouds:
-            raise ValueError(f"sensor {self.sensor!r}: of source 'point_cloud', and of it alone")
-        if not of_clouds and (self.frame or self.layout != "velodyne"):
-            raise ValueError("frame, layout: of source 'point_cloud' alone")
+        of_sensors = " or ".join(map(repr, OF_SENSORS))
+        if bool(self.sensor) != (self.source in OF_SENSORS):
+            raise ValueError(f"sensor {self.sensor!r}: of source {of_sensors}, and of these alone")
+        if self.frame and self.source not in OF_SENSORS:
+            raise ValueError(f"frame {self.frame!r}: of source {of_sensors} alone")
+        if self.layout != "velodyne" and self.source != "point_cloud":
+            raise ValueError(f"layout {self.layout!r}: of source 'point_cloud' alone")
+        if self.source == "radar_list" and not self.frame:
+            raise ValueError(
+                "frame '': a radar list is in the radar's own frame, which has to be named"
+            )
 
     @property
     def towards_vehicle(self) -> bool:

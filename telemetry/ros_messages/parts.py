@@ -41,13 +41,14 @@ TRACKED_OBJECTS = "autoware_perception_msgs/msg/TrackedObjects"
 TRAFFIC_LIGHTS = "autoware_perception_msgs/msg/TrafficLightGroupArray"
 TRAFFIC_SIGNALS = "autoware_auto_perception_msgs/msg/TrafficSignalArray"
 POINT_CLOUD2 = "sensor_msgs/msg/PointCloud2"
+RADAR_SCAN = "radar_msgs/msg/RadarScan"
 TF = "tf2_msgs/msg/TFMessage"
 CLOCK = "rosgraph_msgs/msg/Clock"
 
 
 @functools.cache
 def types_beside_ros() -> Typesdict:
-    """Return the types of `autoware.msg`: Ackermann's and Autoware's."""
+    """Return the types of `autoware.msg`: Ackermann's, Autoware's and those of radars."""
     text = Path(__file__).with_name("autoware.msg").read_text(encoding="utf-8")
     return get_types_from_msg(text, "ackermann_msgs/msg/AckermannDrive")
 

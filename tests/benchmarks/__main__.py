@@ -46,6 +46,7 @@ BENCHMARKS = (
     "ray_overhead",
     "help_startup",
     "lidar_turn",
+    "radar_turn",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""
 

@@ -10,7 +10,9 @@ import numpy as np
 
 import foretwin
 from foretwin.contracts.frames import LocalPose
-from foretwin.sim_worker.sensors.lidar import BaseMotion, scan
+from foretwin.sim_worker.sensors.base_motion import BaseMotion
+from foretwin.sim_worker.sensors.kinds import Lidar
+from foretwin.sim_worker.sensors.lidar import scan
 from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld
 from foretwin.sim_worker.sensors.sensor_file import load_sensor
 from tests.benchmarks.measuring import Measurement, UnavailableError, cpu_minimum_s
@@ -25,7 +27,9 @@ def measure() -> Measurement:
     if rays.parts < FEWEST_PARTS:
         raise AssertionError(f"the World has {rays.parts} parts")
     hdl = load_sensor("hdl_32e")
-    sensor = msgspec.structs.replace(hdl, lidar=msgspec.structs.replace(hdl.lidar, azimuths=1024))
+    sensor = msgspec.structs.replace(
+        hdl, lidar=msgspec.structs.replace(hdl.measures(Lidar), azimuths=1024)
+    )
     for name, speed_mps in (("standing", 0.0), ("driving", 14.0)):
         motion, among = BaseMotion(LocalPose(-20.0, -2.0, 0.1), speed_mps), cars(speed_mps)
         points = len(scan(rays, sensor, motion, among).points)
@@ -52,4 +56,6 @@ def cars(speed_mps: float) -> MovingBoxes:
     x = np.linspace(-60.0, 60.0, 10)
     xy = np.concatenate([np.column_stack([x, np.full(10, y)]) for y in (2.0, 6.0)])
     size = np.tile([4.5, 1.8, 1.5], (20, 1))
-    return MovingBoxes(xy, np.full(20, 0.1), size, np.full(20, speed_mps), np.full(20, 0.4))
+    return MovingBoxes(
+        xy, np.full(20, 0.1), size, np.full(20, speed_mps), np.full(20, 0.4), np.full(20, 10.0)
+    )

@@ -18,6 +18,7 @@ from foretwin.contracts.foreign_bus import Arrived, ForeignBus, ZenohForeignBus
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup, SensorSetup, SensorsSetup, write_setup
+from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.sensor_file import load_sensor, sensor_text
 from foretwin.telemetry.ros_messages.clouds import cloud_from
 from foretwin.telemetry.ros_messages.parts import POINT_CLOUD2, typestore
@@ -107,7 +108,7 @@ def _say_crowds(bus: ZenohBus, over: threading.Event) -> None:
 
 def _taken(car: ForeignBus, merged: Mailbox, *, clouds: int, within_s: float = 5.0) -> list[float]:
     """Say clouds of a wall all around, 60 m away, and return how many ms each took."""
-    lidar = load_sensor("vlp_16").lidar
+    lidar = load_sensor("vlp_16").measures(Lidar)
     column, ring = np.divmod(np.arange(lidar.azimuths * 16), 16)
     up = np.radians(np.array(lidar.elevation_deg))[ring]
     at = -2.0 * np.pi * column / lidar.azimuths

@@ -63,7 +63,7 @@ def test_how_often_each_is_said() -> None:
     assert by_rate == {
         100: {"imu"},
         50: {"speed", "steering", "control", "state", "other_vehicles", "vehicle_command"},
-        20: {"authority", "virtual_traffic", "surroundings"},
+        20: {"authority", "virtual_traffic", "surroundings", "radar_list"},
         10: {
             "gnss",
             "heading",

@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 import foretwin
 from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.ros_messages.parts import typestore
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +100,24 @@ def test_other_mistakes_are_told(
     ):
         with pytest.raises(foretwin.UserError, match=said):
             call()
+
+
+def test_a_radar_lists_who_is_ahead_and_its_lists_are_files_that_ros_reads(
+    world: foretwin.World, car: foretwin.VehicleState, tmp_path: Path
+) -> None:
+    car = msgspec.structs.replace(car, speed_mps=5.0)
+    found = foretwin.radar_list(world, car, ahead(world, car))
+    file = foretwin.save_radar_lists(tmp_path / "radar.mcap", [(1.5, found)])
+
+    # Its rear is 12 m before the rear axle, the radar 3.6 m.
+    assert found.returns[0, [0, 1, 3]] == pytest.approx([8.4, 0.0, -5.0], abs=0.8)
+    with Reader(file) as reader:
+        ((row, _, data),) = reader.messages()
+        scan = typestore().deserialize_cdr(data, row.msgtype)
+    assert (row.topic, row.msgtype) == ("/foretwin/radar", "radar_msgs/msg/RadarScan")
+    assert scan.header.frame_id == "long_range_radar"
+    assert scan.returns[0].range == found.returns[0, 0]
+    with pytest.raises(foretwin.UserError, match="vlp_16: a lidar, and a radar is needed"):
+        foretwin.radar_list(world, car, sensor="vlp_16")
+    with pytest.raises(foretwin.UserError, match="a radar, and a lidar is needed"):
+        foretwin.lidar_scan(world, car, sensor="long_range_radar")

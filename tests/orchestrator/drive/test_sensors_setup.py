@@ -16,7 +16,7 @@ from foretwin.orchestrator.drive.processes import PROCESSES, expected_ids, membe
 from foretwin.orchestrator.drive.sensors_setup import (
     SENSORS,
     TOLD_WORLDS,
-    check_clouds,
+    check_measured,
     mounts,
     read_sensor,
 )
@@ -81,10 +81,33 @@ def test_a_mapping_passes_clouds_of_one_sensor(
     text = TOPIC.format(way=way, kind=kind)
     ros2 = MappingFile("m.toml", text, parse_mapping(text, name="m.toml"))
     sensors = tuple(read_sensor(SensorConfig(file="vlp_16", sees=one)) for one in sees)
-    check_clouds(sensors, None)
+    check_measured(sensors, None)
     if right:
-        check_clouds(sensors, ros2)
+        check_measured(sensors, ros2)
         assert dict(mounts(sensors)) == {"vlp_16": load_sensor("vlp_16").mount}
         return
     with pytest.raises(MappingError, match=r"m.toml: topic /x/points: sensor 'vlp_16': . "):
-        check_clouds(sensors, ros2)
+        check_measured(sensors, ros2)
+
+
+def test_only_a_lidar_has_real_ones_to_be_put_into() -> None:
+    with pytest.raises(UserError, match=r"sees = \"real\": of a lidar, and this is a radar"):
+        read_sensor(SensorConfig(file="long_range_radar", sees="real"))
+
+
+def test_a_file_that_is_no_sensor_is_refused_before_the_drive(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "x"\nsource = "y"\n')
+    with pytest.raises(UserError, match="0 of lidar, radar"):
+        read_sensor(SensorConfig(file=str(file)))
+
+
+def test_a_mapping_passes_lists_of_radars_alone() -> None:
+    text = TOPIC.format(way="out", kind='source = "radar_list"\nframe = "f"')
+    text = text.replace("sensor_msgs/msg/PointCloud2", "radar_msgs/msg/RadarScan")
+    radar = read_sensor(SensorConfig(file="long_range_radar"))
+    ros2 = MappingFile("m.toml", text, parse_mapping(text, name="m.toml"))
+    with pytest.raises(MappingError, match=r"sensor 'vlp_16': 0 .* that are a radar.*long_range"):
+        check_measured((read_sensor(SensorConfig(file="vlp_16")), radar), ros2)
+    right = text.replace("vlp_16", "long_range_radar")
+    check_measured((radar,), MappingFile("m.toml", right, parse_mapping(right, name="m.toml")))

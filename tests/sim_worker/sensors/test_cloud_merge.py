@@ -8,8 +8,10 @@ import pytest
 
 from foretwin.contracts.arrays import Array32
 from foretwin.contracts.frames import LocalPose
+from foretwin.sim_worker.sensors.base_motion import BaseMotion
 from foretwin.sim_worker.sensors.cloud_merge import merge
-from foretwin.sim_worker.sensors.lidar import BaseMotion, LidarScan, scan
+from foretwin.sim_worker.sensors.kinds import Lidar
+from foretwin.sim_worker.sensors.lidar import LidarScan, scan
 from foretwin.sim_worker.sensors.ray_world import NO_BODIES, MovingBoxes, RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile, load_sensor
 from tests.sim_worker.places import box, crossroads
@@ -31,12 +33,14 @@ VISITORS = bodies(
 
 def vlp(**changes: object) -> SensorFile:
     vlp_16 = load_sensor("vlp_16")
-    return msgspec.structs.replace(vlp_16, lidar=msgspec.structs.replace(vlp_16.lidar, **changes))
+    return msgspec.structs.replace(
+        vlp_16, lidar=msgspec.structs.replace(vlp_16.measures(Lidar), **changes)
+    )
 
 
 def image(points: Array32, like: LidarScan) -> Array32:
     """Ranges (A, R) of a cloud by the ring and time of its points; NaN where there is none."""
-    lidar = like.sensor.lidar
+    lidar = like.sensor.measures(Lidar)
     found = np.full(like.range_m.shape, np.nan, dtype=np.float32)
     mount = like.sensor.mount
     column = np.round(points[:, 5] * lidar.azimuths * lidar.rate_hz).astype(int)

@@ -11,8 +11,9 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalPose
 from foretwin.contracts.point_cloud import Mount, base_from_mount, origin_m
+from foretwin.sim_worker.sensors.base_motion import BaseMotion
+from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.lidar import (
-    BaseMotion,
     LidarScan,
     at_begin,
     azimuths_rad,
@@ -21,7 +22,7 @@ from foretwin.sim_worker.sensors.lidar import (
 )
 from foretwin.sim_worker.sensors.materials import back_scatter, reflectivity_of
 from foretwin.sim_worker.sensors.ray_world import NO_BODIES, MovingBoxes, RayWorld
-from foretwin.sim_worker.sensors.sensor_file import Lidar, SensorFile, load_sensor
+from foretwin.sim_worker.sensors.sensor_file import SensorFile, load_sensor
 from tests.sim_worker.places import box, crossroads
 
 COVERS = ("foretwin.sim_worker.sensors.materials",)
@@ -44,7 +45,9 @@ def bodies(*rows: tuple[float, ...]) -> MovingBoxes:
     """Boxes of x, y, yaw, length, width, height, speed; all give back half of the light."""
     table = np.array(rows, dtype=np.float64).reshape(-1, 7)
     half = np.full(len(table), 0.5)
-    return MovingBoxes(table[:, :2], table[:, 2], table[:, 3:6], table[:, 6], half)
+    return MovingBoxes(
+        table[:, :2], table[:, 2], table[:, 3:6], table[:, 6], half, np.full(len(table), 10.0)
+    )
 
 
 def distances_to_boxes(origin: Array, ways: Array, boxes: MovingBoxes) -> Array:
@@ -91,7 +94,7 @@ def test_the_ground_lies_below() -> None:
 
 def test_in_100_drawn_scenes_the_nearest_body_hides_the_others() -> None:
     random, rays, sensor = np.random.default_rng(7), RayWorld(), exact(azimuths=240)
-    ways = base_from_rays(sensor.lidar, sensor.mount).reshape(-1, 3)
+    ways = base_from_rays(sensor.measures(Lidar), sensor.mount).reshape(-1, 3)
     hidden = 0
     for case in range(100):
         count = int(random.integers(2, 13))
@@ -127,7 +130,7 @@ def test_bodies_are_put_anew_at_each_look() -> None:
 
 
 def test_a_turn_begins_behind_and_goes_round_once() -> None:
-    clockwise, against = exact().lidar, exact(turns="counter_clockwise").lidar
+    clockwise, against = exact().measures(Lidar), exact(turns="counter_clockwise").measures(Lidar)
 
     assert np.degrees(azimuths_rad(clockwise)[[0, 90, 180]]) == pytest.approx([180, 90, 0])
     assert np.degrees(azimuths_rad(against)[[0, 90, 180]]) == pytest.approx([-180, -90, 0])

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
+from msgspec.structs import replace
 
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.codec import write_message
@@ -74,3 +76,20 @@ def test_it_leaves_when_the_run_ends(tmp_path: Path) -> None:
 
     assert life.over
     assert (tmp_path / "sensors.turns").exists()
+
+
+def test_what_a_radar_lists_goes_out_on_a_channel_of_its_own(tmp_path: Path) -> None:
+    bus, heard = MemoryBus(), Mailbox(16)
+    text, name = sensor_text("short_range_radar")
+    one = SensorSetup(text=text, name=name, sees="users")
+    process = SensorsProcess(replace(setup_in(tmp_path), sensors=(one,)), bus)
+    bus.subscribe("radar_list", heard, **RUN)
+    bus.publish("virtual_traffic", users(0, "ahead"), **RUN)
+    for stamp_ns in (0, 50_000_000):
+        bus.publish("state", state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ns), **CAR)
+        process.step(0.0)
+    (item,) = iter(heard.take, None)
+
+    assert item.message().sensor == "short_range_radar"
+    assert item.message().returns[0, 0] == pytest.approx(10.0 - 3.0 - 3.5, abs=0.4)
+    assert process.turns == {"short_range_radar": SensorTurns(told=1)}

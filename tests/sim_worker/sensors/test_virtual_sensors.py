@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import numpy as np
 import pytest
 
 from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.point_cloud import PointCloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.sim_worker.sensors.virtual_sensors import LIVES_NS, VirtualSensors
 from tests.sim_worker.places import box, crossroads, state_at
 from tests.sim_worker.sensors.test_lidar import exact
+from tests.sim_worker.sensors.test_radar import exact as radar
 from tests.sim_worker.sensors.test_ray_world import user
 
 MS = 1_000_000
@@ -19,7 +23,7 @@ TOWN = crossroads(buildings=(box(20.0, 0.0, 2.0, 30.0),))
 
 def driven(
     sensors: VirtualSensors, until_ms: int, *, from_ms: int = 0, every_ms: int = 20
-) -> list[PointCloud]:
+) -> list[Any]:
     """Stand at the origin, a state each 20 ms."""
     stamps = range(from_ms, until_ms + 1, every_ms)
     clouds = []
@@ -107,7 +111,7 @@ def test_without_a_heading_nothing_is_measured() -> None:
 
 
 def test_the_same_drive_and_seed_give_the_same_noise() -> None:
-    def clouds(seed: int) -> list[PointCloud]:
+    def clouds(seed: int) -> list[Any]:
         sensors = VirtualSensors([(exact(range_std_m=0.05), "world")], seed=seed)
         sensors.use_world(TOWN)
         return driven(sensors, 200)
@@ -166,3 +170,42 @@ def test_road_users_are_put_into_the_clouds_of_the_cars_own_sensor() -> None:
     late = PointCloud(stamp_ns=2000 * MS, points=wall, sensor="exact")
     sensors.take_real(late)
     assert sensors.measured() == [late], "as it came where it is not known where the car was"
+
+
+def test_a_radar_tells_a_list_when_its_turn_is_over() -> None:
+    """A van of 6 m whose middle is at 60 m and comes at 10 m/s; the list is of the beginning."""
+    sensors = VirtualSensors([(radar(), "world"), (radar(rate_hz=10.0), "users")])
+    sensors.use_world(TOWN)
+    sensors.take_users(users(0, "hidden", x=60.0, speed_mps=-10.0))
+    lists = driven(sensors, 100)
+
+    assert [(one.stamp_ns // MS, one.sensor) for one in lists] == [
+        (0, "exact"), (50, "exact"), (0, "exact")
+    ]  # fmt: skip
+    assert [len(one.returns) for one in lists if isinstance(one, RadarList)] == [0, 0, 1]
+    assert isinstance(lists[2], RadarList)
+    assert lists[2].returns[0, [0, 3]] == pytest.approx([57.0, -10.0])
+    assert lists[2].mount == radar().mount
+
+
+def test_a_delay_is_waited_for_and_moves_no_stamp() -> None:
+    late = VirtualSensors([(msgspec.structs.replace(radar(), delay_s=0.13), "users")])
+    heard = []
+    for stamp_ms in range(0, 401, 10):
+        late.take_state(state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ms * MS))
+        heard += [(stamp_ms, one.stamp_ns // MS) for one in late.measured()]
+
+    assert heard == [(begun + 50 + 130, begun) for begun in range(0, 201, 50)]
+    assert not late.passed_over.total()
+
+
+def test_a_sensors_own_seed_makes_other_noise() -> None:
+    def first(seed: int) -> bytes:
+        own = msgspec.structs.replace(radar(range_std_m=1.0), seed=seed)
+        sensors = VirtualSensors([(own, "users")])
+        sensors.take_users(users(0, "van"))
+        (one,) = driven(sensors, 60)
+        assert isinstance(one, RadarList)
+        return one.returns.tobytes()
+
+    assert first(3) == first(3) != first(4)
