@@ -23,8 +23,9 @@ from foretwin.sim_worker.sensors.base_motion import BaseMotion
 from foretwin.sim_worker.sensors.cloud_merge import merge
 from foretwin.sim_worker.sensors.kinds import Lidar, Radar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
+from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
 from foretwin.sim_worker.sensors.radar import RadarReturns, detect
-from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld, boxes_of
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import DEFAULT_FILE, SensorFile, load_sensor
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.telemetry.logs.write_mcap import create

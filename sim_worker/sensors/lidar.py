@@ -15,7 +15,8 @@ from foretwin.contracts.point_cloud import POINT_COLUMNS, Mount, base_from_mount
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, poses_after
 from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.materials import back_scatter
-from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayHits, RayWorld
+from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes
+from foretwin.sim_worker.sensors.ray_world import RayHits, RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
 _STEP_M = 0.02

@@ -1,4 +1,4 @@
-"""How much of a lidar's light, and of a radar's waves, comes back from what is in a World."""
+"""How what is in a World looks to a lidar's light, to a radar's waves and to a camera."""
 
 from __future__ import annotations
 
@@ -33,6 +33,14 @@ RCS_DBSM: dict[RoadUserKind, float] = {
 }  # fmt: skip
 """Mean radar cross sections at 77 GHz, over all sides: chosen within what is published (people some
 -10 to 0, cars 5 to 20, lorries above), from memory. 3GPP TR 22.837 takes a car for 10."""
+
+COLOURS: dict[RoadUserKind, tuple[float, float, float]] = {
+    "pedestrian": (0.75, 0.45, 0.15), "bicycle": (0.85, 0.65, 0.10),
+    "motorcycle": (0.55, 0.20, 0.55), "car": (0.15, 0.30, 0.65), "unknown": (0.5, 0.5, 0.5),
+    "van": (0.90, 0.90, 0.88), "lorry": (0.25, 0.50, 0.30), "bus": (0.85, 0.75, 0.20),
+    "tram": (0.70, 0.15, 0.15),
+}  # fmt: skip
+"""Of road users in pictures: chosen, one for each kind."""
 
 
 def rcs_m2_of(kind: RoadUserKind) -> float:

@@ -11,13 +11,15 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Array32, Flags, Indices
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, SensorMotion, sensor_motion
 from foretwin.sim_worker.sensors.kinds import Radar
-from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld
+from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
 _RAYS = 16
 """Evenly over the angle that a body takes; one more goes to its nearest point."""
-_INSIDE_M = 1e-3
-"""So far within a body its nearest point is aimed at: at an edge a ray may pass by."""
+_INSIDE_M = np.array([1.0e-3, 1.618e-3])
+"""So far within a body its nearest point is aimed at: a ray that meets an edge itself may pass by,
+as those at 45 degrees would were both alike."""
 _GHOST_DB, _CLUTTER_DBSM = -20.0, -10.0
 
 

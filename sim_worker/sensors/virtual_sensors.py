@@ -19,8 +19,9 @@ from foretwin.sim_worker.sensors.base_motion import BaseMotion, moved
 from foretwin.sim_worker.sensors.cloud_merge import merge
 from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
+from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
 from foretwin.sim_worker.sensors.radar import detect
-from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld, boxes_of
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
 LIVES_NS = 500_000_000

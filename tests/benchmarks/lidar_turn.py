@@ -13,7 +13,8 @@ from foretwin.contracts.frames import LocalPose
 from foretwin.sim_worker.sensors.base_motion import BaseMotion
 from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.lidar import scan
-from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld
+from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import load_sensor
 from tests.benchmarks.measuring import Measurement, UnavailableError, cpu_minimum_s
 
@@ -57,5 +58,11 @@ def cars(speed_mps: float) -> MovingBoxes:
     xy = np.concatenate([np.column_stack([x, np.full(10, y)]) for y in (2.0, 6.0)])
     size = np.tile([4.5, 1.8, 1.5], (20, 1))
     return MovingBoxes(
-        xy, np.full(20, 0.1), size, np.full(20, speed_mps), np.full(20, 0.4), np.full(20, 10.0)
+        xy,
+        np.full(20, 0.1),
+        size,
+        np.full(20, speed_mps),
+        np.full(20, 0.4),
+        np.full(20, 10.0),
+        np.full((20, 3), 0.5),
     )

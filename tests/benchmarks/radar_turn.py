@@ -6,8 +6,9 @@ import numpy as np
 
 from foretwin.contracts.frames import LocalPose
 from foretwin.sim_worker.sensors.base_motion import BaseMotion
+from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes
 from foretwin.sim_worker.sensors.radar import detect
-from foretwin.sim_worker.sensors.ray_world import MovingBoxes, RayWorld
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import load_sensor
 from tests.benchmarks.lidar_turn import cars, world
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s

@@ -12,7 +12,8 @@ from foretwin.sim_worker.sensors.base_motion import BaseMotion
 from foretwin.sim_worker.sensors.cloud_merge import merge
 from foretwin.sim_worker.sensors.kinds import Lidar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
-from foretwin.sim_worker.sensors.ray_world import NO_BODIES, MovingBoxes, RayWorld
+from foretwin.sim_worker.sensors.moving_boxes import NO_BODIES, MovingBoxes
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile, load_sensor
 from tests.sim_worker.places import box, crossroads
 from tests.sim_worker.sensors.test_lidar import HERE, bodies, exact

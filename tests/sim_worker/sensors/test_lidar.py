@@ -21,7 +21,8 @@ from foretwin.sim_worker.sensors.lidar import (
     scan,
 )
 from foretwin.sim_worker.sensors.materials import back_scatter, reflectivity_of
-from foretwin.sim_worker.sensors.ray_world import NO_BODIES, MovingBoxes, RayWorld
+from foretwin.sim_worker.sensors.moving_boxes import NO_BODIES, MovingBoxes
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile, load_sensor
 from tests.sim_worker.places import box, crossroads
 
@@ -46,7 +47,13 @@ def bodies(*rows: tuple[float, ...]) -> MovingBoxes:
     table = np.array(rows, dtype=np.float64).reshape(-1, 7)
     half = np.full(len(table), 0.5)
     return MovingBoxes(
-        table[:, :2], table[:, 2], table[:, 3:6], table[:, 6], half, np.full(len(table), 10.0)
+        table[:, :2],
+        table[:, 2],
+        table[:, 3:6],
+        table[:, 6],
+        half,
+        np.full(len(table), 10.0),
+        np.tile([1.0, 0.0, 0.0], (len(table), 1)),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 import shapely.affinity
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
@@ -18,8 +18,9 @@ from foretwin.contracts.point_cloud import Mount
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, moved, sensor_motion
 from foretwin.sim_worker.sensors.kinds import Radar
 from foretwin.sim_worker.sensors.materials import RCS_DBSM, rcs_m2_of
+from foretwin.sim_worker.sensors.moving_boxes import NO_BODIES, MovingBoxes
 from foretwin.sim_worker.sensors.radar import RadarReturns, detect, found_share
-from foretwin.sim_worker.sensors.ray_world import NO_BODIES, MovingBoxes, RayWorld
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile, load_sensor
 from tests.sim_worker.places import box, crossroads
 from tests.sim_worker.sensors.test_lidar import HERE, bodies
@@ -55,6 +56,7 @@ def test_a_car_ahead_is_as_far_as_its_rear_and_nears_as_fast_as_both_drive() -> 
     assert (found.body.tolist(), found.ghost.tolist()) == ([0], [False])
 
 
+@example(x=11.5, aside=11.5, speed=0.0, own=0.0)
 @given(
     x=st.floats(8.0, 60.0), aside=st.floats(2.5, 12.0), speed=st.floats(-25.0, 25.0),
     own=st.floats(0.0, 20.0),

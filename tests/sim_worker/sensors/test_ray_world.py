@@ -13,9 +13,12 @@ from foretwin.contracts.drive import RoadUser
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Area
-from foretwin.sim_worker.sensors.ray_world import NO_BODIES, RayWorld, boxes_of
+from foretwin.sim_worker.sensors.moving_boxes import NO_BODIES, boxes_of
+from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.world_gen.ground.islands import RING_ISLAND
 from tests.sim_worker.places import FRAME, box, crossroads
+
+COVERS = ("foretwin.sim_worker.sensors.moving_boxes",)
 
 
 def user(x: float, y: float, yaw: float, **changes: object) -> RoadUser:
