@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 
 from foretwin.contracts import (
+    camera_image,
     drive,
     fleet,
     gap,
@@ -169,6 +170,7 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     },
     (_RUN, WATCH, (Writer("worker", "sensors"),)): {
         "point_cloud": Channel(point_cloud.PointCloud, 10, "what virtual lidars measure"),
+        "camera_image": Channel(camera_image.CameraImage, 10, "what virtual cameras see"),
         "radar_list": Channel(radar_list.RadarList, 20, "what virtual radars measure"),
     },
     (_RUN, WATCH, _ORCHESTRATOR): {

@@ -49,13 +49,15 @@ if TYPE_CHECKING:
     )
     from foretwin.recordings import MotionArrays, Recording, open_run, open_sweep
     from foretwin.sensing import (
+        camera_view,
         lidar_scan,
         merge_clouds,
         radar_list,
         road_user,
         save_clouds,
+        save_pictures,
         save_radar_lists,
-    )  # fmt: skip
+    )
     from foretwin.sim_worker.gym import JunctionEnv as JunctionEnv
     from foretwin.sim_worker.gym import JunctionVectorEnv as JunctionVectorEnv
     from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView
@@ -81,11 +83,13 @@ _FROM = {
     "foretwin.plots": _PLOTS,
     "foretwin.recordings": ("MotionArrays", "Recording", "open_run", "open_sweep"),
     "foretwin.sensing": (
+        "camera_view",
         "lidar_scan",
         "merge_clouds",
         "radar_list",
         "road_user",
         "save_clouds",
+        "save_pictures",
         "save_radar_lists",
     ),
     "foretwin.sim_worker.gym": ("JunctionEnv", "JunctionVectorEnv"),
@@ -116,7 +120,7 @@ __all__ += [
 ]
 __all__ += ["plot_driven", "plot_futures", "plot_gap", "plot_junction", "plot_outcomes"]
 __all__ += ["lidar_scan", "merge_clouds", "read_world", "road_user", "run_futures", "save_clouds"]
-__all__ += ["radar_list", "save_radar_lists"]
+__all__ += ["camera_view", "radar_list", "save_pictures", "save_radar_lists"]
 __all__ += ["save_world", "state_on", "ways_through"]
 
 

@@ -20,6 +20,7 @@ from foretwin.contracts.point_cloud import POINT_COLUMNS, PointCloud
 from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion
+from foretwin.sim_worker.sensors.camera import CameraView, CameraWorld, message_of
 from foretwin.sim_worker.sensors.cloud_merge import merge
 from foretwin.sim_worker.sensors.kinds import Lidar, Radar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
@@ -27,6 +28,7 @@ from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
 from foretwin.sim_worker.sensors.radar import RadarReturns, detect
 from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import DEFAULT_FILE, SensorFile, load_sensor
+from foretwin.sim_worker.sensors.virtual_sensors import Measured
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.telemetry.logs.write_mcap import create
 
@@ -79,7 +81,7 @@ def lidar_scan(
     seed = whole_number("seed", seed, 0, MAX_SEED)
     around = _around(world, state, road_users, sensor, users_alone=users_alone)
     around.sensor.measures(Lidar)
-    return scan(around.rays, around.sensor, around.motion, around.boxes, seed=seed)
+    return scan(RayWorld(around.world), around.sensor, around.motion, around.boxes, seed=seed)
 
 
 def radar_list(
@@ -99,7 +101,28 @@ def radar_list(
     seed = whole_number("seed", seed, 0, MAX_SEED)
     around = _around(world, state, road_users, sensor, users_alone=users_alone)
     around.sensor.measures(Radar)
-    return detect(around.rays, around.sensor, around.motion, around.boxes, seed=seed)
+    return detect(RayWorld(around.world), around.sensor, around.motion, around.boxes, seed=seed)
+
+
+def camera_view(
+    world: World,
+    state: VehicleState,
+    road_users: Sequence[RoadUser] = (),
+    sensor: SensorFile | Path | str = "vga_camera",
+    *,
+    users_alone: bool = False,
+) -> CameraView:
+    """Return what a camera on a car sees at the instant of `state` and `road_users`.
+
+    Colours, distances and whom, pixel by pixel. `sensor` and `users_alone` are as for `lidar_scan`.
+    Raises UserError for what is no camera, and where there is no EGL to draw with.
+    """
+    around = _around(world, state, road_users, sensor, users_alone=users_alone)
+    drawn = CameraWorld(around.world, around.sensor)
+    try:
+        return drawn.view(around.motion, around.boxes)
+    finally:
+        drawn.close()
 
 
 def merge_clouds(real: Array | Array32, virtual: LidarScan) -> Array32:
@@ -147,10 +170,22 @@ def save_radar_lists(file: Path | str, lists: Sequence[tuple[float, RadarReturns
     return _saved(file, "radar_list", messages)
 
 
+def save_pictures(file: Path | str, views: Sequence[tuple[float, CameraView]]) -> Path:
+    """Write what cameras saw, each with its seconds, to an MCAP file.
+
+    As sensor_msgs/CompressedImage with CameraInfo. Raises UserError where it cannot be written.
+    """
+    messages = []
+    for time_s, one in views:
+        sensor = expect("a view", one, CameraView).sensor
+        messages.append(message_of(one.rgb, sensor, stamp_ns=_stamp_ns(time_s)))
+    return _saved(file, "camera_image", messages)
+
+
 class _Around(NamedTuple):
     """What a sensor is asked with."""
 
-    rays: RayWorld
+    world: World | None
     sensor: SensorFile
     motion: BaseMotion
     boxes: MovingBoxes
@@ -171,15 +206,15 @@ def _around(
     users = [expect("a road user", user, RoadUser) for user in road_users]
     pose = local_pose(world.frame, state.position.validate(), state.yaw_rad)
     motion = BaseMotion(pose, state.speed_mps, state.yaw_rate_radps)
-    rays = RayWorld(None if users_alone else world)
-    return _Around(rays, sensor, motion, boxes_of(world.frame, users))
+    boxes = boxes_of(world.frame, users)
+    return _Around(None if users_alone else world, sensor, motion, boxes)
 
 
 def _stamp_ns(time_s: float) -> int:
     return int(number("a time", time_s) * 1e9)
 
 
-def _saved(file: Path | str, channel: str, messages: Sequence[PointCloud | RadarList]) -> Path:
+def _saved(file: Path | str, channel: str, messages: Sequence[Measured]) -> Path:
     file = path_of("file", file)
     with files_told(file), create(file) as writer:
         for message in messages:

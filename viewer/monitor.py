@@ -15,6 +15,7 @@ from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
 from foretwin.viewer.legend import legend_rows
+from foretwin.viewer.log_camera_image import CameraImageLog
 from foretwin.viewer.log_drive import DriveLog
 from foretwin.viewer.log_lot import rows_of_injection
 from foretwin.viewer.log_point_cloud import PointCloudLog
@@ -85,6 +86,7 @@ class Monitor:
             "injection": rows_of_injection,
             "point_cloud": PointCloudLog().rows,
             "radar_list": rows_of_radar_list,
+            "camera_image": CameraImageLog().rows,
             "active_world": self._active_world,
             "world": self._world,
             "worker_status": self._run.worker,

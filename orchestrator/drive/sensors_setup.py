@@ -10,6 +10,7 @@ from foretwin.contracts.setup import SensorSetup, SensorsSetup
 from foretwin.orchestrator.drive.watcher_setups import WATCHERS
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.sensor_config import SensorConfig
+from foretwin.sim_worker.sensors.offscreen import check_drawing
 from foretwin.sim_worker.sensors.sensor_file import sensor_of, sensor_text
 from foretwin.telemetry.ros2.mapping import MappingError, MappingFile
 from foretwin.telemetry.ros2.rows import Source
@@ -21,11 +22,16 @@ TOLD_WORLDS = (*WATCHERS, SENSORS)
 
 
 def read_sensor(config: SensorConfig) -> SensorSetup:
-    """Return a sensor whose file was read and checked; raises UserError or MissingFileError."""
+    """Return a sensor whose file was read and checked; raises UserError or MissingFileError.
+
+    A camera is refused where nothing can be drawn.
+    """
     text, name = sensor_text(config.file)
     kind = sensor_of(text, name).kind_name
     if config.sees == "real" and kind != "lidar":
         raise UserError(f'{name}: sees = "real": of a lidar, and this is a {kind}')
+    if kind == "camera":
+        check_drawing()
     return SensorSetup(text=text, name=name, sees=config.sees)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal
@@ -77,9 +78,32 @@ class Radar(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """How many things that are not there a list holds in the mean: they stand anywhere in view."""
 
 
-Kind = Lidar | Radar
+class Camera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A camera: how large its pictures are and how much is in them; it looks along its own x axis,
+    by a pinhole without distortion."""
+
+    rate_hz: float
+    """Pictures in a second."""
+    width_px: int
+    """Of a picture."""
+    height_px: int
+    """Of a picture; pixels are square."""
+    field_of_view_deg: float
+    """Across, half of it to each side."""
+    jpeg_quality: int = 85
+    """Of what is told in a drive."""
+
+    @property
+    def focal_px(self) -> float:
+        """How far the picture is from the pinhole."""
+        return self.width_px / 2.0 / math.tan(math.radians(self.field_of_view_deg) / 2.0)
+
+
+Kind = Lidar | Radar | Camera
 """What a sensor measures."""
-KINDS: Mapping[str, type[Kind]] = MappingProxyType({"lidar": Lidar, "radar": Radar})
+KINDS: Mapping[str, type[Kind]] = MappingProxyType(
+    {"lidar": Lidar, "radar": Radar, "camera": Camera}
+)
 """By the name of their table."""
 RANGES: Mapping[type[Kind], Mapping[str, Range]] = MappingProxyType(
     {
@@ -109,6 +133,13 @@ RANGES: Mapping[type[Kind], Mapping[str, Range]] = MappingProxyType(
             "range_rate_std_mps": Range(0.0, 10.0),
             "ghosts": Range(0.0, 1.0),
             "clutter": Range(0.0, 1000.0),
+        },
+        Camera: {
+            "rate_hz": Range(0.1, 100.0),
+            "width_px": Range(16, 4096),
+            "height_px": Range(16, 4096),
+            "field_of_view_deg": Range(1.0, 170.0),
+            "jpeg_quality": Range(1, 95),
         },
     }
 )

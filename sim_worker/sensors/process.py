@@ -6,6 +6,7 @@ import logging
 from pathlib import Path
 
 from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.camera_image import CameraImage
 from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.process import ProcessLife, run_process
@@ -22,7 +23,11 @@ from foretwin.sim_worker.world_file import load_world
 _DEPTH, _LIVE = 64, 32
 """States and real clouds of half a second: who falls behind longer has nothing to tell of them."""
 _IDLE_S = 0.2
-CHANNEL_OF = {PointCloud: "point_cloud", RadarList: "radar_list"}
+CHANNEL_OF = {
+    PointCloud: "point_cloud",
+    RadarList: "radar_list",
+    CameraImage: "camera_image",
+}
 """By what a turn gave."""
 
 log = logging.getLogger("sim_worker.sensors")

@@ -12,7 +12,7 @@ from foretwin.contracts.errors import MissingFileError, UserError
 from foretwin.contracts.numbers import MAX_SEED, Range
 from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.toml_file import parse_toml, toml_text
-from foretwin.sim_worker.sensors.kinds import KINDS, Kind, Lidar, Radar, check_kind
+from foretwin.sim_worker.sensors.kinds import KINDS, Camera, Kind, Lidar, Radar, check_kind
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "vlp_16.toml"
@@ -38,11 +38,13 @@ class SensorFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """It is a lidar."""
     radar: Radar | None = None
     """It is a radar."""
+    camera: Camera | None = None
+    """It is a camera."""
 
     @property
     def kind(self) -> Kind:
         """What it measures; raises ValueError where that is nothing, or more than one thing."""
-        told = [one for one in (self.lidar, self.radar) if one is not None]
+        told = [one for one in (self.lidar, self.radar, self.camera) if one is not None]
         if len(told) != 1:
             raise ValueError(f"{len(told)} of {', '.join(KINDS)}: a sensor has one of these tables")
         return told[0]

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from foretwin.contracts.camera_image import CameraImage
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_pose
 from foretwin.contracts.point_cloud import PointCloud
@@ -16,8 +17,9 @@ from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.setup import SensorSees
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, moved
+from foretwin.sim_worker.sensors.camera import CameraWorld, message_of
 from foretwin.sim_worker.sensors.cloud_merge import merge
-from foretwin.sim_worker.sensors.kinds import Lidar
+from foretwin.sim_worker.sensors.kinds import Camera, Lidar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
 from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
 from foretwin.sim_worker.sensors.radar import detect
@@ -46,8 +48,8 @@ class _Turn(NamedTuple):
     said: tuple[_LastWord, ...]
 
 
-Measured = PointCloud | RadarList
-"""What a turn gives: of a lidar, of a radar."""
+Measured = PointCloud | RadarList | CameraImage
+"""What a turn gives: of a lidar, of a radar, of a camera."""
 
 
 class VirtualSensors:
@@ -70,6 +72,7 @@ class VirtualSensors:
         self._world: World | None = None
         self._rays: RayWorld | None = None
         self._no_world = RayWorld()
+        self._pictures: dict[int, CameraWorld] = {}
         self.passed_over: Counter[str] = Counter()
         """By sensor, turns of which nothing was told."""
         self.told: Counter[str] = Counter()
@@ -78,6 +81,12 @@ class VirtualSensors:
     def use_world(self, world: World | None) -> None:
         """Look into another World from now on, or into none."""
         self._world, self._rays = world, None if world is None else RayWorld(world)
+        self.close()
+
+    def close(self) -> None:
+        """Give back what cameras draw with; they draw on all the same."""
+        for place in list(self._pictures):
+            self._pictures.pop(place).close()
 
     def take_users(self, users: RoadUsers) -> None:
         """Keep the last word on each road user, whoever says it."""
@@ -154,10 +163,20 @@ class VirtualSensors:
             points = self._scan(rays, place, turn).points
             return PointCloud(stamp_ns=turn.begun_ns, points=points, sensor=sensor.name)
         motion, boxes, seed = self._begun(place, turn)
+        if isinstance(sensor.kind, Camera):
+            rgb = self._camera_world(place).picture(motion, boxes)
+            return message_of(rgb, sensor, stamp_ns=turn.begun_ns)
         returns = detect(rays, sensor, motion, boxes, seed=seed).returns
         return RadarList(
             stamp_ns=turn.begun_ns, returns=returns, sensor=sensor.name, mount=sensor.mount
         )
+
+    def _camera_world(self, place: int) -> CameraWorld:
+        """Made where pictures are drawn, and so in their thread."""
+        if place not in self._pictures:
+            sensor, sees = self._sensors[place]
+            self._pictures[place] = CameraWorld(self._world if sees == "world" else None, sensor)
+        return self._pictures[place]
 
     def _scan(self, rays: RayWorld, place: int, turn: _Turn) -> LidarScan:
         motion, boxes, seed = self._begun(place, turn)

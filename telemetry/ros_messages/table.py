@@ -14,7 +14,8 @@
 Views for other programs, not read back since they hold less (32-bit numbers, fewer fields):
 /foretwin/steering_report (autoware_vehicle_msgs/SteeringReport), /foretwin/control
 (ackermann_msgs/AckermannDriveStamped), /foretwin/state (nav_msgs/Odometry, local frame),
-/foretwin/points (sensor_msgs/PointCloud2), /foretwin/radar (radar_msgs/RadarScan).
+/foretwin/points (sensor_msgs/PointCloud2), /foretwin/radar (radar_msgs/RadarScan),
+/foretwin/camera/compressed (sensor_msgs/CompressedImage) and /foretwin/camera/camera_info.
 """
 
 from __future__ import annotations
@@ -26,7 +27,15 @@ import msgspec
 
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS
-from foretwin.telemetry.ros_messages import clouds, commands, motion, parts, radars, sensors
+from foretwin.telemetry.ros_messages import (
+    clouds,
+    commands,
+    motion,
+    parts,
+    pictures,
+    radars,
+    sensors,
+)
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, Messages, stamp_of
 from foretwin.telemetry.ros_messages.parts import STRING, json_string, typestore
 
@@ -88,6 +97,10 @@ _TOPICS: dict[str, tuple[_Topic, ...]] = {
     ),
     "injection": (_Topic("injection", STRING, json_string),),  # of that drive: never said again
     "point_cloud": (_Topic("points", parts.POINT_CLOUD2, clouds.cloud_from),),
+    "camera_image": (
+        _Topic("camera/compressed", pictures.COMPRESSED_IMAGE, pictures.compressed_image_from),
+        _Topic("camera/camera_info", pictures.CAMERA_INFO, pictures.camera_info_from),
+    ),
     "radar_list": (_Topic("radar", parts.RADAR_SCAN, radars.radar_scan_from),),
 }
 """What stands in a file by channel: a channel without a row of its own as JSON alone."""

@@ -47,6 +47,7 @@ BENCHMARKS = (
     "help_startup",
     "lidar_turn",
     "radar_turn",
+    "camera_turn",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""
 

@@ -74,6 +74,7 @@ def test_how_often_each_is_said() -> None:
             "virtual_objects",
             "lights",
             "point_cloud",
+            "camera_image",
             "real_cloud",
         },
         8: {"comparison"},

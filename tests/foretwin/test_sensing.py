@@ -121,3 +121,22 @@ def test_a_radar_lists_who_is_ahead_and_its_lists_are_files_that_ros_reads(
         foretwin.radar_list(world, car, sensor="vlp_16")
     with pytest.raises(foretwin.UserError, match="a radar, and a lidar is needed"):
         foretwin.lidar_scan(world, car, sensor="long_range_radar")
+
+
+def test_a_camera_sees_who_is_ahead_and_its_pictures_are_files_that_ros_reads(
+    world: foretwin.World, car: foretwin.VehicleState, tmp_path: Path
+) -> None:
+    try:
+        view = foretwin.camera_view(world, car, ahead(world, car))
+    except foretwin.UserError as why:
+        pytest.skip(str(why))
+    file = foretwin.save_pictures(tmp_path / "camera.mcap", [(1.5, view)])
+
+    assert view.rgb.shape == (480, 640, 3)
+    assert view.depth_m[view.body == 0].min() == pytest.approx(12.0 - 1.7, abs=0.3)
+    with Reader(file) as reader:
+        assert [row.msgtype for row, _, _ in reader.messages()] == [
+            "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
+        ]  # fmt: skip
+    with pytest.raises(foretwin.UserError, match="a lidar, and a camera is needed"):
+        foretwin.camera_view(world, car, sensor="vlp_16")

@@ -98,7 +98,7 @@ def test_only_a_lidar_has_real_ones_to_be_put_into() -> None:
 def test_a_file_that_is_no_sensor_is_refused_before_the_drive(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text('name = "x"\nsource = "y"\n')
-    with pytest.raises(UserError, match="0 of lidar, radar"):
+    with pytest.raises(UserError, match="0 of lidar, radar, camera"):
         read_sensor(SensorConfig(file=str(file)))
 
 
@@ -111,3 +111,12 @@ def test_a_mapping_passes_lists_of_radars_alone() -> None:
         check_measured((read_sensor(SensorConfig(file="vlp_16")), radar), ros2)
     right = text.replace("vlp_16", "long_range_radar")
     check_measured((radar,), MappingFile("m.toml", right, parse_mapping(right, name="m.toml")))
+
+
+def test_a_camera_where_nothing_can_be_drawn_ends_before_the_drive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")
+    with pytest.raises(UserError, match="cameras need EGL") as raised:
+        read_sensor(SensorConfig(file="vga_camera"))
+    assert "\n" not in str(raised.value)

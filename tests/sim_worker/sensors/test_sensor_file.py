@@ -42,7 +42,7 @@ def test_a_bundled_sensor_is_what_its_data_sheet_says(
 
 def test_the_bundled_ones_are_known_by_name() -> None:
     lidars, radars = ("hdl_32e", "os1_64", "vlp_16", "vlp_32c"), ("long_range_radar",)
-    assert set(bundled_sensors()) == {*lidars, *radars, "short_range_radar"}
+    assert set(bundled_sensors()) == {*lidars, *radars, "short_range_radar", "vga_camera"}
     assert list(bundled_sensors()) == sorted(bundled_sensors())
     assert load_sensor(DEFAULT_FILE) == load_sensor("vlp_16")
 
@@ -77,10 +77,7 @@ def test_what_is_wrong_is_told_with_its_line(old: str, new: str, said: str) -> N
 
 
 def test_a_missing_file_is_told_with_the_names_that_there_are(tmp_path: Path) -> None:
-    with pytest.raises(
-        MissingFileError,
-        match=r"nowhere.*hdl_32e, long_range_radar, os1_64, short_range_radar, vlp_16, vlp_32c",
-    ):
+    with pytest.raises(MissingFileError, match=r"nowhere.*" + ", ".join(bundled_sensors())):
         load_sensor(tmp_path / "nowhere.toml")
 
 
@@ -117,7 +114,7 @@ def test_a_sensor_is_of_one_kind() -> None:
         (radar + lidar[lidar.index("[lidar]") :], 2),
         (radar[: radar.index("[radar]")], 0),
     ):
-        with pytest.raises(UserError, match=f"mine.toml.*{count} of lidar, radar"):
+        with pytest.raises(UserError, match=f"mine.toml.*{count} of lidar, radar, camera"):
             sensor_of(text, "mine.toml")
     with pytest.raises(UserError, match="vlp_16: a lidar, and a radar is needed"):
         load_sensor("vlp_16").measures(Radar)
