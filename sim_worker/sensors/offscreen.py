@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.terminal import say
 
 _NEEDED = "cameras need EGL: a GPU's driver, or Mesa (on Debian: libegl1 libgl1-mesa-dri)"
 _WITHIN_S = 60.0
@@ -48,7 +49,7 @@ def main() -> int:
     try:
         drawing_context(16, 16).free()
     except UserError as error:
-        print(error)
+        say(str(error))
         return 2
     return 0
 
