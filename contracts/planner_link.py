@@ -14,6 +14,8 @@ from foretwin.contracts.arrays import Array
 LINK_VERSION = 2
 """Of these messages: raised where one of them means something else. 1 told neither its version nor
 who the road users are, and knew no reset."""
+MOST_TOOK_S = 10.0
+"""A stack that says that it takes longer for an answer drives no car."""
 
 
 class PlannerScene(msgspec.Struct, frozen=True, kw_only=True):

@@ -96,10 +96,19 @@ def test_no_file_holds_a_machine_path_or_an_index_address() -> None:
     assert found == []
 
 
-def test_the_command_line_starts_without_heavy_libraries() -> None:
-    code = "import sys, foretwin.__main__; print(*sys.modules)"
+def loaded_by(module: str) -> set[str]:
+    """Return what is loaded once a module is."""
+    code = f"import sys, {module}; print(*sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
+    return set(run.stdout.split())
 
-    assert set(run.stdout.split()) & set(HEAVY) == set()
+
+def test_the_command_line_starts_without_heavy_libraries() -> None:
+    assert loaded_by("foretwin.__main__") & set(HEAVY) == set()
+
+
+def test_who_holds_a_sweep_loads_nothing_that_only_its_workers_need() -> None:
+    loaded = loaded_by("foretwin.orchestrator.commands.sweep")
+    assert loaded & {"numba", "mujoco", "scipy.stats", "rerun", "matplotlib"} == set()

@@ -12,9 +12,8 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import PlannerTiming
 from foretwin.contracts.guard import is_identifier
 from foretwin.contracts.owned_folder import temporary_folder
-from foretwin.contracts.planner_link import PlannerJoined
+from foretwin.contracts.planner_link import MOST_TOOK_S, PlannerJoined
 from foretwin.contracts.setup import StackSetup
-from foretwin.sim_worker.planners.answered_motions import MOST_TOOK_S
 from foretwin.sim_worker.planners.registry import planner_names
 from foretwin.sim_worker.planners.stack_processes import StackProcesses
 

@@ -11,9 +11,10 @@ from foretwin.contracts.futures import Job
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.futures.closed_loop import DriveRecord
 from foretwin.sim_worker.futures.scene import JobScene, SceneMaker
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.route_rules import RouteRules
-from foretwin.sim_worker.metrics.table import METRICS, evaluate
+from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 

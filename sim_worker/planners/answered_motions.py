@@ -8,12 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Flags, Indices
-from foretwin.contracts.planner_link import PlannedMotions, other_link
+from foretwin.contracts.planner_link import MOST_TOOK_S, PlannedMotions, other_link
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
 
-MOST_TOOK_S = 10.0
-"""A stack that says that it takes longer for an answer drives no car."""
 _TICK_S = 1e-6
 """Ticks come a hair before or after their instants."""
 

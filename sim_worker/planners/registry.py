@@ -11,19 +11,15 @@ import functools
 import importlib.metadata
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
-from foretwin.sim_worker.planner_interface import Planner
-from foretwin.sim_worker.planners.as_planned import AsPlanned
-from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
-from foretwin.sim_worker.planners.frenet_lattice import FrenetLattice
-from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance
-from foretwin.sim_worker.planners.hosted import HostedPlanner
 from foretwin.sim_worker.planners.origin import PlannerOrigin, files_digest, origin_of
-from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from foretwin.sim_worker.planners.remote import RemotePlanner
-from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
+
+if TYPE_CHECKING:
+    from foretwin.sim_worker.planner_interface import Planner
+    from foretwin.sim_worker.planners.hosted import HostedPlanner
 
 GROUP = "foretwin.planners"
 REMOTE, AS_PLANNED = "remote", "as_planned"
@@ -33,28 +29,38 @@ _IN_DRIVES = {
 }
 """Planners that need a drive, and what for."""
 
-_BUILT_IN: dict[str, type[Planner]] = {
-    "pure_pursuit_idm": PurePursuitIdm,
-    "constant_speed": ConstantSpeed,
-    "gap_acceptance": GapAcceptance,
-    "frenet_lattice": FrenetLattice,
-    AS_PLANNED: AsPlanned,
-    "reverse_pursuit": ReversePursuit,
-    REMOTE: RemotePlanner,
+_OWN: dict[str, bool] = {
+    "pure_pursuit_idm": False,
+    "constant_speed": False,
+    "gap_acceptance": False,
+    "frenet_lattice": False,
+    AS_PLANNED: False,
+    "reverse_pursuit": True,
+    REMOTE: False,
 }
+"""Those of foretwin, and whether cars are driven in reverse. Their classes stand in `built_in.py`:
+who only asks for names, as the command of a sweep does, loads nothing that plans."""
 
 
 def planner_names() -> tuple[str, ...]:
     """Return all known names, the built-in ones first."""
     offered = {point.name for point in entry_points(group=GROUP)}
-    return (*_BUILT_IN, *sorted(offered - _BUILT_IN.keys()))
+    return (*_OWN, *sorted(offered - _OWN.keys()))
 
 
 @functools.cache
 def load_planner(name: str) -> Planner:
     """Return the planner of that name; raises UserError naming the known ones."""
-    if name in _BUILT_IN:
-        return _BUILT_IN[name]()
+    if name in _OWN:
+        from foretwin.sim_worker.planners.built_in import BUILT_IN
+
+        return BUILT_IN[name]()
+    return _hosted(name)
+
+
+def _hosted(name: str) -> HostedPlanner:
+    from foretwin.sim_worker.planners.hosted import HostedPlanner
+
     return HostedPlanner(name, _entry_point(name).value)
 
 
@@ -72,19 +78,18 @@ def check_planner(name: str, *, in_drive: bool = True) -> None:
     """
     if not in_drive and name in _IN_DRIVES:
         raise UserError(f"planner {name} {_IN_DRIVES[name]}; there is none here")
-    planner = load_planner.__wrapped__(name)
-    if isinstance(planner, HostedPlanner):
-        planner.close()
+    if name not in _OWN:
+        _hosted(name).close()
 
 
 def in_another_process(name: str) -> bool:
     """Return whether a planner answers from a process that is not foretwin's own."""
-    return name == REMOTE or name not in _BUILT_IN
+    return name == REMOTE or name not in _OWN
 
 
 def planner_origin(name: str) -> PlannerOrigin:
     """Return what a planner is made of; raises UserError naming the known ones."""
-    if name in _BUILT_IN:
+    if name in _OWN:
         # Those of foretwin share most of their modules: a change of one counts for all.
         version = importlib.metadata.version("foretwin")
         return PlannerOrigin("foretwin", version, files_digest([Path(__file__).parent]))
@@ -93,4 +98,4 @@ def planner_origin(name: str) -> PlannerOrigin:
 
 def drives_backwards(name: str) -> bool:
     """Return whether a planner has its cars driven in reverse: of foretwin's own, some do."""
-    return bool(getattr(_BUILT_IN.get(name), "drives_backwards", False))
+    return _OWN.get(name, False)

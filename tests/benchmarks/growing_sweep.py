@@ -11,6 +11,7 @@ import argparse
 import json
 import math
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
@@ -33,7 +34,6 @@ from foretwin.orchestrator.sweep.jobs import JobMaker
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
-from tests.orchestrator.sweeps import small_sweep
 
 ROOT = Path(__file__).parents[2]
 TOLD = 20
@@ -97,7 +97,15 @@ def spec_of(cells: int, folder: Path) -> Path:
         [round(low + 0.2 * n / side, 7) for n in range(side)] for low in (0.7, 0.8)
     )
     folder.mkdir(parents=True, exist_ok=True)
-    return small_sweep(folder, SPEC.format(frictions=frictions, speeds=speeds))
+    # In a process of its own: what draws the World is no part of the command.
+    spec = SPEC.format(frictions=frictions, speeds=speeds)
+    drawing = "import sys, pathlib; from tests.orchestrator.sweeps import small_sweep; "
+    drawing += "print(small_sweep(pathlib.Path(sys.argv[1]), sys.stdin.read()))"
+    drawn = subprocess.run(
+        [sys.executable, "-c", drawing, str(folder.resolve())],
+        cwd=ROOT, input=spec, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return Path(drawn.stdout.strip())
 
 
 def measured(cells: int, folder: Path, *, workers: int) -> dict[str, float | str]:

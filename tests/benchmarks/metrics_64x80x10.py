@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
-from foretwin.sim_worker.metrics.table import METRICS, evaluate
+from foretwin.sim_worker.metrics.table import METRICS
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
 from tests.sim_worker.metrics.junction import context
 from tests.sim_worker.metrics.motions import (

@@ -26,6 +26,7 @@ from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled as compiled_pursuit
 from foretwin.sim_worker.planners import pure_pursuit_idm as idm
 from foretwin.sim_worker.planners import registry
+from foretwin.sim_worker.planners.built_in import BUILT_IN
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.tracking import pure_pursuit, turning_speed
 from foretwin.sim_worker.road_users import compiled as compiled_leads
@@ -101,7 +102,8 @@ def test_a_job_adds_no_signature_whatever_its_planners_answer(
 ) -> None:
     kinds = ("float64", "float32", "int64", "strided", "pure_pursuit_idm", "constant_speed")
     for kind in kinds[:4]:
-        monkeypatch.setitem(registry._BUILT_IN, kind, lambda kind=kind: _Dressed(kind))
+        monkeypatch.setitem(registry._OWN, kind, False)
+        monkeypatch.setitem(BUILT_IN, kind, lambda kind=kind: _Dressed(kind))
     load_planner.cache_clear()
     stage, before = BatchSimulation(crossroads(), CAR, nsim=8), signatures()
     faulty = {"position_offset_m": 0.1, "friction_factor": 0.8, "brake_gain": 0.9}

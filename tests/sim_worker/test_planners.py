@@ -8,6 +8,7 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import registry
+from foretwin.sim_worker.planners.built_in import BUILT_IN
 from foretwin.sim_worker.planners.registry import load_planner, planner_names
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, happening, job, state_at, turning_path
@@ -16,6 +17,7 @@ COVERS = (
     "foretwin.sim_worker.planner_interface",
     "foretwin.sim_worker.planners.constant_speed",
     "foretwin.sim_worker.planners.pure_pursuit_idm",
+    "foretwin.sim_worker.planners.built_in",
     "foretwin.sim_worker.planners.registry",
 )
 
@@ -45,12 +47,18 @@ class _Scalar:
         return PlannerOutput(np.zeros(1), np.zeros(1))
 
 
+def test_the_registry_names_the_classes_there_are_and_which_of_them_drive_backwards() -> None:
+    backwards = {name: getattr(kind, "drives_backwards", False) for name, kind in BUILT_IN.items()}
+    assert backwards == registry._OWN
+
+
 @pytest.fixture
 def offered(monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
     """Planners in this process; tests/sim_worker/planners/test_hosted.py has those of packages."""
 
     def offer(kind: object) -> None:
-        monkeypatch.setitem(registry._BUILT_IN, "theirs", kind)
+        monkeypatch.setitem(registry._OWN, "theirs", False)
+        monkeypatch.setitem(BUILT_IN, "theirs", kind)
         load_planner.cache_clear()
 
     yield offer

@@ -15,10 +15,10 @@ from foretwin.sim_worker.analysis.agreement.judgement import Judgement, VerdictW
 from foretwin.sim_worker.analysis.agreement.stop_lines import at_lights, at_signs
 from foretwin.sim_worker.analysis.agreement.window import Users, Window
 from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.impact import minimum_clearance
 from foretwin.sim_worker.metrics.progress import on_road
 from foretwin.sim_worker.metrics.rollout import Context, Rollout, RolloutView
 from foretwin.sim_worker.metrics.route_rules import RouteRules
-from foretwin.sim_worker.metrics.table import METRICS
 
 CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2
@@ -80,7 +80,7 @@ class CriteriaEvaluator:
         valid = np.ones(count, dtype=bool)
         rollout = Rollout(self._window.time_s, states, poses, speeds, sizes, valid, self._vehicle)
         view = RolloutView(rollout, Context(ground=self._doubt.drawn))
-        near = METRICS["min_clearance"].compute(view).values < LEAST_CLEARANCE_M
+        near = minimum_clearance(view).values < LEAST_CLEARANCE_M
         drawn = on_road(view).values > 0.5
         off = np.zeros(count, dtype=bool)
         if not drawn.all():

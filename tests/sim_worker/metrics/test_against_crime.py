@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import VEHICLE, Mover, rollout, times
 from tests.world_gen.export.judges import judges_python
 

@@ -16,8 +16,8 @@ from foretwin.sim_worker.metrics.displacement import (
     displacements,
     relative_pose_error,
 )
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.rollout import Context
-from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import Mover, rollout, steady_poses, times
 
 FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/evo.json").read_text())

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from foretwin.sim_worker.metrics.comfort import EgoMotion, motion
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.extended_score import extended_score
 from foretwin.sim_worker.metrics.lane_areas import LaneAreas
 from foretwin.sim_worker.metrics.rollout import RolloutView
-from foretwin.sim_worker.metrics.table import evaluate
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from tests.sim_worker.metrics.motions import VEHICLE
 from tests.sim_worker.metrics.scored_scenes import ALL_KEPT, JUNCTION, SCENES, Scored, scored, world

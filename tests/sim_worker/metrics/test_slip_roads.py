@@ -7,10 +7,10 @@ import functools
 import numpy as np
 
 from foretwin.contracts.world import Connection, World
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Context
 from foretwin.sim_worker.metrics.route_rules import RouteRules
-from foretwin.sim_worker.metrics.table import evaluate
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules
 from tests.sim_worker.metrics.motions import Mover, rollout, times
 from tests.sim_worker.road_users.crossroads import path_of

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.metrics.encroachment import STOPPING_DECEL_MPS2
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
 COVERS = (

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.sim_worker.driver_model import MAX_DECEL_MPS2
-from foretwin.sim_worker.metrics.table import evaluate
+from foretwin.sim_worker.metrics.evaluation import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, WIDTH_M, Mover, rollout, times
 
 OWN_REACH_M = math.hypot(LENGTH_M, WIDTH_M) / 2.0
