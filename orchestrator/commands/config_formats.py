@@ -147,7 +147,7 @@ KINDS: Mapping[str, FileKind] = {
     "anchor": FileKind(
         "which place of the World a car's lot is, for --anchor",
         AnchorFile,
-        read_anchor,
+        lambda path: read_anchor(path, first_pose=True),
         told_in="foretwin.contracts.anchor_file",
     ),
     "layout": FileKind(

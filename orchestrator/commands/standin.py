@@ -74,9 +74,9 @@ def path_on_lot(anchor: AnchorFile, asked: LotDrive, *, driver: DriverParameters
         line = AnchorLine(lat_deg, lon_deg, np.zeros(len(lat_deg)))
         lat_deg, lon_deg, _ = anchor.anchor.lot_from_world_line(line)
     else:
-        yaw_rad = anchor.lot.yaw_rad
-        ends_m = np.outer([0.0, asked.way_m], [math.cos(yaw_rad), math.sin(yaw_rad)])
-        lat_deg, lon_deg = geo_from_local(anchor.lot.frame, ends_m).T
+        lot = anchor.anchor.lot
+        ends_m = np.outer([0.0, asked.way_m], [math.cos(lot.yaw_rad), math.sin(lot.yaw_rad)])
+        lat_deg, lon_deg = geo_from_local(lot.frame, ends_m).T
     return DrivenPath(lat_deg, lon_deg, np.full(len(lat_deg), asked.speed_mps), driver=driver)
 
 

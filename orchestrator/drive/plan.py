@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.contracts.anchor import Anchor, AnchorLine
-from foretwin.contracts.anchor_file import AnchorFile, read_anchor
+from foretwin.contracts.anchor_file import AnchorFile, anchor_text, read_anchor
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.campaign import role_files
 from foretwin.contracts.codec import write_message
@@ -27,6 +27,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.campaign.joining import check_campaign
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
 from foretwin.orchestrator.drive import sibling_setup, traffic_setup
+from foretwin.orchestrator.drive.first_pose import with_first_pose
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
 from foretwin.orchestrator.drive.sensors_setup import check_measured, read_sensor
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
@@ -76,7 +77,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
     progress = progress_of(config.progress_table)
-    anchor = _anchor_for(config.anchor, config.vehicle)
+    anchor = _anchor_for(config.anchor, config.vehicle, first_pose=True)
     if anchor is not None and config.towards_vehicle and not anchor.fence:
         raise ConfigError(f"--anchor {config.anchor}: --towards-vehicle needs its fence")
     ros2 = read_ros2(config)
@@ -86,6 +87,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         check_campaign(Path(config.secure), config.endpoint, car=starts_a_car(config))
     map_file = Path(config.map) if config.map else MAP_FILE
     source = config.resolved_source
+    if anchor is not None:
+        anchor = with_first_pose(anchor, config, vehicle, ros2)
     info, positions, log_file = None, None, None
     if source == "log":
         log_file = Path(config.log or "")
@@ -196,11 +199,13 @@ def _read_beside(
     )
 
 
-def _anchor_for(file: str | None, vehicle: str | None) -> AnchorFile | None:
+def _anchor_for(
+    file: str | None, vehicle: str | None, *, first_pose: bool = False
+) -> AnchorFile | None:
     """Return the anchor that a file holds; ConfigError where its vehicle is of another scale."""
     if file is None:
         return None
-    anchor, scale = read_anchor(Path(file)), scale_of(vehicle)
+    anchor, scale = read_anchor(Path(file), first_pose=first_pose), scale_of(vehicle)
     if anchor.scale != scale:
         raise ConfigError(
             f"anchor {file}: scale = {anchor.scale:g}, but vehicle {vehicle or DEFAULT_FILE.stem} "
@@ -279,6 +284,8 @@ def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
     try:
         if plan.standin is not None:
             plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
+        if plan.anchor is not None:
+            (folder / "anchor.toml").write_text(anchor_text(plan.anchor), encoding="utf-8")
         if plan.slopes is not None:
             write_message(plan.slopes, plan.slopes_file)
         write_message(roads_shown(plan.graph, plan.routes, plan.drive_frame), plan.roads_file)

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts import anchor_file
-from foretwin.contracts.anchor_file import read_anchor
+from foretwin.contracts.anchor import AnchorPose
+from foretwin.contracts.anchor_file import anchor_text, read_anchor
 from foretwin.contracts.errors import UserError
 
 EXAMPLE = (anchor_file.__doc__ or "").split("```toml\n")[1].split("```")[0]
@@ -23,6 +24,7 @@ def written(folder: Path, text: str) -> Path:
 
 def test_the_example_says_where_the_lot_and_the_world_are(tmp_path: Path):
     read = read_anchor(written(tmp_path, EXAMPLE))
+    assert read.lot is not None
     assert (read.lot.lat_deg, read.world.lat_deg, len(read.fence)) == (52.4739, 52.5113, 4)
     assert (read.anchor.scale, read.anchor.mirrored) == (1.0, False)
     assert read.anchor.lot == read.lot
@@ -59,3 +61,32 @@ def test_what_no_anchor_has_is_refused_with_its_line(tmp_path: Path):
         read_anchor(written(tmp_path, EXAMPLE.replace("yaw_deg ", "yaw_degrees ")))
     with pytest.raises(FileNotFoundError):
         read_anchor(tmp_path / "none.toml")
+
+
+NO_LOT = EXAMPLE.replace(EXAMPLE[EXAMPLE.index("[lot]") : EXAMPLE.index("[world]")], "")
+
+
+def test_a_lot_that_is_not_known_yet_is_for_who_asks_the_car_alone(tmp_path: Path):
+    file = written(tmp_path, NO_LOT)
+    with pytest.raises(UserError, match=r"\[lot\] is missing"):
+        read_anchor(file)
+    read = read_anchor(file, first_pose=True)
+    assert read.lot is None
+    with pytest.raises(ValueError, match="first settled pose"):
+        _ = read.anchor
+    whole = read_anchor(written(tmp_path, EXAMPLE))
+    assert whole.lot is not None
+    assert read.at_lot(whole.lot) == whole
+
+
+def test_a_first_pose_outside_of_the_fence_is_refused(tmp_path: Path):
+    read = read_anchor(written(tmp_path, NO_LOT), first_pose=True)
+    with pytest.raises(UserError, match=r"first pose 52\.5000000, 13\.4000000: fence: .* outside"):
+        read.at_lot(AnchorPose(lat_deg=52.5, lon_deg=13.4, yaw_deg=0.0))
+
+
+def test_it_is_written_as_it_is_read(tmp_path: Path):
+    for text in (EXAMPLE, NO_LOT, EXAMPLE.replace("false", "true"), FENCE.sub("", EXAMPLE)):
+        read = read_anchor(written(tmp_path, text), first_pose=True)
+        again = read_anchor(written(tmp_path, anchor_text(read)), first_pose=True)
+        assert again == read
