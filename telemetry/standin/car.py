@@ -24,7 +24,7 @@ _STEPS_BELOW_FAST, _FAST_MPS = 2, 8.0
 """Slip and wheel spin die away the faster the slower the car: below, two half steps."""
 _SLOW_MPS = 0.8
 _ROLLING_MPS = 1.0
-_MAX_TIRE_RATE_RADPS = 0.4
+MAX_TIRE_RATE_RADPS = 0.4
 _GRAVITY_MPS2 = 9.81
 _COMPLIANCE_LAG_S = 0.02
 """With which a column that gives springs back."""
@@ -136,7 +136,7 @@ class MultiBodyCar:
         target = min(max(target, -_MAX_TIRE_ANGLE_RAD), _MAX_TIRE_ANGLE_RAD)
         steered = self._steered_rad if self._gives else state[_ANGLE]
         rate = given.steering_gain_ps * (target - steered)
-        rate = min(max(rate, -_MAX_TIRE_RATE_RADPS), _MAX_TIRE_RATE_RADPS)
+        rate = min(max(rate, -MAX_TIRE_RATE_RADPS), MAX_TIRE_RATE_RADPS)
         if self._gives:
             self._steered_rad = steered + rate * STEP_S
             wanted = self._steered_rad - given.steering_compliance_rad_per_mps2 * self._accel[1]

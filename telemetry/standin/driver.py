@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
-from foretwin.telemetry.standin.car import CarMotion
+from foretwin.telemetry.standin.car import MAX_TIRE_RATE_RADPS, CarMotion
 from foretwin.telemetry.standin.lights_ahead import LightAhead
 from foretwin.telemetry.standin.obstacles import Hindrance
 from foretwin.telemetry.standin.parameters import CarParameters, DriverParameters
@@ -25,6 +25,12 @@ _BEGINS = 0.8
 """Of the comfortable deceleration, from which on it brakes for somebody."""
 _CLOSE_M, _CREEPS_MPS = 1.5, 0.8
 """So close behind somebody it does not set off again, or creep on."""
+_HURRIED = 1.5
+"""Times the sideways acceleration of its bends: what it does not exceed off its path either."""
+_STRAIGHT_PM = 1e-4
+_TURNED_WITHIN_M, _SLOWEST_MPS = 2.0, 0.5
+_BACK_ACROSS = 0.7
+"""Sine of the angle at which it comes back to its path from far off."""
 _STEERING_LAG_S = 0.09
 """Of the steering motor, which the driver has learnt to anticipate."""
 
@@ -69,13 +75,15 @@ class Driver:
         """Return what to ask of the car, and keep track of the stops."""
         self.s_m = self.path.locate(motion.x_m, motion.y_m, near_s_m=self.s_m)
         self._wait(motion.vx_mps)
+        curvature = self._curvature_pm(motion)
         accel = self._accel(self.s_m, motion.vx_mps, self._next_stop)
+        accel = min(accel, self._not_off(curvature, motion))
         if motion.grade and motion.vx_mps > _STANDING_MPS:
             # Whoever drives uphill presses as much harder as it takes to go as on the level.
             accel += STANDARD_GRAVITY_MPS2 * math.sin(math.atan(motion.grade))
         return DriverCommand(
             accel_mps2=accel,
-            steering_wheel_rad=self._steering_wheel(motion),
+            steering_wheel_rad=self._steering_wheel(curvature),
         )
 
     def _wait(self, speed_mps: float) -> None:
@@ -146,7 +154,22 @@ class Driver:
             return math.inf if left_m > _CLOSE_M or speed_mps > _CREEPS_MPS else -1.0
         return -needed
 
-    def _steering_wheel(self, motion: CarMotion) -> float:
+    def _not_off(self, curvature_pm: float, motion: CarMotion) -> float:
+        """Return the most acceleration with which it turns no harder than it would ever want to,
+        and with which the tyres come to where it turns them within some metres.
+
+        On its path that is the profile's part; who has come off it slows down to come back.
+        """
+        most_mps2 = _HURRIED * self.parameters.lateral_accel_mps2
+        fastest = math.sqrt(most_mps2 / max(abs(curvature_pm), _STRAIGHT_PM))
+        tire_rad = self._steering_wheel(curvature_pm) / self.car.steering_ratio
+        behind_s = abs(tire_rad - motion.steered_rad) / MAX_TIRE_RATE_RADPS
+        fastest = min(fastest, max(_TURNED_WITHIN_M / max(behind_s, 1e-3), _SLOWEST_MPS))
+        accel = _SPEED_GAIN_PS * (fastest - motion.vx_mps)
+        return max(accel, -self.parameters.comfort_decel_mps2)
+
+    def _curvature_pm(self, motion: CarMotion) -> float:
+        """Return the curvature that it would steer for, were there no end to the steering."""
         speed = motion.vx_mps
         here = self.path.at(self.s_m)
         lag_s = self.car.steering_delay_s + _STEERING_LAG_S
@@ -157,12 +180,14 @@ class Driver:
         turned = math.remainder(motion.yaw_rad - here.yaw_rad, math.tau)
         # Offset and heading along the distance obey e'' = κ_asked - κ: critically damped.
         stiffness = min(0.35, 2.0 / max(speed, 1.0))
-        curvature = (
-            ahead.curvature_pm - stiffness * stiffness * offset - 2.0 * stiffness * math.sin(turned)
-        )
-        curvature = min(max(curvature, -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
-        angle = math.atan(self.wheelbase_m * curvature)
-        return angle * self.car.steering_ratio
+        # From far off it comes back across its path, and does not turn in circles beside it.
+        most = 2.0 * stiffness * _BACK_ACROSS
+        back = min(max(stiffness * stiffness * offset, -most), most)
+        return ahead.curvature_pm - back - 2.0 * stiffness * math.sin(turned)
+
+    def _steering_wheel(self, curvature_pm: float) -> float:
+        curvature_pm = min(max(curvature_pm, -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
+        return math.atan(self.wheelbase_m * curvature_pm) * self.car.steering_ratio
 
     def plan(self, speed_mps: float) -> list[PlanPoint]:
         """Return where the driver means to be at each `plan_step_s` over its horizon, now first."""

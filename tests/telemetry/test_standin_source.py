@@ -16,7 +16,6 @@ from foretwin.telemetry.standin.path import DrivenPath, read_path
 from tests.telemetry.standin_drive import FRAME, STOP_AT_M, new_source, whole_drive, wished_path
 
 COVERS = (
-    "foretwin.telemetry.standin.driver",
     "foretwin.telemetry.standin.parameters",
     "foretwin.telemetry.standin.path",
     "foretwin.telemetry.standin.sensors",
