@@ -14,7 +14,6 @@ from foretwin.telemetry.first_pose import FirstPose, first_pose
 from foretwin.telemetry.logs.log import Sample
 from tests.telemetry.test_anchored import on, seen_from
 
-COVERS = ("foretwin.telemetry.first_pose",)
 LOT = AnchorPose(lat_deg=52.4739, lon_deg=13.395, alt_m=40.0, yaw_deg=110.0)
 S = 10**9
 INFO = VehicleInfo(

@@ -33,7 +33,6 @@ from tests.orchestrator.trip import NOW, town, town_line
 from tests.telemetry.lot_car.test_braking import ANCHOR, MAPPING, straight
 from tests.telemetry.test_anchored import seen_from
 
-COVERS = ("foretwin.orchestrator.drive.first_pose",)
 WORLD = "[world]\nlat_deg = {0.lat_deg!r}\nlon_deg = {0.lon_deg!r}\nyaw_deg = {0.yaw_deg!r}\n"
 LANE = AnchorFile(world=ANCHOR.world)
 ROAD = load_vehicle(None)

@@ -16,7 +16,6 @@ from foretwin.telemetry.standin.source import StandinSource
 from tests.telemetry.lot_car.test_braking import ANCHOR, MAPPING, WALL_NS, Wire, straight
 from tests.telemetry.test_anchored import seen_from
 
-COVERS = ("foretwin.telemetry.ros2.lot_pose",)
 MS = 10**6
 
 
