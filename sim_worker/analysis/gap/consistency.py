@@ -26,6 +26,9 @@ _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
 _LEAST_STOP_S = 0.3
 _SPEEDS_TOGETHER_S = 0.4
 """For so long, speeds and courses from positions err alike."""
+_LEAST_TURN_RADPS = 0.03
+"""Positions that are good to 2 cm tell the rate of a course to 0.006 rad/s: how a car weaves on a
+straight is less, and says nothing of its gyro's gain."""
 _EVERY = 5
 """Smoothed signals need not be compared at every sample."""
 
@@ -144,7 +147,8 @@ def _turn_rates(pairs: SignalPairs) -> Line | None:
         return None
     independent = max(seconds / _SPEEDS_TOGETHER_S, 2.0)
     # The course is by far the noisier: over it the gyro's gain would come out too small.
-    line = line_through(gyro, course, independent=independent)
+    bends = float(np.ptp(gyro)) > _LEAST_TURN_RADPS
+    line = line_through(gyro, course, independent=independent) if bends else None
     if line is not None and line.gain > 5.0 * line.gain_std:
         gain = 1.0 / line.gain
         gain_std, offset_std = line.gain_std * gain**2, line.offset_std * gain

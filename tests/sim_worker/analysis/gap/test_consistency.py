@@ -65,6 +65,21 @@ def into_a_bend(*, offset_pm: float) -> SignalPairs:
     return turning(real_pm=1.05 * model + offset_pm + noise, model_pm=model, asked_rad=asked)
 
 
+def straight_on(*, weaves_radps: float, course_radps: float) -> SignalPairs:
+    """A car whose course over ground turns by more than its gyro shows."""
+    weave = np.sin(2.0 * TIME_S)
+    pairs = turning(real_pm=weaves_radps / 5.0 * weave, model_pm=weaves_radps / 5.0 * weave)
+    return pairs._replace(course_radps=course_radps * weave, gyro_radps=weaves_radps * weave)
+
+
+def test_weaving_on_a_straight_says_nothing_of_the_gyros_gain() -> None:
+    weaving = findings_of(consistency_of(straight_on(weaves_radps=0.006, course_radps=0.015)))
+    assert weaving is None
+    bends = findings_of(consistency_of(straight_on(weaves_radps=0.06, course_radps=0.15)))
+    assert bends is not None
+    assert bends.cause == "gyro_sensor"
+
+
 def hurried(*, fastest_radps: float) -> SignalPairs:
     """A car that turns its tyres by 0.4 rad/s at most, and is asked for more than twice that."""
     asked = 0.35 * np.sin(2.5 * TIME_S)
