@@ -20,6 +20,7 @@ from foretwin.contracts import (
     radar_list,
     roles,
     runner,
+    sensed_motion,
     siblings,
     side_by_side,
     simulation,
@@ -171,6 +172,8 @@ _TABLE: dict[tuple[str, Qos, tuple[Writer, ...]], dict[str, Channel]] = {
     (_RUN, WATCH, (Writer("worker", "sensors"),)): {
         "point_cloud": Channel(point_cloud.PointCloud, 10, "what virtual lidars measure"),
         "camera_image": Channel(camera_image.CameraImage, 10, "what virtual cameras see"),
+        "sensed_gnss": Channel(sensed_motion.SensedFix, 10, "what virtual receivers measure"),
+        "sensed_imu": Channel(sensed_motion.SensedImu, 50, "what virtual inertial sensors measure"),
         "radar_list": Channel(radar_list.RadarList, 20, "what virtual radars measure"),
     },
     (_RUN, WATCH, _ORCHESTRATOR): {

@@ -157,7 +157,8 @@ class SensorSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 class SensorsSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Measures what virtual sensors on the car would; each turn is told, clouds on `point_cloud`,
-    lists of radars on `radar_list`, pictures on `camera_image`."""
+    lists of radars on `radar_list`, pictures on `camera_image`, positions on
+    `sensed_gnss`, what inertial sensors say on `sensed_imu`."""
 
     worlds_dir: str
     turns_dir: str

@@ -52,11 +52,13 @@ if TYPE_CHECKING:
         camera_view,
         lidar_scan,
         merge_clouds,
+        motion_samples,
         radar_list,
         road_user,
         save_clouds,
         save_pictures,
         save_radar_lists,
+        save_samples,
     )
     from foretwin.sim_worker.gym import JunctionEnv as JunctionEnv
     from foretwin.sim_worker.gym import JunctionVectorEnv as JunctionVectorEnv
@@ -86,11 +88,13 @@ _FROM = {
         "camera_view",
         "lidar_scan",
         "merge_clouds",
+        "motion_samples",
         "radar_list",
         "road_user",
         "save_clouds",
         "save_pictures",
         "save_radar_lists",
+        "save_samples",
     ),
     "foretwin.sim_worker.gym": ("JunctionEnv", "JunctionVectorEnv"),
     "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
@@ -120,7 +124,8 @@ __all__ += [
 ]
 __all__ += ["plot_driven", "plot_futures", "plot_gap", "plot_junction", "plot_outcomes"]
 __all__ += ["lidar_scan", "merge_clouds", "read_world", "road_user", "run_futures", "save_clouds"]
-__all__ += ["camera_view", "radar_list", "save_pictures", "save_radar_lists"]
+__all__ += ["camera_view", "motion_samples", "radar_list", "save_pictures", "save_radar_lists"]
+__all__ += ["save_samples"]
 __all__ += ["save_world", "state_on", "ways_through"]
 
 

@@ -18,12 +18,14 @@ from foretwin.contracts.frames import geo_pose, local_pose
 from foretwin.contracts.numbers import MAX_SEED
 from foretwin.contracts.point_cloud import POINT_COLUMNS, PointCloud
 from foretwin.contracts.radar_list import RadarList
+from foretwin.contracts.sensed_motion import SensedFix, SensedImu
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion
 from foretwin.sim_worker.sensors.camera import CameraView, CameraWorld, message_of
 from foretwin.sim_worker.sensors.cloud_merge import merge
 from foretwin.sim_worker.sensors.kinds import Lidar, Radar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
+from foretwin.sim_worker.sensors.motion_sensors import MotionSensor
 from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
 from foretwin.sim_worker.sensors.radar import RadarReturns, detect
 from foretwin.sim_worker.sensors.ray_world import RayWorld
@@ -125,6 +127,19 @@ def camera_view(
         drawn.close()
 
 
+def motion_samples(
+    states: Sequence[VehicleState], sensor: SensorFile | Path | str, *, seed: int = 0
+) -> list[SensedFix | SensedImu]:
+    """Return what a satellite receiver or an inertial sensor measures at states, in their order.
+
+    The same seed gives the same errors. Raises UserError for a sensor of another kind.
+    """
+    if not isinstance(sensor, SensorFile):
+        sensor = load_sensor(path_of("sensor", sensor))
+    measures = MotionSensor(sensor, seed=whole_number("seed", seed, 0, MAX_SEED))
+    return [measures.sample(expect("a state", one, VehicleState)) for one in states]
+
+
 def merge_clouds(real: Array | Array32, virtual: LidarScan) -> Array32:
     """Return a real cloud (N, 6) into which a scan of road users alone is put, as (M, 6).
 
@@ -180,6 +195,15 @@ def save_pictures(file: Path | str, views: Sequence[tuple[float, CameraView]]) -
         sensor = expect("a view", one, CameraView).sensor
         messages.append(message_of(one.rgb, sensor, stamp_ns=_stamp_ns(time_s)))
     return _saved(file, "camera_image", messages)
+
+
+def save_samples(file: Path | str, samples: Sequence[SensedFix | SensedImu]) -> Path:
+    """Write what `motion_samples` gave as sensor_msgs/NavSatFix or Imu to an MCAP file.
+
+    Raises UserError where the file cannot be written.
+    """
+    fixes = all(isinstance(one, SensedFix) for one in samples)
+    return _saved(file, "sensed_gnss" if fixes else "sensed_imu", samples)
 
 
 class _Around(NamedTuple):

@@ -29,7 +29,7 @@ def read_sensor(config: SensorConfig) -> SensorSetup:
     text, name = sensor_text(config.file)
     kind = sensor_of(text, name).kind_name
     if config.sees == "real" and kind != "lidar":
-        raise UserError(f'{name}: sees = "real": of a lidar, and this is a {kind}')
+        raise UserError(f'{name}: sees = "real": of kind lidar, and this is of kind {kind}')
     if kind == "camera":
         check_drawing()
     return SensorSetup(text=text, name=name, sees=config.sees)

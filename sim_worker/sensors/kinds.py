@@ -12,6 +12,7 @@ import msgspec
 
 from foretwin.contracts.numbers import Range
 from foretwin.contracts.point_cloud import MOST_RAYS
+from foretwin.contracts.sensor_drift import Drift
 
 
 class Lidar(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -99,10 +100,42 @@ class Camera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return self.width_px / 2.0 / math.tan(math.radians(self.field_of_view_deg) / 2.0)
 
 
-Kind = Lidar | Radar | Camera
+class Gnss(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A satellite receiver, whose antenna sits at the mount: positions, white noise and drift."""
+
+    rate_hz: float
+    """Positions in a second; more than the car's states are not told."""
+    std_m: float
+    """Of positions, along each axis on the ground: one standard deviation of white noise."""
+    up_std_m: float = 0.0
+    """Of heights, likewise."""
+    drift: Drift = Drift()
+    """Of positions, along each axis on the ground, in m."""
+
+
+class Imu(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An inertial sensor in the axes of its mount: specific forces and rates."""
+
+    rate_hz: float
+    """Samples in a second; more than the car's states are not told."""
+    gyro_std_radps: float
+    """Of rates, along each axis: one standard deviation of white noise."""
+    accel_std_mps2: float
+    """Of specific forces, likewise."""
+    gyro_bias_radps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Added to the rates."""
+    accel_bias_mps2: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Added to the specific forces."""
+    gyro_drift: Drift = Drift()
+    """Of rates, along each axis, in rad/s."""
+    accel_drift: Drift = Drift()
+    """Of specific forces, along each axis, in m/s²."""
+
+
+Kind = Lidar | Radar | Camera | Gnss | Imu
 """What a sensor measures."""
 KINDS: Mapping[str, type[Kind]] = MappingProxyType(
-    {"lidar": Lidar, "radar": Radar, "camera": Camera}
+    {"lidar": Lidar, "radar": Radar, "camera": Camera, "gnss": Gnss, "imu": Imu}
 )
 """By the name of their table."""
 RANGES: Mapping[type[Kind], Mapping[str, Range]] = MappingProxyType(
@@ -140,6 +173,16 @@ RANGES: Mapping[type[Kind], Mapping[str, Range]] = MappingProxyType(
             "height_px": Range(16, 4096),
             "field_of_view_deg": Range(1.0, 170.0),
             "jpeg_quality": Range(1, 95),
+        },
+        Gnss: {
+            "rate_hz": Range(0.1, 100.0),
+            "std_m": Range(0.0, 100.0),
+            "up_std_m": Range(0.0, 100.0),
+        },
+        Imu: {
+            "rate_hz": Range(0.1, 100.0),
+            "gyro_std_radps": Range(0.0, 10.0),
+            "accel_std_mps2": Range(0.0, 100.0),
         },
     }
 )

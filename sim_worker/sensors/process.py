@@ -12,6 +12,7 @@ from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.refusals import Refusals
+from foretwin.contracts.sensed_motion import SensedFix, SensedImu
 from foretwin.contracts.sensor_turns import SensorTurns, Turns, TurnsFile
 from foretwin.contracts.setup import SensorsSetup
 from foretwin.contracts.simulation import ActiveWorld
@@ -27,6 +28,8 @@ CHANNEL_OF = {
     PointCloud: "point_cloud",
     RadarList: "radar_list",
     CameraImage: "camera_image",
+    SensedFix: "sensed_gnss",
+    SensedImu: "sensed_imu",
 }
 """By what a turn gave."""
 

@@ -12,7 +12,16 @@ from foretwin.contracts.errors import MissingFileError, UserError
 from foretwin.contracts.numbers import MAX_SEED, Range
 from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.toml_file import parse_toml, toml_text
-from foretwin.sim_worker.sensors.kinds import KINDS, Camera, Kind, Lidar, Radar, check_kind
+from foretwin.sim_worker.sensors.kinds import (
+    KINDS,
+    Camera,
+    Gnss,
+    Imu,
+    Kind,
+    Lidar,
+    Radar,
+    check_kind,
+)
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "vlp_16.toml"
@@ -40,11 +49,16 @@ class SensorFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """It is a radar."""
     camera: Camera | None = None
     """It is a camera."""
+    gnss: Gnss | None = None
+    """It is a satellite receiver."""
+    imu: Imu | None = None
+    """It is an inertial sensor."""
 
     @property
     def kind(self) -> Kind:
         """What it measures; raises ValueError where that is nothing, or more than one thing."""
-        told = [one for one in (self.lidar, self.radar, self.camera) if one is not None]
+        tables = self.lidar, self.radar, self.camera, self.gnss, self.imu
+        told = [one for one in tables if one is not None]
         if len(told) != 1:
             raise ValueError(f"{len(told)} of {', '.join(KINDS)}: a sensor has one of these tables")
         return told[0]
@@ -59,7 +73,7 @@ class SensorFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         found = self.kind
         if not isinstance(found, kind):
             wanted = next(name for name, one in KINDS.items() if one is kind)
-            raise UserError(f"sensor {self.name}: a {self.kind_name}, and a {wanted} is needed")
+            raise UserError(f"sensor {self.name}: of kind {self.kind_name}, and {wanted} is needed")
         return found
 
 

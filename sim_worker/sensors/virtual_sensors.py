@@ -14,13 +14,15 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_pose
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.radar_list import RadarList
+from foretwin.contracts.sensed_motion import SensedFix, SensedImu
 from foretwin.contracts.setup import SensorSees
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, moved
 from foretwin.sim_worker.sensors.camera import CameraWorld, message_of
 from foretwin.sim_worker.sensors.cloud_merge import merge
-from foretwin.sim_worker.sensors.kinds import Camera, Lidar
+from foretwin.sim_worker.sensors.kinds import Camera, Gnss, Imu, Lidar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
+from foretwin.sim_worker.sensors.motion_sensors import MotionSensor
 from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
 from foretwin.sim_worker.sensors.radar import detect
 from foretwin.sim_worker.sensors.ray_world import RayWorld
@@ -48,8 +50,8 @@ class _Turn(NamedTuple):
     said: tuple[_LastWord, ...]
 
 
-Measured = PointCloud | RadarList | CameraImage
-"""What a turn gives: of a lidar, of a radar, of a camera."""
+Measured = PointCloud | RadarList | CameraImage | SensedFix | SensedImu
+"""What a turn gives: of a lidar, a radar, a camera, a receiver, an inertial sensor."""
 
 
 class VirtualSensors:
@@ -57,15 +59,20 @@ class VirtualSensors:
 
     Turns begin at whole periods of the car's clock, whenever the first state came: the same input
     and seed give the same clouds. Who is asked late measures the newest turn alone and counts the
-    others. A sensor that sees the World measures nothing while there is none. One with a delay is
-    asked for its turns so much later.
+    others; receivers and inertial sensors measure them all. A sensor that sees the World measures
+    nothing while there is none. One with a delay is asked for its turns so much later.
     """
 
     def __init__(self, sensors: Sequence[tuple[SensorFile, SensorSees]], *, seed: int = 0) -> None:
         self._sensors, self._seed = tuple(sensors), seed
         self._turns: dict[int, _Turn] = {}
         self._over: dict[int, deque[_Turn]] = {}
-        self._due: dict[int, _Turn] = {}
+        self._due: dict[int, list[_Turn]] = {}
+        self._of_motion = {
+            place: MotionSensor(sensor, seed=(self._seed + sensor.seed, place))
+            for place, (sensor, _) in enumerate(self._sensors)
+            if isinstance(sensor.kind, Gnss | Imu)
+        }
         self._real: dict[int, PointCloud] = {}
         self._said: dict[str, _LastWord] = {}
         self._states: deque[VehicleState] = deque(maxlen=_STATES)
@@ -123,16 +130,24 @@ class VirtualSensors:
                 over.clear()
         told_ns = state.stamp_ns - period_ns - round(sensor.delay_s * 1e9)
         while over and over[0].begun_ns <= told_ns:
-            self.passed_over[sensor.name] += place in self._due
-            self._due[place] = over.popleft()
+            due = self._due.setdefault(place, [])
+            if place not in self._of_motion:
+                self.passed_over[sensor.name] += len(due)
+                due.clear()
+            due.append(over.popleft())
 
     def measured(self) -> list[Measured]:
         """Return what is due."""
         real, self._real, due, self._due = self._real, {}, self._due, {}
         found: list[Measured] = [self._merged(place, cloud) for place, cloud in real.items()]
-        for place, turn in due.items():
+        for place, turn in ((place, turn) for place, turns in due.items() for turn in turns):
             rays = self._rays if self._sensors[place][1] == "world" else self._no_world
-            if rays is not None and turn.state.yaw_valid:
+            if not turn.state.yaw_valid:
+                continue
+            if place in self._of_motion:
+                motion = self._of_motion[place]
+                found.append(motion.sample(turn.state, at_ns=turn.begun_ns))
+            elif rays is not None:
                 found.append(self._measure(rays, place, turn))
         self.told.update(one.sensor for one in found)
         return found

@@ -15,7 +15,8 @@ Views for other programs, not read back since they hold less (32-bit numbers, fe
 /foretwin/steering_report (autoware_vehicle_msgs/SteeringReport), /foretwin/control
 (ackermann_msgs/AckermannDriveStamped), /foretwin/state (nav_msgs/Odometry, local frame),
 /foretwin/points (sensor_msgs/PointCloud2), /foretwin/radar (radar_msgs/RadarScan),
-/foretwin/camera/compressed (sensor_msgs/CompressedImage) and /foretwin/camera/camera_info.
+/foretwin/camera/compressed (sensor_msgs/CompressedImage) and /foretwin/camera/camera_info,
+/foretwin/sensed_gnss (sensor_msgs/NavSatFix) and /foretwin/sensed_imu (sensor_msgs/Imu).
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from foretwin.telemetry.ros_messages import (
     parts,
     pictures,
     radars,
+    sensed,
     sensors,
 )
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, Messages, stamp_of
@@ -101,6 +103,8 @@ _TOPICS: dict[str, tuple[_Topic, ...]] = {
         _Topic("camera/compressed", pictures.COMPRESSED_IMAGE, pictures.compressed_image_from),
         _Topic("camera/camera_info", pictures.CAMERA_INFO, pictures.camera_info_from),
     ),
+    "sensed_gnss": (_Topic("sensed_gnss", parts.NAV_SAT_FIX, sensed.sensed_fix_from),),
+    "sensed_imu": (_Topic("sensed_imu", parts.IMU, sensed.sensed_imu_from),),
     "radar_list": (_Topic("radar", parts.RADAR_SCAN, radars.radar_scan_from),),
 }
 """What stands in a file by channel: a channel without a row of its own as JSON alone."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import msgspec
 
+from foretwin.contracts.sensor_drift import Drift
 from foretwin.contracts.toml_file import load_toml
-from foretwin.telemetry.standin.sensor_drift import Drift
 
 DEFAULT_FILE = Path(__file__).with_name("standin.toml")
 

@@ -15,6 +15,7 @@ from foretwin.contracts.drive import (
     VehicleStatus,
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.sensor_drift import NoisyError
 from foretwin.geometry.polyline import interpolated, left_of
 from foretwin.geometry.steering import SteeringColumn
 from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
@@ -22,7 +23,6 @@ from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.driver import PlanPoint
 from foretwin.telemetry.standin.parameters import CarParameters, SensorParameters
 from foretwin.telemetry.standin.path import DrivenPath
-from foretwin.telemetry.standin.sensor_drift import DriftingError
 
 PERIOD_MS = {
     "imu": 10,
@@ -47,9 +47,13 @@ class Sensors:
         self._frame = frame
         streams = [*map(np.random.default_rng, np.random.SeedSequence(seed).spawn(8))]
         self._gnss, self._imu, self._speed, self._steering, self._height = streams[:5]
-        drifts = parameters.gnss_drift, parameters.gyro_drift, parameters.accel_drift
-        self._gnss_drift, self._gyro_drift, self._accel_drift = map(
-            DriftingError, drifts, (2, 3, 3), streams[5:]
+        self._gnss_error, self._gyro_error, self._accel_error = (
+            NoisyError(std, drift, axes, white=white, wandering=wandering)
+            for std, drift, axes, white, wandering in (
+                (parameters.gnss_std_m, parameters.gnss_drift, 2, self._gnss, streams[5]),
+                (parameters.gyro_std_radps, parameters.gyro_drift, 3, self._imu, streams[6]),
+                (parameters.accel_std_mps2, parameters.accel_drift, 3, self._imu, streams[7]),
+            )
         )
 
     def gnss(self, stamp_ns: int, motion: CarMotion) -> GnssFix:
@@ -59,7 +63,7 @@ class Sensors:
         x_m = motion.x_m + cos * forward - sin * left
         y_m = motion.y_m + sin * forward + cos * left
         std = self._parameters.gnss_std_m
-        error_m = self._gnss.normal(0.0, std, 2) + self._gnss_drift.at(stamp_ns)
+        error_m = self._gnss_error.at(stamp_ns)
         lat, lon = geo_from_local(self._frame, np.array([x_m, y_m]) + error_m)
         height = up
         if motion.altitude_m:
@@ -71,8 +75,7 @@ class Sensors:
     def imu(self, stamp_ns: int, motion: CarMotion) -> ImuSample:
         """Return specific force and rates at the centre of gravity, with bias and drifts."""
         given = self._parameters
-        force = self._imu.normal(0.0, given.accel_std_mps2, 3) + self._accel_drift.at(stamp_ns)
-        rate = self._imu.normal(0.0, given.gyro_std_radps, 3) + self._gyro_drift.at(stamp_ns)
+        force, rate = self._accel_error.at(stamp_ns), self._gyro_error.at(stamp_ns)
         return ImuSample(
             stamp_ns=stamp_ns,
             accel_mps2=(

@@ -62,7 +62,15 @@ def test_how_often_each_is_said() -> None:
             by_rate.setdefault(channel.rate_hz, set()).add(name)
     assert by_rate == {
         100: {"imu"},
-        50: {"speed", "steering", "control", "state", "other_vehicles", "vehicle_command"},
+        50: {
+            "speed",
+            "steering",
+            "control",
+            "state",
+            "other_vehicles",
+            "vehicle_command",
+            "sensed_imu",
+        },
         20: {"authority", "virtual_traffic", "surroundings", "radar_list"},
         10: {
             "gnss",
@@ -75,6 +83,7 @@ def test_how_often_each_is_said() -> None:
             "lights",
             "point_cloud",
             "camera_image",
+            "sensed_gnss",
             "real_cloud",
         },
         8: {"comparison"},

@@ -67,7 +67,7 @@ def test_clouds_are_files_that_ros_reads(
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"sensor": "nosuch"}, "no bundled sensor of that name: hdl_32e"),
+        ({"sensor": "nosuch"}, "no bundled sensor of that name: gnss_standard"),
         ({"sensor": 5}, "sensor must be a path"),
         ({"seed": -1}, "whole number from 0"),
         ({"road_users": [5]}, "a road user must be a RoadUser"),
@@ -117,9 +117,9 @@ def test_a_radar_lists_who_is_ahead_and_its_lists_are_files_that_ros_reads(
     assert (row.topic, row.msgtype) == ("/foretwin/radar", "radar_msgs/msg/RadarScan")
     assert scan.header.frame_id == "long_range_radar"
     assert scan.returns[0].range == found.returns[0, 0]
-    with pytest.raises(foretwin.UserError, match="vlp_16: a lidar, and a radar is needed"):
+    with pytest.raises(foretwin.UserError, match="vlp_16: of kind lidar, and radar is needed"):
         foretwin.radar_list(world, car, sensor="vlp_16")
-    with pytest.raises(foretwin.UserError, match="a radar, and a lidar is needed"):
+    with pytest.raises(foretwin.UserError, match="of kind radar, and lidar is needed"):
         foretwin.lidar_scan(world, car, sensor="long_range_radar")
 
 
@@ -138,5 +138,25 @@ def test_a_camera_sees_who_is_ahead_and_its_pictures_are_files_that_ros_reads(
         assert [row.msgtype for row, _, _ in reader.messages()] == [
             "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
         ]  # fmt: skip
-    with pytest.raises(foretwin.UserError, match="a lidar, and a camera is needed"):
+    with pytest.raises(foretwin.UserError, match="of kind lidar, and camera is needed"):
         foretwin.camera_view(world, car, sensor="vlp_16")
+
+
+def test_receivers_and_inertial_sensors_measure_a_drive(
+    car: foretwin.VehicleState, tmp_path: Path
+) -> None:
+    states = [msgspec.structs.replace(car, stamp_ns=k * 100_000_000) for k in range(5)]
+    fixes = foretwin.motion_samples(states, "gnss_standard", seed=3)
+    samples = foretwin.motion_samples(states, "imu_mems")
+    files = [
+        foretwin.save_samples(tmp_path / f"{k}.mcap", one) for k, one in enumerate((fixes, samples))
+    ]
+
+    assert [one.stamp_ns for one in fixes] == [one.stamp_ns for one in states]
+    for file, kind in zip(files, ("NavSatFix", "Imu"), strict=True):
+        with Reader(file) as reader:
+            assert [row.msgtype for row, _, _ in reader.messages()] == 5 * [
+                f"sensor_msgs/msg/{kind}"
+            ]
+    with pytest.raises(foretwin.UserError, match="of kind lidar, and imu is needed"):
+        foretwin.motion_samples(states, "vlp_16")

@@ -42,7 +42,14 @@ def test_a_bundled_sensor_is_what_its_data_sheet_says(
 
 def test_the_bundled_ones_are_known_by_name() -> None:
     lidars, radars = ("hdl_32e", "os1_64", "vlp_16", "vlp_32c"), ("long_range_radar",)
-    assert set(bundled_sensors()) == {*lidars, *radars, "short_range_radar", "vga_camera"}
+    assert set(bundled_sensors()) == {
+        *lidars,
+        *radars,
+        "short_range_radar",
+        "vga_camera",
+        "gnss_standard",
+        "imu_mems",
+    }
     assert list(bundled_sensors()) == sorted(bundled_sensors())
     assert load_sensor(DEFAULT_FILE) == load_sensor("vlp_16")
 
@@ -116,7 +123,7 @@ def test_a_sensor_is_of_one_kind() -> None:
     ):
         with pytest.raises(UserError, match=f"mine.toml.*{count} of lidar, radar, camera"):
             sensor_of(text, "mine.toml")
-    with pytest.raises(UserError, match="vlp_16: a lidar, and a radar is needed"):
+    with pytest.raises(UserError, match="vlp_16: of kind lidar, and radar is needed"):
         load_sensor("vlp_16").measures(Radar)
 
 

@@ -1,4 +1,8 @@
-"""Errors of sensors that wander: first-order Gauss-Markov processes and random walks."""
+"""Errors of sensors: white noise, and what wanders: Gauss-Markov processes and random walks.
+
+The one model of them, for the stand-in car and for sensor files. White noise, a bias that is
+correlated for a while and one that walks are the terms that IMUs are commonly described by.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +35,8 @@ class DriftingError:
     """One error of several axes, which begins as if it had gone on for long; a walk begins at 0.
 
     Steps are exact for any spacing of stamps: what is left of the Gauss-Markov part after dt is
-    exp(-dt / time_s), and its variance stays. Nothing is drawn for a part that is 0.
+    exp(-dt / time_s), and its variance stays (Gillespie, 1996, Exact numerical simulation of the
+    Ornstein-Uhlenbeck process and its integral). Nothing is drawn for a part that is 0.
     """
 
     def __init__(self, drift: Drift, axes: int, random: np.random.Generator) -> None:
@@ -54,3 +59,18 @@ class DriftingError:
             self._walk = self._walk + self._random.normal(0.0, size, len(self._walk))
         self._stamp_ns = stamp_ns
         return self._markov + self._walk
+
+
+class NoisyError:
+    """White noise and a drift together, of several axes."""
+
+    def __init__(
+        self, std: float, drift: Drift, axes: int, *, white: np.random.Generator,
+        wandering: np.random.Generator,
+    ) -> None:  # fmt: skip
+        self._std, self._axes, self._white = std, axes, white
+        self._drift = DriftingError(drift, axes, wandering)
+
+    def at(self, stamp_ns: int) -> Array:
+        """Return the error (axes,) at a stamp."""
+        return self._white.normal(0.0, self._std, self._axes) + self._drift.at(stamp_ns)

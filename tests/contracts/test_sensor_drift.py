@@ -10,9 +10,9 @@ from msgspec.structs import replace
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.contracts.sensor_drift import Drift, DriftingError
 from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.parameters import read_parameters
-from foretwin.telemetry.standin.sensor_drift import Drift, DriftingError
 from foretwin.telemetry.standin.sensors import Sensors
 
 STEP_NS = 100_000_000
