@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 import pytest
+from msgspec.structs import replace
 
 from foretwin.contracts.anchor import AnchorPose
 from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo
@@ -98,3 +99,28 @@ def test_a_place_beside_the_antenna_counts_for_the_body():
     assert pose is not None
     assert seen_from(LOT, pose.frame.origin)[:2] == pytest.approx((-1.0, 0.0), abs=0.01)
     assert pose.alt_m == pytest.approx(LOT.alt_m - 1.5, abs=0.01)
+
+
+def test_a_small_cars_positions_are_to_be_as_much_better_as_it_is_smaller():
+    """0.5 m on a lot of 1:10 are 5 m in the World."""
+    rough = list(straight(0.0, std_m=0.5, heading=True, seconds=3.0))
+    assert first_pose(FirstPose(INFO, ROAD, scale=1.0), rough) is not None
+    watch = FirstPose(INFO, ROAD, scale=10.0)
+    assert first_pose(watch, rough) is None
+    assert "position is known to" in watch.lacks
+
+
+def test_after_overdue_positions_it_takes_a_second_again():
+    info = replace(INFO, sends=("gnss", "heading", "speed"))
+    gap = [
+        (channel, message)
+        for channel, message in straight(0.0, heading=True, seconds=20.0)
+        if channel != "gnss" or not 1.7 * S < message.stamp_ns < 12.0 * S  # type: ignore[attr-defined]
+    ]
+    watch = FirstPose(info, ROAD, scale=1.0)
+    settled_ns = next(
+        message.stamp_ns  # type: ignore[attr-defined]
+        for channel, message in gap
+        if watch.take(channel, message) is not None
+    )
+    assert settled_ns >= 13.0 * S
