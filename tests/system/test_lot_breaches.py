@@ -212,13 +212,15 @@ def test_injection_stops_with_one_empty_list_and_then_silence(tmp_path: Path, na
         folder = tmp_path / str(attempt)
         folder.mkdir()
         drive, log = breached(folder, breach)
+        shut = [line for line in log.splitlines() if "towards the vehicle: shut" in line]
+        if drive.wrong_ns is None and shut and not re.search(breach.why, shut[0]):
+            continue  # shut for another reason, and the car never came to do wrong
         assert drive.wrong_ns is not None, log
         before = [one for one in drive.heard if one.mono_ns < drive.wrong_ns]
         if not before or before[-1].objects == 0:
             continue  # shut too early
         after = [one for one in drive.heard if one.mono_ns >= drive.wrong_ns]
         told_s = [(one.mono_ns - drive.wrong_ns) * 1e-9 for one in after]
-        shut = [line for line in log.splitlines() if "towards the vehicle: shut" in line]
         lists = [(round(at_s, 3), one.objects) for at_s, one in zip(told_s, after, strict=True)]
         print(f"{name}: {lists} {shut}")
         assert len(shut) == 1
