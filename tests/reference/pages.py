@@ -13,7 +13,7 @@ from foretwin.contracts.keys import CHANNELS
 from foretwin.orchestrator.commands.config import Key, keys_of, text_of
 from foretwin.orchestrator.commands.config_formats import KINDS, RANGES
 from foretwin.orchestrator.record.results import TABLES
-from foretwin.orchestrator.record.table_words import ROWS, meaning_of
+from tests.reference.table_words import ROWS, meaning_of
 
 FOLDER = Path(__file__).parents[2] / "docs" / "reference"
 MADE = "<!-- Made by `python -m tests.reference`; change the types that it is made of. -->\n\n"

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from foretwin.contracts.numbers import FUTURE_NUMBERS
-from foretwin.orchestrator.record.future_words import COLUMNS as FUTURE_WORDS
-from foretwin.orchestrator.record.future_words import OF_A_PLACE, each_of
 from foretwin.sim_worker.metrics.table import METRICS
+from tests.reference.future_words import COLUMNS as FUTURE_WORDS
+from tests.reference.future_words import OF_A_PLACE, each_of
 
 _ROWS = {
     "rounds": "one round that was run",

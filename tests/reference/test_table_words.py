@@ -5,9 +5,7 @@ from __future__ import annotations
 import pytest
 
 from foretwin.orchestrator.record.results import TABLES
-from foretwin.orchestrator.record.table_words import ROWS, meaning_of
-
-COVERS = ("foretwin.orchestrator.record.future_words",)
+from tests.reference.table_words import ROWS, meaning_of
 
 
 def test_every_table_says_what_a_row_is() -> None:
