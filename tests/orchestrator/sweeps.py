@@ -21,7 +21,7 @@ from foretwin.world_gen.world_store import WorldStore
 from tests.sim_worker.scenarios.worlds import cross
 
 if TYPE_CHECKING:
-    from foretwin.sim_worker.in_process_runner import InProcessRunner
+    from tests.sim_worker.in_process_runner import InProcessRunner
 
 SMALL = """
 worlds = "{worlds}"
@@ -47,7 +47,7 @@ def small_sweep(folder: Path, text: str = SMALL) -> Path:
 def alone(loaded: Loaded) -> InProcessRunner:
     """A runner of this process alone: what it answers is what any worker would."""
     # What it takes is not to count as a sweep's where that is measured.
-    from foretwin.sim_worker.in_process_runner import InProcessRunner
+    from tests.sim_worker.in_process_runner import InProcessRunner
 
     setup = worker_setup(loaded, Path("nowhere"))
     there = str(worlds_folder(loaded.spec))

@@ -15,9 +15,9 @@ from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
-from foretwin.sim_worker.in_process_runner import InProcessRunner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
+from tests.sim_worker.in_process_runner import InProcessRunner
 from tests.sim_worker.places import crossroads, job
 
 CAR = load_vehicle()

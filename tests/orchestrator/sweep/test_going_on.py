@@ -18,9 +18,9 @@ from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.record.ledger import JobsLedger
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
-from foretwin.sim_worker.in_process_runner import InProcessRunner
 from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.sweeps import small_sweep
+from tests.sim_worker.in_process_runner import InProcessRunner
 from tests.sim_worker.scenarios.worlds import tee
 
 COVERS = (

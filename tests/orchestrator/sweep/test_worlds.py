@@ -19,11 +19,11 @@ from foretwin.orchestrator.sweep.worlds import Progress, all_there, choose_world
 from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.sim_worker import world_building
-from foretwin.sim_worker.in_process_runner import InProcessRunner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.world_store import WorldStore
+from tests.sim_worker.in_process_runner import InProcessRunner
 from tests.sim_worker.scenarios.worlds import cross
 
 COVERS = ("foretwin.contracts.world_building", "foretwin.sim_worker.world_building")

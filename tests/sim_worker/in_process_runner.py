@@ -1,4 +1,4 @@
-"""A runner whose one worker is this process: for tests, notebooks and small work."""
+"""A runner whose one worker is this process: no bus, no other process, the same code."""
 
 from __future__ import annotations
 
