@@ -7,7 +7,6 @@ import json
 import logging
 import os
 from pathlib import Path
-from typing import Any, NamedTuple
 
 MOST_BYTES, MOST_URGENT_BYTES = 8_000_000, 16_000_000
 """Of one process in a log: a day's drive says some hundred kilobytes."""
@@ -32,28 +31,6 @@ class JsonLines(logging.Formatter):
         if record.exc_info:
             line["traceback"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False)
-
-
-class LogLines(NamedTuple):
-    """The lines of a log that are whole, and how many are not."""
-
-    lines: list[dict[str, Any]]
-    torn: int
-
-
-def read_log(file: Path) -> LogLines:
-    """Return what a log holds; a line that was cut short costs itself alone. Raises OSError."""
-    lines, torn = [], 0
-    for line in file.read_bytes().splitlines(keepends=True):
-        try:
-            found = json.loads(line)
-        except ValueError:
-            found = None
-        if isinstance(found, dict) and line.endswith(b"\n"):
-            lines.append(found)
-        else:
-            torn += bool(line.strip())
-    return LogLines(lines, torn)
 
 
 class LogFile(logging.Handler):

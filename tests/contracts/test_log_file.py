@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts import log_file
-from foretwin.contracts.log_file import JsonLines, LogFile, read_log
+from foretwin.contracts.log_file import JsonLines, LogFile
+from tests.log_lines import read_log
 
 
 @pytest.fixture

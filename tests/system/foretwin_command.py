@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import pyarrow.parquet as pq
 
-from foretwin.contracts.log_file import read_log
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.log_lines import read_log
 from tests.system.warm_command import WarmCommand
 
 REPOSITORY = Path(__file__).parents[2]

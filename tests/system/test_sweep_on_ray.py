@@ -17,9 +17,9 @@ from typing import Any
 
 import pytest
 
-from foretwin.contracts.log_file import read_log
 from foretwin.orchestrator.commands.cli import run
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.log_lines import read_log
 from tests.orchestrator.sweeps import SMALL, small_sweep
 from tests.sim_worker.planners.installed import install
 from tests.system.ray_nodes import RayNodes

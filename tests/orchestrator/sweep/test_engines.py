@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.log_file import read_log
 from foretwin.orchestrator.sweep.engines import Engine, _log_of_the_sweep
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
+from tests.log_lines import read_log
 from tests.orchestrator.sweeps import small_sweep
 
 
