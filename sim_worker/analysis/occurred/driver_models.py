@@ -122,12 +122,6 @@ def critical_safety(gap_m: float, ego_mps: float, other_mps: float, accel_mps2: 
     return _membership(gap_m, safe, unsafe)
 
 
-def must_be_avoided(ttc_at_intrusion_s: float, closing_mps: float) -> bool:
-    """Whether an automated lane keeping system has to avoid a cut-in: paragraph 5.2.5.2,
-    TTC at lane intrusion > v_rel / (2 · 6 m/s²) + 0.35 s."""
-    return ttc_at_intrusion_s > closing_mps / (2.0 * HARD_MPS2) + 0.35
-
-
 def _membership(gap_m: float, safe_m: float, unsafe_m: float) -> float:
     if gap_m >= safe_m:
         return 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import msgspec
 
@@ -42,9 +42,6 @@ AcrossKind = Literal[
     "pedestrian_crossing",
     "cyclist_crossing",
 ]
-OccurredKind = EgoKind | AlongKind | AcrossKind
-EGO_KINDS: tuple[str, ...] = get_args(EgoKind)
-OTHER_KINDS: tuple[str, ...] = (*get_args(AlongKind), *get_args(AcrossKind))
 
 
 class KindMeaning(NamedTuple):

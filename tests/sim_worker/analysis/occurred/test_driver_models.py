@@ -10,7 +10,6 @@ from foretwin.sim_worker.analysis.occurred.driver_models import (
     careful_driver,
     critical_safety,
     fuzzy_driver,
-    must_be_avoided,
     proactive_safety,
 )
 
@@ -97,9 +96,3 @@ def test_the_fuzzy_driver_lets_alone_who_comes_behind_it() -> None:
     ahead = cutting_in(-3.0, 20.0, 0.4)
 
     assert not fuzzy_driver(ahead, front_m=0.0, speed_mps=14.0).collided
-
-
-def test_a_lane_keeping_system_has_to_avoid_what_comes_early() -> None:
-    # 20 km/h: 5.56 / 12 + 0.35 = 0.81 s.
-    assert must_be_avoided(0.82, 20.0 / 3.6)
-    assert not must_be_avoided(0.80, 20.0 / 3.6)
