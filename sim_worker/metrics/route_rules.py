@@ -9,6 +9,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Conflict, Connection, LineControl, World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 
 _CONTROLS: dict[str, LineControl] = {name: name for name in get_args(LineControl)}
 _ON_PATH_M = 1.2
@@ -134,5 +135,4 @@ def direction_near(line: Array, point: Array) -> Array:
 
 def _last(line: Array, length_m: float) -> Array:
     """Return the points of a line (N, 2) within `length_m` before its end."""
-    to_end = np.cumsum(np.hypot(*np.diff(line[::-1], axis=0).T))[::-1]
-    return line[np.concatenate([to_end, [0.0]]) <= length_m]
+    return line[arc_lengths(line[::-1])[::-1] <= length_m]

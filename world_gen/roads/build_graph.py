@@ -14,6 +14,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import DrivingSide
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.countries.outlines import CountryPlace, places_of
 from foretwin.world_gen.osm.driving_side import driving_sides
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
@@ -87,7 +88,7 @@ def _sides(
     if not ways:
         return ()
     first = np.cumsum([0, *(len(path) for _, path in ways)])
-    arc_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    arc_m = arc_lengths(points)
     begin, length_m = first[:-1], arc_m[first[1:] - 1] - arc_m[first[:-1]]
     return driving_sides([way.tags for way, _ in ways], places, lat_lon_deg[begin], length_m)
 
