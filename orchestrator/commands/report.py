@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.compare import compare_logs
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.redaction import Redaction
 from foretwin.orchestrator.report.write_report import write_report
-from foretwin.sim_worker.analysis.two_drives.differences import Spread
+
+if TYPE_CHECKING:
+    from foretwin.sim_worker.analysis.two_drives.differences import Spread
 
 _SUFFIXES = (".html", ".htm")
 
@@ -55,6 +56,8 @@ def _redaction(word: str | None) -> Redaction | None:
 
 
 def _people(run: Path, against: Path) -> list[HumanRow]:
+    from foretwin.orchestrator.commands.compare import compare_logs
+
     found = compare_logs(run / DRIVE_FILE, against)
     return [
         HumanRow(row.horizon_s, row.along.places, *map(_rms, (row.along, row.across, row.speed)))

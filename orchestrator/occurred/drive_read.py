@@ -16,7 +16,7 @@ from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo
 from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.orchestrator.record.recorded_messages import OBJECTS, STATES, recorded_messages
+from foretwin.orchestrator.record.recorded_messages import CarRecorded, car_recorded
 from foretwin.orchestrator.record.run_folder import VEHICLES
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.occurred.scene import Detected, DrivenMotion, even_motion
@@ -27,9 +27,6 @@ from foretwin.telemetry.logs.log import Log
 from foretwin.telemetry.logs.road_users import RoadUserTrack, detections_of, log_of_detections
 
 _WORLDS = "worlds"
-_EVERY_NS = 100_000_000
-"""Motion is looked at ten times a second."""
-_StatesAndObjects = tuple[list[VehicleState], list[RoadUsers]]
 
 
 class DriveRead(NamedTuple):
@@ -46,8 +43,8 @@ class DriveRead(NamedTuple):
     vehicle: VehicleParameters
 
 
-def read_run(run: Path) -> DriveRead:
-    """Return a run's drive.
+def read_run(run: Path, recorded: CarRecorded | None = None) -> DriveRead:
+    """Return a run's drive; `recorded` is what it recorded of its car, where that was read before.
 
     Raises FileNotFoundError for a folder that is none of a run, UserError for a run that goes on
     or holds no motion.
@@ -58,7 +55,9 @@ def read_run(run: Path) -> DriveRead:
         raise FileNotFoundError(f"run {run}: no {recording.name} in it")
     vehicle = _vehicle(run)
     log = open_log(recording)
-    states, objects = _as_recorded(recording) or _estimated(log, vehicle)
+    states, objects = recorded or car_recorded(run / DRIVE_FILE)
+    if len(states) < 2:
+        states, objects = _estimated(log, vehicle)
     told = [message.stamp_ns for message in objects]
     seen = [detections_of(one) for one in objects]
     headed = [state for state in states if state.yaw_valid]
@@ -77,15 +76,7 @@ def read_run(run: Path) -> DriveRead:
     )
 
 
-def _as_recorded(recording: Path) -> _StatesAndObjects | None:
-    """Return states as they were estimated then and what was detected; None without states."""
-    states = list(recorded_messages(recording, STATES, VehicleState, every_ns=_EVERY_NS))
-    if len(states) < 2:
-        return None
-    return states, list(recorded_messages(recording, OBJECTS, RoadUsers))
-
-
-def _estimated(log: Log, vehicle: VehicleParameters) -> _StatesAndObjects:
+def _estimated(log: Log, vehicle: VehicleParameters) -> CarRecorded:
     """Return states as they are estimated now from all sensors, and what was detected."""
     estimator = estimator_of(log.info, vehicle)
     states: list[VehicleState] = []
@@ -96,7 +87,7 @@ def _estimated(log: Log, vehicle: VehicleParameters) -> _StatesAndObjects:
         state = estimator.handle(channel, message)
         if state is not None:
             states.append(state)
-    return states, objects
+    return CarRecorded(tuple(states), tuple(objects))
 
 
 def motion_in(frame: LocalFrame, states: Iterable[VehicleState]) -> DrivenMotion:

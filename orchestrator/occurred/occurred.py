@@ -9,6 +9,7 @@ import msgspec
 from foretwin.orchestrator.occurred.drive_read import DriveRead, read_run
 from foretwin.orchestrator.occurred.model_validity import ModelGap, model_gaps
 from foretwin.orchestrator.record.kept_rows import kept_rows
+from foretwin.orchestrator.record.recorded_messages import CarRecorded
 from foretwin.orchestrator.record.run_state import RESULTS
 from foretwin.sim_worker.analysis.occurred.odd import OddExposure, odd_of
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
@@ -35,21 +36,20 @@ class Occurred(msgspec.Struct, frozen=True, kw_only=True):
     """What could not be looked at, in words."""
 
 
-def occurred_in(run: Path) -> Occurred:
-    """Return what occurred in a run's drive.
+def occurred_in(run: Path, *, recorded: CarRecorded | None = None) -> Occurred:
+    """Return what occurred in a run's drive; `recorded` where that was read before.
 
     Raises FileNotFoundError for a folder that is none of a run, UserError for a run that goes on
     or holds no motion.
     """
-    return occurred_of(read_run(run), gaps=kept_rows(run / RESULTS, "gaps"))
+    return occurred_of(read_run(run, recorded), gaps=kept_rows(run / RESULTS, "gaps"))
 
 
 def occurred_of(drive: DriveRead, *, gaps: list[dict[str, object]]) -> Occurred:
     """Return what occurred in a drive that was read; `gaps` are rows of the run's table."""
     sees_others = bool(len(drive.told_ns))
-    found = recognise(
-        drive.ego, drive.detected, drive.worlds, frame=drive.frame, vehicle=drive.vehicle
-    )
+    roads = Roads(drive.worlds, drive.frame)
+    found = recognise(drive.ego, drive.detected, roads, vehicle=drive.vehicle)
     notes = []
     if not sees_others:
         notes.append("the car told of no road users: only its own manoeuvres are known")
@@ -61,7 +61,7 @@ def occurred_of(drive: DriveRead, *, gaps: list[dict[str, object]]) -> Occurred:
         odd=odd_of(
             drive.ego,
             courses_of(drive.detected, drive.ego),
-            Roads(drive.worlds, drive.frame),
+            roads,
             found,
             where=drive.states[0].position,
             utc=drive.info.time_base == "utc",

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import bisect
-from pathlib import Path
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.drive import VehicleState
-from foretwin.orchestrator.record.recorded_messages import STATES, recorded_messages
-
-_EVERY_NS = 100_000_000
-"""What is drawn and asked for speeds needs no more."""
 
 
 class CarTrack(NamedTuple):
@@ -34,13 +30,11 @@ class CarTrack(NamedTuple):
         )
 
 
-def driven_track(first: Path, *, start_stamp_ns: int | None) -> CarTrack | None:
-    """Return the track in a recording, its first part given; None where it holds no states.
+def driven_track(states: Sequence[VehicleState], *, start_stamp_ns: int | None) -> CarTrack | None:
+    """Return the track of recorded states; None where there are none.
 
-    Drive time begins at `start_stamp_ns`, or with the first state. What cannot be read is passed
-    by.
+    Drive time begins at `start_stamp_ns`, or with the first state.
     """
-    states = list(recorded_messages(first, STATES, VehicleState, every_ns=_EVERY_NS))
     if len(states) < 2:
         return None
     stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.world import World
+from foretwin.orchestrator.record.recorded_messages import CarRecorded, car_recorded
 from foretwin.orchestrator.record.run_folder import table_at
 from foretwin.orchestrator.record.run_state import check_finished, read_record
 from foretwin.orchestrator.record.table_parts import read_parts
@@ -147,9 +148,14 @@ class RunMaterial:
         return self._worlds.those_of(row["world_id"] for row in self.rounds)
 
     @cached_property
+    def recorded(self) -> CarRecorded:
+        """Return what is recorded of the car, read in one walk."""
+        return car_recorded(self.folder / DRIVE_FILE)
+
+    @cached_property
     def track(self) -> CarTrack | None:
         """Return where the car was as it was estimated then, None where nothing is recorded."""
-        return driven_track(self.folder / DRIVE_FILE, start_stamp_ns=self.start_stamp_ns or None)
+        return driven_track(self.recorded.states, start_stamp_ns=self.start_stamp_ns or None)
 
     @property
     def attribution(self) -> str:

@@ -27,7 +27,7 @@ _MOST_LISTED = 300
 def occurred_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Chapter:
     """Return what occurred in a run's drive; why nothing is known of it where that is so."""
     try:
-        found = occurred_in(run.folder)
+        found = occurred_in(run.folder, recorded=run.recorded)
     except (UserError, OSError) as error:
         why = "nothing is recorded" if isinstance(error, OSError) else str(error).split(": ", 1)[-1]
         return _chapter((Prose(f"What occurred cannot be told: {why}."),))

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.drive import RoadUserKind
-from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.contracts.world import World
 from foretwin.sim_worker.analysis.occurred.across_way import across_way
 from foretwin.sim_worker.analysis.occurred.along_way import Encounter, along_way
 from foretwin.sim_worker.analysis.occurred.driven_way import DrivenWay, runs_of
@@ -38,16 +36,16 @@ _INSTEAD = {
 def recognise(
     ego: DrivenMotion,
     detected: Iterable[Detected],
-    worlds: Iterable[World],
+    roads: Roads,
     *,
-    frame: LocalFrame,
     vehicle: VehicleParameters,
 ) -> tuple[OccurredScenario, ...]:
     """Return what occurred, by when it began; nothing where the car never moved.
 
-    Motion and detections are in `frame`; a drive with holes is looked at piece by piece.
+    Motion and detections are in the frame of `roads`; a drive with holes is looked at piece by
+    piece.
     """
-    roads, courses = Roads(worlds, frame), courses_of(detected, ego)
+    courses = courses_of(detected, ego)
     found: list[OccurredScenario] = []
     for piece in runs_of(np.asarray(np.isfinite(ego.xy_m).all(axis=1))):
         if piece.stop - piece.start < _LEAST_ROWS:

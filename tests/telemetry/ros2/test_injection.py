@@ -9,7 +9,7 @@ import pytest
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.guard import Refused, admit
 from foretwin.contracts.towards_vehicle import Injection
-from foretwin.orchestrator.record.recorded_messages import recorded_messages
+from foretwin.orchestrator.record.recorded_messages import TopicRead, recorded_messages
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.recording import DriveRecording
 from foretwin.telemetry.ros2.injection import EVERY_NS, InjectionWord
@@ -99,5 +99,5 @@ def test_it_is_recorded_and_never_said_again(tmp_path: Path) -> None:
     bus.publish("injection", shut, vehicle="car")
     process.step()
     process.finish()
-    assert list(recorded_messages(path, "/foretwin/injection", Injection)) == [shut]
+    assert list(recorded_messages(path, TopicRead("/foretwin/injection", Injection))) == [shut]
     assert "injection" not in {channel for channel, _ in open_log(path).samples()}

@@ -9,6 +9,7 @@ from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import arc_lengths, headings_rad, points_at
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
+from foretwin.sim_worker.analysis.occurred.roads import Roads
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
 from foretwin.sim_worker.analysis.occurred.scene import Detected, DrivenMotion
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -68,7 +69,7 @@ def seen_in(
 ) -> tuple[OccurredScenario, ...]:
     """What is recognised at the drawn crossing."""
     place = cross() if world is None else world
-    return recognise(ego, others, (place,), frame=place.frame, vehicle=CAR)
+    return recognise(ego, others, Roads((place,), place.frame), vehicle=CAR)
 
 
 def kinds(rows: tuple[OccurredScenario, ...], other_id: str = "") -> list[str]:

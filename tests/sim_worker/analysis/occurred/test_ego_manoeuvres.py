@@ -12,6 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import World
 from foretwin.sim_worker.analysis.occurred.ego_manoeuvres import within
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
+from foretwin.sim_worker.analysis.occurred.roads import Roads
 from tests.sim_worker.analysis.occurred.scenes import CAR, START_NS, ego_along, kinds, seen_in
 from tests.sim_worker.scenarios.worlds import cross
 from tests.world_gen.drawn_maps import AVENUE, STREET, crossing, world_of
@@ -49,7 +50,7 @@ def test_turns_are_told_with_a_map_and_without(
     ego = ego_along(bend(sign, turn_rad=turn_rad, radius_m=radius_m), np.full(180, 7.0))
     worlds = (cross(),) if mapped else ()
 
-    rows = recognise(ego, (), worlds, frame=cross().frame, vehicle=CAR)
+    rows = recognise(ego, (), Roads(worlds, cross().frame), vehicle=CAR)
 
     assert kinds(rows) == [kind]
     assert rows[0].junction_id == (cross().intersection.id if mapped else "")

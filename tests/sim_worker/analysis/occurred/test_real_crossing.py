@@ -16,6 +16,7 @@ import pytest
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
+from foretwin.sim_worker.analysis.occurred.roads import Roads
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
 from foretwin.sim_worker.analysis.occurred.scene import Detected, even_motion
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
@@ -99,7 +100,7 @@ def seen_by(data: Path, one: ByHand) -> tuple[OccurredScenario, ...]:
         )
         for name, (kind, rows) in everybody.items()
     ]
-    return recognise(ego, others, (), frame=ORIGIN, vehicle=CAR)
+    return recognise(ego, others, Roads((), ORIGIN), vehicle=CAR)
 
 
 @pytest.mark.real_data

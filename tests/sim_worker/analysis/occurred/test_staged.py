@@ -12,6 +12,7 @@ import pytest
 from foretwin.contracts.world import World
 from foretwin.orchestrator.occurred.drive_read import motion_in
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
+from foretwin.sim_worker.analysis.occurred.roads import Roads
 from foretwin.sim_worker.analysis.occurred.scene import Detected, DrivenMotion
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.standin.source import START_STAMP_NS
@@ -77,9 +78,8 @@ class Record(NamedTuple):
 
     def rows(self) -> list[Label]:
         """Return what is recognised in it."""
-        found = recognise(
-            self.motion, self.detected, (self.world,), frame=self.world.frame, vehicle=CAR
-        )
+        roads = Roads((self.world,), self.world.frame)
+        found = recognise(self.motion, self.detected, roads, vehicle=CAR)
         return [
             Label(
                 row.kind,
