@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
+from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from foretwin.orchestrator.occurred.drive_read import motion_in
+from foretwin.contracts.segments import DRIVE_FILE
+from foretwin.orchestrator.occurred.drive_read import motion_in, read_run
 from foretwin.orchestrator.occurred.occurred import occurred_in
+from foretwin.telemetry.logs.write_mcap import create
 from tests.orchestrator.recorded_runs import write_run
 from tests.sim_worker.scenarios.worlds import cross
 
@@ -77,6 +79,22 @@ def test_a_car_that_tells_of_nobody_is_said_to(tmp_path: Path) -> None:
 
     assert not found.sees_others
     assert "told of no road users" in found.notes[0]
+
+
+def test_a_recording_whose_first_parts_are_gone_is_read_in_all_that_are_left(
+    tmp_path: Path,
+) -> None:
+    run = _run(tmp_path, "b")
+    whole = read_run(run)
+    (run / DRIVE_FILE).unlink()
+    halves = whole.states[:80], whole.states[80:]
+    for name, states in zip(("drive-002.mcap", "drive-003.mcap"), halves, strict=True):
+        with create(run / name, info=whole.info) as writer:
+            writer.add("gnss", GnssFix(stamp_ns=START_NS, position=states[0].position))
+            for state in states:
+                writer.add("state", state)
+
+    assert read_run(run).states == whole.states
 
 
 def test_a_folder_of_no_run_is_refused(tmp_path: Path) -> None:
