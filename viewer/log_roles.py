@@ -113,14 +113,16 @@ class RolesLog:
         rows = [Row(path, drive_ns, _plane(other.shown))]
         if self._shown.get(other.vehicle_id) != other.role:
             self._shown[other.vehicle_id] = other.role
+            # Of one that is all three at once its twin is shown.
+            drawn = "twin" if other.role == "all" else other.role
             label = rr.Points3D(
                 [[0.0, 0.0, other.height_m + 0.6]],
                 labels=[f"{other.vehicle_id}: {other.role}"],
-                colors=[CARS[other.role][0]],
+                colors=[CARS[drawn][0]],
                 radii=0.05,
             )
             rows += [
-                Row(f"{path}/box", drive_ns, box_of(other.role, size_m)),
+                Row(f"{path}/box", drive_ns, box_of(drawn, size_m)),
                 Row(f"{path}/name", drive_ns, label),
                 Row(f"{measured}/box", drive_ns, box_of("real", size_m)),
             ]

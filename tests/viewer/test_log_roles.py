@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from foretwin.contracts.roles import Role
+from foretwin.contracts.roles import ROLES, Role
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, TwinCorrection
 from foretwin.viewer.log_roles import CARS, RolesLog, static_rows
 from foretwin.viewer.rows import Row
@@ -58,12 +58,12 @@ def test_only_who_is_there_is_drawn_once_roles_are_used() -> None:
         assert drawn == there
 
 
-@pytest.mark.parametrize("role", ["twin", "shadow", "ghost"])
+@pytest.mark.parametrize("role", ROLES)
 def test_a_vehicle_beside_has_the_colour_of_its_role_and_its_own_size(role: Role) -> None:
     rows = by_path(RolesLog().rows(sample(others=(van(role),)), 1))
     path = next(path for path in rows if path.startswith("world/others/") and path.endswith("/box"))
     colour = rows[path].colors.as_arrow_array().to_pylist()[0]
-    red, green, blue = CARS[role][0]
+    red, green, blue = CARS["twin" if role == "all" else role][0]
     assert colour >> 8 == (red << 16) + (green << 8) + blue
     half = rows[path].half_sizes.as_arrow_array().to_pylist()[0]
     assert half[0] == pytest.approx(2.3, abs=0.1)
