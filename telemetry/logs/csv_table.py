@@ -34,7 +34,7 @@ from foretwin.telemetry.logs.declaration import (
     sections_of,
 )
 from foretwin.telemetry.logs.gpx import representable_ns, stamp_ns_from_iso
-from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.log import LAST_LINE_OPEN, Log, LogError
 from foretwin.telemetry.logs.table_cells import Cells, read_cells
 
 _MANY_ROWS = 20_000
@@ -52,6 +52,7 @@ class Table(NamedTuple):
     cells: dict[str, Cells]
     decimal: str
     unreadable_rows: int
+    open_end: bool
 
 
 def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
@@ -104,6 +105,7 @@ def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
         reference_point=declared.reference_point,
         body_from_antenna_m=declared.body_from_antenna_m,
         unreadable=unreadable,
+        refused={LAST_LINE_OPEN: 1} if table.open_end else None,
     )
 
 
@@ -121,7 +123,7 @@ def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Ta
     for section in sections_of(declared).values():
         wanted.update(column.column for column in columns_of(section).values())
         wanted.update(section.new_when)
-    cells, unreadable = read_cells(
+    cells, unreadable, open_end = read_cells(
         path,
         wanted=sorted(wanted),
         declared_in=declaration_path.name,
@@ -137,7 +139,7 @@ def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Ta
     known = np.array([stamp_ns for stamp_ns in stamps if stamp_ns is not None], dtype=np.int64)
     if not len(known):
         raise LogError(f"{path}: no row with a readable time in column {declared.time.column!r}")
-    return Table(path, known, cells, declared.decimal, unreadable)
+    return Table(path, known, cells, declared.decimal, unreadable, open_end)
 
 
 def _stamp_reader(unit: str, decimal: str) -> Callable[[str], int | None]:

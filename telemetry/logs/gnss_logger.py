@@ -35,7 +35,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import Vector3
 from foretwin.telemetry.logs.columns import Stamps, Stream, stream_of, table_log
 from foretwin.telemetry.logs.gpx import representable_ns
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError
+from foretwin.telemetry.logs.log import LAST_LINE_OPEN, UNREADABLE_ROW, Log, LogError
 from foretwin.telemetry.logs.map_origin import declaration_beside
 from foretwin.telemetry.logs.nmea import MIN_COURSE_MPS
 from foretwin.telemetry.logs.nmea_sentences import yaw_rad_of
@@ -148,6 +148,9 @@ def _read(path: Path, fixes: dict[str, list[_Fix]], sensors: dict[str, _Sensor])
         if kind.startswith("#"):
             if kind.lstrip("# ") == "Fix":
                 places = _places(rest.strip().split(","))
+            continue
+        if kind in ("Fix", *_SENSORS) and not line.endswith("\n"):
+            refused[LAST_LINE_OPEN] += 1
             continue
         try:
             if kind == "Fix":

@@ -35,6 +35,7 @@ TIME_DOUBLED = "time doubled"
 TIME_BEFORE_ZERO = "time before zero"
 UNREADABLE_ROW = "unreadable row"
 FILE_CUT_SHORT = "file cut short"
+LAST_LINE_OPEN = "last line without its end, of which digits may be missing"
 
 
 _MOTION = (

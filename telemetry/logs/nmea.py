@@ -24,7 +24,13 @@ import msgspec
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs import units
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample
+from foretwin.telemetry.logs.log import (
+    LAST_LINE_OPEN,
+    UNREADABLE_ROW,
+    Log,
+    LogError,
+    Sample,
+)
 from foretwin.telemetry.logs.map_origin import declaration_beside
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.nmea_positions import (
@@ -55,6 +61,9 @@ _MODES_WITHOUT_FIX = ("N", "E", "M", "S")
 """Mode indicators: not valid, estimated, manual, simulator."""
 
 Skipped = Counter[str]
+
+_UBX = "\ufffdb"
+"""What the first two bytes of a u-blox message are as text; such hold zeros, texts hold none."""
 
 
 class NmeaDeclaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -153,8 +162,14 @@ def _survey(path: Path, declared: datetime.date | None) -> _Found:
 
 def _samples(path: Path, found: _Found, skipped: Skipped) -> Iterator[Sample]:
     date, latest_ns, stamp_ns = found.first_date, found.first_time_ns, None
-    zero_ns = 0 if found.dated else found.first_time_ns
+    zero_ns, mixed = 0 if found.dated else found.first_time_ns, False
     for line in _lines(path):
+        if "*" not in line and not line.endswith("\n"):
+            skipped[LAST_LINE_OPEN] += 1
+            continue
+        mixed = mixed or _UBX in line
+        if "\0" in line and not mixed:  # of a disk that filled up: lines may have gone with it
+            skipped[UNREADABLE_ROW] += 1
         sentence = sentence_of(line)
         if sentence is None:
             continue

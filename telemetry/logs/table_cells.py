@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection
+import itertools
+import os
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,16 +17,23 @@ PARQUET_MAGIC = b"PAR1"
 
 
 class CellTable(NamedTuple):
-    """Texts by column, each as long as there are whole rows, and how many rows were cut short."""
+    """Texts by column, each as long as there are whole rows, how many rows were cut short, and
+    whether the last line was left out because it has no end: digits of it may be missing."""
 
     cells: dict[str, Cells]
-    short_rows: int
+    short_rows: int = 0
+    open_end: bool = False
 
 
 def is_parquet(path: Path) -> bool:
     """Tell whether a file is a Parquet table, by its content."""
     with path.open("rb") as file:
         return file.read(len(PARQUET_MAGIC)) == PARQUET_MAGIC
+
+
+def whole_lines(text: str) -> str:
+    """Return a text without its last line where that has no end."""
+    return text[: 1 + max(text.rfind("\n"), text.rfind("\r"))]
 
 
 def names_without_header(count: int) -> list[str]:
@@ -41,7 +50,7 @@ def read_cells(
     `declared_in` names and the table lacks.
     """
     if is_parquet(path):
-        return CellTable(_parquet_cells(path, wanted, declared_in), 0)
+        return CellTable(_parquet_cells(path, wanted, declared_in))
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as text:
         reader = csv.reader(text, delimiter=delimiter)
         first = next(reader, [])
@@ -51,10 +60,11 @@ def read_cells(
         cells: dict[str, Cells] = {name: [] for name in wanted}
         kept = [(cells[name].append, place) for name, place in places.items()]
         width, short = len(names), 0
-        if not header:
-            for add, place in kept:
-                add(first[place])
-        for row in reader:
+        rows: Iterable[list[str]] = reader if header else itertools.chain([first], reader)
+        open_end = not _ends_its_last_line(path)
+        if open_end:
+            rows = _all_but_last(rows)
+        for row in rows:
             if not any(map(str.strip, row)):
                 continue
             if len(row) < width:
@@ -62,7 +72,18 @@ def read_cells(
                 continue
             for add, place in kept:
                 add(row[place])
-    return CellTable(cells, short)
+    return CellTable(cells, short, open_end)
+
+
+def _ends_its_last_line(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() in (b"\n", b"\r")
+
+
+def _all_but_last(rows: Iterable[list[str]]) -> Iterator[list[str]]:
+    for row, _ in itertools.pairwise(rows):
+        yield row
 
 
 def _parquet_cells(path: Path, wanted: Collection[str], declared_in: str) -> dict[str, Cells]:

@@ -10,6 +10,7 @@ import pytest
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.log import LAST_LINE_OPEN
 
 COVERS = (
     "foretwin.telemetry.logs.csv_table",
@@ -68,6 +69,34 @@ def test_nineteen_digits_of_time_survive(tmp_path: Path) -> None:
     )
     path = drive(tmp_path, rows, DECLARATION.replace('unit = "s"', 'unit = "ns"'))
     assert [m.stamp_ns % 1000 for m in channels(path)["gnss"]] == [789, 790]
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\r\n", "\r", "\n\n", "\n \n"])
+def test_a_last_line_without_its_end_is_left_out_and_said(tmp_path: Path, end: str) -> None:
+    """`23` could have been `23.75`."""
+    rows = "t,lat,lon,v,wheel\n0.0,52.5,13.4,10,90\n0.1,52.6,13.5,20,-45\n0.2,52.7,13.6,30,23"
+    path = drive(tmp_path)
+    path.write_bytes((rows.replace("\n", "\r") if end == "\r" else rows).encode() + end.encode())
+    log = open_log(path)
+    read = [channel for channel, _ in log.samples()]
+    assert read.count("steering") == (3 if end else 2)
+    assert log.skipped == ({} if end else {LAST_LINE_OPEN: 1})
+    assert log.info.end_stamp_ns == (200_000_000 if end else 100_000_000)
+
+
+def test_a_last_line_is_counted_once_where_it_is_short_as_well(tmp_path: Path) -> None:
+    log = open_log(drive(tmp_path, ROWS + "0.2,52.7,13"))
+    assert len(list(log.samples())) == 6
+    assert log.skipped == {LAST_LINE_OPEN: 1}
+
+
+def test_a_table_without_names_is_cut_alike(tmp_path: Path) -> None:
+    named = DECLARATION
+    for number, name in enumerate(("t", "lat", "lon", "v", "wheel"), start=1):
+        named = named.replace(f'column = "{name}"', f'column = "c{number}"')
+    rows = ROWS.partition("\n")[2] + "0.2,52.7,13.6,30,23"
+    log = open_log(drive(tmp_path, rows, "header = false\n" + named))
+    assert len(list(log.samples())) == 6
 
 
 def test_empty_cells_hold_no_sample_and_bad_ones_are_counted(tmp_path: Path) -> None:

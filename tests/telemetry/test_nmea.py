@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.telemetry.logs import Log, LogError, open_log
+from foretwin.telemetry.logs.log import LAST_LINE_OPEN, UNREADABLE_ROW
 from foretwin.telemetry.logs.nmea_sentences import (
     CHECKSUM_WRONG,
     Sentence,
@@ -50,6 +51,25 @@ def opened(tmp_path: Path, *lines: str) -> tuple[Log, dict[str, list[Any]]]:
     for channel, message in log.samples():
         found.setdefault(channel, []).append(message)
     return log, found
+
+
+def test_a_last_line_that_was_cut_before_its_checksum_is_left_out(tmp_path: Path) -> None:
+    """Of an altitude of 545.4 m there stood 54 m."""
+    cut = gga("120001.00").partition("34.5")[0] + "3"
+    log, found = opened(tmp_path, gga("120000.00"), cut)
+    assert [fix.position.alt_m for fix in found["gnss"]] == [79.0]
+    assert log.skipped == {LAST_LINE_OPEN: 1}
+    log, found = opened(tmp_path, gga("120000.00"), gga("120001.00").rstrip())
+    assert (len(found["gnss"]), log.skipped) == (2, {})
+
+
+def test_lines_that_were_blanked_are_counted(tmp_path: Path) -> None:
+    """The line break went with them: what stands behind is read."""
+    log, found = opened(
+        tmp_path, gga("120000.00"), gga("120001.00")[:30], "\0" * 200, gga("120004.00")
+    )
+    assert [fix.stamp_ns for fix in found["gnss"]] == [0, 4 * 10**9]
+    assert log.skipped == {UNREADABLE_ROW: 1}
 
 
 def test_the_example_of_the_standard_has_its_checksum() -> None:

@@ -16,7 +16,11 @@ import pyarrow.parquet as pq
 from foretwin.contracts.arrays import Array, Stamps
 from foretwin.telemetry.logs.gpx import stamp_ns_from_iso
 from foretwin.telemetry.logs.log import LogError
-from foretwin.telemetry.logs.table_cells import is_parquet, names_without_header
+from foretwin.telemetry.logs.table_cells import (
+    is_parquet,
+    names_without_header,
+    whole_lines,
+)
 
 _DELIMITERS = (";", "\t", ",", "|")
 """A semicolon first: with it commas are decimal."""
@@ -54,7 +58,7 @@ def read_loose_table(path: Path) -> LooseTable:
         except (OSError, pa.ArrowException) as error:
             raise LogError(f"{path}: no Parquet table that can be read: {error}") from error
     else:
-        text = path.read_bytes().decode("utf-8-sig", errors="replace")
+        text = whole_lines(path.read_bytes().decode("utf-8-sig", errors="replace"))
         try:
             shape = _shape(path, text)
             table = _parsed(path, text, *shape)

@@ -11,6 +11,7 @@ import pytest
 
 from foretwin.telemetry.logs import Log, LogError, open_log
 from foretwin.telemetry.logs.gnss_logger import MOUNTING_UNKNOWN
+from foretwin.telemetry.logs.log import LAST_LINE_OPEN
 from tests.telemetry.public_drives import public_drive
 
 V1 = "# Fix,Provider,Latitude,Longitude,Altitude,Speed,Accuracy,(UTC)TimeInMs\n"
@@ -64,6 +65,21 @@ def test_the_speed_is_not_its_accuracy_and_bearings_are_clockwise(tmp_path: Path
     _, found = opened(tmp_path, V2, fix(0), fix(1, bearing="180.0"), fix(2, speed="1.0"))
     assert [one.speed_mps for one in found["speed"]] == [10.0, 10.0, 1.0]
     assert [one.yaw_rad for one in found["heading"]] == pytest.approx([0.0, -math.pi / 2])
+
+
+def test_a_last_line_without_its_end_is_left_out_and_said(tmp_path: Path) -> None:
+    """Of a time in 2026 its first digits are one in 1970, of a rate of 0.35 rad/s 0.3."""
+    lines = (V2, fix(0), fix(1))
+    log, found = opened(tmp_path, *lines, fix(2).partition("000000,0.2")[0][:-4])
+    assert len(found["gnss"]) == 2
+    assert log.skipped == {LAST_LINE_OPEN: 1}
+    assert log.info.start_stamp_ns == NOON_MS * 1_000_000
+    held = (*lines, sensor("Accel", 0, "0,0,9.8"), sensor("Gyro", 0, "0,0,0.1"))
+    log, found = opened(
+        tmp_path, *held, sensor("Gyro", 1, "0,0,0.35")[:-2], mounting='forward = "y"\nup = "z"\n'
+    )
+    assert [one.rate_radps[2] for one in found["imu"]] == [0.1]
+    assert log.skipped == {LAST_LINE_OPEN: 1}
 
 
 def test_gps_is_taken_else_the_fused_provider_never_the_network(tmp_path: Path) -> None:

@@ -36,3 +36,10 @@ def test_decimal_commas_and_missing_names_are_seen(tmp_path: Path) -> None:
     table = read_loose_table(path)
     assert (table.delimiter, table.decimal, table.header) == (";", ",", False)
     assert [column[0] for column in table.columns.values()] == [1.5, 2.0]
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\r\n"])
+def test_a_last_line_without_its_end_is_no_row(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "cut.csv"
+    path.write_bytes(((end or "\n").join(["1.5,2"] * 42) + end).encode())
+    assert read_loose_table(path).rows == (42 if end else 41)
