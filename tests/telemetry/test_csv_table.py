@@ -84,12 +84,6 @@ def test_a_last_line_without_its_end_is_left_out_and_said(tmp_path: Path, end: s
     assert log.info.end_stamp_ns == (200_000_000 if end else 100_000_000)
 
 
-def test_a_last_line_is_counted_once_where_it_is_short_as_well(tmp_path: Path) -> None:
-    log = open_log(drive(tmp_path, ROWS + "0.2,52.7,13"))
-    assert len(list(log.samples())) == 6
-    assert log.skipped == {LAST_LINE_OPEN: 1}
-
-
 def test_a_table_without_names_is_cut_alike(tmp_path: Path) -> None:
     named = DECLARATION
     for number, name in enumerate(("t", "lat", "lon", "v", "wheel"), start=1):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,8 @@ ANSWERS = {
 """What a user may answer beforehand, by key."""
 _UNKNOWN_POINT = "unknown: positions do not tell what on the car they are of"
 _CLOCKS_TRIED = 4
+_BY_CHANCE = ("local", "wgs84", "projected", "ecef")
+"""Frames, that which columns fit by chance first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,10 +64,12 @@ def propose(
         if key not in ANSWERS:
             raise LogError(f"--answer {key}: no such question; {one_of(key, ANSWERS)}")
     table = read_loose_table(path)
-    clock, places = _clock_and_places(table, answers)
-    time_s = clock.time_s
-    everything = columns_beside(table.columns, time_s, {clock.column})
-    chosen = chosen_place(places, everything, country_of=country_of, answers=answers)
+    readings = [
+        _reading(table, clock, places, country_of, answers)
+        for clock, places in _clocks_and_places(table, answers)
+    ]
+    readings.sort(key=lambda reading: reading.plainness, reverse=True)
+    clock, _, chosen, sensors = readings[0]
     if chosen.question is not None:
         return Proposal(declaration=None, question=chosen.question)
     place = chosen.place
@@ -74,8 +78,7 @@ def propose(
     frame, question, framed = _frame(place, table, answers)
     if question is not None:
         return Proposal(declaration=None, question=question)
-    without = {clock.column, *place.fields.values()}
-    sensors = sensors_of(place, {n: c for n, c in everything.items() if n not in without})
+    assert sensors is not None
     if clock.counts and not sensors.fits:
         raise LogError(
             f"{path}: column {clock.column!r} counts rows, and no other is their time: nothing says"
@@ -84,9 +87,41 @@ def propose(
     return _written(table, clock, chosen, frame, framed, sensors, answers)
 
 
-def _clock_and_places(
+class _Reading(NamedTuple):
+    """A table by one clock in one unit: what positions it leaves, and the sensors beside them."""
+
+    clock: ClockColumn
+    frame: str
+    chosen: Chosen
+    sensors: FoundSensors | None
+
+    @property
+    def plainness(self) -> tuple[int, int]:
+        """How many sensors go with the positions; then, how unlikely their frame is by chance."""
+        found = self.sensors
+        fits = -1 if self.chosen.place is None and self.chosen.question is None else 0
+        if found is not None:
+            fits = len(found.fits) + (found.heading is not None)
+        return fits, _BY_CHANCE.index(self.frame)
+
+
+def _reading(
+    table: LooseTable, clock: ClockColumn, places: list[Place], country_of: CountryOf | None,
+    answers: dict[str, str],
+) -> _Reading:  # fmt: skip
+    everything = columns_beside(table.columns, clock.time_s, {clock.column})
+    chosen = chosen_place(places, everything, country_of=country_of, answers=answers)
+    sensors = None
+    if (place := chosen.place) is not None:
+        without = {clock.column, *place.fields.values()}
+        sensors = sensors_of(place, {n: c for n, c in everything.items() if n not in without})
+    return _Reading(clock, places[0].frame, chosen, sensors)
+
+
+def _clocks_and_places(
     table: LooseTable, answers: dict[str, str]
-) -> tuple[ClockColumn, list[Place]]:
+) -> list[tuple[ClockColumn, list[Place]]]:
+    """Return the likeliest clock that leaves positions, in each unit in which it does."""
     clocks = clocks_of(table)
     if (named := answers.get("time")) is not None:
         clocks = [clock for clock in clocks if clock.column == named]
@@ -97,10 +132,15 @@ def _clock_and_places(
             f"{table.path}: no column that rises as a time does (seconds to nanoseconds, or"
             f" ISO 8601 dates); columns: {', '.join([*table.columns, *table.times, *table.texts])}"
         )
+    found: list[tuple[ClockColumn, list[Place]]] = []
     for clock in clocks[:_CLOCKS_TRIED]:
+        if found and (clock.column, clock.base) != (found[0][0].column, found[0][0].base):
+            continue
         columns = {name: column for name, column in table.columns.items() if name != clock.column}
         if places := places_of(columns, clock.time_s):
-            return clock, places
+            found.append((clock, places))
+    if found:
+        return found
     raise LogError(
         f"{table.path}: no columns that move as a car does (degrees, radians, ECEF or metres, at a"
         f" time of {clocks[0].column!r} in {clocks[0].unit}): nothing to declare"

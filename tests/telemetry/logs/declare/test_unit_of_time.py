@@ -1,0 +1,41 @@
+"""A table whose clock may be in seconds or in milliseconds, and moves as a car does by either."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from foretwin.telemetry.logs.declare.proposal import propose
+from tests.telemetry.logs.declare.test_propose import country
+
+
+def straight_table(folder: Path) -> Path:
+    """Write an all but straight minute at 100 Hz, by a clock in ms, with a heading in radians.
+
+    In seconds that clock makes a drive as well, of which the heading is the latitude.
+    """
+    time_s = np.arange(0.0, 60.0, 0.01)
+    held = np.repeat(np.arange(0, len(time_s), 10), 10)
+    swing = 0.03 * np.sin(time_s / 4.0) + 0.02 * np.sin(time_s / 1.5)
+    speed = 20.0 + 4.0 * np.sin(time_s / 7.0)
+    metre = 0.01 / 6.371e6
+    east, north = np.cumsum(speed * np.cos(swing)) * metre, np.cumsum(speed * np.sin(swing)) * metre
+    heading = 0.1 - swing[held]
+    columns = (heading, 4_321_632 + time_s * 1e3, -2.1 + east[held] / 0.8, 0.6435 + north[held])
+    path = folder / "straight.csv"
+    path.write_text(
+        "".join(f"{a:.6f},{b:.3f},{c:.12f},{d:.12f}\n" for a, b, c, d in zip(*columns, strict=True))
+    )
+    return path
+
+
+def test_a_heading_is_no_latitude_by_a_clock_that_is_a_thousand_times_slower(
+    tmp_path: Path,
+) -> None:
+    found = propose(straight_table(tmp_path), country_of=country)
+    assert found.declaration is not None
+    assert (found.declaration.time.unit, found.question) == ("ms", None)
+    place = found.declaration.position
+    assert place is not None
+    assert (getattr(place.latitude, "column", ""), place.frame) == ("c4", "wgs84")
