@@ -27,6 +27,8 @@ from foretwin.sim_worker.futures.columns import RESULT_SCHEMA_VERSION
 
 STEP_BYTES = 256 << 20
 """Runs of about so many bytes of tables are taken in one step."""
+_UNTIL_WRITTEN = 0.95
+"""Of what a bar shows of a step, until all rows are read; to publish them is the rest."""
 _NAMED_FIRST = "jobs", "road_users", "futures", "rounds"
 """Tables are published in this order, then the others, `runs` last: who finds a run there finds all
 of it."""
@@ -49,9 +51,12 @@ def collect(
     folders: Sequence[Path],
     *,
     replace: bool = False,
-    advance: Callable[[str], None] = lambda _: None,
+    advance: Callable[..., None] = lambda *_, **__: None,
 ) -> Collected:
     """Take runs and sweeps into a lake; what it holds already changes nothing.
+
+    `advance` counts a run, or `by` so many, once it is there; runs of one step are written
+    together, table by table, and count by the share of their cells that are.
 
     With `replace` a run that has changed since takes the place of what was taken of it. Whatever a
     killed collect left is brought to its end first. Raises UserError where the lake cannot be
@@ -62,7 +67,7 @@ def collect(
         manifest = read_manifest(store)
         finish(store, manifest)
         for step in _steps(_new(folders, manifest, done, replace=replace, advance=advance)):
-            _take(store, manifest, step, done)
+            _take(store, manifest, step, done, advance)
     return done
 
 
@@ -95,12 +100,12 @@ def _new(
     done: Collected,
     *,
     replace: bool,
-    advance: Callable[[str], None],
+    advance: Callable[..., None],
 ) -> Iterator[SourceTables]:
     """Yield what the lake lacks; the others are counted in `done`."""
     begun: dict[str, RunSource] = {}
     for folder in folders:
-        advance(folder.name)
+        advance(f"reading {folder.name}", by=0)
         try:
             source = source_of(folder)
             known = manifest.runs.get(source.run_id)
@@ -109,6 +114,7 @@ def _new(
                 before and before.sha256 == source.sha256
             ):
                 done.there.append(source.run_id)
+                advance(folder.name)
                 continue
             if before is not None:
                 raise UserError(f"{folder}: is called {source.run_id} as {before.folder} is")
@@ -121,6 +127,7 @@ def _new(
             begun[source.run_id] = source
         except (UserError, OSError) as error:
             done.refused.append(" ".join(str(error).split()))
+            advance(folder.name)
 
 
 def _steps(sources: Iterator[SourceTables]) -> Iterator[list[SourceTables]]:
@@ -138,18 +145,31 @@ def _steps(sources: Iterator[SourceTables]) -> Iterator[list[SourceTables]]:
 
 
 def _take(
-    store: LakeStore, manifest: LakeManifest, sources: list[SourceTables], done: Collected
+    store: LakeStore,
+    manifest: LakeManifest,
+    sources: list[SourceTables],
+    done: Collected,
+    advance: Callable[..., None],
 ) -> None:
     """Take runs in one step, without those whose rows turn out to be unreadable."""
+    told = 0
+
+    def tell(what: str, share: float) -> None:
+        nonlocal told
+        more = max(int(share * len(sources)) - told, 0)  # begun anew without one, it goes not back
+        told += more
+        advance(what, by=more)
+
     left = sorted(sources, key=lambda one: (one.partition, one.source.run_id))
     while left:
         try:
-            after = _staged(store, manifest, left)
+            after = _staged(store, manifest, left, tell)
             break
         except UncollectableError as error:
             done.refused.append(" ".join(str(error).split()))
             left = [one for one in left if one.source.run_id != error.run_id]
     else:
+        tell("refused", 1.0)
         return
     store.renew()
     write_manifest(store, after)
@@ -159,9 +179,15 @@ def _take(
         done.rows += sum(of.rows for of in after.runs[one.source.run_id].tables.values())
     manifest.runs, manifest.files, manifest.columns = after.runs, after.files, after.columns
     finish(store, manifest)
+    tell("published", 1.0)
 
 
-def _staged(store: LakeStore, manifest: LakeManifest, sources: list[SourceTables]) -> LakeManifest:
+def _staged(
+    store: LakeStore,
+    manifest: LakeManifest,
+    sources: list[SourceTables],
+    tell: Callable[[str, float], None],
+) -> LakeManifest:
     """Stage all files that change; returns the manifest as it is with them."""
     after = LakeManifest(
         runs=dict(manifest.runs), files=dict(manifest.files), columns=dict(manifest.columns)
@@ -176,8 +202,18 @@ def _staged(store: LakeStore, manifest: LakeManifest, sources: list[SourceTables
             wanted.setdefault((table, one.partition), []).append(one)
             after.columns[table] = widened(after.columns.get(table, {}), one, table)
     tables: dict[str, dict[str, RowsOfRun]] = {one.source.run_id: {} for one in sources}
+    cells = sum(one.rows[table] * len(one.schemas[table]) for one in sources for table in one.rows)
+    taken = 0
+
+    def took(table: str, more: int) -> None:
+        nonlocal taken
+        taken += more
+        tell(table, _UNTIL_WRITTEN * taken / cells)
+
     for (table, partition), of in wanted.items():
-        written = write_parts(store, after, f"{table}/{partition.path}", of, without=without)
+        written = write_parts(
+            store, after, f"{table}/{partition.path}", of, without=without, took=took
+        )
         after.files |= written.files
         for one in of:
             names = tuple(name.rpartition("/")[2] for name in written.files_of[one.source.run_id])

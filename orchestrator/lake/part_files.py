@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from typing import NamedTuple
 
@@ -70,9 +70,12 @@ def write_parts(
     sources: Iterable[SourceTables],
     *,
     without: Collection[str] = (),
+    took: Callable[[str, int], None] = lambda *_: None,
 ) -> Written:
     """Stage the files of a table and partition that change: the last one with the rows of sources
     after its own, and further ones; and those that hold runs which are to be taken out.
+
+    `took` is told the table and how many more cells of sources were taken.
 
     Raises UncollectableError where rows of a source cannot be read, else OSError.
     """
@@ -98,7 +101,7 @@ def write_parts(
         names = (part_name(folder, number) for number in range(first, 100_000))
         before = last if grows else None
         named = _credits(store, before) | {source.attribution for source in adding}
-        rows = _all_rows(store, before, adding, table, without)
+        rows = _all_rows(store, before, adding, table, without, took)
         _write(store, staged, names, _credited(schema, named), rows)
     return staged
 
@@ -145,6 +148,7 @@ def _all_rows(
     adding: Iterable[SourceTables],
     table: str,
     without: Container[str],
+    took: Callable[[str, int], None],
 ) -> _Rows:
     if last is not None:
         yield from _rows_of_part(store, last, without)
@@ -153,6 +157,7 @@ def _all_rows(
         try:
             for batch in source.batches(table):
                 yield run_id, batch
+                took(table, batch.num_rows * batch.num_columns)
         except (UserError, FileNotFoundError) as error:
             raise UncollectableError(run_id, str(error)) from error
 

@@ -47,6 +47,31 @@ def test_runs_of_one_partition_share_a_file_of_each_table(tmp_path: Path) -> Non
     assert {row["run_vehicle"] for row in table} == {"ego"}
 
 
+def test_runs_are_counted_as_their_rows_are_written_and_not_before(tmp_path: Path) -> None:
+    runs = [*three_runs(tmp_path), made_run(tmp_path / "killed", 3, exit="running")]
+    lake = tmp_path / "lake"
+    counted: list[tuple[str, int]] = []
+
+    def advance(what: str, *, by: int = 1) -> None:
+        counted.append((what, by))
+
+    collect(FolderStore(lake), runs, advance=advance)
+
+    by_what: dict[str, int] = {}
+    for what, by in counted:
+        by_what[what] = by_what.get(what, 0) + by
+    assert sum(by_what.values()) == len(runs)
+    assert [by_what[f"reading {run.name}"] for run in runs] == [0] * 4
+    assert by_what[runs[3].name] == 1  # refused
+    assert by_what["futures"] >= 1
+    assert by_what["published"] == 1
+    assert max(by for _, by in counted) == 1
+
+    counted.clear()
+    collect(FolderStore(lake), runs[:3], advance=advance)
+    assert [what for what, by in counted if by] == [run.name for run in runs[:3]]
+
+
 def test_the_same_runs_again_change_no_byte(tmp_path: Path) -> None:
     runs, lake = three_runs(tmp_path), tmp_path / "lake"
     collect(FolderStore(lake), runs)
