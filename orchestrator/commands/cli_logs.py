@@ -147,6 +147,9 @@ def report(
         Path | None,
         typer.Option(help="another drive of this road: how far people differ, beside the gap"),
     ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="file, verdict, and indicators over several runs as JSON")
+    ] = False,
 ) -> None:
     """Write what a run or sweep foresaw, and what came, as one HTML file that opens anywhere.
 
@@ -154,7 +157,7 @@ def report(
     """
     from foretwin.orchestrator.commands.report import report as write
 
-    write(runs, out=out, redact=redact, against=against)
+    write(runs, out=out, redact=redact, against=against, as_json=as_json)
 
 
 def repeat(

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+import msgspec
+
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.redaction import Redaction
 from foretwin.orchestrator.report.write_report import write_report
@@ -20,8 +23,23 @@ if TYPE_CHECKING:
 _SUFFIXES = (".html", ".htm")
 
 
+class ReportWritten(msgspec.Struct, frozen=True, kw_only=True):
+    """A report that was written: its file, the sentence of its first page, and of several runs the
+    indicators over them."""
+
+    file: str
+    size_bytes: int
+    verdict: str
+    indicators: msgspec.Struct | None = None
+
+
 def report(
-    folders: Sequence[Path], *, out: Path, redact: str | None = None, against: Path | None = None
+    folders: Sequence[Path],
+    *,
+    out: Path,
+    redact: str | None = None,
+    against: Path | None = None,
+    as_json: bool = False,
 ) -> None:
     """Write the report of a run; with `against`, another drive of its road, how far people differ
     stands beside the gap.
@@ -41,8 +59,17 @@ def report(
     with named_in_errors(f"--out {out}"):
         out.parent.mkdir(parents=True, exist_ok=True)
         told = write_report(folders, out, people=people, redaction=redaction)
-    say(told.verdict)
-    say(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
+    written = ReportWritten(
+        file=str(out),
+        size_bytes=out.stat().st_size,
+        verdict=told.verdict,
+        indicators=told.counted,
+    )
+    if as_json:
+        print_json(written)
+        return
+    say(written.verdict)
+    say(f"wrote {written.file} ({written.size_bytes / 1e6:.1f} MB)")
 
 
 def _redaction(word: str | None) -> Redaction | None:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
+import msgspec
+
 UNKNOWN = "\u2013"
 """Stands where a value is not known, or does not apply."""
 _UNBROKEN = "\u00a0"
@@ -110,6 +112,8 @@ class Report(NamedTuple):
     front: tuple[Block, ...]
     parts: tuple[Chapter, ...]
     attribution: tuple[str, ...]
+    counted: msgspec.Struct | None = None
+    """Its figures as a message, where it has some that a program would ask for; without places."""
 
 
 def row(*cells: TableCell | str) -> tuple[TableCell, ...]:

@@ -22,6 +22,8 @@ from foretwin.orchestrator.report.blocks import (
     scientific,
 )
 from foretwin.orchestrator.report.first_page import rounds_in_time, verdict_of
+from foretwin.orchestrator.report.indicators import indicators_over
+from foretwin.orchestrator.report.indicators_part import indicators_part
 from foretwin.orchestrator.report.material import RunMaterial, part_of
 from foretwin.orchestrator.report.passages import JunctionPassed, passages, tone_of
 from foretwin.orchestrator.report.provenance_part import provenance_part
@@ -48,6 +50,7 @@ def several_runs_report(
     ]
     ids = [str(one.run.record.get("run_id") or one.run.folder.name) for one in seen]
     attribution = dict.fromkeys(one.run.attribution for one in seen if one.run.attribution)
+    indicators = indicators_over(runs)
     tone: Tone = "watch" if any(_tone(one) in ("watch", "bad") for one in seen) else "good"
     return Report(
         title=f"{plural(len(seen), 'drive')} side by side",
@@ -59,6 +62,7 @@ def several_runs_report(
         parts=(
             Chapter("settings", "What was set otherwise", (_settings(seen, places=places),)),
             Chapter("junctions", "Junction by junction", (_junctions(seen),)),
+            indicators_part(indicators),
             *(_one(one, pictures=pictures) for one in seen),
             Chapter(
                 "provenance",
@@ -73,6 +77,7 @@ def several_runs_report(
             ),
         ),
         attribution=tuple(attribution),
+        counted=indicators,
     )
 
 

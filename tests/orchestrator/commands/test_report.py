@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,24 @@ def test_it_writes_the_file_and_says_the_verdict(
     assert said.startswith("The car passed 1 junction")
     assert f"wrote {out} (" in said
     assert out.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_json_holds_the_indicators_over_several_runs_and_nothing_else_is_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [
+        str(told_run(tmp_path / name, run_id=f"20261123-12000{name}-told")) for name in ("0", "1")
+    ]
+    out = tmp_path / "two.html"
+
+    assert run(["report", *runs, "--out", str(out), "--json"]) == 0
+
+    told = json.loads(capsys.readouterr().out)
+    assert (told["file"], told["size_bytes"]) == (str(out), out.stat().st_size)
+    assert told["verdict"].startswith("What B foresaw")
+    assert told["indicators"]["drives"] == 2
+    lost = [one for one in told["indicators"]["indicators"] if one["name"] == "telemetry lost"]
+    assert [(one["events"], one["exposure"], one["low"]) for one in lost] == [(0, 80.0, 0.0)]
 
 
 @pytest.mark.parametrize(
