@@ -77,13 +77,14 @@ class Driver:
         self._wait(motion.vx_mps)
         curvature = self._curvature_pm(motion)
         accel = self._accel(self.s_m, motion.vx_mps, self._next_stop)
-        accel = min(accel, self._not_off(curvature, motion))
+        tire_rad = self._tire_rad(curvature)
+        accel = min(accel, self._not_off(curvature, tire_rad, motion))
         if motion.grade and motion.vx_mps > _STANDING_MPS:
             # Whoever drives uphill presses as much harder as it takes to go as on the level.
             accel += STANDARD_GRAVITY_MPS2 * math.sin(math.atan(motion.grade))
         return DriverCommand(
             accel_mps2=accel,
-            steering_wheel_rad=self._steering_wheel(curvature),
+            steering_wheel_rad=tire_rad * self.car.steering_ratio,
         )
 
     def _wait(self, speed_mps: float) -> None:
@@ -154,7 +155,7 @@ class Driver:
             return math.inf if left_m > _CLOSE_M or speed_mps > _CREEPS_MPS else -1.0
         return -needed
 
-    def _not_off(self, curvature_pm: float, motion: CarMotion) -> float:
+    def _not_off(self, curvature_pm: float, tire_rad: float, motion: CarMotion) -> float:
         """Return the most acceleration with which it turns no harder than it would ever want to,
         and with which the tyres come to where it turns them within some metres.
 
@@ -162,7 +163,6 @@ class Driver:
         """
         most_mps2 = _HURRIED * self.parameters.lateral_accel_mps2
         fastest = math.sqrt(most_mps2 / max(abs(curvature_pm), _STRAIGHT_PM))
-        tire_rad = self._steering_wheel(curvature_pm) / self.car.steering_ratio
         behind_s = abs(tire_rad - motion.steered_rad) / MAX_TIRE_RATE_RADPS
         fastest = min(fastest, max(_TURNED_WITHIN_M / max(behind_s, 1e-3), _SLOWEST_MPS))
         accel = _SPEED_GAIN_PS * (fastest - motion.vx_mps)
@@ -185,9 +185,9 @@ class Driver:
         back = min(max(stiffness * stiffness * offset, -most), most)
         return ahead.curvature_pm - back - 2.0 * stiffness * math.sin(turned)
 
-    def _steering_wheel(self, curvature_pm: float) -> float:
+    def _tire_rad(self, curvature_pm: float) -> float:
         curvature_pm = min(max(curvature_pm, -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
-        return math.atan(self.wheelbase_m * curvature_pm) * self.car.steering_ratio
+        return math.atan(self.wheelbase_m * curvature_pm)
 
     def plan(self, speed_mps: float) -> list[PlanPoint]:
         """Return where the driver means to be at each `plan_step_s` over its horizon, now first."""
