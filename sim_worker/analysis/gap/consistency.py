@@ -17,7 +17,8 @@ from foretwin.sim_worker.analysis.gap.fitting import (
     delayed_line,
     line_through,
 )
-from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, SignalPairs
+from foretwin.sim_worker.analysis.gap.free_run import MIN_TURN_RAD
+from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 _MIN_CURVATURE_PM = 0.006

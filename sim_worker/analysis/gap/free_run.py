@@ -24,7 +24,7 @@ from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_
 
 _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
-_BEHIND_RAD = 0.012
+MIN_TURN_RAD = 0.012
 """Of a tyre's angle: the least turn that steering is compared by."""
 _AT_MOST = 0.7
 """Of the fastest: tyres that turn by more turn as fast as they can. Chosen."""
@@ -68,7 +68,7 @@ def outrun(asked_rad: Array, done_rad: Array, *, fastest_radps: float) -> Flags:
             tire = min(max(asked, tire - step), tire + step)
         else:
             tire = asked
-        behind[k] = abs(tire - asked) > _BEHIND_RAD
+        behind[k] = abs(tire - asked) > MIN_TURN_RAD
     turns = np.abs(np.gradient(done_rad)) / PERIOD_S
     return np.asarray(behind & (turns > _AT_MOST * fastest_radps))
 

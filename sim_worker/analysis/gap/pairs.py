@@ -14,6 +14,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.sim_worker.analysis.gap.free_run import (
+    MIN_TURN_RAD,
     FreeRunner,
     RunMemory,
     outrun,
@@ -41,7 +42,6 @@ MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration alone, say something."""
 FASTEST_MPS = 80.0
 """No car's: positions that leap say nothing of its sensors."""
-MIN_TURN_RAD = 0.012
 
 
 class PushBlocks(NamedTuple):
