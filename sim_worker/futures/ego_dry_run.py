@@ -283,7 +283,8 @@ def _on_time(case: StagedCase, line: DrivenLine, way: Way, *, tick_s: float) -> 
 def _from_line(
     actor: StagedActor, later_s: float, ahead_m: float, line: DrivenLine, way: Way
 ) -> StagedActor:
-    """Return an actor so much earlier; who drives along with the ego is so far ahead as that."""
+    """Return an actor so much earlier; who drives along with the ego is so far ahead as that, and
+    who stands stays there: the line and the ego's path are not the same in bends."""
     if actor.relation not in ALONG:
         box = actor.moving(FrenetPath(actor.xy_m))
         return actor._replace(start_arc_m=float(box.arc_after(actor.start_arc_m, -later_s)))
@@ -291,5 +292,7 @@ def _from_line(
     if actor.way != way.name:
         return actor._replace(start_arc_m=actor.start_arc_m + along_m)
     arc = np.array([actor.start_on(line.way) + along_m])
-    place = way.path.locate(line.way.path.point_at(arc), near_arc_m=arc)
-    return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))
+    aside_m = 0.0 if actor.speed_mps > 0.0 else actor.lateral_m
+    place = way.path.locate(line.way.path.point_at(arc, aside_m), near_arc_m=arc)
+    lateral_m = actor.lateral_m if actor.speed_mps > 0.0 else float(place.offset_m[0])
+    return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]), lateral_m=lateral_m)

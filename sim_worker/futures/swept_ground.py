@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.geometry.rectangles import Rectangles
+from foretwin.geometry.rectangles import Rectangles, overlapping
 from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.driven_line import DrivenLine, time_at
 from foretwin.sim_worker.scenarios.impact import ego_box
@@ -22,19 +22,27 @@ _LONGEST_STEP_M = 1.0
 def met_on_the_way(
     case: StagedCase, line: DrivenLine | None, vehicle: VehicleParameters, *, horizon_s: float
 ) -> str:
-    """Return who of a case begins in, or would go through, what stands in the World before the
-    impact, or, where none is planned, before the end; nothing where all ways are free.
+    """Return who of a case begins in, or would go through, what stands in the World, or whom the
+    ego would touch that is parked, before the impact, or, where none is planned, before the end;
+    nothing where all ways are free.
 
     The ego is where it drove, by its `line`, or else on its path.
     """
     walls = case.place.walls
-    if walls is None:
-        return ""
     end_s = case.impact_time_s if case.impact_with else horizon_s
     fastest = max(case.ego_speed_mps, *(a.speed_mps for a in case.actors), 0.0)
     count = math.ceil(max(end_s / _EVERY_S, end_s * fastest / _LONGEST_STEP_M)) + 1
     time_s = np.linspace(0.0, end_s, count)
-    met = walls.first_met(_ego_boxes(case, line, vehicle, time_s), drives=not case.place.reverse)
+    ego = _ego_boxes(case, line, vehicle, time_s)
+    for actor in case.actors:
+        if actor.relation == "parked" and actor.name != case.impact_with:
+            way = case.place.way_named(actor.way)
+            stands_m = np.full(count, actor.start_on(way))
+            if overlapping(ego, actor.moving(way.path).rectangles(stands_m)).any():
+                return f"the ego would touch {actor.name} on its way"
+    if walls is None:
+        return ""
+    met = walls.first_met(ego, drives=not case.place.reverse)
     if met is not None:
         return _words("the ego", met, case.place.reverse)
     for actor in case.actors:

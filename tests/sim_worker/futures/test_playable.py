@@ -8,9 +8,12 @@ import pytest
 
 from foretwin.contracts.futures import Job
 from foretwin.contracts.world import Area, World
+from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.playable import job_at, places
 from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.swept_ground import met_on_the_way
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.fitting import LEAST_RUN_UP_S
 from foretwin.sim_worker.scenarios.places import Unplaced
@@ -18,7 +21,7 @@ from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import box
-from tests.sim_worker.scenarios.worlds import cross, tee
+from tests.sim_worker.scenarios.worlds import after_a_bend, cross, tee
 from tests.world_gen.drawn_maps import drawn_map, world_of
 
 COVERS = ("foretwin.sim_worker.futures.swept_ground",)
@@ -99,6 +102,39 @@ def test_nobody_is_placed_on_what_was_cut_of_a_house() -> None:
         cleared = msgspec.structs.replace(world, cut_away=(away,))
         found = places(scenario, cleared, vehicle=CAR)
         assert (place.name in [one.name for one in found.places]) == stays
+
+
+def test_a_van_is_passed_with_the_same_room_where_the_ego_cuts_a_bend_either_way() -> None:
+    """It is parked beside the line that a car drives, a third of a metre off its path there."""
+    scenario, rooms_m = catalogue()["occluded_pedestrian"], []
+    for left in (1.0, -1.0):
+        world = after_a_bend(left)
+        found = places(scenario, world, vehicle=CAR, most=1)
+        case = found.cases[0][1]
+        assert isinstance(case, StagedCase)
+        assert case.ego_speed_mps == pytest.approx(11.111)
+        result = run_job(
+            job_at(found.places[0], scenario, [case.values], world),
+            BatchSimulation(world, CAR, nsim=1),
+        )
+        before = result.trajectory.time_s < case.impact_time_s
+        ego = ego_rectangles(CAR, result.trajectory.states[0])
+        van = result.road_users.poses[0, :, 1]
+        box = Rectangles(van[:, :2], van[:, 2], *result.road_users.size_m[0, 1])
+        rooms_m.append(float(clearance(ego, box)[before].min()))
+    assert min(rooms_m) > 0.3
+    assert rooms_m[0] == pytest.approx(rooms_m[1], abs=0.1)
+
+
+def test_who_is_parked_where_the_ego_really_drives_is_in_its_way() -> None:
+    """On its path nothing is touched; a car that drives a metre beside it touches the van."""
+    case = places(catalogue()["occluded_pedestrian"], cross(), vehicle=CAR, most=1).cases[0][0]
+    assert isinstance(case, StagedCase)
+    assert met_on_the_way(case, None, CAR, horizon_s=8.0) == ""
+    aside = case._replace(ego_lateral_m=-case.place.near_sign)
+    assert met_on_the_way(aside, None, CAR, horizon_s=8.0) == (
+        "the ego would touch parked_van on its way"
+    )
 
 
 def test_streets_that_are_too_short_are_no_run_up() -> None:
