@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple, get_args
 
 from foretwin.contracts.keys import ALIVE_KEY, CHANNELS, PREFIX, BusRole, Channel, Writer
+from foretwin.contracts.lives import key_of_life
 
 SubjectKind = Literal["usernames", "cert_common_names"]
 """By what a router knows its clients: passwords, or certificates."""
@@ -126,14 +127,14 @@ def _allowed(member: BusMember, run_id: str) -> list[tuple[str, tuple[str, ...],
             []
             if member.role in _HEARS
             else [
-                ALIVE_KEY.format(**own | {"process": one})
+                key_of_life(ALIVE_KEY.format(**own | {"process": one}), "**")
                 for one in (member.process_id, *member.beside)
             ],
         ),
         (
             "sees who is",
             ("liveliness_query", "declare_liveliness_subscriber"),
-            [ALIVE_KEY.format(**_ANY)],
+            [key_of_life(ALIVE_KEY.format(**_ANY), "**")],
         ),
     ]
 

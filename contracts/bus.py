@@ -28,6 +28,7 @@ from foretwin.contracts.kept import (
 )
 from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
+from foretwin.contracts.lives import Lives, key_of_life, new_life
 from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.trace import span
@@ -90,13 +91,16 @@ class ZenohSession:
 
     def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
         """Watch liveliness tokens; see Bus."""
+        self._watch_tokens(alive_key, mailbox.put)
+
+    def _watch_tokens(self, tokens: str, land: Callable[[Alive], None]) -> None:
         put = self._zenoh.SampleKind.PUT
 
-        def land(sample: Any) -> None:
-            mailbox.put(Alive(str(sample.key_expr), sample.kind == put, time.monotonic_ns()))
+        def heard(sample: Any) -> None:
+            land(Alive(str(sample.key_expr), sample.kind == put, time.monotonic_ns()))
 
         self._declared.append(
-            self._session.liveliness().declare_subscriber(alive_key, land, history=True)
+            self._session.liveliness().declare_subscriber(tokens, heard, history=True)
         )
 
     def _hear(self, key: str, land: Callable[[Any], None], *, history: bool) -> None:
@@ -154,6 +158,20 @@ class ZenohBus(ZenohSession):
         """Asks for what is kept of a key, by key."""
         self._sender = 1 + secrets.randbelow(MOST_SENDER)
         self._lock = threading.Lock()
+
+    def declare_alive(self, alive_key: str) -> None:
+        """Hold a liveliness token; see Bus."""
+        super().declare_alive(key_of_life(alive_key, new_life()))
+
+    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
+        """Watch liveliness tokens; see Bus."""
+        lives = Lives()
+
+        def land(token: Alive) -> None:
+            if (process_key := lives.take(token.key, up=token.up)) is not None:
+                mailbox.put(token._replace(key=process_key))
+
+        self._watch_tokens(key_of_life(alive_key, "**"), land)
 
     def _qos(self, qos: Qos) -> dict[str, Any]:
         control = self._zenoh.CongestionControl

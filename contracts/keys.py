@@ -222,7 +222,7 @@ TELEMETRY_CHANNELS = tuple(
 """What a vehicle may send, `end` included."""
 
 ALIVE_KEY = f"{PREFIX}/{_RUN}/alive/{{process}}"
-"""Liveliness token of each process of a run."""
+"""Under which each process of a run is alive; its token adds the life that it is in."""
 
 
 @functools.lru_cache(maxsize=1024)

@@ -11,6 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Iterator
 
+from foretwin.contracts.lives import life_of_key
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalCounts
 
 _RULES = "zenoh::net::routing::interceptor::access_control"
@@ -48,6 +49,7 @@ _MOST_KEY = 200
 _NO_SUBJECT = re.compile(rb"([0-9a-f]+) did not match any configured ACL subject")
 _NAME = re.compile(rb"(?:Username|CertCommonName)\((.*?)\)(?=\+|$)")
 
+_IS_ALIVE = "be alive as"
 _DOES = {
     "Put": "say",
     "Delete": "delete",
@@ -55,8 +57,8 @@ _DOES = {
     "Reply": "answer",
     "Declare Subscriber": "hear",
     "Declare Queryable": "serve",
-    "Liveliness Token": "be alive as",
-    "Declare Liveliness Token": "be alive as",
+    "Liveliness Token": _IS_ALIVE,
+    "Declare Liveliness Token": _IS_ALIVE,
     "Liveliness Query": "see who is",
     "Declare Liveliness Subscriber": "watch who is",
 }
@@ -188,7 +190,10 @@ class RouterLog:
         word = does.decode(errors="replace").removeprefix("Declare/Undeclare ")
         if not word.startswith("Undeclare"):  # of what was refused when it was declared
             word = word if word in _DOES else f"Declare {word}"
-            self._count(name, _DOES.get(word, word), key.decode(errors="replace"))
+            what, full_key = _DOES.get(word, word), key.decode(errors="replace")
+            if what == _IS_ALIVE:  # of whatever life
+                full_key, _ = life_of_key(full_key)
+            self._count(name, what, full_key)
 
     def _handshake(self, text: bytes) -> None:
         if (why := _word(_PASSWORDS, text)) is not None:

@@ -149,3 +149,20 @@ def test_closing_twice_is_harmless_and_ends_receiving() -> None:
         sides.near.publish("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), vehicle="ego")
 
         assert mailbox.take(0.2) is None
+
+
+def test_a_process_that_is_there_again_before_its_end_is_seen_stays_there() -> None:
+    setup = BusSetup(endpoint=free_endpoint())
+    tokens = Mailbox(10)
+    with ZenohBus(setup, router=True) as bus:
+        bus.watch_alive(alive_key(run="r1", process="*"), tokens)
+        with ZenohBus(setup) as successor:
+            with ZenohBus(setup) as before:
+                before.declare_alive(alive_key(**W0))
+                assert take(tokens).up
+                successor.declare_alive(alive_key(**W0))
+                again = take(tokens)
+                assert (again.key, again.up) == (alive_key(**W0), True)
+            successor.declare_alive(alive_key(run="r1", process="w1"))
+            assert take(tokens).key.endswith("/w1")
+        assert {take(tokens).up, take(tokens).up} == {False}

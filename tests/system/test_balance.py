@@ -20,14 +20,7 @@ from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.orchestrator.record.ledger import Ledger
-from tests.system.foretwin_command import (
-    FRESH,
-    child_pids,
-    foretwin,
-    orchestrator_pid,
-    started,
-    wait_for,
-)
+from tests.system.foretwin_command import child_pids, foretwin, orchestrator_pid, started, wait_for
 from tests.system.test_faults import LIVE, assert_nothing_left, says, under_way
 
 ENDS_WITHIN_S = 240.0
@@ -75,8 +68,7 @@ def frozen(pid: int) -> Iterator[None]:
 
 def test_a_sick_worker_takes_no_round_down_and_is_tried_again(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    # A fork is there again before the bus tells that the one killed is gone.
-    with started(out, *LIVE, *TWO, entry=FRESH) as process:
+    with started(out, *LIVE, *TWO) as process:
         run = under_way(out)
         wait_for(lambda: bool(loaded_by(run, "w1")), "the other worker's World")
         with hidden(run, loaded_by(run, "w1")):
