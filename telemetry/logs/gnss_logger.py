@@ -145,11 +145,15 @@ def _read(path: Path, fixes: dict[str, list[_Fix]], sensors: dict[str, _Sensor])
     places: dict[str, int] = {}
     for line in _lines(path):
         kind, _, rest = line.partition(",")
+        if "\0" in line:  # of a disk that filled up: lines may have gone with it
+            refused[UNREADABLE_ROW] += 1
+            continue
         if kind.startswith("#"):
             if kind.lstrip("# ") == "Fix":
                 places = _places(rest.strip().split(","))
             continue
-        if kind in ("Fix", *_SENSORS) and not line.endswith("\n"):
+        if not line.endswith("\n") and len(line) < _MOST_LINE:
+            # Of a satellite nothing is lost, but what would have come after it is.
             refused[LAST_LINE_OPEN] += 1
             continue
         try:

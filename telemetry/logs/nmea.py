@@ -45,6 +45,7 @@ from foretwin.telemetry.logs.nmea_sentences import (
     Sentence,
     date_of,
     degrees_of,
+    is_any_sentence,
     midnight_ns,
     sentence_of,
     time_of_day_ns,
@@ -87,7 +88,10 @@ def is_nmea(text: str) -> bool:
     lines = text.splitlines()[:20]
     if text.startswith(("<", "{")):
         return False
-    return any(sentence_of(line.partition("*")[0]) is not None for line in lines)
+    # Receivers tell all satellites before the first position.
+    return any(
+        sentence_of(line.partition("*")[0]) is not None or is_any_sentence(line) for line in lines
+    )
 
 
 def open_nmea(path: Path, *, declaration: Path | None = None) -> Log:

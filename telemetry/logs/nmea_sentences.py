@@ -14,6 +14,7 @@ from foretwin.contracts.frames import wrap_angle
 CHECKSUM_WRONG = "checksum wrong"
 DAY_NS = 86_400 * 10**9
 _SENTENCE = re.compile(r"\$([A-Z]{2}|P[A-Z]*)(RMC|GGA|VTG|HDT|ZDA),([^*\r\n$]*)(?:\*(\w*))?")
+_ANY = re.compile(r"\$([A-Z]{2}[A-Z]{3},[^*$]*)\*([0-9A-Fa-f]{2})")
 
 Fields = list[str]
 
@@ -33,12 +34,21 @@ def sentence_of(line: str) -> Sentence | str | None:
     if match is None:
         return None
     _, formatter, body, checksum = match.groups()
-    if checksum is not None:
-        between = line[start + 1 : line.index("*", start)]
-        summed = functools.reduce(operator.xor, between.encode("utf-8", "replace"), 0)
-        if checksum.upper() != f"{summed:02X}":
-            return CHECKSUM_WRONG
+    if checksum is not None and checksum.upper() != _checksum(
+        line[start + 1 : line.index("*", start)]
+    ):
+        return CHECKSUM_WRONG
     return Sentence(formatter, body.split(","))
+
+
+def is_any_sentence(line: str) -> bool:
+    """Tell whether a line holds a sentence of any formatter whose checksum is right."""
+    match = _ANY.search(line)
+    return match is not None and match[2].upper() == _checksum(match[1])
+
+
+def _checksum(between: str) -> str:
+    return f"{functools.reduce(operator.xor, between.encode('utf-8', 'replace'), 0):02X}"
 
 
 def time_of_day_ns(sentence: Sentence) -> int | None:

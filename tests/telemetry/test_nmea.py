@@ -72,6 +72,15 @@ def test_lines_that_were_blanked_are_counted(tmp_path: Path) -> None:
     assert log.skipped == {UNREADABLE_ROW: 1}
 
 
+def test_a_log_that_begins_with_satellites_is_known_by_any_sentence(tmp_path: Path) -> None:
+    """As GnssLogger writes them: what kind, the sentence, its time in ms."""
+    satellites = f"NMEA,{line('GPGSV,2,1,08,03,14,263,23').rstrip()},1713027213567\n"
+    _log, found = opened(tmp_path, *[satellites] * 40, gga("120000.00"))
+    assert len(found["gnss"]) == 1
+    with pytest.raises(LogError, match="no known log"):
+        opened(tmp_path, *[satellites.replace("263", "264")] * 40)
+
+
 def test_the_example_of_the_standard_has_its_checksum() -> None:
     told = "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47"
     sentence = sentence_of(told)

@@ -1,4 +1,4 @@
-"""openpilot's logs, as Cap'n Proto's own library wrote them (tests/data/comma), none real."""
+"""openpilot's logs, as Cap'n Proto's own library wrote them (tests/data/comma), and a real qlog."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import zstandard
 
 from foretwin.telemetry.logs import Log, LogError, open_log
 from tests.telemetry.motion_proof import MotionProof
+from tests.telemetry.public_drives import public_drive
 
 LOGS = Path(__file__).parents[2] / "data" / "comma"
 
@@ -101,3 +103,49 @@ def test_what_is_no_log_is_told_in_a_line(tmp_path: Path) -> None:
         (tmp_path / "rlog").write_bytes(data)
         with pytest.raises(LogError, match=r"rlog: no gpsLocation with a fix in it"):
             open_log(tmp_path / "rlog")
+
+
+REAL = "openpilot-demo/qlog.bz2"
+
+
+def test_a_real_drive_on_a_motorway(tmp_path: Path) -> None:
+    """One minute at 21 to 29 m/s, all but straight, with positions in its last 20 s.
+
+    So steady a speed proves a unit by the way alone; signs and axes are proved by sensors.
+    """
+    log = open_log(public_drive(REAL))
+    found = by_channel(log)
+    assert len(found["gnss"]) == len(found["heading"]) == 20
+    assert log.skipped == {"receiver without fix": 23, "gyroscope without accelerometer": 38}
+    shown = MotionProof(log)
+    # The receiver's first six fixes come without altitude, and the seventh leaps.
+    known = np.isfinite(shown.speed.values) & (shown.speed.time_s > 7.0)
+    told = np.interp(
+        shown.speed.time_s[known],
+        shown.seconds("speed"),
+        [one.speed_mps for one in found["speed"]],
+    )
+    assert shown.speed.values[known].mean() / told.mean() == pytest.approx(1.0, abs=0.01)
+    assert abs(shown.heading_offset_deg()) < 1.0
+    force, rate = (
+        np.array([getattr(one, name) for one in found["imu"]])
+        for name in ("accel_mps2", "rate_radps")
+    )
+    assert force[:, 2].mean() == pytest.approx(9.8, abs=0.05)
+
+    def at_imu(channel: str, values: list[float]) -> np.ndarray:
+        return np.interp(shown.seconds("imu"), shown.seconds(channel), values)
+
+    speed = [one.speed_mps for one in found["speed"]]
+    wheel = at_imu("steering", [one.steering_wheel_rad for one in found["steering"]])
+    turning = wheel * at_imu("speed", speed)
+    assert np.corrcoef(rate[:, 2], turning)[0, 1] > 0.8
+    assert 1.0 / np.polyfit(turning, rate[:, 2], 1)[0] == pytest.approx(77.0, abs=10.0)
+    gained = np.convolve(np.gradient(speed, shown.seconds("speed")), np.ones(10) / 10, "same")
+    assert np.corrcoef(force[:, 0], at_imu("speed", gained.tolist()))[0, 1] > 0.75
+
+    packed = public_drive(REAL).read_bytes()
+    (tmp_path / "qlog.bz2").write_bytes(packed[: len(packed) * 9 // 10])
+    cut = open_log(tmp_path / "qlog.bz2")
+    assert 0 < len(by_channel(cut)["gnss"]) < 20
+    assert cut.skipped["file cut short"] == 1

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from foretwin.telemetry.logs import Log, LogError, open_log
+from foretwin.telemetry.logs.clock_between import clock_between
 from foretwin.telemetry.logs.gnss_logger import MOUNTING_UNKNOWN
-from foretwin.telemetry.logs.log import LAST_LINE_OPEN
+from foretwin.telemetry.logs.log import LAST_LINE_OPEN, UNREADABLE_ROW
+from tests.telemetry.motion_proof import MotionProof
 from tests.telemetry.public_drives import public_drive
 
 V1 = "# Fix,Provider,Latitude,Longitude,Altitude,Speed,Accuracy,(UTC)TimeInMs\n"
@@ -82,6 +84,15 @@ def test_a_last_line_without_its_end_is_left_out_and_said(tmp_path: Path) -> Non
     assert log.skipped == {LAST_LINE_OPEN: 1}
 
 
+def test_damage_among_satellites_is_said_as_well(tmp_path: Path) -> None:
+    """Most lines are of satellites: blanked or cut off there, a fix may have gone too."""
+    row = f"Status,{NOON_MS},61,0,1,8,1575420030,32.6,278.8,16.5,1,1,1,27.6\n"
+    blanked = row[:20] + "\0" * 200 + row[30:]
+    log, found = opened(tmp_path, V2, fix(0), blanked, fix(1), row[:-9])
+    assert len(found["gnss"]) == 2
+    assert log.skipped == {UNREADABLE_ROW: 1, LAST_LINE_OPEN: 1}
+
+
 def test_gps_is_taken_else_the_fused_provider_never_the_network(tmp_path: Path) -> None:
     lines = [fix(0, provider="NLP"), fix(0, provider="FLP"), fix(1, provider="FLP")]
     _, found = opened(tmp_path, V2, *lines)
@@ -144,3 +155,20 @@ def test_real_logs_of_phones_that_stand(tmp_path: Path) -> None:
     pixel = open_log(public_drive("gnsslogger-phones/Pixel4_GnssLog.txt"))
     list(pixel.samples())
     assert pixel.skipped["unreadable row"] == 1  # its altitude -29co.199999
+
+
+def test_a_real_drive_with_a_telephone() -> None:
+    """139 fixes in a car; the NMEA that the telephone wrote beside has the same clock."""
+    drive = "gnsslogger-drive/gnss_log_2024_04_13_19_53_33"
+    log = open_log(public_drive(f"{drive}.txt"))
+    shown = MotionProof(log)
+    speed, heading = shown.of_speed(), shown.of_heading()
+    assert (len(shown.found["gnss"]), len(shown.found["heading"]), log.skipped) == (139, 110, {})
+    assert speed.correlation > 0.99
+    assert speed.slope == pytest.approx(1.0, abs=0.03)
+    assert 0.0 <= speed.lag_s < 0.6
+    assert heading.correlation > 0.9
+    assert heading.slope == pytest.approx(1.0, abs=0.05)
+    assert abs(shown.heading_offset_deg()) < 0.5
+    between = clock_between(log, open_log(public_drive(f"{drive}.nmea")))
+    assert abs(between.offset_s) < 3.0 * between.std_s < 0.1
