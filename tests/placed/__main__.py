@@ -6,6 +6,7 @@ import argparse
 import collections
 import json
 import time
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ def main() -> None:
     parser.add_argument("maps", nargs="+", type=Path)
     parser.add_argument("--most", type=int, help="of a map's junctions, drawn by a seed")
     parser.add_argument("--kind", help="junctions of this kind alone, such as roundabout")
+    parser.add_argument("--scenario", action="append", help="this one alone; may be given again")
     parser.add_argument("--counted", action="store_true", help="only where a scenario is counted")
     parser.add_argument("--part", default="1/1", help="K/N: of them, every Nth from the Kth on")
     parser.add_argument("--seed", type=int, default=7, help="of the draw")
@@ -33,7 +35,14 @@ def main() -> None:
         part = tuple(map(int, given.part.split("/")))
         at = set[int]().union(*counted(raw).values()) if given.counted else None
         result = played_map(
-            file, raw, most=given.most, seed=given.seed, kind=given.kind, part=part, at=at
+            file,
+            raw,
+            most=given.most,
+            seed=given.seed,
+            kind=given.kind,
+            part=part,
+            at=at,
+            only=given.scenario,
         )
         junctions = result.junctions
         took_s = time.perf_counter() - start
@@ -41,7 +50,7 @@ def main() -> None:
         print(f"\n{file.name}: {len(junctions)} junctions in {took_s:.0f} s")
         print(f"  placing took {placing_s:.1f} s of them")
         _print_cases([case for junction in junctions for case in junction.played])
-        shares.update(_counts(raw, result, first_part=part[0] == 1))
+        shares.update(_counts(raw, result, first_part=part[0] == 1, only=given.scenario))
         every += junctions
         if given.cases:
             with given.cases.open("a") as out:
@@ -62,7 +71,7 @@ def main() -> None:
 
 
 def _counts(
-    raw: RawMap, result: PlayedMap, *, first_part: bool
+    raw: RawMap, result: PlayedMap, *, first_part: bool, only: Collection[str] | None
 ) -> collections.Counter[tuple[str, str]]:
     """Return how often each scenario applies, as counted, and is placed there.
 
@@ -71,6 +80,8 @@ def _counts(
     looked_at = {node for junction in result.junctions for node in junction.osm_nodes}
     counts = collections.Counter[tuple[str, str]]()
     for id_, nodes in counted(raw).items():
+        if only and id_ not in only:
+            continue
         placed = {n for j in result.junctions if id_ in j.placed for n in j.osm_nodes}
         known = result.known_nodes if first_part else result.known_nodes | nodes
         here = found(nodes, placed, looked_at, known)

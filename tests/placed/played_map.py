@@ -72,9 +72,10 @@ def played_map(
     kind: str | None = None,
     part: tuple[int, ...] = (1, 1),
     at: Collection[int] | None = None,
+    only: Collection[str] | None = None,
 ) -> PlayedMap:
-    """Place and play the catalogue on all junctions of a map, or of a kind, or `at` some nodes, or
-    `most` of them."""
+    """Place and play the catalogue, or `only` some scenarios, on all junctions of a map, or of a
+    kind, or `at` some nodes, or `most` of them."""
     osm = read_map(file)
     graph = build_road_graph(osm)
     junctions = find_intersections(osm, graph)
@@ -92,11 +93,17 @@ def played_map(
         world = build_world(osm, graph, junction, radius_m=RADIUS_M, index=index)
         origin = world.frame.origin
         around = Around.of(raw, origin.lat_deg, origin.lon_deg)
-        played.append(played_world(world, rehearsal, around))
+        played.append(played_world(world, rehearsal, around, only=only))
     return PlayedMap(tuple(played), known)
 
 
-def played_world(world: World, rehearsal: BatchSimulation, around: Around) -> PlayedJunction:
+def played_world(
+    world: World,
+    rehearsal: BatchSimulation,
+    around: Around,
+    *,
+    only: Collection[str] | None = None,
+) -> PlayedJunction:
     """Place the catalogue at a World's junction and play a few cases of each scenario."""
     vehicle = rehearsal.vehicle
     stage, maker = BatchSimulation(world, vehicle, nsim=CASES), SceneMaker(world)
@@ -105,6 +112,8 @@ def played_world(world: World, rehearsal: BatchSimulation, around: Around) -> Pl
     unplaced: dict[str, tuple[str, bool]] = {}
     spent_s = 0.0
     for scenario in catalogue().values():
+        if only and scenario.id not in only:
+            continue
         start = time.perf_counter()
         found = places(scenario, world, scenes=maker, stage=rehearsal, most=1)
         spent_s += time.perf_counter() - start
