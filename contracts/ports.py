@@ -91,6 +91,11 @@ def tls_place(endpoint: str) -> ListenPlace | None:
     return None if found is None else ListenPlace(found["host"].strip("[]"), int(found["port"]))
 
 
+def tcp_place(endpoint: str) -> ListenPlace | None:
+    """Return host and port of `tls/HOST:PORT` or `tcp/HOST:PORT`, None for any other endpoint."""
+    return tls_place(re.sub("^tcp/", "tls/", endpoint))
+
+
 def trouble_with_bus(endpoint: str | None, *, insecure: bool, secure: str | None) -> str | None:
     """Return what is wrong with where a drive's bus shall be, None where nothing is.
 

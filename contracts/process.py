@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TypeVar
 
@@ -28,7 +29,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.log_file import JsonLines, LogFile
 from foretwin.contracts.one_heap import share_one_heap
-from foretwin.contracts.process_setup import setup_given
+from foretwin.contracts.process_setup import BusSetup, setup_given
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup
@@ -151,8 +152,11 @@ def run_process(
     kind: type[_Setup],
     serve: Callable[[_Setup, Bus, ProcessLife], None],
     argv: list[str] | None = None,
+    *,
+    join: Callable[[BusSetup], AbstractContextManager[Bus]] = ZenohBus,
 ) -> None:
-    """Run `serve` as this process's work, with `--setup FILE` from the command line.
+    """Run `serve` as this process's work, with `--setup FILE` from the command line; it is on the
+    bus as `join` says.
 
     Leaves through os._exit: a library's exit handler must not hold up the end of a drive. Exit
     codes: 0 done, 2 something wrong with setup or input, in one line, 1 any other error.
@@ -167,7 +171,7 @@ def run_process(
     meter, code = CpuMeter(file.parent, setup.process_id), 0
     refusal_file = RefusalFile(file.parent, setup.process_id)
     try:
-        with ZenohBus(setup.bus) as bus:
+        with join(setup.bus) as bus:
             life = ProcessLife(setup, bus, meter=meter, refusal_file=refusal_file)
             on_end_signals(life.terminated.set)
             serve(setup, bus, life)

@@ -82,6 +82,8 @@ UNFINISHED = "an unfinished handshake"
 _HUNG_UP = re.compile(rb"(?:Read|Write) error on ")
 """Who has gone before it was answered was turned away by nobody: a process of ours on a slow
 machine hangs up when its time to connect is over, and calls again."""
+_ONLY_KNOCKED = b"tls handshake eof"
+"""As those do whose link to the router was cut; see foretwin.contracts.redialled_bus."""
 
 
 class RouterLog:
@@ -119,7 +121,7 @@ class RouterLog:
             self._handshake(text)
         elif b"tls" in target and (why := _word(_CERTIFICATES, text)) is not None:
             self._count("", why)
-        elif level in (b"WARN", b"ERROR"):
+        elif level in (b"WARN", b"ERROR") and not text.startswith(_ONLY_KNOCKED):
             self._other(record)
         return None
 

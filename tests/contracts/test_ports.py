@@ -12,6 +12,7 @@ from foretwin.contracts.ports import (
     free_endpoint,
     free_port,
     metrics_place,
+    tcp_place,
     tls_place,
     trouble_with_bus,
     trouble_with_endpoint,
@@ -90,13 +91,19 @@ def test_where_a_bus_may_be(
         ("tls/[::1]:7447", ("::1", 7447)),
         (f"{TLS}#enable_mtls=false", None),
         (f"{TLS}?rel=1", None),
-        ("tcp/localhost:7447", None),
+        ("quic/localhost:7447", None),
     ],
 )
 def test_a_place_is_host_and_port_and_nothing_else(
     endpoint: str, place: tuple[str, int] | None
 ) -> None:
     assert tls_place(endpoint) == place
+    assert tcp_place(endpoint.replace("tls/", "tcp/")) == place
+
+
+def test_a_place_is_where_tcp_connects_to() -> None:
+    assert tcp_place("tcp/localhost:7447") == tcp_place(TLS) == ("localhost", 7447)
+    assert tcp_place("unixsock-stream//tmp/bus") is None
 
 
 def test_metrics_are_told_on_the_loopback_interface_unless_a_host_is_named() -> None:

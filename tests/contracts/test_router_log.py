@@ -173,6 +173,13 @@ def test_certificates_that_are_not_taken_are_counted_by_why(text: str, why: str)
     assert counted(line) == {("", why, ""): 1}
 
 
+def test_who_only_knocks_is_not_told_of() -> None:
+    text = "tls handshake eof. Hint: increase the system open file limit."
+    log = RouterLog()
+    log.take(record(text, target="zenoh_link_tls::unicast", level="WARN"))
+    assert (list(log.others()), log.counted().kinds) == ([], ())
+
+
 def test_nobody_says_it_in_anothers_name() -> None:
     """A key may hold line breaks, and what follows one looks like the log."""
     forged = decided("Put", SPEED, name="orchestrator", session="0a").decode()

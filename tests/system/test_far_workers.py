@@ -8,6 +8,7 @@ import itertools
 import json
 import os
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -35,13 +36,12 @@ COVERS = ("foretwin.sim_worker.far.__main__",)
 
 PORT = 7447
 RATE_HZ = 1.0
-CONFIG = f"futures = 8\nfutures_per_job = 4\nrate_hz = {RATE_HZ}\nworkers = 1\n"
 
 
 class Fleet:
     """A drive in one network, its car in another, and workers in a third."""
 
-    def __init__(self, folder: Path, stack: contextlib.ExitStack) -> None:
+    def __init__(self, folder: Path, stack: contextlib.ExitStack, rate_hz: float) -> None:
         self.folder, self._stack = folder, stack
         drive, car, far = (stack.enter_context(own_network()) for _ in range(3))
         name = f"ff{os.getpid() % 10_000}"
@@ -59,7 +59,9 @@ class Fleet:
         issue(self.campaign, "router", days=2, now=now(), hosts=(self.link.host,))
         issue(self.campaign, "worker-laptop", days=2, now=now())
         self._in_drive = ("nsenter", "-t", str(drive), "-n")
-        (folder / "config.toml").write_text(CONFIG)
+        (folder / "config.toml").write_text(
+            f"futures = 8\nfutures_per_job = 4\nrate_hz = {rate_hz}\nworkers = 1\n"
+        )
         self.out = folder / "runs"
         self.drive = self._started(
             "drive", "--config", str(folder / "config.toml"), "--source", "live",
@@ -158,10 +160,10 @@ def _ended(process: subprocess.Popen[str]) -> None:
 
 
 @pytest.fixture
-def fleet(tmp_path: Path) -> Iterator[Fleet]:
+def fleet(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Fleet]:
     with contextlib.ExitStack() as stack:
         try:
-            made = Fleet(tmp_path, stack)
+            made = Fleet(tmp_path, stack, getattr(request, "param", RATE_HZ))
         except OSError as error:
             pytest.skip(f"no networks of their own here: {error}")
         yield made
@@ -250,3 +252,46 @@ def test_what_befalls_a_worker_costs_the_drive_nothing(fleet: Fleet) -> None:
     assert not any(one["late"] for one in (*in_cut, *in_slow))
     # A process that was killed was told of, and started again.
     assert worker.returncode == 3
+
+
+@pytest.mark.judge
+@pytest.mark.timeout(280)
+@pytest.mark.parametrize("fleet", [2.0], indirect=True)
+@pytest.mark.parametrize("more_s", [0.0, 0.1])
+def test_a_worker_plays_again_within_a_second_of_a_cut(fleet: Fleet, more_s: float) -> None:
+    worker = fleet.worker()
+    fleet.plays_along()
+    fleet.let_pass(3.0)
+    mends: list[float] = []
+    again: list[float] = []
+    for number in range(5):
+        fleet.link.befall("cut")
+        # TCP calls once a second: where in it the link is back differs.
+        fleet.let_pass(5.0 + 0.2 * number + more_s)
+        mends.append(time.monotonic())
+        fleet.link.mend()
+        fleet.plays_along(number + 2)
+        again.append(time.monotonic() - mends[-1])
+        fleet.let_pass(3.0)
+    worker.send_signal(signal.SIGTERM)
+    worker.communicate(timeout=60.0)
+    record, rounds, players = fleet.end(), fleet.rounds(), fleet.players()
+    far = [one["mono_s"] for one in rounds if "w-laptop-0" in players.get(one["round_id"], set())]
+    first = [
+        min((at_s - mend_s for at_s in far if at_s > mend_s), default=99.0) for mend_s in mends
+    ]
+    figures = {
+        "rounds": len(rounds),
+        "by the far worker": len(far),
+        "late": sum(one["late"] for one in rounds),
+        "missed": record["futures"]["missed_rounds"],
+        "longest gap s": round(longest_gap_s([one["mono_s"] for one in rounds]), 2),
+        "plays along again s": [round(one, 2) for one in sorted(again)],
+        "first far result s": [round(one, 2) for one in sorted(first)],
+        "loads": os.getloadavg(),
+    }
+    print(json.dumps(figures))
+    assert record["dropped"]["given_up_rounds"] == 0
+    assert statistics.median(again) < 0.5
+    assert statistics.median(first) < 1.0
+    assert max(first) < 1.5
