@@ -9,9 +9,9 @@ import numpy as np
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPose, geo_pose, local_from_geo
-from foretwin.contracts.terminal import say
 from foretwin.contracts.world import Lane, World
 from foretwin.geometry.polyline import arc_lengths, interpolated
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.choice import choose_junctions, parse_place
 from foretwin.world_gen.build import build_world
 
@@ -26,11 +26,26 @@ class LanePose(NamedTuple):
     """From the place that was asked for to the lane."""
     pose: GeoPose
 
+    def world_table(self) -> dict[str, str]:
+        """Return the keys of the table [world] of an anchor file, and what stands there."""
+        point = self.pose.position
+        return {
+            "lat_deg": f"{point.lat_deg:.7f}",
+            "lon_deg": f"{point.lon_deg:.7f}",
+            "yaw_deg": f"{np.degrees(self.pose.yaw_rad):.2f}",
+        }
 
-def show_anchors(map_file: Path, *, at: str, before_m: float) -> None:
-    """Print the poses on the lanes that lead to the junction nearest to a place, best first.
+    def as_object(self) -> dict[str, object]:
+        """Return the pose as JSON has it."""
+        far_m = {"before_m": round(self.before_m, 2), "off_m": round(self.off_m, 2)}
+        world = {key: float(text) for key, text in self.world_table().items()}
+        return {"lane": self.lane.name, **far_m, "world": world}
 
-    The first is a table of an anchor file as it stands, the others are comments of one.
+
+def show_anchors(map_file: Path, *, at: str, before_m: float) -> CommandResult:
+    """Return the poses on the lanes that lead to the junction nearest to a place, best first.
+
+    In words the first is a table of an anchor file as it stands, the others are comments of one.
     """
     if not 0.0 <= before_m <= 1000.0:
         raise UserError(f"--before {before_m}: 0 to 1000 m")
@@ -39,16 +54,20 @@ def show_anchors(map_file: Path, *, at: str, before_m: float) -> None:
     found = lane_poses(world, parse_place(at), before_m=before_m)
     if not found:
         raise UserError(f"--at {at}: no lane leads to {junction.summary.id}")
+    lines = []
     for place, one in enumerate(found):
         name = one.lane.name or "a road without a name"
-        say(f"# {name}, {one.before_m:.0f} m before its end at {junction.summary.name}")
-        mark = "# " if place else ""
-        point = one.pose.position
-        say(f"{mark}[world]")
-        say(f"{mark}lat_deg = {point.lat_deg:.7f}")
-        say(f"{mark}lon_deg = {point.lon_deg:.7f}")
-        say(f"{mark}yaw_deg = {np.degrees(one.pose.yaw_rad):.2f}")
-    say(f"# {world.attribution}")
+        lines.append(f"# {name}, {one.before_m:.0f} m before its end at {junction.summary.name}")
+        table = ("[world]", *(f"{key} = {text}" for key, text in one.world_table().items()))
+        lines += [f"# {line}" if place else line for line in table]
+    lines.append(f"# {world.attribution}")
+    body = {
+        "junction_id": junction.summary.id,
+        "junction": junction.summary.name,
+        "poses": [one.as_object() for one in found],
+        "attribution": world.attribution,
+    }
+    return CommandResult(body, "\n".join(lines))
 
 
 def lane_poses(world: World, place: tuple[float, float], *, before_m: float) -> list[LanePose]:

@@ -57,6 +57,7 @@ from foretwin.orchestrator.commands.error_lines import (
     report,
     usage_line,
 )
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 EXIT_USER, EXIT_INTERRUPTED = USER, INTERRUPTED
 _NO_FOLDER = IsADirectoryError, NotADirectoryError
@@ -87,6 +88,7 @@ def begin(version: VersionOption = False) -> None:
 
 
 @app.command()
+@told
 def drive(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
     map_file: Annotated[
@@ -155,7 +157,7 @@ def drive(
             "--towards-vehicle", help="second switch for what goes to the car; see docs/ros2.md"
         ),
     ] = False,
-) -> None:
+) -> CommandResult:
     """Drive ahead of a car: worlds for the coming junctions, futures, live comparison.
 
     Example: foretwin drive --map MAP.osm --log DRIVE.mcap --route from-log
@@ -165,31 +167,32 @@ def drive(
     settings["dem"] = None if dem is None else str(dem)
     switches = {"towards_vehicle": towards_vehicle, "trace": trace, "insecure": insecure}
     settings |= {name: given or None for name, given in switches.items()}
+    from foretwin.orchestrator.commands.drive import drive as run_drive
     from foretwin.orchestrator.config_file import load_config
-    from foretwin.orchestrator.drive.drive import drive as run_drive
 
-    raise typer.Exit(run_drive(load_config(settings.pop("config"), settings)))
+    return run_drive(load_config(settings.pop("config"), settings))
 
 
 @app.command()
+@told
 def intersections(
     map_file: MapArgument,
     route: Annotated[
         Path | None, typer.Option(help="only those along this GPX or GeoJSON line")
     ] = None,
     service_roads: ServiceRoadsOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
-) -> None:
+) -> CommandResult:
     """List the junctions of a map, each one as a driver sees it.
 
     Example: foretwin intersections MAP.osm --route ROUTE.gpx --json
     """
     from foretwin.orchestrator.commands.intersections import list_intersections
 
-    list_intersections(map_file, route=route, as_json=as_json, service_roads=service_roads)
+    return list_intersections(map_file, route=route, service_roads=service_roads)
 
 
 @app.command()
+@told
 def world(
     map_file: MapArgument,
     out: Annotated[
@@ -239,7 +242,7 @@ def world(
     report: Annotated[
         bool, typer.Option("--report", help="also say what was tagged and what was guessed")
     ] = False,
-) -> None:
+) -> CommandResult:
     """Write Worlds of a map: models, road networks for other simulators, or pictures.
 
     Example: foretwin world MAP.osm --at 52.511,13.390 --out junction.png
@@ -247,7 +250,7 @@ def world(
     asked = locals()  # named as the fields of WorldRequest
     from foretwin.orchestrator.commands.world import WorldRequest, write_worlds
 
-    raise typer.Exit(write_worlds(WorldRequest(**asked)))
+    return write_worlds(WorldRequest(**asked))
 
 
 for command in (sweep, *ABOUT_LOGS, view_run, watch, learn_progress, doctor, worker, standin, join):

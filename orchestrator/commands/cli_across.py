@@ -12,8 +12,8 @@ from foretwin.orchestrator.commands.cli_options import (
     FirstDeclarationOption,
     OtherDeclarationOption,
 )
+from foretwin.orchestrator.commands.told import CommandResult, told
 
-JsonOption = Annotated[bool, typer.Option("--json", help="a JSON list, an object for each row")]
 CsvOption = Annotated[bool, typer.Option("--csv", help="comma-separated values, with a header")]
 PlacesArgument = Annotated[
     list[str] | None,
@@ -24,36 +24,36 @@ PlacesArgument = Annotated[
 ]
 
 
-def runs(
-    folders: PlacesArgument = None, as_json: JsonOption = False, as_csv: CsvOption = False
-) -> None:
+@told
+def runs(folders: PlacesArgument = None, as_csv: CsvOption = False) -> CommandResult:
     """List runs and sweeps: when, what, how long, how they ended, what was found.
 
     Example: foretwin runs --json
     """
     from foretwin.orchestrator.commands.runs import list_runs
 
-    list_runs(tuple(folders or ()), as_json=as_json, as_csv=as_csv)
+    return list_runs(tuple(folders or ()), as_csv=as_csv)
 
 
+@told
 def query(
     sql: Annotated[
         str | None,
         typer.Argument(metavar="[SQL]", help="one SELECT; without any, views and their columns"),
     ] = None,
     folders: PlacesArgument = None,
-    as_json: JsonOption = False,
     as_csv: CsvOption = False,
-) -> None:
+) -> CommandResult:
     """Ask many runs and sweeps at once, in SQL (DuckDB): views runs, futures, rounds and more.
 
     Example: foretwin query "FROM rounds WHERE late" runs
     """
     from foretwin.orchestrator.commands.query import ask_runs
 
-    ask_runs(sql, tuple(folders or ()), as_json=as_json, as_csv=as_csv)
+    return ask_runs(sql, tuple(folders or ()), as_csv=as_csv)
 
 
+@told
 def compare(
     first: Annotated[Path, typer.Argument(metavar="A", help="run or sweep; or recorded drive")],
     second: Annotated[
@@ -71,13 +71,13 @@ def compare(
         ),
     ] = False,
     every: Annotated[
-        bool, typer.Option("--all", help="runs, sweeps: measures whose change may be chance, too")
+        bool,
+        typer.Option("--all", help="runs, sweeps: measures whose change may be chance, too"),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="all of it as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="drives: folder for a picture")] = None,
     declaration: FirstDeclarationOption = None,
     other_declaration: OtherDeclarationOption = None,
-) -> None:
+) -> CommandResult:
     """Compare two runs, sweeps or planners: what changed; or two drives of one road, as recorded.
 
     Example: foretwin compare sweeps/before sweeps/after --fail-on-worse
@@ -88,25 +88,22 @@ def compare(
         from foretwin.orchestrator.commands.compare_runs import compare_runs, refuse_for_runs
 
         refuse_for_runs(first, second, of_drives=(out, declaration, other_declaration))
-        code = compare_runs(
+        return compare_runs(
             first,
             second,
             planners=planners,
             every=every,
-            as_json=as_json,
             fail_on_worse=fail_on_worse,
         )
-        raise typer.Exit(code)
     if planners is not None or fail_on_worse or every:
         raise UserError(
             f"{first}, {second}: --planners, --fail-on-worse and --all are for runs or sweeps"
         )
     from foretwin.orchestrator.commands.compare import compare as compare_drives
 
-    compare_drives(
+    return compare_drives(
         first,
         second,
-        as_json=as_json,
         out=out,
         declaration=declaration,
         other_declaration=other_declaration,

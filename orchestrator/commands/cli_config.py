@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 
+@told
 def config(
     example: Annotated[
         bool, typer.Option("--example", help="a file to begin with, each key explained")
@@ -30,10 +32,7 @@ def config(
             "overpass [default: drive; of --check, what FILE is; of --explain, all]"
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="of --explain and --check, as JSON")
-    ] = False,
-) -> None:
+) -> CommandResult:
     """Explain the TOML files that foretwin reads: settings, sweeps, vehicles, declarations.
 
     Example: foretwin config --check SPEC.toml
@@ -47,11 +46,8 @@ def config(
 
     if kind is not None:
         kind_named(kind)
-    if example:
-        command.show_example(kind or "drive")
-    elif schema:
-        command.show_schema(kind or "drive")
-    elif explain is not None:
-        command.explain(explain, kind=kind, as_json=as_json)
-    elif check is not None:
-        command.check(check, kind=kind, as_json=as_json)
+    if explain is not None:
+        return command.explain(explain, kind=kind)
+    if check is not None:
+        return command.check(check, kind=kind)
+    return (command.example if example else command.schema)(kind or "drive")

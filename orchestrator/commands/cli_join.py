@@ -38,6 +38,8 @@ def join(
 ) -> None:
     """Take part in a running drive as a car on a lot of its own (docs/several-cars.md).
 
+    Goes on until the drive is over, or Ctrl-C: there is no result, and no --json.
+
     Example: foretwin join second --anchor lot-there.toml --connect tls/twin-pc:7447 --secure car
     """
     asked = locals()  # named as the fields of JoinAsked

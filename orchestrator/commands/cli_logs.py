@@ -14,8 +14,10 @@ from foretwin.orchestrator.commands.cli_options import (
     OtherDeclarationOption,
     VehicleFileOption,
 )
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 
+@told
 def convert(
     source: Annotated[Path, typer.Argument(metavar="SOURCE", help="recorded drive")],
     target: Annotated[
@@ -35,16 +37,17 @@ def convert(
             help="TOML that declares SOURCE [default: SOURCE.toml, where it is there]",
         ),
     ] = None,
-) -> None:
+) -> CommandResult:
     """Convert a recorded drive to MCAP, a ROS bag, or CSV.
 
     Example: foretwin convert DRIVE.csv DRIVE.mcap
     """
     from foretwin.orchestrator.commands.recordings import convert_log
 
-    convert_log(source, target, to=to, declaration=declaration)
+    return convert_log(source, target, to=to, declaration=declaration)
 
 
+@told
 def declare(
     table: Annotated[Path, typer.Argument(metavar="FILE", help="CSV, TSV or Parquet of a drive")],
     out: Annotated[
@@ -54,16 +57,17 @@ def declare(
         list[str] | None,
         typer.Option(help="KEY=VALUE of time, latitude, x, epsg, origin or reference_point"),
     ] = None,
-) -> None:
+) -> CommandResult:
     """Find out what a table's columns are, prove it, and write the declaration it is read by.
 
     Example: foretwin declare DRIVE.csv --answer time=millis
     """
     from foretwin.orchestrator.commands.declare import declare as declare_table
 
-    declare_table(table, out=out, answers=tuple(answer or ()))
+    return declare_table(table, out=out, answers=tuple(answer or ()))
 
 
+@told
 def merge(
     first: Annotated[
         Path, typer.Argument(metavar="LOG_A", help="recorded drive, whose clock holds")
@@ -76,7 +80,7 @@ def merge(
     ],
     declaration: FirstDeclarationOption = None,
     other_declaration: OtherDeclarationOption = None,
-) -> None:
+) -> CommandResult:
     """Put two recordings of one drive on one clock, by how the car moved, and write them as one.
 
     Example: foretwin merge CAN.csv GNSS.gpx BOTH.mcap
@@ -84,32 +88,30 @@ def merge(
     asked = locals()
     from foretwin.orchestrator.commands.recordings import merge_logs
 
-    merge_logs(**asked)
+    return merge_logs(**asked)
 
 
+@told
 def identify(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
     vehicle: Annotated[
         str | None, typer.Option(help="parameters in force, TOML [default: the bundled BMW 320i]")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
     out: Annotated[
         Path | None, typer.Option(help="folder for plots and a vehicle file with what was taken")
     ] = None,
     declaration: DeclarationOption = None,
-) -> None:
+) -> CommandResult:
     """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances.
 
     Example: foretwin identify DRIVE.mcap --out found
     """
     from foretwin.orchestrator.commands.identify import identify_log
 
-    code = identify_log(
-        log, vehicle_file=vehicle, as_json=as_json, out=out, declaration=declaration
-    )
-    raise typer.Exit(code)
+    return identify_log(log, vehicle_file=vehicle, out=out, declaration=declaration)
 
 
+@told
 def judge(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
     map_file: Annotated[
@@ -124,8 +126,7 @@ def judge(
     out: Annotated[
         Path | None, typer.Option(help="folder for the runs it makes [default: RUN/judged]")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
-) -> None:
+) -> CommandResult:
     """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?
 
     Example: foretwin judge runs/NAME --map FIXED.osm
@@ -133,9 +134,10 @@ def judge(
     asked = locals()
     from foretwin.orchestrator.commands.judge import judge as judge_run
 
-    raise typer.Exit(judge_run(**asked))
+    return judge_run(**asked)
 
 
+@told
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="folders of runs or sweeps")],
     out: Annotated[Path, typer.Option("--out", help="the HTML file to write")],
@@ -147,30 +149,27 @@ def report(
         Path | None,
         typer.Option(help="another drive of this road: how far people differ, beside the gap"),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="file, verdict, and indicators over several runs as JSON")
-    ] = False,
-) -> None:
+) -> CommandResult:
     """Write what a run or sweep foresaw, and what came, as one HTML file that opens anywhere.
 
     Example: foretwin report runs/NAME --out REPORT.html
     """
     from foretwin.orchestrator.commands.report import report as write
 
-    write(runs, out=out, redact=redact, against=against, as_json=as_json)
+    return write(runs, out=out, redact=redact, against=against)
 
 
+@told
 def repeat(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run or sweep")],
     future: Annotated[
         str, typer.Argument(metavar="FUTURE", help="future_id of the table of futures")
     ],
-    as_json: Annotated[bool, typer.Option("--json", help="both hashes as JSON")] = False,
     view: Annotated[bool, typer.Option("--view", help="also draw it, into RUN/repeated")] = False,
     physics: Annotated[
         str | None, typer.Option(help="on another engine (multibody, gazebo): how far apart?")
     ] = None,
-) -> None:
+) -> CommandResult:
     """Play a recorded future again, bit for bit: exit code 3 where it comes to something else.
 
     Example: foretwin repeat runs/NAME FUTURE --view
@@ -179,32 +178,33 @@ def repeat(
     from foretwin.orchestrator.commands.repeat import repeat as repeat_future
 
     if physics is not None:
-        raise typer.Exit(elsewhere(folder, future, physics, as_json=as_json))
-    raise typer.Exit(repeat_future(folder, future, as_json=as_json, view=view))
+        return elsewhere(folder, future, physics)
+    return repeat_future(folder, future, view=view)
 
 
+@told
 def recover(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
-) -> None:
+) -> CommandResult:
     """Make readable what a run left that was killed: exit code 3 where something of it is lost.
 
     Example: foretwin recover runs/NAME
     """
     from foretwin.orchestrator.commands.recover import recover_run
 
-    raise typer.Exit(recover_run(run))
+    return recover_run(run)
 
 
+@told
 def gap(
     recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
     vehicle: VehicleFileOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
     declaration: DeclarationOption = None,
     against: Annotated[
         Path | None, typer.Option(help="another drive of this road: how far people differ on it")
     ] = None,
-) -> None:
+) -> CommandResult:
     """Measure how far the model leaves a recorded drive, and say which of the two is wrong.
 
     Example: foretwin gap DRIVE.mcap --vehicle CAR.toml --out plots
@@ -212,9 +212,10 @@ def gap(
     asked = locals()
     from foretwin.orchestrator.commands.gap import report_gap
 
-    report_gap(**asked)
+    return report_gap(**asked)
 
 
+@told
 def collect(
     runs: Annotated[
         list[Path] | None,
@@ -229,18 +230,14 @@ def collect(
     verify: Annotated[
         bool, typer.Option("--verify", help="also hold every file of the lake against its hash")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
-) -> None:
+) -> CommandResult:
     """Collect the tables of many runs and sweeps into one lake of partitioned Parquet.
 
     Example: foretwin collect runs sweeps --into lake
     """
     from foretwin.orchestrator.commands.collect import collect_runs
 
-    code = collect_runs(
-        tuple(runs or ()), into=into, replace=replace, verify=verify, as_json=as_json
-    )
-    raise typer.Exit(code)
+    return collect_runs(tuple(runs or ()), into=into, replace=replace, verify=verify)
 
 
 ABOUT_LOGS = (

@@ -9,6 +9,7 @@ import typer
 
 from foretwin.orchestrator.commands.cli_help import WholeSentences
 from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 maps = typer.Typer(
     name="map", cls=WholeSentences, help="Fetch maps and prepare them.", no_args_is_help=True
@@ -16,6 +17,7 @@ maps = typer.Typer(
 
 
 @maps.command("get", context_settings={"ignore_unknown_options": True})
+@told
 def get_map(
     area: Annotated[
         str,
@@ -23,38 +25,40 @@ def get_map(
     ],
     out: OutOption,
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
-) -> None:
+) -> CommandResult:
     """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint.
 
     Example: foretwin map get ROUTE.gpx --out MAP.osm --config MAPS.toml
     """
     from foretwin.orchestrator.commands.map_get import get_map as fetch
 
-    fetch(area, out=out, config=config)
+    return fetch(area, out=out, config=config)
 
 
 @maps.command("town")
-def write_town(out: OutOption) -> None:
+@told
+def write_town(out: OutOption) -> CommandResult:
     """Write the drawn town's map, to try things on, and a route through it beside the map.
 
     Example: foretwin map town --out town.osm
     """
     from foretwin.orchestrator.commands.map_town import write_town as write
 
-    write(out)
+    return write(out)
 
 
 @maps.command("index")
+@told
 def index_map(
     map_file: MapArgument,
     folder: Annotated[
         Path | None, typer.Option(help="folder of indexes [default: the user's cache]")
     ] = None,
-) -> None:
+) -> CommandResult:
     """Read a map of any size into an index on disk, from which places and routes are clipped.
 
     Example: foretwin map index GERMANY.osm.pbf
     """
-    from foretwin.orchestrator.worlds.indexing import index_map_file
+    from foretwin.orchestrator.commands.map_index import index_map_file
 
-    index_map_file(map_file, folder=folder)
+    return index_map_file(map_file, folder=folder)

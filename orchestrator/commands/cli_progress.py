@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from foretwin.orchestrator.commands.told import CommandResult, told
 
+
+@told
 def learn_progress(
     logs: Annotated[
         list[Path] | None, typer.Argument(metavar="LOG...", help="recorded drives to learn from")
@@ -25,12 +28,11 @@ def learn_progress(
     licence: Annotated[
         str, typer.Option(help="of the drives, and so of the table; stands in it")
     ] = "of the drives' owner",
-    as_json: Annotated[bool, typer.Option("--json", help="the figures as JSON")] = False,
-) -> None:
+) -> CommandResult:
     """Learn from drives how far a car gets in the next seconds (docs/progress.md).
 
     Example: foretwin learn-progress DRIVE_1.mcap DRIVE_2.mcap --out OURS.npz
     """
     from foretwin.orchestrator.commands.learn_progress import learn_progress as learn
 
-    learn(logs or [], out=out, check=check or [], table=table, licence=licence, as_json=as_json)
+    return learn(logs or [], out=out, check=check or [], table=table, licence=licence)

@@ -9,6 +9,7 @@ import typer
 
 from foretwin.orchestrator.commands.cli_help import WholeSentences
 from foretwin.orchestrator.commands.cli_options import MapArgument, ServiceRoadsOption
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 scenarios = typer.Typer(
     name="scenarios", cls=WholeSentences, help="List, check, place, draw and export scenarios."
@@ -16,32 +17,32 @@ scenarios = typer.Typer(
 
 
 @scenarios.callback(invoke_without_command=True)
-def list_scenarios(
-    context: typer.Context,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
-) -> None:
+@told
+def list_scenarios(context: typer.Context) -> CommandResult | None:
     """List the scenarios that come with foretwin, or check and place scenarios."""
     if context.invoked_subcommand is not None:
-        return
+        return None
     from foretwin.orchestrator.commands.scenarios import list_scenarios as list_them
 
-    list_them(as_json=as_json)
+    return list_them()
 
 
 @scenarios.command("check")
+@told
 def check_scenario(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="scenario, TOML")],
-) -> None:
+) -> CommandResult:
     """Say whether a scenario file is sound, and how many cases it has.
 
     Example: foretwin scenarios check SCENARIO.toml
     """
     from foretwin.orchestrator.commands.scenarios import check_scenario_file
 
-    check_scenario_file(file)
+    return check_scenario_file(file)
 
 
 @scenarios.command("place")
+@told
 def place_scenarios(
     map_file: MapArgument,
     scenario: Annotated[
@@ -50,8 +51,7 @@ def place_scenarios(
     junction_id: Annotated[str | None, typer.Option("--id", help="only this junction")] = None,
     at: Annotated[str | None, typer.Option(help="LAT,LON: only the junction nearest to it")] = None,
     service_roads: ServiceRoadsOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
-) -> None:
+) -> CommandResult:
     """Say which junctions of a map take which scenarios, and why not elsewhere.
 
     Example: foretwin scenarios place MAP.osm --scenario ccftap
@@ -60,7 +60,7 @@ def place_scenarios(
     from foretwin.orchestrator.commands.scenarios import place_scenarios as place_them
 
     request = PlacesAsked(map_file, scenario or (), junction_id, at, service_roads)
-    raise typer.Exit(place_them(request, as_json=as_json))
+    return place_them(request)
 
 
 MapOption = Annotated[Path, typer.Option("--map", help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
@@ -74,6 +74,7 @@ ScenarioArgument = Annotated[str, typer.Argument(metavar="SCENARIO", help="id or
 
 
 @scenarios.command("export")
+@told
 def export_scenario(
     scenario: ScenarioArgument,
     map_file: MapOption,
@@ -83,7 +84,7 @@ def export_scenario(
     case: CaseOption = 1,
     vehicle: VehicleOption = None,
     service_roads: ServiceRoadsOption = False,
-) -> None:
+) -> CommandResult:
     """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE.
 
     Example: foretwin scenarios export ccftap --map MAP.osm --out CASE.xosc
@@ -93,10 +94,11 @@ def export_scenario(
     from foretwin.orchestrator.commands.scenarios import PlacesAsked
 
     where = PlacesAsked(map_file, (scenario,), junction_id, at, service_roads)
-    export(CaseRequest(scenario, where, case, vehicle), out)
+    return export(CaseRequest(scenario, where, case, vehicle), out)
 
 
 @scenarios.command("draw")
+@told
 def draw_scenario(
     scenario: ScenarioArgument,
     map_file: MapOption,
@@ -107,7 +109,7 @@ def draw_scenario(
     planner: Annotated[str, typer.Option(help="who drives the ego")] = "pure_pursuit_idm",
     vehicle: VehicleOption = None,
     service_roads: ServiceRoadsOption = False,
-) -> None:
+) -> CommandResult:
     """Draw one case at one junction from above: as planned, and as a planner drives it.
 
     Example: foretwin scenarios draw ccftap --map MAP.osm --out CASE.png
@@ -117,4 +119,4 @@ def draw_scenario(
     from foretwin.orchestrator.commands.scenarios import PlacesAsked
 
     where = PlacesAsked(map_file, (scenario,), junction_id, at, service_roads)
-    draw(CaseRequest(scenario, where, case, vehicle), out, planner=planner)
+    return draw(CaseRequest(scenario, where, case, vehicle), out, planner=planner)

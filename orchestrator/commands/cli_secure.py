@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from foretwin.orchestrator.commands.cli_help import WholeSentences
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 secure = typer.Typer(
     cls=WholeSentences,
@@ -25,22 +26,24 @@ HostOption = Annotated[
 
 
 @secure.command("init")
+@told
 def init(
     folder: FolderOption,
     host: HostOption = None,
     campaign_days: Annotated[int, typer.Option(help="how long the campaign goes on")] = 30,
     days: Annotated[int, typer.Option(help="how long a role's certificate holds")] = 7,
-) -> None:
+) -> CommandResult:
     """Begin a campaign: an authority of its own, and certificates for a drive's processes.
 
     Example: foretwin secure init --folder CAMPAIGN --host 192.168.7.2
     """
     from foretwin.orchestrator.commands.secure import begin
 
-    raise typer.Exit(begin(folder, hosts=host or (), days=campaign_days, role_days=days))
+    return begin(folder, hosts=host or (), days=campaign_days, role_days=days)
 
 
 @secure.command("add")
+@told
 def add(
     role: Annotated[
         str,
@@ -51,27 +54,29 @@ def add(
     folder: FolderOption,
     host: HostOption = None,
     days: Annotated[int, typer.Option(help="how long the certificate holds")] = 7,
-) -> None:
+) -> CommandResult:
     """Make or renew a role's certificate; its folder is what its host needs.
 
     Example: foretwin secure add worker-boot --folder CAMPAIGN
     """
     from foretwin.orchestrator.commands.secure import add as add_role
 
-    raise typer.Exit(add_role(folder, role, hosts=host or (), days=days))
+    return add_role(folder, role, hosts=host or (), days=days)
 
 
 @secure.command("show")
-def show(folder: FolderOption) -> None:
+@told
+def show(folder: FolderOption) -> CommandResult:
     """Say for how long each certificate holds, and what is wrong with any.
 
     Example: foretwin secure show --folder CAMPAIGN
     """
     from foretwin.orchestrator.commands.secure import show as show_roles
 
-    raise typer.Exit(show_roles(folder))
+    return show_roles(folder)
 
 
+@told
 def doctor(
     endpoint: Annotated[
         str | None, typer.Option(help="tls/HOST:PORT of a drive that lets nobody in")
@@ -80,7 +85,7 @@ def doctor(
         Path | None, typer.Option(help="the campaign's folder, or that of one role")
     ] = None,
     role: Annotated[str, typer.Option(help="who is not let in")] = "car",
-) -> None:
+) -> CommandResult:
     """Say what this machine has and what is missing, or why a bus lets one of its roles not in.
 
     Example: foretwin doctor
@@ -88,5 +93,5 @@ def doctor(
     from foretwin.orchestrator.commands.doctor import examine, examine_bus
 
     if endpoint is None and secure is None:
-        raise typer.Exit(examine())
-    raise typer.Exit(examine_bus(endpoint, secure, role=role))
+        return examine()
+    return examine_bus(endpoint, secure, role=role)

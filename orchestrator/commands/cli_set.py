@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 
+@told
 def set_value(
     assignment: Annotated[
         str,
@@ -28,7 +29,7 @@ def set_value(
     secure: Annotated[
         Path | None, typer.Option(help="the operator's certificate, where the drive wants one")
     ] = None,
-) -> None:
+) -> CommandResult:
     """Change a running drive: a vehicle's role, the twins' correction, the car's parameters,
     what a light shows, virtual traffic.
 
@@ -36,4 +37,4 @@ def set_value(
     """
     from foretwin.orchestrator.commands.set import set_in_drive
 
-    say(set_in_drive(assignment, run=run, out=out, secure=secure))
+    return set_in_drive(assignment, run=run, out=out, secure=secure)

@@ -8,39 +8,43 @@ from typing import Annotated
 import typer
 
 from foretwin.orchestrator.commands.cli_options import MapArgument
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 
+@told
 def anchor(
     map_file: MapArgument,
     at: Annotated[str, typer.Option(help="LAT,LON: on the lane, near a junction")],
     before_m: Annotated[
         float, typer.Option("--before", help="metres before the lane's end")
     ] = 60.0,
-) -> None:
+) -> CommandResult:
     """Print where a lot can be anchored: poses on lanes, as the [world] of an anchor file.
 
     Example: foretwin anchor MAP.osm --at 52.5127,13.3914
     """
     from foretwin.orchestrator.commands.anchor import show_anchors
 
-    show_anchors(map_file, at=at, before_m=before_m)
+    return show_anchors(map_file, at=at, before_m=before_m)
 
 
+@told
 def lights(
     exports: Annotated[
         list[Path],
         typer.Argument(metavar="EXPORT", help="one World as Lanelet2 (.osm), OpenDRIVE (.xodr)"),
     ],
-) -> None:
+) -> CommandResult:
     """Print by which numbers exports of a World know its lights, as [[light]] rows of a mapping.
 
     Example: foretwin lights town.osm town.xodr
     """
     from foretwin.orchestrator.commands.lights import show_lights
 
-    show_lights(exports)
+    return show_lights(exports)
 
 
+@told
 def standin(
     ros2: Annotated[
         Path, typer.Option(help="mapping of its ROS 2 topics, TOML, as foretwin drive reads it")
@@ -53,12 +57,11 @@ def standin(
     way_m: Annotated[float, typer.Option("--way", help="metres straight on")] = 100.0,
     speed_mps: Annotated[float, typer.Option("--speed", help="metres per second")] = 8.0,
     end_s: Annotated[float, typer.Option("--end", help="seconds after which it ends")] = 120.0,
-    as_json: Annotated[bool, typer.Option("--json", help="what it came to, as JSON")] = False,
-) -> None:
+) -> CommandResult:
     """Drive the stand-in car on a lot, over ROS 2: it brakes for the objects that it is told of.
 
     Example: foretwin standin --ros2 my.toml --anchor lot.toml
     """
     from foretwin.orchestrator.commands.standin import LotDrive, drive_on_lot
 
-    drive_on_lot(LotDrive(ros2, anchor, route, way_m, speed_mps, end_s), as_json=as_json)
+    return drive_on_lot(LotDrive(ros2, anchor, route, way_m, speed_mps, end_s))

@@ -9,8 +9,10 @@ import typer
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 
+@told
 def sweep(
     specs: Annotated[
         list[Path],
@@ -36,7 +38,6 @@ def sweep(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="start anew, not where it stopped")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
     shard: Annotated[
         str | None,
         typer.Option(metavar="I/N", help="only one of N parts, I from 0 to N - 1"),
@@ -44,7 +45,7 @@ def sweep(
     merge: Annotated[
         bool, typer.Option("--merge", help="put the folders of all shards together into --out")
     ] = False,
-) -> None:
+) -> CommandResult:
     """Play scenarios on junctions with planners and parameters, offline, into Parquet.
 
     Example: foretwin sweep SPEC.toml --workers 4
@@ -56,15 +57,13 @@ def sweep(
     if merge:
         if shard is not None:
             raise UserError(f"--shard {shard}: goes with a SPEC, not with --merge")
-        raise typer.Exit(merge_shards(specs, out=out, as_json=as_json))
+        return merge_shards(specs, out=out)
     if len(specs) != 1:
         raise UserError("sweep takes one SPEC; --merge takes the folders of shards")
-    code = run_sweep(
+    return run_sweep(
         specs[0],
         out=out,
         engine=Engine(engine, workers, address),
         fresh=fresh,
-        as_json=as_json,
         shard=shard,
     )
-    raise typer.Exit(code)

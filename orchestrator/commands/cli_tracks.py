@@ -9,6 +9,7 @@ import typer
 
 from foretwin.orchestrator.commands.cli_help import WholeSentences
 from foretwin.orchestrator.commands.cli_options import DeclarationOption
+from foretwin.orchestrator.commands.told import CommandResult, told
 
 tracks = typer.Typer(
     cls=WholeSentences,
@@ -22,17 +23,19 @@ StoreOption = Annotated[
 
 
 @tracks.command("list")
-def list_(store: StoreOption = None) -> None:
+@told
+def list_(store: StoreOption = None) -> CommandResult:
     """List the tracks: id, length, when added, from what.
 
     Example: foretwin tracks list
     """
     from foretwin.orchestrator.commands.tracks import list_tracks
 
-    list_tracks(store=store)
+    return list_tracks(store=store)
 
 
 @tracks.command()
+@told
 def add(
     log: Annotated[
         Path, typer.Argument(metavar="LOG", help="recorded drive, such as RUN/drive.mcap")
@@ -48,28 +51,29 @@ def add(
         ),
     ] = None,
     declaration: DeclarationOption = None,
-) -> None:
+) -> CommandResult:
     """Keep where a recorded drive went.
 
     Example: foretwin tracks add runs/NAME/drive.mcap
     """
     from foretwin.orchestrator.commands.tracks import add_track
 
-    add_track(log, store=store, name=name, std_m=std_m, declaration=declaration)
+    return add_track(log, store=store, name=name, std_m=std_m, declaration=declaration)
 
 
 @tracks.command()
+@told
 def delete(
     ids: Annotated[
         list[str] | None, typer.Argument(metavar="[ID]...", help="ids of tracks")
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="all tracks of the store")] = False,
     store: StoreOption = None,
-) -> None:
+) -> CommandResult:
     """Delete tracks.
 
     Example: foretwin tracks delete --all
     """
     from foretwin.orchestrator.commands.tracks import delete_tracks
 
-    delete_tracks(ids or [], everything=everything, store=store)
+    return delete_tracks(ids or [], everything=everything, store=store)

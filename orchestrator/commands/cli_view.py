@@ -34,6 +34,8 @@ def view(
 ) -> None:
     """Open the recording of a run in the viewer.
 
+    Goes on until the window is closed, or Ctrl-C: there is no result, and no --json.
+
     Example: foretwin view latest --layout gap
     """
     from foretwin.orchestrator.commands.view import open_view

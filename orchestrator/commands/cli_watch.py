@@ -31,6 +31,8 @@ def watch(
 ) -> None:
     """Open the co-pilot display of a drive from another seat, or of one that is over.
 
+    Goes on until the drive is over, or Ctrl-C: there is no result, and no --json.
+
     Example: foretwin watch latest
     """
     from foretwin.orchestrator.commands.watch import WatchRequest

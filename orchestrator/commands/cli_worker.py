@@ -33,6 +33,8 @@ def worker(
 ) -> None:
     """Play futures for a drive on another machine (docs/workers.md).
 
+    Goes on until the drive is over, or Ctrl-C: there is no result, and no --json.
+
     Example: foretwin worker --connect tls/192.168.7.2:7447 --secure worker-boot
     """
     from foretwin.orchestrator.commands.worker import WorkerRequest, work

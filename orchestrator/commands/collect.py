@@ -9,8 +9,8 @@ import pyarrow as pa
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.lake.collect import collect, damaged
 from foretwin.orchestrator.lake.manifest import MANIFEST
 from foretwin.orchestrator.lake.store import FolderStore, LakeStore, store_at
@@ -19,11 +19,9 @@ from foretwin.orchestrator.record.folders_of_runs import folders_of_runs
 NONE_USABLE, SOME_REFUSED = 2, 3
 
 
-def collect_runs(
-    given: Sequence[Path], *, into: str, replace: bool, verify: bool, as_json: bool
-) -> int:
-    """Collect runs into a lake and say what was done; returns 0, 2 where no run can be used, or 3
-    where some are refused or files of the lake are damaged.
+def collect_runs(given: Sequence[Path], *, into: str, replace: bool, verify: bool) -> CommandResult:
+    """Collect runs into a lake; its code is 0, 2 where no run can be used, or 3 where some are
+    refused or files of the lake are damaged.
 
     Raises UserError in one line where nothing can be collected.
     """
@@ -34,7 +32,7 @@ def collect_runs(
     try:
         if not folders and store.read(MANIFEST) is None:
             raise UserError(f"--into {into}: no lake is there")
-        return _collect(store, folders, replace=replace, verify=verify, as_json=as_json)
+        return _collect(store, folders, replace=replace, verify=verify)
     except (OSError, pa.ArrowException) as error:
         if isinstance(store, FolderStore):
             raise
@@ -42,8 +40,8 @@ def collect_runs(
 
 
 def _collect(
-    store: LakeStore, folders: Sequence[Path], *, replace: bool, verify: bool, as_json: bool
-) -> int:
+    store: LakeStore, folders: Sequence[Path], *, replace: bool, verify: bool
+) -> CommandResult:
     with progress_bar(len(folders), "runs") as (advance, tell):
         done = collect(store, folders, replace=replace, advance=advance)
         for line in done.refused:
@@ -51,15 +49,14 @@ def _collect(
     wrong = damaged(store) if verify else []
     for line in wrong:
         say(f"damaged: {line}", error=True)
-    if as_json:
-        print_json({"lake": store.where, "damaged": wrong, "collected": done})
-    else:
-        counts = len(done.added), len(done.replaced), len(done.there), len(done.refused)
-        words = ("collected", "replaced", "were there", "refused")
-        told = ", ".join(
-            f"{count} {word}" for count, word in zip(counts, words, strict=True) if count
-        )
-        say(f"{store.where}: {told or 'no runs given'}; {done.rows} rows added")
+    counts = len(done.added), len(done.replaced), len(done.there), len(done.refused)
+    words = ("collected", "replaced", "were there", "refused")
+    told = ", ".join(f"{count} {word}" for count, word in zip(counts, words, strict=True) if count)
+    code = SOME_REFUSED if done.refused or wrong else 0
     if done.refused and not (done.added or done.replaced or done.there):
-        return NONE_USABLE
-    return SOME_REFUSED if done.refused or wrong else 0
+        code = NONE_USABLE
+    return CommandResult(
+        {"lake": store.where, "damaged": wrong, "collected": done},
+        f"{store.where}: {told or 'no runs given'}; {done.rows} rows added",
+        code,
+    )

@@ -11,9 +11,8 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, geo_from_local
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
-from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.compare_text import difference_lines
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.two_drives.common_stretches import LEAST_M, common_ways
 from foretwin.sim_worker.analysis.two_drives.differences import (
@@ -75,12 +74,11 @@ def compare(
     first: Path,
     second: Path,
     *,
-    as_json: bool,
     out: Path | None,
     declaration: Path | None = None,
     other_declaration: Path | None = None,
-) -> None:
-    """Print how two recorded drives differ; with `out` also draw it there."""
+) -> CommandResult:
+    """Return how two recorded drives differ; with `out` also draw it there."""
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     for recording in (first, second):
@@ -94,14 +92,13 @@ def compare(
 
         with named_in_errors(f"--out {out}"), new_files(out):
             drawn = write_plot(found.difference, out)
-    if as_json:
-        print_json(as_object(found))
-        return
-    say("\n".join(difference_lines(found.difference, str(first), str(second))))
+    lines = [*difference_lines(found.difference, str(first), str(second))]
     if found.unplaced and first.resolve() != second.resolve():
-        say("to the left: where on the car positions are of is not said, which adds up to a metre")
+        unsaid = "where on the car positions are of is not said, which adds up to a metre"
+        lines.append(f"to the left: {unsaid}")
     if drawn is not None:
-        say(f"wrote {drawn}")
+        lines.append(f"wrote {drawn}")
+    return CommandResult(as_object(found), "\n".join(lines))
 
 
 def as_object(found: ComparedDrives) -> dict[str, Any]:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import plain, say
+from foretwin.contracts.terminal import plain
 from foretwin.orchestrator.across.changes import changes_between, is_worse
 from foretwin.orchestrator.across.paired_statistics import LEVEL
 from foretwin.orchestrator.across.pairs import side_of
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.folders_of_runs import is_run_folder
 
 WORSE = 3
@@ -25,11 +25,10 @@ def compare_runs(
     *,
     planners: str | None,
     every: bool = False,
-    as_json: bool,
     fail_on_worse: bool,
-) -> int:
-    """Print what changed from one run or sweep to another; returns 0, or where it is asked 3 if
-    significantly more cases newly fail than were fixed.
+) -> CommandResult:
+    """Return what changed from one run or sweep to another; its code is 0, or where it is asked 3
+    if significantly more cases newly fail than were fixed.
 
     `planners` names one for each side, with a comma between; with `every` measures are listed whose
     change may be chance. Raises UserError in one line.
@@ -39,14 +38,12 @@ def compare_runs(
         raise UserError(f"compare: both are {first}: name another, or two of its --planners A,B")
     found = changes_between(side_of(first, of_first), side_of(second, of_second))
     judged = _judged(first, second) if found["first"]["kind"] == "drive" else None
-    if as_json:
-        print_json({**found, "judged": judged})
-    else:
-        for line in change_lines(found, every=every):
-            say(plain(line))
-        for line in difference_lines(judged)[2:] if judged else ():
-            say(plain(line))
-    return WORSE if fail_on_worse and is_worse(found) else 0
+    lines = [*change_lines(found, every=every), *(difference_lines(judged)[2:] if judged else ())]
+    return CommandResult(
+        {**found, "judged": judged},
+        "\n".join(map(plain, lines)),
+        WORSE if fail_on_worse and is_worse(found) else 0,
+    )
 
 
 def refuse_for_runs(first: Path, second: Path, *, of_drives: tuple[object, ...]) -> None:

@@ -14,7 +14,6 @@ import msgspec
 from foretwin.contracts.did_you_mean import meant
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.field_words import FieldWords, fields_of, summary_of
-from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.config_formats import (
     HIDDEN,
     KINDS,
@@ -25,6 +24,7 @@ from foretwin.orchestrator.commands.config_formats import (
 )
 from foretwin.orchestrator.commands.config_schema import schema_of
 from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.settings import flag_of
 
 
@@ -59,18 +59,20 @@ def _flags() -> frozenset[str]:
     return frozenset(name.removesuffix("_file") for name in names)
 
 
-def show_example(kind: str) -> None:
-    """Print a file of a kind, with what each key is in comments."""
-    say(example_of(kind_named(kind)).rstrip())
+def example(kind: str) -> CommandResult:
+    """Return a file of a kind, with what each key is in comments."""
+    text = example_of(kind_named(kind)).rstrip()
+    return CommandResult({"kind": kind, "example": text}, text)
 
 
-def show_schema(kind: str) -> None:
-    """Print the JSON Schema of a kind of file, for editors."""
-    print_json(schema_of(kind_named(kind)))
+def schema(kind: str) -> CommandResult:
+    """Return the JSON Schema of a kind of file, for editors; in words it is JSON as well."""
+    found = schema_of(kind_named(kind))
+    return CommandResult(found, lambda: print_json(found))
 
 
-def explain(name: str, *, kind: str | None, as_json: bool) -> None:
-    """Print what a key is, in every kind of file that has it; UserError for one that none has."""
+def explain(name: str, *, kind: str | None) -> CommandResult:
+    """Return what a key is, in every kind of file that has it; UserError for one that none has."""
     every = [key for one in ([kind] if kind else KINDS) for key in keys_of(one)]
     found = [key for key in every if name in (key.place, key.field.name)]
     if not found:
@@ -80,25 +82,23 @@ def explain(name: str, *, kind: str | None, as_json: bool) -> None:
             f"--explain {name}: no file{where} has this key; {meant(name, sorted(names))}"
             "foretwin config --example shows all"
         )
-    if as_json:
-        print_json(
-            [{"kind": k.kind, "key": k.place, "is": k.known, "text": text_of(k)} for k in found]
-        )
-        return
+    lines = []
     for key in found:
-        say(f"{key.kind}: {key.place} ({key.known})")
+        lines.append(f"{key.kind}: {key.place} ({key.known})")
         if text := text_of(key):
-            say(f"  {text}")
+            lines.append(f"  {text}")
+    return CommandResult(
+        [{"kind": k.kind, "key": k.place, "is": k.known, "text": text_of(k)} for k in found],
+        "\n".join(lines),
+    )
 
 
-def check(path: Path, *, kind: str | None, as_json: bool) -> None:
+def check(path: Path, *, kind: str | None) -> CommandResult:
     """Read a file as whoever uses it does; UserError, with the line, for what is wrong in it."""
     name = kind or kind_of(path)
     kind_named(name).read(path)
-    if as_json:
-        print_json({"file": str(path), "kind": name, "sound": True})
-    else:
-        say(f"{path}: sound; {name}: {KINDS[name].what}")
+    found = {"file": path, "kind": name, "sound": True}
+    return CommandResult(found, f"{path}: sound; {name}: {KINDS[name].what}")
 
 
 def keys_of(kind: str) -> Iterator[Key]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+import tomllib
 from pathlib import Path
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.partial_file import partial_file
 from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.telemetry.logs.declare import Proposal, propose
 from foretwin.telemetry.logs.declare.choice import OpenQuestion
 from foretwin.telemetry.logs.write_declaration import comment_lines, declaration_toml
@@ -17,8 +19,8 @@ DECLARED_MARK = "# Proposed by foretwin declare"
 """How a declaration begins that `declare` may replace."""
 
 
-def declare(file: Path, *, out: Path | None, answers: tuple[str, ...]) -> None:
-    """Write the declaration of a table, and say on what grounds.
+def declare(file: Path, *, out: Path | None, answers: tuple[str, ...]) -> CommandResult:
+    """Write the declaration of a table, and return it with on what grounds.
 
     Asks one question at most, and where there is a terminal alone. Raises UserError where a file
     would be replaced that somebody wrote, or what the data cannot answer was not answered either.
@@ -39,12 +41,21 @@ def declare(file: Path, *, out: Path | None, answers: tuple[str, ...]) -> None:
     text = text_of(file.name, found)
     with partial_file(target) as partial:
         partial.write_text(text, encoding="utf-8")
-    say(text.partition("\n")[2].strip())
     from foretwin.telemetry.logs.csv_table import open_csv
 
     log = open_csv(file, declaration=target)
     lasts_s = ((log.info.end_stamp_ns or 0) - log.info.start_stamp_ns) * 1e-9
-    say(f"\n{target}: read with it, {lasts_s:.1f} s of {', '.join(log.info.sends)}")
+    read = f"{target}: read with it, {lasts_s:.1f} s of {', '.join(log.info.sends)}"
+    body = {
+        "table": file,
+        "declaration": target,
+        "declared": tomllib.loads(text),
+        "evidence": found.evidence,
+        "unknown": found.unknown,
+        "lasts_s": round(lasts_s, 3),
+        "sends": log.info.sends,
+    }
+    return CommandResult(body, f"{text.partition(chr(10))[2].strip()}\n\n{read}")
 
 
 def text_of(name: str, found: Proposal) -> str:

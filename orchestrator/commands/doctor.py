@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.told import CommandResult
 
 Verdict = Literal["ok", "missing", "note"]
 
@@ -31,17 +31,17 @@ class CheckResult(NamedTuple):
     text: str
 
 
-def examine() -> int:
-    """Print every finding; returns 3 where something that a drive needs is missing."""
+def examine() -> CommandResult:
+    """Return every finding; its code is 3 where something that a drive needs is missing."""
     findings = [check() for check in CHECKS]
     marks = {"ok": "ok     ", "missing": "MISSING", "note": "note   "}
-    for finding in findings:
-        say(f"{marks[finding.verdict]}  {finding.what}: {finding.text}")
-    return 3 if any(f.verdict == "missing" for f in findings) else 0
+    lines = [f"{marks[one.verdict]}  {one.what}: {one.text}" for one in findings]
+    code = 3 if any(one.verdict == "missing" for one in findings) else 0
+    return CommandResult([one._asdict() for one in findings], "\n".join(lines), code)
 
 
-def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> int:
-    """Print why a bus with certificates does not let a role in; 3 where a cause was found.
+def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> CommandResult:
+    """Return why a bus with certificates does not let a role in; 3 where a cause was found.
 
     Raises UserError where endpoint or folder are missing or no such thing.
     """
@@ -62,17 +62,14 @@ def examine_bus(endpoint: str | None, folder: Path | None, *, role: str) -> int:
         endpoint=endpoint, tls=certificate_in(folder) if own else role_files(folder, role)
     )
     causes = list(likely_causes(setup))
-    for cause in causes:
-        say(f"cause    {cause}")
-    if causes:
-        return 3
-    try:
-        with ZenohBus(setup):
-            say(f"ok       {ADMITTED}")
-    except BusUnreachable as error:
-        say(f"cause    {error}")
-        return 3
-    return 0
+    if not causes:
+        try:
+            with ZenohBus(setup):
+                return CommandResult({"role": role, "causes": []}, f"ok       {ADMITTED}")
+        except BusUnreachable as error:
+            causes = [str(error)]
+    words = "\n".join(f"cause    {cause}" for cause in causes)
+    return CommandResult({"role": role, "causes": causes}, words, 3)
 
 
 def _python() -> CheckResult:

@@ -15,7 +15,6 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
-from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.compare import compare_logs, scale_object
 from foretwin.orchestrator.commands.compare_text import after_lines
@@ -28,8 +27,8 @@ from foretwin.orchestrator.commands.gap_text import (
     verdict_lines,
     why_undecided,
 )
-from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.drive.telemetry_watch import estimate_line, estimate_object
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.gap.clock_offsets import on_one_clock
@@ -149,14 +148,13 @@ def report_gap(
     recording: Path,
     *,
     vehicle: str | None,
-    as_json: bool,
     out: Path | None,
     declaration: Path | None = None,
     against: Path | None = None,
-) -> None:
-    """Print the gap of a recorded drive; with `out` also write its plots there.
+) -> CommandResult:
+    """Return the gap of a recorded drive; with `out` also write its plots there.
 
-    `against` is another drive of the same road: how far people differ on it is printed beside.
+    `against` is another drive of the same road: how far people differ on it stands beside.
     """
     parameters = load_vehicle(vehicle)
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
@@ -173,16 +171,14 @@ def report_gap(
             plots = write_plots(
                 report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
             )
-    if as_json:
-        scale = {} if people is None else {"against": scale_object(people)}
-        print_json(as_object(report) | scale)
-        return
+    body, lines = as_object(report), []
     if people is not None:
+        body |= {"against": scale_object(people)}
         title = f"two drives of this road, this one and {against}: what a gap is measured against"
-        say("\n".join([title, *after_lines(people.difference), ""]))
-    say("\n".join(_lines(report)))
-    for plot in plots:
-        say(f"wrote {plot}")
+        lines = [title, *after_lines(people.difference), ""]
+    return CommandResult(
+        body, "\n".join([*lines, *_lines(report), *(f"wrote {plot}" for plot in plots)])
+    )
 
 
 def as_object(report: GapReport) -> dict[str, Any]:

@@ -15,10 +15,9 @@ from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
-from foretwin.contracts.terminal import say
 from foretwin.contracts.tuning import Identification
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
 from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
@@ -53,14 +52,10 @@ def identify_log(
     log_file: Path,
     *,
     vehicle_file: str | None,
-    as_json: bool,
     out: Path | None,
     declaration: Path | None = None,
-) -> int:
-    """Print what the log says; write plots and a vehicle file with what is taken to `out`.
-
-    Returns the exit code, 0.
-    """
+) -> CommandResult:
+    """Return what the log says; write plots and a vehicle file with what is taken to `out`."""
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     vehicle = load_vehicle(vehicle_file)
@@ -78,13 +73,10 @@ def identify_log(
             # A drive without steering, yaw rate or speed has no such picture: the table says so.
             with contextlib.suppress(ValueError):
                 draw_steering(record, vehicle, out / "steering.png")
-    if as_json:
-        print_json(as_object(told))
-    else:
-        say("\n".join(as_lines(told, vehicle)))
-        if out is not None:
-            say(f"{out}: vehicle.toml, identification.json and plots")
-    return 0
+    lines = as_lines(told, vehicle)
+    if out is not None:
+        lines.append(f"{out}: vehicle.toml, identification.json and plots")
+    return CommandResult(as_object(told), "\n".join(lines))
 
 
 def read_record(log_file: Path, *, declaration: Path | None = None) -> tuple[MotionRecord, str]:

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from foretwin.orchestrator.commands.output import print_json, print_table
+from foretwin.orchestrator.commands.output import print_table
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.choice import choose_junctions
 
 
 def list_intersections(
-    map_file: Path, *, route: Path | None, as_json: bool, service_roads: bool = False
-) -> None:
-    """Print the junctions of a map, or those along a line, in driving order.
+    map_file: Path, *, route: Path | None, service_roads: bool = False
+) -> CommandResult:
+    """Return the junctions of a map, or those along a line, in driving order.
 
     Service roads count where the line uses them, or everywhere if asked for.
     """
     junctions = choose_junctions(map_file, route=route, service_roads=service_roads).junctions
     found = [junction.summary for junction in junctions]
-    if as_json:
-        print_json(found)
-        return
     columns = ("id", "kind", "control", "arms", "lat", "lon", "name")
     rows = [
         (s.id, s.kind, s.control, s.arms, f"{s.lat:.6f}", f"{s.lon:.6f}", s.name) for s in found
     ]
-    print_table(str(map_file), columns, rows)
+    return CommandResult(found, lambda: print_table(str(map_file), columns, rows))

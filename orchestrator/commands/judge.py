@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import datetime
 import json
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,10 @@ from foretwin.contracts.terminal import say
 from foretwin.contracts.versions import versions
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.drive import carry_out
-from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.drive.drive import EndedDrive, drive
+from foretwin.orchestrator.drive.plan import read_inputs
 from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.orchestrator.processors import most_workers
 from foretwin.orchestrator.record.recovery import RECOVERED
@@ -37,10 +36,9 @@ def judge(
     vehicle: str | None = None,
     worlds: Path | None = None,
     out: Path | None = None,
-    as_json: bool = False,
-) -> int:
-    """Drive a run's recorded drive again in lock step and print what changes; returns 0, or the
-    exit code of the drive that did not come to its end.
+) -> CommandResult:
+    """Drive a run's recorded drive again in lock step: what changes? Its code is 0, or that of the
+    drive that did not come to its end.
 
     What it is compared with is the run itself where that was in lock step and of this version;
     else the drive is first driven again as it was, so that nothing but the correction differs.
@@ -63,19 +61,16 @@ def judge(
     before = run
     if not _stands_for_itself(record):
         _say(f"{run}: driven again as it was, in lock step, to compare with")
-        code, before = _drive(again)
-        if code:
-            return code
+        driven = drive(again)
+        if driven.code:
+            return _ended_early(driven)
+        before = driven.folder
     _say("driven again with what is corrected")
-    code, after = _drive(corrected)
-    if code:
-        return code
-    found = difference_of(read_judged(before), read_judged(after))
-    if as_json:
-        print_json(found)
-    else:
-        say("\n".join(difference_lines(found)))
-    return 0
+    driven = drive(corrected)
+    if driven.code:
+        return _ended_early(driven)
+    found = difference_of(read_judged(before), read_judged(driven.folder))
+    return CommandResult(found, "\n".join(difference_lines(found)))
 
 
 def _stands_for_itself(record: dict[str, Any]) -> bool:
@@ -86,9 +81,8 @@ def _stands_for_itself(record: dict[str, Any]) -> bool:
     return in_lock_step and ended and record.get("versions") == versions()
 
 
-def _drive(config: DriveConfig) -> tuple[int, Path]:
-    plan = make_plan(read_inputs(config), datetime.datetime.now())
-    return carry_out(plan), plan.folder
+def _ended_early(driven: EndedDrive) -> CommandResult:
+    return CommandResult({"run": driven.folder, "exit_code": driven.code}, code=driven.code)
 
 
 def _record(run: Path) -> dict[str, Any]:
@@ -131,7 +125,7 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
         "map": map_file,
         "route": route,
     }
-    alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept}
+    alone = {"speed": None, "view": "none", "out": str(out), "vehicles": kept, "metrics": None}
     workers = {"workers": min(was.workers, most_workers())}  # it may come from a larger machine
     no_bus = {"endpoint": None, "insecure": False, "secure": None}
     no_car = no_bus | {"ros2": None, "towards_vehicle": False}

@@ -9,7 +9,8 @@ import numpy as np
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json, print_table
+from foretwin.orchestrator.commands.output import print_table
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.forecast.examples import Examples, causal_states, examples_of
 from foretwin.orchestrator.forecast.learning import learn
 from foretwin.orchestrator.forecast.progress_model import ProgressModel, progress_of
@@ -26,9 +27,8 @@ def learn_progress(
     check: Sequence[Path],
     table: str | None,
     licence: str,
-    as_json: bool,
-) -> None:
-    """Write the table learnt from `logs` to `out`, and print how it does on those of `check`.
+) -> CommandResult:
+    """Write the table learnt from `logs` to `out`, and return how it does on those of `check`.
 
     Without logs to learn from, `table` is checked. Raises UserError for what cannot be used.
     """
@@ -51,9 +51,12 @@ def learn_progress(
     if model is None:
         raise UserError("--table off: nothing to check")
     scores = {path.stem: score(model, _examples(path)) for path in check}
-    if as_json:
-        print_json({name: _figures(of) for name, of in scores.items()})
-        return
+    return CommandResult(
+        {name: _figures(of) for name, of in scores.items()}, lambda: _say(told, scores)
+    )
+
+
+def _say(told: str, scores: dict[str, DriveScore]) -> None:
     if told:
         say(told)
     if scores:

@@ -10,22 +10,23 @@ from xml.etree import ElementTree
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import plain, say
+from foretwin.contracts.terminal import plain
+from foretwin.orchestrator.commands.told import CommandResult
 
 _NUMBERS = dict[str, dict[str, list[int]]]
 """By group and key of a row, `ids`, `ways` or `signals`."""
 
 
-def show_lights(exports: Sequence[Path]) -> None:
-    """Print the [[light]] rows of a ROS 2 mapping for exports of one World.
+def show_lights(exports: Sequence[Path]) -> CommandResult:
+    """Return the [[light]] rows of a ROS 2 mapping for exports of one World.
 
     Raises UserError for a file that is no Lanelet2 map or OpenDRIVE file of ours.
     """
-    for row in light_rows(exports):
-        say("[[light]]")
-        for name, value in row.items():
-            say(f"{name} = {msgspec.json.encode(value).decode()}")
-        say("")
+    rows, lines = light_rows(exports), []
+    for row in rows:
+        values = (f"{name} = {msgspec.json.encode(value).decode()}" for name, value in row.items())
+        lines += ["[[light]]", *values, ""]
+    return CommandResult({"light": rows}, "\n".join(lines))
 
 
 def light_rows(exports: Sequence[Path]) -> list[dict[str, str | int | list[int]]]:

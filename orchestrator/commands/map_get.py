@@ -8,7 +8,8 @@ import shutil
 from pathlib import Path
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import console, described, plain, say, visible
+from foretwin.contracts.terminal import console, described, plain, visible
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.overpass import OverpassConfig, fetch_map, load_overpass_config
 from foretwin.orchestrator.worlds.overpass_query import (
     box_filter,
@@ -20,7 +21,7 @@ from foretwin.orchestrator.worlds.overpass_query import (
 ROUTE_SUFFIXES = (".gpx", ".geojson", ".json")
 
 
-def get_map(area: str, *, out: Path, config: Path | None) -> None:
+def get_map(area: str, *, out: Path, config: Path | None) -> CommandResult:
     """Write the map of `area`, a box W,S,E,N or a file with a line, to `out`, whole or not at all.
 
     `config` names a TOML file with a table `[overpass]`; nobody is asked without. Raises UserError
@@ -54,7 +55,11 @@ def get_map(area: str, *, out: Path, config: Path | None) -> None:
         packed.unlink(missing_ok=True)
     from foretwin.contracts.world import ATTRIBUTION
 
-    say(f"{out}: {counts['w']} ways, {counts['n']} nodes. {ATTRIBUTION}")
+    found = {"ways": counts["w"], "nodes": counts["n"], "relations": counts["r"]}
+    return CommandResult(
+        {"map": out, **found, "attribution": ATTRIBUTION},
+        f"{out}: {counts['w']} ways, {counts['n']} nodes. {ATTRIBUTION}",
+    )
 
 
 def area_filter(area: str, *, margin_m: float) -> str:

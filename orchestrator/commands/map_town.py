@@ -6,12 +6,13 @@ import shutil
 from pathlib import Path
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import plain, say
+from foretwin.contracts.terminal import plain
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 
 
-def write_town(out: Path) -> Path:
-    """Write the town's map to `out` and its route to a `.geojson` of that name; returns the latter.
+def write_town(out: Path) -> CommandResult:
+    """Write the town's map to `out` and its route to a `.geojson` of that name.
 
     Raises UserError where `out` is not named as a map, OSError where it cannot be written.
     """
@@ -20,5 +21,5 @@ def write_town(out: Path) -> Path:
     route = out.with_suffix(".geojson")
     for source, target in ((MAP_FILE, out), (ROUTE_FILE, route)):
         shutil.copyfile(source, target)
-    say(plain(f"{out} and a route, {route}: drawn for foretwin, an invented town"))
-    return route
+    words = plain(f"{out} and a route, {route}: drawn for foretwin, an invented town")
+    return CommandResult({"map": out, "route": route}, words)

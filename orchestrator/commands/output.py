@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def print_json(body: object) -> None:
-    """Print a message, or what holds messages, as indented JSON."""
-    say(msgspec.json.format(msgspec.json.encode(body), indent=1).decode())
+    """Print a message, or what holds messages and paths, as indented JSON."""
+    say(msgspec.json.format(msgspec.json.encode(body, enc_hook=os.fspath), indent=1).decode())
 
 
 def print_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

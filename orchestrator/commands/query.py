@@ -9,7 +9,8 @@ from foretwin.contracts.terminal import console, say
 from foretwin.orchestrator.across.database import AskedRows, ask, columns_in
 from foretwin.orchestrator.across.places import found_in
 from foretwin.orchestrator.across.tables import RunTables
-from foretwin.orchestrator.commands.output import print_csv, print_json, print_table
+from foretwin.orchestrator.commands.output import print_csv, print_table
+from foretwin.orchestrator.commands.told import CommandResult
 
 MOST_SHOWN = 200
 """Rows of an answer as a table; --json and --csv give all."""
@@ -17,27 +18,33 @@ LEAST_WIDTH = 9
 """Of a column, in characters."""
 
 
-def ask_runs(sql: str | None, places: Sequence[str], *, as_json: bool, as_csv: bool) -> None:
-    """Print what a question in SQL comes to; without one, the views and their columns.
+def ask_runs(sql: str | None, places: Sequence[str], *, as_csv: bool) -> CommandResult:
+    """Return what a question in SQL comes to; without one, the views and their columns.
 
     Raises UserError in one line where the SQL is wrong, or nothing is found to ask.
     """
     tables = RunTables(found_in(places), lambda line: say(f"foretwin: {line}", error=True))
     answer = _views(tables) if sql is None else ask(tables, sql)
-    if as_json:
-        named = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
-        print_json([{name: _plain(cell) for name, cell in row.items()} for row in named])
-    elif as_csv:
+    return CommandResult(lambda: _objects(answer), lambda: _print(answer, as_csv=as_csv))
+
+
+def _objects(answer: AskedRows) -> list[dict[str, Any]]:
+    named = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+    return [{name: _plain(cell) for name, cell in row.items()} for row in named]
+
+
+def _print(answer: AskedRows, *, as_csv: bool) -> None:
+    if as_csv:
         print_csv(answer.columns, answer.rows)
-    else:
-        fit = max(console().width // LEAST_WIDTH, 1)
-        shown = [[_text(cell) for cell in row[:fit]] for row in answer.rows[:MOST_SHOWN]]
-        print_table("", answer.columns[:fit], shown)
-        if len(answer.columns) > fit:
-            count = f"{fit} of {len(answer.columns)} columns"
-            say(f"{count} fit here; --csv and --json give all", error=True)
-        if len(answer.rows) > MOST_SHOWN:
-            say(f"{MOST_SHOWN} of {len(answer.rows)} rows; --csv and --json give all", error=True)
+        return
+    fit = max(console().width // LEAST_WIDTH, 1)
+    shown = [[_text(cell) for cell in row[:fit]] for row in answer.rows[:MOST_SHOWN]]
+    print_table("", answer.columns[:fit], shown)
+    if len(answer.columns) > fit:
+        count = f"{fit} of {len(answer.columns)} columns"
+        say(f"{count} fit here; --csv and --json give all", error=True)
+    if len(answer.rows) > MOST_SHOWN:
+        say(f"{MOST_SHOWN} of {len(answer.rows)} rows; --csv and --json give all", error=True)
 
 
 def _views(tables: RunTables) -> AskedRows:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import say
+from foretwin.orchestrator.commands.told import CommandResult
 
 if TYPE_CHECKING:
     from foretwin.telemetry.logs.convert import ConvertReport
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 def convert_log(
     source: Path, target: Path, *, to: str | None = None, declaration: Path | None = None
-) -> None:
-    """Convert a recorded drive and say what was kept and what was not.
+) -> CommandResult:
+    """Convert a recorded drive and return what was kept and what was not.
 
     `to` is one of foretwin.telemetry.logs.convert.TARGETS, else the target's suffix tells.
     """
@@ -29,15 +29,21 @@ def convert_log(
         raise FileNotFoundError(f"recorded drive {source}: no such file or folder")
     if not target.parent.is_dir():
         raise UserError(f"{target}: folder {target.parent} does not exist")
-    _say_written(target, convert(source, target, declaration=declaration, to=kind))
+    report = convert(source, target, declaration=declaration, to=kind)
+    return CommandResult(_written(target, report), "\n".join(_lines(target, report)))
 
 
-def _say_written(target: Path, report: ConvertReport) -> None:
+def _written(target: Path, report: ConvertReport) -> dict[str, object]:
+    return {"file": target, "samples": report.counts, "left_out": report.skipped}
+
+
+def _lines(target: Path, report: ConvertReport) -> list[str]:
     kept = ", ".join(f"{count} {name}" for name, count in sorted(report.counts.items()))
-    say(f"{target}: {kept}")
+    lines = [f"{target}: {kept}"]
     if report.skipped:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.skipped.items()))
-        say(f"left out: {left}")
+        lines.append(f"left out: {left}")
+    return lines
 
 
 def merge_logs(
@@ -47,8 +53,8 @@ def merge_logs(
     *,
     declaration: Path | None = None,
     other_declaration: Path | None = None,
-) -> None:
-    """Put two recordings of one drive on the first's clock, write them as one, and say how."""
+) -> CommandResult:
+    """Put two recordings of one drive on the first's clock, write them as one, and return how."""
     from foretwin.telemetry.logs.clock_between import clock_between
     from foretwin.telemetry.logs.convert import target_of, write_log
     from foretwin.telemetry.logs.merge import together
@@ -68,6 +74,8 @@ def merge_logs(
     report = write_log(
         log, target, kind=kind, read=((first, declaration), (second, other_declaration))
     )
-    say(clock.said(str(second), str(first)))
-    say(f"taken from {second}: {', '.join(taken)}")
-    _say_written(target, report)
+    how = [clock.said(str(second), str(first)), f"taken from {second}: {', '.join(taken)}"]
+    return CommandResult(
+        {**_written(target, report), "taken": {str(second): taken}, "clock": clock._asdict()},
+        "\n".join([*how, *_lines(target, report)]),
+    )

@@ -10,34 +10,33 @@ from typing import Any
 from foretwin.contracts.credentials import runtime_folder
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.owned_folder import remove_left
-from foretwin.contracts.terminal import say
 from foretwin.orchestrator.agreement.recovered import recovered_agreement
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.recovery import RECOVERED, recover
 
 SOME_LOST = 3
 
 
-def recover_run(run: Path) -> int:
-    """Recover a run and print what became of each of its parts; returns 0, or 3 where something of
-    it is lost.
+def recover_run(run: Path) -> CommandResult:
+    """Recover a run and return what became of each of its parts; its code is 0, or 3 where
+    something of it is lost.
 
     Raises UserError in one line for what is no run, or goes on.
     """
     done = recover(run, judge=recovered_agreement)
     with contextlib.suppress(UserError):
         remove_left(runtime_folder())  # with the passwords of drives that were killed
+    parts = [part._asdict() for part in done.parts]
+    body = {"run": run, "exit": done.exit_word, "whole": done.healthy, "parts": parts}
     if done.healthy:
-        say(f"{run}: whole (exit: {done.exit_word}); nothing to recover")
-        return 0
-    for part in done.parts:
-        say(part.text)
-    for line in ledger_lines(done.record):
-        say(line)
+        return CommandResult(body, f"{run}: whole (exit: {done.exit_word}); nothing to recover")
+    body |= {"ledger": done.record.get("ledger"), RECOVERED: done.record.get(RECOVERED)}
+    lines = [*(part.text for part in done.parts), *ledger_lines(done.record)]
+    how = "all that was written can be read"
     if done.lost:
-        say(f"{run}: {done.exit_word}; lost in part: {len(done.lost)} of {len(done.parts)}")
-        return SOME_LOST
-    say(f"{run}: {done.exit_word}; all that was written can be read")
-    return 0
+        how = f"lost in part: {len(done.lost)} of {len(done.parts)}"
+    lines.append(f"{run}: {done.exit_word}; {how}")
+    return CommandResult(body, "\n".join(lines), SOME_LOST if done.lost else 0)
 
 
 def ledger_lines(record: Mapping[str, Any]) -> list[str]:

@@ -11,8 +11,7 @@ import numpy as np
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import EngineName
 from foretwin.contracts.new_folder import trouble_with_folder
-from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.played_again import play_again
 from foretwin.orchestrator.record.recorded_jobs import recorded_future, recorded_sibling
 from foretwin.orchestrator.record.run_folder import REPEATED
@@ -22,11 +21,11 @@ from foretwin.sim_worker.futures.future_rows import motion_sha256
 DIFFERS = 3
 
 
-def elsewhere(folder: Path, future_id: str, physics: str, *, as_json: bool) -> int:
-    """Play a recorded future as it was and on another engine, and print how far apart they are.
+def elsewhere(folder: Path, future_id: str, physics: str) -> CommandResult:
+    """Play a recorded future as it was and on another engine: how far apart are they?
 
-    Returns 0, or 3 where it was played on that engine in the drive, too, and came to something else
-    there. Raises FileNotFoundError or UserError, in one line, where it cannot be played.
+    Its code is 0, or 3 where it was played on that engine in the drive, too, and came to something
+    else there. Raises FileNotFoundError or UserError, in one line, where it cannot be played.
     """
     if physics not in (known := get_args(EngineName)):
         raise UserError(f"--physics {physics}: {', '.join(known)}")
@@ -43,27 +42,28 @@ def elsewhere(folder: Path, future_id: str, physics: str, *, as_json: bool) -> i
     told = recorded_sibling(folder, future_id, engine)
     now = motion_sha256(there, row)
     collided = [bool(result.outcome.collided[row]) for result in (here, there)]
-    if as_json:
-        words = {"future": future_id, "engines": [recorded.job.engine, engine]}
-        apart = {"end_m": float(apart_m[-1]), "most_m": float(apart_m.max())}
-        hashes = {"sibling_sha256": told, "sha256": now}
-        print_json(words | {"apart": apart, "collided": collided} | hashes)
-        return 0 if told in (None, now) else DIFFERS
+    body = {
+        "future": future_id,
+        "engines": [recorded.job.engine, engine],
+        "apart": {"end_m": float(apart_m[-1]), "most_m": float(apart_m.max())},
+        "collided": collided,
+        "sibling_sha256": told,
+        "sha256": now,
+    }
     said = ["collides" if one else "does not collide" for one in collided]
-    say(
+    words = (
         f"{future_id}: {recorded.job.engine} and {engine} end {apart_m[-1]:.2f} m apart, at most "
         f"{apart_m.max():.2f} m; on {recorded.job.engine} it {said[0]}, "
         f"on {engine} it {said[1]}"
     )
-    if told is None:
-        return 0
-    say(f"its sibling of the drive: {'the same again' if told == now else f'differs: {told}'}")
-    return 0 if told == now else DIFFERS
+    if told is not None:
+        sibling = "the same again" if told == now else f"differs: {told}"
+        words += f"\nits sibling of the drive: {sibling}"
+    return CommandResult(body, words, 0 if told in (None, now) else DIFFERS)
 
 
-def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
-    """Play a recorded future again and print whether it came to the same; returns 0, or 3 where
-    it did not.
+def repeat(folder: Path, future_id: str, *, view: bool) -> CommandResult:
+    """Play a recorded future again: did it come to the same? Its code is 0, or 3 where it did not.
 
     Its whole job is played, as it was then. Raises FileNotFoundError or UserError, in one line,
     where it cannot be repeated.
@@ -78,18 +78,17 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
         raise UserError(f"{future_id}: was not played: {reason}")
     result, hashes = play_again(recorded)
     after = hashes[recorded.row.index]
-    if as_json:
-        both = {"recorded_sha256": before, "sha256": after}
-        print_json({"future": future_id, **both, "equal": before == after})
-    elif before == after:
-        say(f"{future_id}: the same again, sha256 {after}")
-    else:
-        say(f"{future_id}: differs: recorded sha256 {before}, now {after}")
+    equal = before == after
+    found = {"future": future_id, "recorded_sha256": before, "sha256": after, "equal": equal}
+    words = f"{future_id}: differs: recorded sha256 {before}, now {after}"
+    if equal:
+        words = f"{future_id}: the same again, sha256 {after}"
     if view and after is not None:
         from foretwin.sim_worker.futures.future_picture import write_future_picture
 
         picture = pictures / f"{future_id}.png"
         index = result.future_indices.index(recorded.row.index)
         write_future_picture(picture, recorded.job, result, index, recorded.world, recorded.vehicle)
-        say(picture)
-    return 0 if before == after else DIFFERS
+        found["picture"] = str(picture)
+        words += f"\n{picture}"
+    return CommandResult(found, words, 0 if equal else DIFFERS)

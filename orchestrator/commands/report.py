@@ -11,8 +11,7 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.segments import DRIVE_FILE
-from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.redaction import Redaction
 from foretwin.orchestrator.report.write_report import write_report
@@ -39,8 +38,7 @@ def report(
     out: Path,
     redact: str | None = None,
     against: Path | None = None,
-    as_json: bool = False,
-) -> None:
+) -> CommandResult:
     """Write the report of a run; with `against`, another drive of its road, how far people differ
     stands beside the gap.
 
@@ -65,11 +63,8 @@ def report(
         verdict=told.verdict,
         indicators=told.counted,
     )
-    if as_json:
-        print_json(written)
-        return
-    say(written.verdict)
-    say(f"wrote {written.file} ({written.size_bytes / 1e6:.1f} MB)")
+    size = f"{written.size_bytes / 1e6:.1f} MB"
+    return CommandResult(written, f"{written.verdict}\nwrote {written.file} ({size})")
 
 
 def _redaction(word: str | None) -> Redaction | None:

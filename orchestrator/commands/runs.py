@@ -12,7 +12,8 @@ from foretwin.orchestrator.across.places import found_in
 from foretwin.orchestrator.across.run_rows import DAMAGED, KILLED, RunRow
 from foretwin.orchestrator.across.table_heads import not_whole
 from foretwin.orchestrator.across.tables import lake_rows
-from foretwin.orchestrator.commands.output import print_csv, print_json, print_table
+from foretwin.orchestrator.commands.output import print_csv, print_table
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.folders_of_runs import table_files
 from foretwin.orchestrator.record.run_state import RUNNING
 
@@ -23,8 +24,8 @@ _WHERE_WIDE = frozenset({"when", "junctions", "futures"})
 """Columns that narrower terminals leave out; the id of a drive says when."""
 
 
-def list_runs(places: Sequence[str], *, as_json: bool, as_csv: bool) -> None:
-    """Print a row for each run, in the order of time; what is wrong with one stands in its row.
+def list_runs(places: Sequence[str], *, as_csv: bool) -> CommandResult:
+    """Return a row for each run, in the order of time; what is wrong with one stands in its row.
 
     Raises FileNotFoundError or UserError where there is none.
     """
@@ -32,12 +33,11 @@ def list_runs(places: Sequence[str], *, as_json: bool, as_csv: bool) -> None:
     rows = [_looked_into(row) for row in found.rows]
     rows += [row for lake in found.lakes for row in lake_rows(lake)]
     told = [_told(row) for row in rows]
-    if as_json:
-        print_json(told)
-    elif as_csv:
-        print_csv(list(told[0]), [list(row.values()) for row in told])
-    else:
-        _print(rows)
+    if as_csv:
+        return CommandResult(
+            told, lambda: print_csv(list(told[0]), [list(one.values()) for one in told])
+        )
+    return CommandResult(told, lambda: _print(rows))
 
 
 def _looked_into(row: RunRow) -> RunRow:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
-from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, asked_junctions
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.drawing import draw_cases
@@ -39,7 +39,7 @@ class PlacedCase(NamedTuple):
     played: StagedCase
 
 
-def export_scenario(request: CaseRequest, out: Path) -> None:
+def export_scenario(request: CaseRequest, out: Path) -> CommandResult:
     """Write one case as OpenSCENARIO, and its roads beside it as OpenDRIVE.
 
     Raises UserError where there is no such case, no place for it at that junction, or where the
@@ -53,9 +53,7 @@ def export_scenario(request: CaseRequest, out: Path) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     now, case = datetime.datetime.now(datetime.UTC), (found.played, found.scenario, found.world)
     roads = write_openscenario(*case, out, vehicle=vehicle, written_at=now)
-    played = found.played
-    say(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
-    say(f"{roads}: its roads")
+    return _written(request, found, out, roads=roads)
 
 
 def _check_roads(out: Path) -> None:
@@ -69,7 +67,7 @@ def _check_roads(out: Path) -> None:
         )
 
 
-def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
+def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> CommandResult:
     """Write a picture of one case: as planned, and as a planner drives it.
 
     Raises UserError where there is no such case, place or planner, or where the planner fails.
@@ -81,14 +79,26 @@ def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
         raise UserError(f"{out}: a picture of a case is written as .png")
     check_planner(planner, in_drive=False)
     vehicle = load_vehicle(request.vehicle)
-    scenario, world, played = placed_case(request)
+    found = placed_case(request)
+    scenario, world, played = found
     heedless = heedless_run(played, vehicle, horizon_s=scenario.horizon_s)
     try:
         planned = planned_run(played, scenario, world, vehicle, planner=planner)
     except ValueError as error:
         raise UserError(str(error)) from error
     write_case_picture(out, played, scenario, world, heedless, planned, planner=planner)
-    say(f"{out}: {scenario.id}, case {request.case}, at {played.place.junction_id}")
+    return _written(request, found, out)
+
+
+def _written(
+    request: CaseRequest, found: PlacedCase, out: Path, *, roads: Path | None = None
+) -> CommandResult:
+    scenario_id, junction_id = found.scenario.id, found.played.place.junction_id
+    body = {"file": out, "scenario": scenario_id, "case": request.case, "junction_id": junction_id}
+    words = f"{out}: {scenario_id}, case {request.case}, at {junction_id}"
+    if roads is None:
+        return CommandResult(body, words)
+    return CommandResult(body | {"roads": roads}, f"{words}\n{roads}: its roads")
 
 
 def placed_case(request: CaseRequest) -> PlacedCase:

@@ -11,9 +11,9 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
-from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json, print_table
+from foretwin.orchestrator.commands.output import print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
 from foretwin.sim_worker.futures.playable import places
@@ -63,12 +63,15 @@ class PlacesAsked(NamedTuple):
     service_roads: bool = False
 
 
-def list_scenarios(*, as_json: bool) -> None:
-    """Print the catalogue."""
-    found = catalogue().values()
-    if as_json:
-        print_json([_described(scenario) for scenario in found])
-        return
+def list_scenarios() -> CommandResult:
+    """Return the catalogue."""
+    found = list(catalogue().values())
+    return CommandResult(
+        [_described(scenario) for scenario in found], lambda: _print_catalogue(found)
+    )
+
+
+def _print_catalogue(found: Sequence[Scenario]) -> None:
     from rich.table import Column
 
     columns = (Column("id", no_wrap=True), "title", "cases", "where", "source")
@@ -76,27 +79,25 @@ def list_scenarios(*, as_json: bool) -> None:
     print_table("scenarios", columns, rows)
 
 
-def check_scenario_file(file: Path) -> None:
-    """Print what a scenario file holds; UserError, in one line, where it holds none."""
+def check_scenario_file(file: Path) -> CommandResult:
+    """Return what a scenario file holds; UserError, in one line, where it holds none."""
     scenario = read_scenario(file)
-    cases = len(draw_cases(scenario))
-    say(f"{file}: {scenario.id}, {scenario.title}: {cases} cases, {_where(scenario)}")
+    found = _described(scenario)
+    words = f"{file}: {scenario.id}, {scenario.title}: {found['cases']} cases, {_where(scenario)}"
+    return CommandResult({"file": file, **found}, words)
 
 
-def place_scenarios(request: PlacesAsked, *, as_json: bool) -> int:
-    """Print where scenarios take place on a map's junctions, and why not elsewhere.
+def place_scenarios(request: PlacesAsked) -> CommandResult:
+    """Return where scenarios take place on a map's junctions, and why not elsewhere.
 
-    Returns 0, or 3 where a junction that a scenario applies to has no place for it.
+    Its code is 0, or 3 where a junction that a scenario applies to has no place for it.
     """
     chosen = [find_scenario(name) for name in request.scenarios] or list(catalogue().values())
     opened, junctions = asked_junctions(request)
     with progress_bar(len(junctions), "junctions") as (advance, _):
         found = placed_on(opened, junctions, chosen, advance=advance)
-    if as_json:
-        print_json(found)
-    else:
-        _print_table(request.map_file, found)
-    return 3 if any(scenario.unplaced for scenario in found) else 0
+    code = 3 if any(scenario.unplaced for scenario in found) else 0
+    return CommandResult(found, lambda: _print_table(request.map_file, found), code)
 
 
 def asked_junctions(request: PlacesAsked) -> tuple[OpenMap, tuple[Junction, ...]]:

@@ -10,6 +10,7 @@ from foretwin.contracts.joining import RunningDrive, newest_running, running_dri
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.tuning import SetReply, SetRequest
 from foretwin.orchestrator.campaign.joining import own_certificate
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.which_run import run_folder
 
 ANSWER_S = 120.0
@@ -18,7 +19,7 @@ ANSWER_S = 120.0
 
 def set_in_drive(
     assignment: str, *, run: Path | None, out: Path, secure: Path | None = None
-) -> str:
+) -> CommandResult:
     """Ask the drive `run`, or the newest running one below `out`; returns what counts now.
 
     Raises UserError, in one line, where the assignment or the run cannot be used or the drive
@@ -31,7 +32,8 @@ def set_in_drive(
     request = SetRequest(key=key.strip(), value=value.strip())
     try:
         with ZenohBus(_bus_of(drive, secure)) as bus:
-            return f"{drive.run_id}: {ask_drive(bus, drive.run_id, request)}"
+            text = ask_drive(bus, drive.run_id, request)
+            return CommandResult({"run": drive.run_id, "now": text}, f"{drive.run_id}: {text}")
     except BusUnreachable as error:
         if drive.endpoint.startswith("tls/"):
             raise UserError(f"{drive.folder}: {error}") from None

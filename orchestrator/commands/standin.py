@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from foretwin.contracts.anchor import AnchorLine
@@ -17,8 +16,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.foreign_bus import ZenohForeignBus
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.setup import BusSetup
-from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.telemetry.logs import read_line
 from foretwin.telemetry.lot_car.lot_car import LotCar, LotReport
 from foretwin.telemetry.ros2.mapping import read_mapping
@@ -38,8 +36,8 @@ class LotDrive(NamedTuple):
     end_s: float
 
 
-def drive_on_lot(asked: LotDrive, *, as_json: bool) -> None:
-    """Drive until the path or the time is over, and say what it came to.
+def drive_on_lot(asked: LotDrive) -> CommandResult:
+    """Drive until the path or the time is over, and return what it came to.
 
     Raises UserError, in one line, for files and numbers that cannot be used.
     """
@@ -54,17 +52,13 @@ def drive_on_lot(asked: LotDrive, *, as_json: bool) -> None:
     parameters = read_parameters()
     path = path_on_lot(read_anchor(asked.anchor), asked, driver=parameters.driver)
     source = StandinSource(path, parameters, vehicle_id="standin")
-    if not as_json:
-        logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
     with ZenohForeignBus(BusSetup(endpoint=mapping.endpoint)) as foreign:
         car = LotCar(mapping, source, foreign=foreign, steering_ratio=parameters.car.steering_ratio)
         until_s = time.monotonic() + asked.end_s
         while not car.ended and time.monotonic() < until_s:
             car.step()
-    if as_json:
-        print_json(msgspec.to_builtins(car.report()))
-    else:
-        say(told(car.report()))
+    return CommandResult(car.report(), told(car.report()))
 
 
 def path_on_lot(anchor: AnchorFile, asked: LotDrive, *, driver: DriverParameters) -> DrivenPath:

@@ -15,8 +15,8 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.runner import Runner, answers, place_task
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.commands.output import print_json
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.ledger import jobs_ledger
 from foretwin.orchestrator.record.run_folder import SUMMARY, keep_vehicles
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError
@@ -48,10 +48,9 @@ def sweep(
     out: Path | None,
     engine: Engine = LOCAL,
     fresh: bool = False,
-    as_json: bool = False,
     shard: str | None = None,
-) -> int:
-    """Run a sweep or one `shard` of it, or go on with it; returns 0, or 3 where futures failed,
+) -> CommandResult:
+    """Run a sweep or one `shard` of it, or go on with it; its code is 0, or 3 where futures failed,
     where none was played, or where no worker can be started.
 
     Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
@@ -73,11 +72,11 @@ def sweep(
         raise
     except NoWorkerError as error:
         say(f"foretwin: {error}; what is done is kept", error=True)
-        return SOME_FAILED
-    return _told(out, summary, as_json=as_json)
+        return CommandResult({"failed": str(error)}, code=SOME_FAILED)
+    return _told(out, summary)
 
 
-def merge_shards(folders: Sequence[Path], *, out: Path | None, as_json: bool = False) -> int:
+def merge_shards(folders: Sequence[Path], *, out: Path | None) -> CommandResult:
     """Put the shards of a sweep together; returns what one sweep would have returned.
 
     Raises UserError, in one line, where they do not come to one sweep.
@@ -85,17 +84,13 @@ def merge_shards(folders: Sequence[Path], *, out: Path | None, as_json: bool = F
     if out is None or not folders:
         raise UserError("--merge takes the folders of all shards, and --out FOLDER for the whole")
     with named_in_errors(f"--out {out}"):
-        return _told(out, merge(folders, out), as_json=as_json)
+        return _told(out, merge(folders, out))
 
 
-def _told(out: Path, summary: dict[str, Any], *, as_json: bool) -> int:
-    """Print a summary; returns the exit code that it comes to."""
-    if as_json:
-        print_json(summary)
-    else:
-        print_summary(out, summary)
+def _told(out: Path, summary: dict[str, Any]) -> CommandResult:
     nothing = not summary["placed"] and (summary["jobs"] or "shard" not in summary)
-    return SOME_FAILED if summary["failed"] or summary["failures"] or nothing else 0
+    code = SOME_FAILED if summary["failed"] or summary["failures"] or nothing else 0
+    return CommandResult(summary, lambda: print_summary(out, summary), code)
 
 
 def run_sweep(

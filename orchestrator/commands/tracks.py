@@ -10,9 +10,9 @@ import numpy as np
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from foretwin.contracts.terminal import say
 from foretwin.contracts.tracks import DrivenTrack, track_id
 from foretwin.geometry.polyline import length
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.track_store import TrackStore, store_folder
 
 _STEP_M = 1.0
@@ -21,13 +21,22 @@ _ROUGH_M = 3.0
 """Positions rougher than this tell no lane from the next: a lane's width (RASt 06: 3.00 m)."""
 
 
-def list_tracks(*, store: str | None) -> None:
-    """Say what the store holds: id, metres, when it was added, from what."""
+def list_tracks(*, store: str | None) -> CommandResult:
+    """Return what the store holds: id, metres, when it was added, from what."""
     found = TrackStore(store_folder(store))
     tracks = [found.load(name) for name in found.ids()]
-    for track in tracks:
-        say(f"{track.id}  {_length_m(track):8.0f} m  {track.added_utc}  {track.name}")
-    say(f"{found.folder}: {len(tracks)} tracks")
+    rows = [
+        {
+            "id": track.id,
+            "length_m": round(_length_m(track), 1),
+            "added_utc": track.added_utc,
+            "name": track.name,
+        }
+        for track in tracks
+    ]
+    lines = [f"{r['id']}  {r['length_m']:8.0f} m  {r['added_utc']}  {r['name']}" for r in rows]
+    lines.append(f"{found.folder}: {len(tracks)} tracks")
+    return CommandResult({"store": found.folder, "tracks": rows}, "\n".join(lines))
 
 
 def add_track(
@@ -37,16 +46,18 @@ def add_track(
     name: str | None = None,
     std_m: float | None = None,
     declaration: Path | None = None,
-) -> None:
+) -> CommandResult:
     """Put where a recorded drive went into the store."""
     track = track_of_log(log, name=name or log.name, std_m=std_m, declaration=declaration)
     kept = TrackStore(store_folder(store))
     new = kept.add(track)
-    said = f"{_length_m(track):.0f} m of {log}" if new else f"{log} is there already"
-    say(f"{kept.folder}: track {track.id}, {said}")
+    length_m = _length_m(track)
+    said = f"{length_m:.0f} m of {log}" if new else f"{log} is there already"
+    body = {"store": kept.folder, "id": track.id, "length_m": round(length_m, 1), "new": new}
+    return CommandResult(body, f"{kept.folder}: track {track.id}, {said}")
 
 
-def delete_tracks(names: list[str], *, everything: bool, store: str | None) -> None:
+def delete_tracks(names: list[str], *, everything: bool, store: str | None) -> CommandResult:
     """Remove tracks by id, or all."""
     if bool(names) == everything:
         raise UserError("tracks delete: name tracks by id, or give --all")
@@ -54,7 +65,11 @@ def delete_tracks(names: list[str], *, everything: bool, store: str | None) -> N
     doomed = found.ids() if everything else names
     for track in doomed:
         found.delete(track)
-    say(f"{found.folder}: {len(doomed)} tracks deleted, {len(found.ids())} left")
+    left = len(found.ids())
+    return CommandResult(
+        {"store": found.folder, "deleted": doomed, "left": left},
+        f"{found.folder}: {len(doomed)} tracks deleted, {left} left",
+    )
 
 
 def track_of_log(

@@ -9,8 +9,8 @@ from typing import TypeVar
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import trouble_with_folder
-from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.commands.world_files import write_each, write_report
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
@@ -66,8 +66,8 @@ class WorldRequest:
     report: bool = False
 
 
-def write_worlds(request: WorldRequest) -> int:
-    """Build and write what is asked for; returns 0, or 3 where some of many Worlds failed.
+def write_worlds(request: WorldRequest) -> CommandResult:
+    """Build and write what is asked for; its code is 0, or 3 where some of many Worlds failed.
 
     Raises UserError, in one line, for anything that cannot be meant.
     """
@@ -117,23 +117,36 @@ def write_worlds(request: WorldRequest) -> int:
 
 def _region(
     request: WorldRequest, bounds: LatLonBounds, format_: Format, options: ExportOptions
-) -> int:
+) -> CommandResult:
     opened = open_map(request.map_file, clip=bounds, service_roads=request.service_roads)
     part = region_on_map(opened.file, opened.osm.bounds, bounds)
     world = build_region(opened.osm, opened.graph, part, index=_index(opened, request))
     return _write_one(world, request, format_, options)
 
 
-def _write_one(world: World, request: WorldRequest, format_: Format, options: ExportOptions) -> int:
+def _write_one(
+    world: World, request: WorldRequest, format_: Format, options: ExportOptions
+) -> CommandResult:
     format_.write(world, request.out, options)
     s = world.intersection
     place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
-    counts = {"lanes": world.lanes, "buildings": world.buildings, "notes": world.notes}
-    text = ", ".join(f"{len(those)} {name}" for name, those in counts.items())
-    say(f"{request.out}: {place}, {text}. {world.attribution}")
+    of_world = {"lanes": world.lanes, "buildings": world.buildings, "notes": world.notes}
+    counts = {name: len(those) for name, those in of_world.items()}
+    text = ", ".join(f"{count} {name}" for name, count in counts.items())
+    words = f"{request.out}: {place}, {text}. {world.attribution}"
+    body: dict[str, object] = {
+        "file": request.out,
+        "kind": s.kind,
+        "id": s.id,
+        "name": s.name,
+        **counts,
+        "attribution": world.attribution,
+    }
     if request.report:
-        write_report(world, request.out, show=True)
-    return 0
+        report = write_report(world, request.out)
+        body["report"] = report
+        words += f"\n{report.as_text().rstrip()}"
+    return CommandResult(body, words)
 
 
 def _index(opened: OpenMap, request: WorldRequest) -> MapIndex:

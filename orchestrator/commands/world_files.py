@@ -7,11 +7,16 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from foretwin.contracts.terminal import say
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.world_gen.junctions.intersections import Junction
+
+if TYPE_CHECKING:
+    from foretwin.world_gen.report.report import WorldReport
 
 FAILURES_FILE = "failures.txt"
 SOME_FAILED = 3
@@ -27,8 +32,8 @@ def write_each(
     suffix: str,
     attribution: str,
     report: bool = False,
-) -> int:
-    """Write one file per junction into a folder, made if need be; returns 0, or 3 if some failed.
+) -> CommandResult:
+    """Write one file per junction into a folder, made if need be; its code is 3 if some failed.
 
     What goes wrong with one junction is said in a line and in the failures file of the folder,
     and does not stop the others.
@@ -46,7 +51,7 @@ def write_each(
                 world = build(junction)
                 write(world, path)
                 if report:
-                    write_report(world, path, show=False)
+                    write_report(world, path)
                 kinds.update({note_kind(note) for note in world.notes})
             except Exception as error:  # one bad junction never stops the rest
                 path.unlink(missing_ok=True)
@@ -56,43 +61,51 @@ def write_each(
     return _summary(len(junctions), failures, kinds, folder, attribution)
 
 
-def write_report(world: World, path: Path, *, show: bool) -> None:
-    """Write what was tagged, inferred and a default beside a World's file; print it if asked to."""
+def write_report(world: World, path: Path) -> WorldReport:
+    """Write what was tagged, inferred and a default beside a World's file; returns it."""
     from foretwin.world_gen.report.report import report_of
 
     report = report_of(world)
     for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):
         path.with_name(path.name + ending).write_text(text, encoding="utf-8")
-    if show:
-        say(report.as_text().rstrip("\n"))
+    return report
 
 
 def _summary(
     count: int, failures: list[str], kinds: Counter[str], folder: Path, attribution: str
-) -> int:
+) -> CommandResult:
     listed = folder / FAILURES_FILE
     listed.unlink(missing_ok=True)
-    say(f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}")
-    for kind, junctions in kinds.most_common(_SHOWN_KINDS):
-        say(f"  {junctions:6d}  {kind}")
+    lines = [f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}"]
+    lines += [f"  {junctions:6d}  {kind}" for kind, junctions in kinds.most_common(_SHOWN_KINDS)]
     if len(kinds) > _SHOWN_KINDS:
-        say(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
-    if not failures:
-        return 0
+        lines.append(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
+    body = {
+        "folder": folder,
+        "written": count - len(failures),
+        "failures": failures,
+        "notes": kinds,
+        "attribution": attribution,
+    }
+    if failures:
+        _list_failures(failures, listed)
+    return CommandResult(body, "\n".join(lines), SOME_FAILED if failures else 0)
+
+
+def _list_failures(failures: list[str], listed: Path) -> None:
     try:
         listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
     except OSError as error:  # a full disk: the first of them is told here
         listed.unlink(missing_ok=True)
         with contextlib.suppress(OSError):
-            folder.rmdir()
+            listed.parent.rmdir()
         say(
             f"{len(failures)} failed, and {listed} cannot be written: {error.strerror}; the first: "
             f"{failures[0]}",
             error=True,
         )
-        return SOME_FAILED
+        return
     say(f"{len(failures)} failed: {listed}", error=True)
-    return SOME_FAILED
 
 
 def _file_name(junction_id: str) -> str:

@@ -9,6 +9,7 @@ import logging
 import shutil
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
@@ -37,13 +38,21 @@ from foretwin.orchestrator.runner.warm_fork import trouble_with_forking
 log = logging.getLogger(ORCHESTRATOR)
 
 
-def drive(config: DriveConfig) -> int:
-    """Run one drive; returns its exit code. Raises UserError before anything is written."""
+class EndedDrive(NamedTuple):
+    """How a drive ended, and the folder of its run."""
+
+    code: int
+    folder: Path
+
+
+def drive(config: DriveConfig) -> EndedDrive:
+    """Run one drive. Raises UserError before anything is written."""
     inputs = read_inputs(config)
     out = f"--out {config.out}"
     with listening(config.metrics) as metrics, named_in_errors(out), new_folder(Path(config.out)):
         plan = make_plan(inputs, datetime.datetime.now())
-        return carry_out(dataclasses.replace(plan, metrics=metrics))
+        code = carry_out(dataclasses.replace(plan, metrics=metrics))
+        return EndedDrive(code, plan.folder)
 
 
 def carry_out(plan: DrivePlan) -> int:

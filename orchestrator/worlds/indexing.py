@@ -1,11 +1,10 @@
-"""The command `map index`: read a map of any size into an index on disk, once."""
+"""Opens the index of a map, and makes it behind a progress bar where it is not there yet."""
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
-from foretwin.contracts.terminal import console, described, plain, say
+from foretwin.contracts.terminal import console, described, plain
 from foretwin.world_gen.osm.map_store import MapStore
 
 
@@ -26,20 +25,3 @@ def open_index(map_file: Path, folder: Path | None) -> MapStore:
                 bar.update(task, completed=done, total=total)
 
         return MapStore.open(map_file, folder, show)
-
-
-def index_map_file(map_file: Path, *, folder: Path | None) -> None:
-    """Build the index of a map in `folder`, by default in the user's cache, unless it is there."""
-    begin_s = time.monotonic()
-    store = open_index(map_file, folder)
-    meta = store.meta
-    say(
-        f"{store.path}: {meta.ways} ways, {meta.nodes} nodes of {map_file} "
-        f"({store.path.stat().st_size / 1e6:.1f} MB, {time.monotonic() - begin_s:.1f} s). "
-        f"{meta.attribution}"
-    )
-    for note in meta.notes[:5]:
-        say(f"note: {note}")
-    if len(meta.notes) > 5:
-        say(f"note: and {len(meta.notes) - 5} more")
-    store.close()

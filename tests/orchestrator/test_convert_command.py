@@ -22,13 +22,16 @@ def source(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["out.mcap", "out.bag", "out.csv", "out"])
-def test_it_tells_what_was_kept_and_left_out(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
-    convert_log(source, tmp_path / name)
+def test_it_tells_what_was_kept_and_left_out(source: Path, tmp_path: Path, name: str) -> None:
+    told = convert_log(source, tmp_path / name)
     assert (tmp_path / name).exists()
-    out = capsys.readouterr().out
-    assert out == f"{tmp_path / name}: 2 gnss\nleft out: 1 position not finite\n"
+    assert told.words == f"{tmp_path / name}: 2 gnss\nleft out: 1 position not finite"
+    left_out = {"position not finite": 1}
+    assert told.body == {
+        "file": tmp_path / name,
+        "samples": {"gnss": 2},
+        "left_out": left_out,
+    }
 
 
 def test_an_unknown_kind_of_target_is_named(source: Path, tmp_path: Path) -> None:

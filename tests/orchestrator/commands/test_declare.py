@@ -30,10 +30,10 @@ def table(folder: Path, *, grid: bool = False, name: str = "drive.csv") -> Path:
     return path
 
 
-def test_a_table_is_declared_and_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_is_declared_and_read(tmp_path: Path) -> None:
     path = table(tmp_path)
-    command.declare(path, out=None, answers=("reference_point=rear axle",))
-    said = capsys.readouterr().out
+    said = command.declare(path, out=None, answers=("reference_point=rear axle",)).words
+    assert isinstance(said, str)
     written = (tmp_path / "drive.csv.toml").read_text()
     assert written.startswith(command.DECLARED_MARK)
     assert "by names alone" in said
@@ -101,17 +101,23 @@ forward = { column = "v", unit = "m/s" }
 """
 
 
-def test_two_recordings_become_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    first = table(tmp_path)
+def two_recordings(folder: Path) -> tuple[Path, Path]:
+    """The positions of a drive, declared, and its speeds by a clock that is 77.25 s ahead."""
+    first = table(folder, name="gnss.csv")
     command.declare(first, out=None, answers=())
     drive = drawn_drive()["speed"]
-    second = tmp_path / "car.csv"
+    second = folder / "car.csv"
     rows = zip(drive.stamps_ns / 1e9 + 77.25, drive.columns["forward"], strict=True)
     second.write_text("t,v\n" + "".join(f"{t:.3f},{v:.4f}\n" for t, v in rows))
-    (tmp_path / "car.csv.toml").write_text(SPEEDS)
-    capsys.readouterr()
-    merge_logs(first, second, tmp_path / "both.mcap")
-    said = capsys.readouterr().out
+    (folder / "car.csv.toml").write_text(SPEEDS)
+    return first, second
+
+
+def test_two_recordings_become_one(tmp_path: Path) -> None:
+    first, second = two_recordings(tmp_path)
+    drive = drawn_drive()["speed"]
+    said = merge_logs(first, second, tmp_path / "both.mcap").words
+    assert isinstance(said, str)
     assert "its clock says 77.2" in said
     assert "taken from" in said
     assert "speed" in said

@@ -14,15 +14,15 @@ from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.orchestrator.trip import town, town_world
 
 
-def test_the_lights_of_both_exports_of_a_world_make_rows(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_lights_of_both_exports_of_a_world_make_rows(tmp_path: Path) -> None:
     world = town_world("n44")
     files = [tmp_path / "a.osm", tmp_path / "a.xodr"]
     write_lanelet2(world, files[0])
     write_opendrive(world, files[1])
-    show_lights(files)
-    rows = tomllib.loads(capsys.readouterr().out)["light"]
+    told = show_lights(files)
+    assert isinstance(told.words, str)
+    rows = tomllib.loads(told.words)["light"]
+    assert told.body == {"light": rows}
     assert [row["group"] for row in rows] == sorted({one.group_id for one in world.signals})
     assert [(row["intersection"], row["signal_group"]) for row in rows] == [
         (1, number) for number in range(1, len(rows) + 1)

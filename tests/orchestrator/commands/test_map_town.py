@@ -25,4 +25,7 @@ def test_map_and_route_are_those_of_the_town(
 def test_a_wrong_name_is_told(name: str, tmp_path: Path) -> None:
     assert run(["map", "town", "--out", str(tmp_path / name)]) == 2
     assert list(tmp_path.iterdir()) == []
-    assert write_town(tmp_path / "a.osm") == tmp_path / "a.geojson"
+    assert write_town(tmp_path / "a.osm").body == {
+        "map": tmp_path / "a.osm",
+        "route": tmp_path / "a.geojson",
+    }

@@ -267,13 +267,13 @@ def test_one_bad_junction_does_not_stop_the_rest(
     def write(world: World, path: Path) -> None:
         path.write_text(world.id, encoding="utf-8")
 
-    code = write_each(
+    found = write_each(
         opened.junctions[:3], build, write,
         folder=tmp_path, suffix=".txt", attribution=opened.osm.attribution,
     )  # fmt: skip
     said = capsys.readouterr()
-    assert code == 3
-    assert "2 of 3 Worlds written" in said.out
+    assert found.code == 3
+    assert "2 of 3 Worlds written" in str(found.words)
     assert f"{bad}: ZeroDivisionError: a road without length" in said.err
     listed = (tmp_path / FAILURES_FILE).read_text(encoding="utf-8")
     assert listed == f"{bad}: ZeroDivisionError: a road without length\n"
