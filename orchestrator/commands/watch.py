@@ -19,6 +19,7 @@ from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.setup import CopilotSetup, ViewerSetup, read_setup, write_setup
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.campaign.joining import own_certificate
+from foretwin.orchestrator.drive.exit_words import EXIT_DONE
 from foretwin.orchestrator.record.run_state import RUNNING, read_record
 from foretwin.orchestrator.record.which_run import run_folder
 
@@ -112,11 +113,12 @@ def _bus_of(drive: RunningDrive, secure: Path | None, user: str, role: str) -> B
 
 
 def _run(*arguments: str) -> int:
-    """Run the display's process until it ends; Ctrl-C ends both."""
+    """Run the display's process until it ends, or somebody ends this one: so a display is closed,
+    and nothing is interrupted by it."""
     process = subprocess.Popen([sys.executable, "-P", "-m", MODULE, *arguments])
     try:
         return process.wait()
     except KeyboardInterrupt:
         process.terminate()
         process.wait()
-        raise
+        return EXIT_DONE

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,8 @@ from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.setup import ViewerSetup, write_setup
 from foretwin.orchestrator.commands import watch as command
 from foretwin.orchestrator.commands.watch import WatchRequest, watch, watch_setup
+from tests.contracts.bus_sides import DEADLINE_S
+from tests.viewer.copilot.test_replayed import run_with_frames
 from tests.viewer.scene import DRIVE_FRAME
 
 COVERS = ("foretwin.orchestrator.commands.cli_watch",)
@@ -107,3 +112,20 @@ def test_a_run_that_is_over_is_shown_again_on_this_machine_alone(
         watch(request(tmp_path, run=Path("r1"), operate=True))
     with pytest.raises(UserError, match="no drive is running"):
         watch(request(tmp_path))
+
+
+@pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGINT])
+def test_a_display_that_somebody_ends_is_closed_and_not_interrupted(
+    tmp_path: Path, by: signal.Signals
+) -> None:
+    shown = run_with_frames(tmp_path / "r1")
+    (shown / "run.json").write_text(json.dumps({"run_id": "r1", "exit": "completed"}))
+    with subprocess.Popen(
+        [sys.executable, "-P", "-m", "foretwin", "watch", str(shown)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as watching:  # fmt: skip
+        assert watching.stdout is not None
+        assert "co-pilot display: http" in watching.stdout.readline()
+        watching.send_signal(by)
+        _, said = watching.communicate(timeout=DEADLINE_S)
+    assert (watching.returncode, said) == (0, "")

@@ -27,12 +27,11 @@ from tests.viewer import scene
 from tests.viewer.copilot.test_now import Drive
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """The folder of a run whose frames are of 1, 2 and 3 s."""
+def run_with_frames(folder: Path) -> Path:
+    """Make the folder of a run whose frames are of 1, 2 and 3 s."""
     for sub in ("worlds", "processes"):
-        (tmp_path / sub).mkdir()
-    write_message(scene.junction(), tmp_path / "worlds" / f"{scene.WORLD_ID}.world")
+        (folder / sub).mkdir(parents=True)
+    write_message(scene.junction(), folder / "worlds" / f"{scene.WORLD_ID}.world")
     setup = CopilotSetup(
         run_id="r1",
         process_id="copilot",
@@ -42,14 +41,19 @@ def folder(tmp_path: Path) -> Path:
         port=1,
         drive_frame=scene.DRIVE_FRAME,
     )
-    write_setup(setup, tmp_path / "processes" / "copilot.json")
-    writer, drive = FramesWriter(tmp_path / FRAMES_FILE, 0.0), Drive()
+    write_setup(setup, folder / "processes" / "copilot.json")
+    writer, drive = FramesWriter(folder / FRAMES_FILE, 0.0), Drive()
     drive.take("active_world", ActiveWorld(stamp_ns=1, world_id=scene.WORLD_ID))
     for time_s in (1.0, 2.0, 3.0):
         drive.goes_on(time_s)
         writer.add(msgspec.json.encode(drive.frame()), time_s)
     writer.write()
-    return tmp_path
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return run_with_frames(tmp_path)
 
 
 def test_it_goes_at_the_drives_pace_and_begins_again(folder: Path) -> None:
