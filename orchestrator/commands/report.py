@@ -11,6 +11,7 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.segments import DRIVE_FILE
+from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.redaction import Redaction
@@ -56,7 +57,7 @@ def report(
     people = [] if against is None else _people(folders[0], against)
     with named_in_errors(f"--out {out}"):
         out.parent.mkdir(parents=True, exist_ok=True)
-        told = write_report(folders, out, people=people, redaction=redaction)
+        told = write_report(folders, out, people=people, redaction=redaction, progress=progress_bar)
     written = ReportWritten(
         file=str(out),
         size_bytes=out.stat().st_size,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -94,11 +94,10 @@ def _ready(one: JunctionPassed) -> TableCell:
 
 def junction_parts(
     run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool = True
-) -> tuple[Chapter, ...]:
-    """Return a section for each junction, the first `DRAWN` of them with pictures."""
-    return tuple(
-        _junction(run, one, drawn=pictures and place < DRAWN) for place, one in enumerate(passed)
-    )
+) -> Iterator[Chapter]:
+    """Yield a section for each junction, the first `DRAWN` of them with pictures."""
+    for place, one in enumerate(passed):
+        yield _junction(run, one, drawn=pictures and place < DRAWN)
 
 
 def _junction(run: RunMaterial, one: JunctionPassed, *, drawn: bool) -> Chapter:

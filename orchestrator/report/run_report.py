@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
+from foretwin.orchestrator.progress import Progress, untold
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -37,13 +38,37 @@ from foretwin.orchestrator.report.vehicle_parts import vehicle_part, verdict_par
 
 
 def run_report(
-    run: RunMaterial, *, people: Sequence[HumanRow] = (), pictures: bool = True, places: bool = True
+    run: RunMaterial,
+    *,
+    people: Sequence[HumanRow] = (),
+    pictures: bool = True,
+    places: bool = True,
+    progress: Progress = untold,
 ) -> Report:
     """Return the report of a drive; `people` is how far drivers differ on its road, where known.
 
     Without `pictures` nothing is drawn that shows the place, without `places` no map is named.
     """
     passed = passages(run)
+    after_junctions: tuple[Callable[[], Chapter], ...] = (
+        lambda: prediction_part(run),
+        lambda: gap_part(run, people),
+        lambda: calibration_part(run),
+        lambda: agreement_part(run),
+        lambda: occurred_part(run, passed),
+        lambda: verdict_part(run),
+        lambda: vehicle_part(run),
+        lambda: disagreement_part(run, passed),
+        lambda: marks_part(run),
+        lambda: events_part(run),
+        lambda: losses_part(run),
+        lambda: provenance_part(run.folder, run.record, places=places),
+    )
+    with progress(len(passed) + len(after_junctions), "sections") as (advance, _):
+        parts = [_junctions(run, passed, pictures=pictures, advance=advance)]
+        for part in after_junctions:
+            parts.append(part())
+            advance(parts[-1].title)
     verdict, tone = verdict_of(run, passed)
     return Report(
         title=f"Drive {run.record.get('run_id') or run.folder.name}",
@@ -52,21 +77,7 @@ def run_report(
         tone=tone,
         figures=figures_of(run, passed),
         front=tuple(_front(run, passed, pictures=pictures)),
-        parts=(
-            _junctions(run, passed, pictures=pictures),
-            prediction_part(run),
-            gap_part(run, people),
-            calibration_part(run),
-            agreement_part(run),
-            occurred_part(run, passed),
-            verdict_part(run),
-            vehicle_part(run),
-            disagreement_part(run, passed),
-            marks_part(run),
-            events_part(run),
-            losses_part(run),
-            provenance_part(run.folder, run.record, places=places),
-        ),
+        parts=tuple(parts),
         attribution=(run.attribution,) if run.attribution else (),
     )
 
@@ -107,14 +118,19 @@ def _front(run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool
     return blocks
 
 
-def _junctions(run: RunMaterial, passed: Sequence[JunctionPassed], *, pictures: bool) -> Chapter:
+def _junctions(
+    run: RunMaterial,
+    passed: Sequence[JunctionPassed],
+    *,
+    pictures: bool,
+    advance: Callable[[str], None],
+) -> Chapter:
     title = "Junction by junction"
     if not passed:
         text = "The car met no junction in this drive: nothing was foreseen."
         return Chapter("junctions", title, (Prose(text),))
-    return Chapter(
-        "junctions",
-        title,
-        (junction_table(passed),),
-        junction_parts(run, passed, pictures=pictures),
-    )
+    parts = []
+    for part in junction_parts(run, passed, pictures=pictures):
+        parts.append(part)
+        advance(part.title)
+    return Chapter("junctions", title, (junction_table(passed),), tuple(parts))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from foretwin.orchestrator.progress import Progress, untold
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -41,29 +42,38 @@ class _Seen(NamedTuple):
 
 
 def several_runs_report(
-    runs: Sequence[RunMaterial], *, pictures: bool = True, places: bool = True
+    runs: Sequence[RunMaterial],
+    *,
+    pictures: bool = True,
+    places: bool = True,
+    progress: Progress = untold,
 ) -> Report:
     """Return the report of several runs; the first is what the others are held against."""
-    seen = [
-        _Seen(run, f"{chr(ord('A') + place)}", passages(run))
-        for place, run in enumerate(runs[:_MOST_RUNS])
-    ]
+    shown = runs[:_MOST_RUNS]
+    seen, of_each = [], []
+    with progress(2 * len(shown) + 1, "sections") as (advance, _):
+        for place, run in enumerate(shown):
+            seen.append(_Seen(run, f"{chr(ord('A') + place)}", passages(run)))
+            advance(seen[-1].name)
+        indicators = indicators_over(runs)
+        advance("indicators")
+        for one in seen:
+            of_each.append(_one(one, pictures=pictures))
+            advance(one.name)
     ids = [str(one.run.record.get("run_id") or one.run.folder.name) for one in seen]
     attribution = dict.fromkeys(one.run.attribution for one in seen if one.run.attribution)
-    indicators = indicators_over(runs)
-    tone: Tone = "watch" if any(_tone(one) in ("watch", "bad") for one in seen) else "good"
     return Report(
         title=f"{plural(len(seen), 'drive')} side by side",
         subtitle=" · ".join(f"{one.name}: {run_id}" for one, run_id in zip(seen, ids, strict=True)),
         verdict=_verdict(seen),
-        tone=tone,
+        tone="watch" if any(_tone(one) in ("watch", "bad") for one in seen) else "good",
         figures=tuple(_figure(one) for one in seen[:5]),
         front=(_key_figures(seen), *_left(runs)),
         parts=(
             Chapter("settings", "What was set otherwise", (_settings(seen, places=places),)),
             Chapter("junctions", "Junction by junction", (_junctions(seen),)),
             indicators_part(indicators),
-            *(_one(one, pictures=pictures) for one in seen),
+            *of_each,
             Chapter(
                 "provenance",
                 "Provenance",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pyarrow.compute as pc
 
+from foretwin.orchestrator.progress import Progress, untold
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -41,9 +42,28 @@ from foretwin.orchestrator.report.sweep_material import SweepMaterial
 _WORST, _PICTURES = 12, 6
 
 
-def sweep_report(sweep: SweepMaterial, *, pictures: bool = True, places: bool = True) -> Report:
+def sweep_report(
+    sweep: SweepMaterial,
+    *,
+    pictures: bool = True,
+    places: bool = True,
+    progress: Progress = untold,
+) -> Report:
     """Return the report of a sweep; see `run_report` for what is left out."""
     verdict, tone = _verdict(sweep)
+    makers: tuple[Callable[[], Chapter], ...] = (
+        lambda: _by_place(sweep),
+        lambda: _worst(sweep, pictures=pictures, advance=advance),
+        lambda: metrics_chapter(sweep),
+        lambda: left_out_chapter(sweep),
+        lambda: losses_chapter(sweep),
+        lambda: provenance_part(sweep.folder, sweep.record, places=places),
+    )
+    parts = []
+    with progress(len(makers) + _PICTURES, "sections") as (advance, _):
+        for part in makers:
+            parts.append(part())
+            advance(parts[-1].title)
     attribution = str(sweep.record.get("attribution") or "")
     return Report(
         title=f"Sweep {sweep.folder.name if places else ''}".strip(),
@@ -52,14 +72,7 @@ def sweep_report(sweep: SweepMaterial, *, pictures: bool = True, places: bool = 
         tone=tone,
         figures=_figures(sweep),
         front=(_outcomes(sweep),),
-        parts=(
-            _by_place(sweep),
-            _worst(sweep, pictures=pictures),
-            metrics_chapter(sweep),
-            left_out_chapter(sweep),
-            losses_chapter(sweep),
-            provenance_part(sweep.folder, sweep.record, places=places),
-        ),
+        parts=tuple(parts),
         attribution=(attribution,) if attribution else (),
     )
 
@@ -195,10 +208,11 @@ def _by_place(sweep: SweepMaterial) -> Chapter:
     return Chapter("places", title, (table,))
 
 
-def _worst(sweep: SweepMaterial, *, pictures: bool) -> Chapter:
+def _worst(sweep: SweepMaterial, *, pictures: bool, advance: Callable[..., None]) -> Chapter:
     title = "Worst cases"
     worst = sweep.worst(_WORST)
     if not worst:
+        advance(title, by=_PICTURES)
         return Chapter("worst", title, (Prose("Nothing critical happens in any case."),))
     rows = tuple(
         row(
@@ -220,8 +234,12 @@ def _worst(sweep: SweepMaterial, *, pictures: bool) -> Chapter:
         frozenset({3, 4, 6}),
     )
     drawn: list[Block] = []
-    if pictures:
-        drawn = [one for future in worst[:_PICTURES] if (one := _picture(sweep, future))]
+    shown = worst[:_PICTURES] if pictures else []
+    for future in shown:
+        if picture := _picture(sweep, future):
+            drawn.append(picture)
+        advance(title_of(future))
+    advance(title, by=_PICTURES - len(shown))
     return Chapter("worst", title, (table, *drawn))
 
 

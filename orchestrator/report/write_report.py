@@ -7,6 +7,7 @@ from pathlib import Path
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.partial_file import partial_file
+from foretwin.orchestrator.progress import Progress, untold
 from foretwin.orchestrator.record.run_folder import SUMMARY
 from foretwin.orchestrator.report.blocks import Report
 from foretwin.orchestrator.report.gap_rows import HumanRow
@@ -28,13 +29,14 @@ def write_report(
     *,
     people: Sequence[HumanRow] = (),
     redaction: Redaction | None = None,
+    progress: Progress = untold,
 ) -> Report:
     """Write the report of a run, of a sweep, or of several runs; returns what it says.
 
     Raises UserError in one line for a folder that holds no run, or one that goes on, and OSError
     where the file cannot be written.
     """
-    report = report_of_folders(folders, people=people, redaction=redaction)
+    report = report_of_folders(folders, people=people, redaction=redaction, progress=progress)
     with partial_file(out) as partial:
         partial.write_text(html_of(report), encoding="utf-8")
     return report
@@ -45,6 +47,7 @@ def report_of_folders(
     *,
     people: Sequence[HumanRow] = (),
     redaction: Redaction | None = None,
+    progress: Progress = untold,
 ) -> Report:
     """Return the report of a run, of a sweep, or of several runs; see `write_report`."""
     look = {"pictures": redaction != "places", "places": redaction is None}
@@ -55,14 +58,14 @@ def report_of_folders(
                 "a report is of one sweep, or of runs: not of sweeps and others together"
             )
         sweep = SweepMaterial(folders[0], called="SWEEP" if redaction else "")
-        report = sweep_report(sweep, **look)
+        report = sweep_report(sweep, **look, progress=progress)
         records, worlds = [sweep.record], sweep.worlds()
     else:
         runs = [_run(folder, redaction) for folder in folders]
         report = (
-            run_report(runs[0], people=people, **look)
+            run_report(runs[0], people=people, **look, progress=progress)
             if len(runs) == 1
-            else several_runs_report(runs, **look)
+            else several_runs_report(runs, **look, progress=progress)
         )
         records = [run.record for run in runs]
         worlds = [world for run in runs for world in run.worlds()]

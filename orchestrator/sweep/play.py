@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
 
 from foretwin.contracts.job_identity import JobBytes, job_bytes
 from foretwin.contracts.runner import Answer, JobRequest, Runner, Task, answers, job_task
+from foretwin.orchestrator.progress import Progress
 from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.rows import Due, Parts, fault_in
 from foretwin.orchestrator.sweep.shard import Shard
 from foretwin.sim_worker.futures.finished_part import finished_part
-
-Progress = Callable[
-    [int, str], AbstractContextManager[tuple[Callable[..., None], Callable[[str], None]]]
-]
-"""Given how many there are of what; in it, what is called first names each that is done, or `by`
-so many, and what is called second says a line."""
 
 
 def jobs_left(plan: SweepPlan, maker: JobMaker, parts: Parts, shard: Shard) -> bytearray:

@@ -16,8 +16,8 @@ from foretwin.contracts.runner import Answer, Runner, answers, world_task
 from foretwin.contracts.world import World
 from foretwin.contracts.world_building import BuiltWorld, MapPart, WantedWorld
 from foretwin.contracts.world_identity import checked_world, with_id
+from foretwin.orchestrator.progress import Progress
 from foretwin.orchestrator.record.recorded_jobs import kept_world
-from foretwin.orchestrator.sweep.play import Progress
 from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
 from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for

@@ -6,6 +6,9 @@ import pytest
 
 from foretwin.orchestrator.commands import progress_bar as module
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.progress import Progress, untold
+
+COVERS = ("foretwin.orchestrator.progress",)
 
 
 @pytest.mark.parametrize(("period_s", "lines"), [(0.0, 3), (60.0, 0)])
@@ -25,3 +28,13 @@ def test_a_line_is_written_now_and_then_where_there_is_no_terminal(
     *counted, last = said.err.splitlines()
     assert counted == [f"{n} of 3 Worlds, n{n}" for n in range(1, lines + 1)]
     assert last == "failed: [n2]"
+
+
+@pytest.mark.parametrize("progress", [progress_bar, untold])
+def test_both_take_the_same_words(progress: Progress, capsys: pytest.CaptureFixture[str]) -> None:
+    with progress(3, "sections") as (advance, say):
+        advance("first")
+        advance("the others", by=2)
+        say("a line")
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", "" if progress is untold else "a line\n")

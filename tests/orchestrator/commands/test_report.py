@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+from foretwin.orchestrator.commands import progress_bar
 from foretwin.orchestrator.commands.cli import run
-from tests.orchestrator.report.told_runs import told_run
+from tests.orchestrator.across.test_changes import case, sweep_of
+from tests.orchestrator.report.told_runs import NAME, told_run
 
 
 def test_it_writes_the_file_and_says_the_verdict(
@@ -40,6 +43,32 @@ def test_json_holds_the_indicators_over_several_runs_and_nothing_else_is_printed
     assert told["indicators"]["drives"] == 2
     lost = [one for one in told["indicators"]["indicators"] if one["name"] == "telemetry lost"]
     assert [(one["events"], one["exposure"], one["low"]) for one in lost] == [(0, 80.0, 0.0)]
+
+
+@pytest.mark.parametrize("of", ["a run", "two runs", "a sweep"])
+def test_how_far_it_is_is_counted_section_by_section_to_the_last(
+    of: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(progress_bar, "PLAIN_PERIOD_S", 0.0)
+    if of == "a sweep":
+        folders = [sweep_of(tmp_path / "swept", [case(number) for number in range(9)])]
+    else:
+        names = ["0", "1"][: 1 + (of == "two runs")]
+        folders = [told_run(tmp_path / name, run_id=f"20261123-12000{name}-t") for name in names]
+
+    assert run(["report", *map(str, folders), "--out", str(tmp_path / "report.html")]) == 0
+
+    told = re.findall(r"(\d+) of (\d+) sections, (.+)", capsys.readouterr().err)
+    done = [int(count) for count, _, _ in told]
+    assert done[-1] == int(told[-1][1]) >= 5
+    assert done == sorted(done)
+    assert len(told) >= 5
+    named = {name for _, _, name in told}
+    last = {"a run": f"1 · {NAME}", "two runs": "indicators", "a sweep": "Provenance"}
+    assert last[of] in named
 
 
 @pytest.mark.parametrize(
