@@ -72,7 +72,7 @@ def compare(
     ] = False,
     every: Annotated[
         bool,
-        typer.Option("--all", help="runs, sweeps: measures whose change may be chance, too"),
+        typer.Option("--all", help="runs, sweeps: every measure that changed, were it by chance"),
     ] = False,
     out: Annotated[Path | None, typer.Option(help="drives: folder for a picture")] = None,
     declaration: FirstDeclarationOption = None,

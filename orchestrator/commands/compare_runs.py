@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -119,10 +120,11 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
 
 
 def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
-    """Yield the measures that changed, the surest first."""
-    changed = sorted((row for row in rows if row["change"]["mean"] != 0.0), key=_doubt)
+    """Yield so many of the measures that changed as are read at once, and with `every` all: those
+    first that are for the worse or the better, and of these the surest."""
+    changed = sorted((row for row in rows if row["change"]["mean"] != 0.0), key=_order)
     sure = [row for row in changed if _doubt(row) < LEVEL]
-    shown = changed if every else sure
+    shown = changed if every else sure[:_MOST_LISTED]
     if shown:
         yield f"{'measure':<40}{'A':>10}{'B':>10}  {'B minus A, 95 %':<40}p adjusted"
     for row in shown:
@@ -132,9 +134,20 @@ def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
             f"{name:<40}{row['first']:>10.4g}{row['second']:>10.4g}  "
             f"{_interval(row['change'], 1.0):<40}{p_value:<10}{row['word']}"
         )
-    if len(shown) < len(changed):
-        count = len(changed) - len(shown)
-        yield f"{count} {'measure' if count == 1 else 'measures'} changed not significantly: --all"
+    if every:
+        return
+    left = Counter(row["word"] for row in sure[len(shown) :])
+    if left:
+        words = ", ".join(f"{count} {word}" for word, count in sorted(left.items()))
+        yield f"{left.total()} more changed significantly ({words}): --all"
+    if chance := len(changed) - len(sure):
+        measures = "measure" if chance == 1 else "measures"
+        yield f"{chance} {measures} changed not significantly: --all"
+
+
+def _order(row: dict[str, Any]) -> tuple[bool, bool, float]:
+    doubt = _doubt(row)
+    return doubt >= LEVEL, row["word"] == "changed", doubt
 
 
 def _doubt(row: dict[str, Any]) -> float:

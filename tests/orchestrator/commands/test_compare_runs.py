@@ -68,6 +68,25 @@ def test_what_is_surest_stands_first() -> None:
     assert [line[0] for line in lines[1:]] == ["c", "a", "b"]
 
 
+def test_of_forty_five_measures_those_are_shown_that_are_for_the_worse_or_the_better() -> None:
+    change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
+    rows = [
+        {"measure": f"m{place:02d}", "unit": "m", "first": 0.0, "second": 1.0, "change": change,
+         "word": word, "p_adjusted": 1e-9 / (place + 1)}
+        for place, word in enumerate(["worse"] * 9 + ["changed"] * 30 + ["better"] * 6)
+    ]  # fmt: skip
+
+    head, *shown, more = _measure_lines(rows, every=False)
+
+    assert head.startswith("measure")
+    assert [line[:3] for line in shown] == [
+        *(f"m{place}" for place in range(44, 38, -1)),
+        *(f"m0{place}" for place in range(8, 2, -1)),
+    ]
+    assert more == "33 more changed significantly (30 changed, 3 worse): --all"
+    assert len(list(_measure_lines(rows, every=True))) == 46
+
+
 def test_exit_code_3_is_for_those_who_ask(
     sweeps: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
