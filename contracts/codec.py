@@ -8,6 +8,7 @@ random number of who numbers, 0 where none is told: who begins anew numbers from
 from __future__ import annotations
 
 import struct
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -73,6 +74,9 @@ def _from_wire(kind: type, value: Any) -> Any:
 
 _encoder = msgspec.msgpack.Encoder(enc_hook=_to_wire, order="deterministic")
 _decoders: dict[Any, msgspec.msgpack.Decoder[Any]] = {}
+_making = threading.Lock()
+"""One decoder is made at a time: what msgspec (0.22) knows of a type it lets others use before it
+knows all of it, and these then end the process."""
 
 
 def encode(message: msgspec.Struct, *, seq: int = 0, sent_ns: int = 0, sender: int = 0) -> bytes:
@@ -114,9 +118,7 @@ def decode_content(
     data: bytes | memoryview | msgspec.Raw, kind: type[Message], *, where: str
 ) -> Message:
     """Return the message of a body alone; raises SchemaMismatch where it does not fit `kind`."""
-    decoder = _decoders.get(kind)
-    if decoder is None:
-        decoder = _decoders[kind] = msgspec.msgpack.Decoder(kind, dec_hook=_from_wire)
+    decoder = _decoders.get(kind) or _decoder_of(kind)
     try:
         message: Message = decoder.decode(data)
     except Exception as error:  # whatever bytes of strangers make of it, depth and sizes included
@@ -124,6 +126,13 @@ def decode_content(
             f"{where}: no valid {kind.__name__}: {error}", kind=f"no valid {kind.__name__}"
         ) from error
     return message
+
+
+def _decoder_of(kind: type[Message]) -> msgspec.msgpack.Decoder[Message]:
+    with _making:
+        if kind not in _decoders:
+            _decoders[kind] = msgspec.msgpack.Decoder(kind, dec_hook=_from_wire)
+        return _decoders[kind]
 
 
 def content_bytes(message: msgspec.Struct | tuple[Any, ...]) -> bytes:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -31,6 +33,7 @@ from foretwin.contracts.futures import FuturesResult
 from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.messages import messages, same
 
 COVERS = (
@@ -213,3 +216,51 @@ def test_a_disk_without_room_is_left_as_it_was(
             write_message(PLAN, tmp_path / "plan")
     assert [path.name for path in tmp_path.iterdir()] == ["plan"]
     assert same(read_message(tmp_path / "plan", type(PLAN)), PLAN)
+
+
+AT_ONCE = '''
+import threading
+import msgspec
+from foretwin.contracts.codec import content_bytes, decode_content
+
+begun, done = threading.Event(), threading.Event()
+
+def held():
+    begun.set()
+    done.wait(0.5)
+    return int
+
+class Leaf(msgspec.Struct):
+    number: "held()"
+
+class Middle(msgspec.Struct):
+    leaf: Leaf
+
+class One(msgspec.Struct):
+    middle: Middle
+
+class Two(msgspec.Struct):
+    middle: Middle
+
+data = content_bytes(One(Middle(Leaf(3))))
+
+def other():
+    begun.wait()
+    assert decode_content(data, Two, where="two") == Two(Middle(Leaf(3)))
+    done.set()
+
+thread = threading.Thread(target=other)
+thread.start()
+assert decode_content(data, One, where="one") == One(Middle(Leaf(3)))
+thread.join()
+'''
+"""Two threads that decode for the first time what has a type in common, one while msgspec still
+asks the other's for its fields."""
+
+
+def test_threads_that_meet_a_type_for_the_first_time_decode_it() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-P", "-c", AT_ONCE], capture_output=True, text=True, timeout=DEADLINE_S
+    )
+
+    assert (ended.returncode, ended.stderr) == (0, "")
