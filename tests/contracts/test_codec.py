@@ -218,7 +218,7 @@ def test_a_disk_without_room_is_left_as_it_was(
     assert same(read_message(tmp_path / "plan", type(PLAN)), PLAN)
 
 
-AT_ONCE = '''
+AT_ONCE = """
 import threading
 import msgspec
 from foretwin.contracts.codec import content_bytes, decode_content
@@ -253,7 +253,7 @@ thread = threading.Thread(target=other)
 thread.start()
 assert decode_content(data, One, where="one") == One(Middle(Leaf(3)))
 thread.join()
-'''
+"""
 """Two threads that decode for the first time what has a type in common, one while msgspec still
 asks the other's for its fields."""
 
