@@ -168,8 +168,8 @@ class ZenohBus(ZenohSession):
         lives = Lives()
 
         def land(token: Alive) -> None:
-            if (process_key := lives.take(token.key, up=token.up)) is not None:
-                mailbox.put(token._replace(key=process_key))
+            if (word := lives.take(token.key, up=token.up)) is not None:
+                mailbox.put(token._replace(key=word.alive_key, up=word.up))
 
         self._watch_tokens(key_of_life(alive_key, "**"), land)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from typing import NamedTuple
 
 _WORDS = 6
 """Of a liveliness key, see foretwin.contracts.keys.ALIVE_KEY; what follows is the life."""
@@ -29,24 +30,31 @@ def life_of_key(full_key: str) -> tuple[str, str]:
     return "/".join(words[:_WORDS]), "/".join(words[_WORDS:])
 
 
+class Word(NamedTuple):
+    """That a process is there, or no more, under its liveliness key."""
+
+    alive_key: str
+    up: bool
+
+
 class Lives:
     """Makes of the tokens of lives what is to be told of their processes.
 
-    The life that began last counts; one of before it comes and goes untold.
+    The life that began last counts; one of before it comes and goes untold. Clocks of machines
+    differ: where a process has moved to one that was started later, its new life counts once the
+    old one has ended.
     """
 
     def __init__(self) -> None:
-        self._counts: dict[str, str] = {}
+        self._living: dict[str, set[str]] = {}
 
-    def take(self, full_key: str, *, up: bool) -> str | None:
-        """Return the liveliness key of the process that came or went with a token, None where it
-        did not."""
+    def take(self, full_key: str, *, up: bool) -> Word | None:
+        """Return what a token that came or went says of its process, None where nothing."""
         alive_key, life = life_of_key(full_key)
-        last = self._counts.get(alive_key)
-        if up and (last is None or life >= last):
-            self._counts[alive_key] = life
-        elif not up and life == last:
-            del self._counts[alive_key]
-        else:
+        living = self._living.setdefault(alive_key, set())
+        before = max(living, default=None)
+        (living.add if up else living.discard)(life)
+        counts = max(living, default=None)
+        if counts == before and not (up and life == counts):
             return None
-        return alive_key
+        return Word(alive_key, counts is not None)
