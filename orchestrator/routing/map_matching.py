@@ -22,6 +22,8 @@ from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, legali
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
 LOST_AFTER_M = 20.0
+_SURE = 2.0
+"""What more must speak against each other road for a match to be confident."""
 
 
 class Match(NamedTuple):
@@ -39,6 +41,8 @@ class Match(NamedTuple):
     direction_known: bool = True
     heading_off_rad: float = 0.0
     """The car's heading against the road's there, positive to the left; 0 while it is unknown."""
+    rivals: tuple[NearEdge, ...] = ()
+    """Other roads than it and those next to it that are nearly as likely, likeliest first."""
 
 
 class OffRoadStretch(NamedTuple):
@@ -135,17 +139,16 @@ class MapMatcher:
             return None
         best = self._hypotheses[0]
         near = project(best.near.directed_edge, xy)
-        rivals = [
-            other.cost for other in self._hypotheses[1:] if not _adjacent(best.near, other.near)
-        ]
+        rivals = tuple(
+            project(other.near.directed_edge, xy)
+            for other in self._hypotheses[1:]
+            if other.cost <= _SURE and not _adjacent(best.near, other.near)
+        )
         confident = (
-            self._direction_known
-            and self._away_m == 0.0
-            and near.distance_m < 15.0
-            and min(rivals, default=math.inf) > 2.0
+            self._direction_known and self._away_m == 0.0 and near.distance_m < 15.0 and not rivals
         )
         place = near.directed_edge, near.s_m, near.lateral_m, near.distance_m
-        return Match(*place, confident, self._direction_known)
+        return Match(*place, confident, self._direction_known, rivals=rivals)
 
     def _note_legality(self, moved_m: float) -> None:
         edge = self._hypotheses[0].near.directed_edge

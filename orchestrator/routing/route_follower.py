@@ -13,6 +13,7 @@ from foretwin.orchestrator.routing.junctions_ahead import (
 )
 from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.other_turns import OtherTurns
+from foretwin.orchestrator.routing.place_on_route import FoundOnRoute, as_likely, locate
 from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
 from foretwin.orchestrator.routing.route import Route, extend_most_probable
 from foretwin.orchestrator.routing.turning import TURNING_RAD, route_with_turn, turns_back
@@ -176,26 +177,14 @@ class RouteFollower:
             return False
         return match.direction_known and (match.confident or not self._direction_known)
 
-    def _locate(self, match: Match) -> tuple[int, float] | None:
-        """Return the place in the route and position s of a match, None where it is elsewhere."""
+    def _locate(self, match: Match) -> FoundOnRoute | None:
+        """Return where on its route the car is, None where the match says that it is elsewhere."""
         assert self._route is not None
-        best: tuple[float, int, float] | None = None
-        for place in range(max(0, self._place - 4), len(self._route.edges)):
-            start_m = float(self._route.start_m[place])
-            if start_m > self._s_m + 300.0:
-                break
-            edge = self._route.edges[place]
-            if edge.edge.index != match.directed_edge.edge.index:
-                continue
-            s_on_edge = match.s_on_edge_m
-            if edge.reverse != match.directed_edge.reverse:
-                if match.direction_known:
-                    continue
-                s_on_edge = edge.edge.length_m - s_on_edge
-            s_m = start_m + s_on_edge
-            found = (abs(s_m - self._s_m), place, s_m)
-            best = found if best is None else min(best, found)
-        return None if best is None else (best[1], best[2])
+        last = FoundOnRoute(self._place, self._s_m)
+        found = locate(self._route, last, match)
+        if found is None and self._on_given:
+            found = as_likely(self._route, last, match)
+        return found
 
     def _turns_back(self, match: Match) -> bool:
         assert self._route is not None

@@ -10,12 +10,13 @@ from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
 from foretwin.world_gen.roads.road_graph import DirectedEdge
-from tests.orchestrator.grid_map import drive, grid, headings, junctions
+from tests.orchestrator.grid_map import drive, graph_of, grid, headings, junctions, road
 
 COVERS = (
     "foretwin.orchestrator.routing.given_routes",
     "foretwin.orchestrator.routing.junctions_ahead",
     "foretwin.orchestrator.routing.other_turns",
+    "foretwin.orchestrator.routing.place_on_route",
     "foretwin.orchestrator.routing.turning",
 )
 
@@ -134,6 +135,55 @@ def test_beyond_its_end_a_given_route_goes_on_most_probably() -> None:
     driver = Driver((along((4, False)),)).go([(20, 100), (60, 100)])
 
     assert driver.ahead(250.0) == [("n102", 40), ("n103", 140), ("n104", 240)]
+
+
+FORK = graph_of(
+    [
+        road(0, 1, 2, [(0, 0), (100, 0)], backward=False),
+        road(1, 2, 3, [(100, 0), (140, 0), (200, 8)], backward=False),
+        road(2, 2, 4, [(100, 0), (112, -2.5), (200, -24)], backward=False),
+    ]
+)
+"""A carriageway that goes on, and a road that leaves it at 14° to the right."""
+
+
+def through_fork(corners: list[tuple[float, float]]) -> list[tuple[float, RouteProgress]]:
+    """Return x and progress of a car whose route leaves the carriageway."""
+    to_the_right = Route(tuple(DirectedEdge(FORK.edges[index], False) for index in (0, 2)))
+    matcher, follower = MapMatcher(FORK), RouteFollower(FORK, (), (to_the_right,))
+    xy = drive(corners, spacing_m=0.5)
+    told = []
+    for point, yaw in zip(xy, headings(xy), strict=True):
+        now = follower.update(matcher.update(point, yaw, True, 8.0))
+        assert now is not None
+        told.append((float(point[0]), now))
+    return told
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [(20, 1.5), (104, 1.0), (113, -2), (180, -19)],
+        [(20, 0), (108, 0), (116, -2.5), (180, -18.5)],
+        [(20, 2), (112, 1.5), (125, -3.5), (180, -18)],
+    ],
+    ids=["soon", "on the line", "late"],
+)
+def test_a_route_that_forks_at_a_small_angle_is_not_left_while_both_roads_are_alike(
+    corners: list[tuple[float, float]],
+) -> None:
+    told = through_fork(corners)
+    s_m = np.array([now.s_m for _, now in told])
+
+    assert not any(now.off_route for _, now in told)
+    assert np.diff(s_m).max() < 2.0
+
+
+def test_a_car_that_takes_the_other_road_of_a_fork_has_left_its_route() -> None:
+    off = [x for x, now in through_fork([(20, -2), (138, -2), (195, 6)]) if now.off_route]
+
+    assert 110.0 < off[0] < 155.0
+    assert off[-1] == 195.0
 
 
 def test_leaving_a_given_route_is_told_and_rejoining_it_too() -> None:
