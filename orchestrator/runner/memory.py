@@ -6,10 +6,11 @@ What counts is a process's own memory: resident, and not shared with others or w
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 LOOK_EVERY_S = 5.0
 SETTLED_AFTER_S = 300.0
@@ -17,6 +18,9 @@ SETTLED_AFTER_S = 300.0
 GROWN_MB, MOST_MB = 256.0, 4096.0
 """Who has grown by so much since it settled, or is so large, is told of; again at each doubling."""
 _LEAST_SPAN_S = 600.0
+SEEK_AT_LEAST_EVERY_S = 60.0
+"""Who is not found, as he has ended or never was, is looked for ever more rarely: all processes of
+the machine are read for it."""
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -51,6 +55,11 @@ class _Watched:
         return 3600.0 * (self.now_mb - self.settled[1]) / (self.last_s - self.settled[0])
 
 
+class _Sought(NamedTuple):
+    again_s: float = -math.inf
+    pause_s: float = LOOK_EVERY_S / 2.0
+
+
 @dataclass(slots=True)
 class MemoryWatch:
     """Looks into /proc; where there is none, nothing is known. Times are monotonic, in s."""
@@ -58,6 +67,7 @@ class MemoryWatch:
     proc: Path = Path("/proc")
     _watched: dict[str, _Watched] = field(default_factory=dict)
     _looked_s: float | None = None
+    _not_found: dict[str, _Sought] = field(default_factory=dict)
 
     def look(self, setups: Path, now_s: float, *, own: str = "orchestrator") -> list[str]:
         """Look again, at most every few seconds; returns what is to be told.
@@ -100,8 +110,16 @@ class MemoryWatch:
             for path in setups.glob("*.json")
             if (known := self._watched.get(path.stem)) is None or self._own_mb(known.pid) is None
         }
-        if missing:
-            here |= self._pids(setups, missing)
+        sought = {name: self._not_found.pop(name, _Sought()) for name in missing}
+        due = {name for name, one in sought.items() if now_s >= one.again_s}
+        if due:
+            here |= self._pids(setups, due)
+        for name in missing - here.keys():
+            one = sought[name]
+            if name in due:
+                pause_s = min(2.0 * one.pause_s, SEEK_AT_LEAST_EVERY_S)
+                one = _Sought(now_s + pause_s, pause_s)
+            self._not_found[name] = one
         for name, pid in here.items():
             known = self._watched.get(name)
             if known is None or known.pid != pid:

@@ -9,7 +9,9 @@ import pytest
 
 from foretwin.orchestrator.runner.memory import (
     GROWN_MB,
+    LOOK_EVERY_S,
     MOST_MB,
+    SEEK_AT_LEAST_EVERY_S,
     SETTLED_AFTER_S,
     MemoryWatch,
 )
@@ -92,6 +94,30 @@ def test_one_that_was_started_again_begins_anew(house: House) -> None:
     house.look(21.0)  # too soon: nothing is looked at
     record = house.watch.record()["w0"]
     assert (record["at_end"], record["most"], record["settled"]) == (20.0, 50.0, None)
+
+
+def test_a_file_that_is_no_process_is_not_sought_among_all_processes_again_and_again(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (house.setups / "standin_path.json").touch()
+    walks: list[float] = []
+    pids = MemoryWatch._pids
+
+    def counted(watch: MemoryWatch, setups: Path, names: set[str]) -> dict[str, int]:
+        walks.append(now_s)
+        return pids(watch, setups, names)
+
+    monkeypatch.setattr(MemoryWatch, "_pids", counted)
+    now_s = 0.0
+    while now_s < 600.0:
+        house.look(now_s)
+        now_s += LOOK_EVERY_S
+    assert walks[:4] == [0.0, 5.0, 15.0, 35.0]
+    assert len(walks) < 15
+    # Whoever starts late is found all the same.
+    house.holds(80, 30.0, name="standin_path")
+    house.look(now_s + SEEK_AT_LEAST_EVERY_S)
+    assert house.watch.now_mb["standin_path"] == pytest.approx(30.0, abs=0.01)
 
 
 def test_where_there_is_no_proc_nothing_is_known(tmp_path: Path) -> None:
