@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -58,7 +59,10 @@ def measure() -> Measurement:
             found = machine.run("-m", "tests.benchmarks.ray_overhead", check=True)
     except pytest.skip.Exception as missing:
         raise UnavailableError(str(missing)) from missing
-    ray_ms, zenoh_ms, job_bytes_, answer_bytes = json.loads(found.stdout.splitlines()[-1])
+    by_ray, by_zenoh, job_bytes_, answer_bytes = json.loads(found.stdout.splitlines()[-1])
+    (ray_ms, ray_cpu_ms), (zenoh_ms, zenoh_cpu_ms) = (
+        zip(*blocks, strict=True) for blocks in (by_ray, by_zenoh)
+    )
     return Measurement(
         float(np.median(ray_ms)),
         "ms a job of 64 futures",
@@ -68,18 +72,30 @@ def measure() -> Measurement:
             "most_ray": max(ray_ms),
             "fewest_zenoh": min(zenoh_ms),
             "most_zenoh": max(zenoh_ms),
+            "parents_cpu_ray": float(np.median(ray_cpu_ms)),
+            "parents_cpu_zenoh": float(np.median(zenoh_cpu_ms)),
+            "load": os.getloadavg()[0],
             "job_bytes": job_bytes_,
             "answer_bytes": answer_bytes,
         },
     )
 
 
-def taken_ms(runner: Runner, made: list[Task]) -> float:
-    """Return how long a job took from question to answer, of many on their way at once."""
-    start_s = time.perf_counter()
+class Taken(NamedTuple):
+    """What a job took from question to answer, of many on their way at once."""
+
+    wall_ms: float
+    cpu_ms: float
+    """Of the process that asks: what holds on a busy machine too."""
+
+
+def taken(runner: Runner, made: list[Task]) -> Taken:
+    """Let all jobs be answered once; returns what one of them took."""
+    start_s, cpu_s = time.perf_counter(), time.process_time()
     for answer in answers(runner, made):
         assert answer.message is not None, answer.failure
-    return 1e3 * (time.perf_counter() - start_s) / len(made)
+    each_ms = 1e3 / len(made)
+    return Taken(each_ms * (time.perf_counter() - start_s), each_ms * (time.process_time() - cpu_s))
 
 
 def jobs_of_64(folder: Path) -> tuple[list[Task], WorkerSetup]:
@@ -130,9 +146,9 @@ def main(folder: Path) -> None:
         on_ray(folder, setup) as ray,
     ):
         for runner in ray, zenoh:
-            taken_ms(runner, made)  # Until both are there and warm.
+            taken(runner, made)  # Until both are there and warm.
         by_ray, by_zenoh = zip(
-            *((taken_ms(ray, made), taken_ms(zenoh, made)) for _ in range(REPEATS)), strict=True
+            *((taken(ray, made), taken(zenoh, made)) for _ in range(REPEATS)), strict=True
         )
     answer = (folder / ANSWER).stat().st_size
     print(json.dumps([by_ray, by_zenoh, len(encode(made[0].question)), answer]), flush=True)

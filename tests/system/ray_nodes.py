@@ -20,6 +20,8 @@ from tests.contracts.bus_sides import DEADLINE_S
 from tests.system.foretwin_command import REPOSITORY
 
 PORT = 6379
+RAY_DEADLINE_S = 3.0 * DEADLINE_S
+"""Each node is a dozen processes, and each seat one that imports all: on a busy machine minutes."""
 _NUMBERS = itertools.count()
 _UNSHARE = ("unshare", "--pid", "--fork", "--mount-proc", "--kill-child")
 _STORE_BYTES = 80_000_000
@@ -96,7 +98,8 @@ class RayNodes:
                 stdout=file,
                 stderr=subprocess.STDOUT,
             )
-        self.run("-c", _WAIT, self.address, self.ip(number), check=True)
+        waited = self.run("-c", _WAIT, self.address, self.ip(number), str(RAY_DEADLINE_S))
+        assert waited.returncode == 0, (waited.stderr, screen.read_text(errors="replace"))
 
     def kill(self, number: int) -> None:
         """Take a node away, with all its processes, as a power cut does."""
@@ -115,6 +118,7 @@ class RayNodes:
             "PYTHONPATH": os.pathsep.join(paths),
             "RAY_USAGE_STATS_ENABLED": "0",
             "RAY_AUTH_MODE": "disabled",
+            "RAY_raylet_start_wait_time_s": f"{RAY_DEADLINE_S:.0f}",
             "XDG_CACHE_HOME": str(self.folder / "cache"),
         }
 
@@ -138,7 +142,7 @@ class RayNodes:
         *arguments: str,
         on: int = 0,
         check: bool = False,
-        within_s: float = 240.0,
+        within_s: float = RAY_DEADLINE_S,
         before_path: Path | None = None,
     ) -> subprocess.CompletedProcess[str]:
         """Run Python on a node to its end."""
@@ -154,7 +158,7 @@ class RayNodes:
         )
 
     def alone(
-        self, *command: str, on: int = 0, within_s: float = 240.0
+        self, *command: str, on: int = 0, within_s: float = RAY_DEADLINE_S
     ) -> subprocess.CompletedProcess[str]:
         """Run any command to its end on a node that sees no processes but its own."""
         return subprocess.run(
@@ -175,8 +179,8 @@ def _ip(*arguments: str) -> None:
 _WAIT = """
 import socket, sys, time
 from foretwin.orchestrator.runner import ray_cluster
-address, node = sys.argv[1:]
-until_s = time.monotonic() + 60.0
+address, node, within_s = sys.argv[1:]
+until_s = time.monotonic() + float(within_s)
 while time.monotonic() < until_s:
     try:
         socket.create_connection(tuple(address.split(":")), timeout=1.0).close()
