@@ -12,8 +12,6 @@ import pytest
 from tests.starvation import kept_waiting
 from tests.system.far_cuts import FarLink
 
-COVERS = ("foretwin.contracts.redialled_bus",)
-
 
 @pytest.mark.judge
 @pytest.mark.timeout(280)

@@ -19,12 +19,6 @@ from tests.system.foretwin_command import environment, started, wait_for
 from tests.system.test_balance import ledger_of, record_of
 from tests.system.test_faults import LIVE, assert_nothing_left, says, under_way
 
-COVERS = (
-    "foretwin.orchestrator.drive.fleet_handler",
-    "foretwin.orchestrator.commands.worker",
-    "foretwin.sim_worker.far.worlds",
-)
-
 pytestmark = [pytest.mark.judge, pytest.mark.timeout(600)]
 
 ENDS_WITHIN_S = 240.0
