@@ -1,4 +1,4 @@
-"""The first page of a drive's report: what it comes to in one sentence, and five numbers."""
+"""The first page of a drive's report: what it comes to in a few sentences, and five numbers."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
     KeyFigure,
     Tone,
-    listed_words,
     plural,
     power,
 )
-from foretwin.orchestrator.report.junction_parts import title_of
+from foretwin.orchestrator.report.junction_parts import scenario_of
 from foretwin.orchestrator.report.material import RunMaterial, part_of
 from foretwin.orchestrator.report.passages import JunctionPassed, tone_of
 
@@ -22,7 +21,7 @@ _LATE_SHARE = 0.1
 
 
 def verdict_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[str, Tone]:
-    """Return what the drive comes to in one sentence, and how it is to be taken."""
+    """Return what the drive comes to in short sentences, and how it is to be taken."""
     record = run.record
     if not record:
         return "The folder holds no record of a drive: nothing can be said of it.", "bad"
@@ -41,7 +40,7 @@ def verdict_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[str,
         grave = worst.gravest or 0.0
         said.append(
             f"the gravest of what was foreseen is {_level(grave)}: "
-            f"{title_of(worst.worst[0])} at {worst.name}"
+            f"{scenario_of(worst.worst[0])} at {worst.name}"
         )
         tone = _graver(tone, tone_of(grave))
     elif passed:
@@ -54,8 +53,7 @@ def verdict_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[str,
     if troubles := [*(record.get("troubles") or []), *(part_of(record, "recovered", "lost") or [])]:
         said.append(f"something is missing: {str(troubles[0]).rstrip('.')}")
         tone = "bad"
-    sentence = f"{listed_words(said)}."
-    return sentence[0].upper() + sentence[1:], tone
+    return " ".join(f"{one[0].upper()}{one[1:]}." for one in said), tone
 
 
 def _level(criticality: float) -> str:
@@ -86,12 +84,22 @@ def _graver(one: Tone, other: Tone) -> Tone:
 
 
 def rounds_in_time(run: RunMaterial) -> tuple[int, int] | None:
-    """Return how many rounds were complete in time, of how many that were due and could begin."""
+    """Return how many rounds were complete in time, of how many that were due and could begin.
+
+    None where that is not known, and in lock step, where a drive waits for its rounds.
+    """
+    if _in_lock_step(run):
+        return None
     told = part_of(run.record, "ledger", "rounds")
     if not told or any(told.get(name) is None for name in ("due", "run", "unseeded")):
         return None
     late = part_of(run.record, "futures", "late_rounds") or 0
     return told["run"] - late, told["due"] - told["unseeded"]
+
+
+def _in_lock_step(run: RunMaterial) -> bool:
+    config = run.record.get("config") or {}
+    return "speed" in config and config["speed"] is None
 
 
 def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[KeyFigure, ...]:
@@ -139,6 +147,8 @@ def _agreement_figure(overall: dict[str, int] | None) -> KeyFigure:
 
 def _pace_figure(run: RunMaterial) -> KeyFigure:
     name = "rounds in time"
+    if _in_lock_step(run):
+        return KeyFigure(UNKNOWN, name, "in lock step the drive waits for its rounds")
     found = rounds_in_time(run)
     if found is None or not found[1]:
         return KeyFigure(UNKNOWN, name, "no round was due, or it is not known")

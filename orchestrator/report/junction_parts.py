@@ -166,13 +166,17 @@ def _came(one: JunctionPassed, came: WhatCame) -> str:
 
 
 def title_of(future: Mapping[str, Any]) -> str:
-    """Return what happens in a future in words: its scenario's title, else what differs from the
-    nominal one."""
+    """Return what happens in a future in words: its scenario's title, and what else differs from
+    the nominal one."""
+    title = scenario_of(future)
+    rest = str(future["name"]).partition(future["scenario"] or title)[2].strip(" ,")
+    return f"{title} ({rest})" if rest else title
+
+
+def scenario_of(future: Mapping[str, Any]) -> str:
+    """Return the title of a future's scenario, else what differs from the nominal one."""
     scenario = catalogue().get(future["scenario"] or "")
-    if scenario is None:
-        return str(future["name"])
-    _, _, rest = str(future["name"]).partition(scenario.id)
-    return f"{scenario.title} ({rest.strip(' ,')})" if rest.strip(" ,") else scenario.title
+    return str(future["name"]) if scenario is None else scenario.title
 
 
 def repeat_command(run: RunMaterial, future_id: str) -> str:

@@ -83,7 +83,7 @@ def _row(
     return row(
         number((one.begin_ns - start_ns) / 1e9, 1, "s"),
         number((one.end_ns - start_ns) / 1e9, 1, "s"),
-        f"{one.kind.replace('_', ' ')}{f', {one.side}' if one.side else ''}",
+        _what(one),
         f"{one.other_kind} {one.other_id}".strip() or UNKNOWN,
         TableCell(at.name, to=at.anchor) if at else TableCell(one.junction_id or UNKNOWN),
         number(one.ttc_s, 1, "s"),
@@ -92,3 +92,9 @@ def _row(
         TableCell(", ".join(one.beyond), tone="watch" if one.beyond else ""),
         ", ".join(one.tags),
     )
+
+
+def _what(one: OccurredScenario) -> str:
+    """Return a scenario in words, with its side where the word does not end in it."""
+    kind = one.kind.replace("_", " ")
+    return f"{kind}, {one.side}" if one.side and not kind.endswith(one.side) else kind

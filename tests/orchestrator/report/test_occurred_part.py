@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from foretwin.orchestrator.occurred.occurred import Occurred
 from foretwin.orchestrator.report.blocks import Listed, Prose
 from foretwin.orchestrator.report.material import RunMaterial
@@ -41,6 +43,22 @@ def test_scenarios_stand_by_time_with_their_junction(tmp_path: Path) -> None:
     assert [cell.text for cell in cells[:4]] == ["2.0\u00a0s", "5.0\u00a0s", "cut in", "car 7"]
     assert cells[4].to == passed[0].anchor
     assert cells[8].tone == "watch"
+
+
+@pytest.mark.parametrize(
+    ("kind", "side", "said"),
+    [
+        ("turn_right", "right", "turn right"),
+        ("crossing_from_left", "left", "crossing from left"),
+        ("cut_in", "left", "cut in, left"),
+        ("stop", "", "stop"),
+    ],
+)
+def test_a_side_is_said_once(kind: str, side: str, said: str) -> None:
+    one = OccurredScenario(kind=kind, side=side, begin_ns=START_NS, end_ns=START_NS + 1)
+    table = told_of(Occurred(scenarios=(one,), sees_others=True), START_NS, []).blocks[1]
+    assert isinstance(table, Listed)
+    assert table.rows[0][2].text == said
 
 
 def test_a_run_without_a_recording_says_why_nothing_is_told(tmp_path: Path) -> None:

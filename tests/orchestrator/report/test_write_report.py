@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.repeat import repeat
+from foretwin.orchestrator.report.blocks import UNKNOWN
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.write_report import report_of_folders, write_report
 from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
@@ -65,11 +67,26 @@ def test_it_says_what_was_foreseen_and_what_came(page: str) -> None:
     assert f"1 · {NAME}" in page
     assert "The car was there at 15.0 s with 29 km/h" in page
     assert "9 futures of that round, played again to the recorded hash" in page
-    assert "simulation and reality agree in 3 of 4 judged windows" in page
+    assert (
+        "foreseen is to be watched: Pedestrian from behind a parked van at "
+        f"{NAME}. Simulation and reality agree in 3 of 4 judged windows."
+    ) in page
     assert "too optimistic" in page
-    assert "to be watched: Pedestrian from behind a parked van" in page
     assert "1 of 2 due" in page
     assert OSM in page
+
+
+def test_a_drive_in_lock_step_has_no_rounds_in_time_since_it_waits_for_them(tmp_path: Path) -> None:
+    folder = told_run(tmp_path)
+    record = json.loads((folder / "run.json").read_text())
+    record["config"]["speed"] = None
+    (folder / "run.json").write_text(json.dumps(record))
+
+    report = report_of_folders([folder])
+
+    assert report.figures[-1].value == UNKNOWN
+    assert report.figures[-1].note == "in lock step the drive waits for its rounds"
+    assert "in time" not in report.verdict
 
 
 def test_worst_futures_come_with_a_command_that_plays_them_again(run: Path, page: str) -> None:
@@ -125,7 +142,7 @@ def test_what_is_missing_of_a_recovered_run_makes_the_verdict(tmp_path: Path) ->
     report = report_of_folders([run])
 
     assert report.tone == "bad"
-    assert report.verdict.endswith("something is missing: the last 0.5 s of rounds.")
+    assert report.verdict.endswith("Something is missing: the last 0.5 s of rounds.")
     page = html_of(report)
     assert "Not known of this recovered run: missed rounds" in page
     assert "what the car did is not recorded" in page
