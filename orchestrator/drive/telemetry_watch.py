@@ -40,8 +40,8 @@ class TelemetryWatch:
         self._silent = channels
         if not newly:
             return []
-        verb = "is" if len(newly) == 1 else "are"
-        return [f"telemetry: {', '.join(newly)} {verb} overdue; states go on without"]
+        # What is wrong stands first: the display has one line, and the names may not fit there.
+        return [f"telemetry overdue: {', '.join(newly)}; states go on without"]
 
     def estimator(self, estimator: StateEstimator) -> list[str]:
         """Return a warning for each new step of the clock and each channel of a wrong type."""

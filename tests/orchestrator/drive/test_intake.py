@@ -145,7 +145,7 @@ def test_a_live_vehicles_clock_is_recorded_and_its_silence_told_once() -> None:
     assert record["clock_steps_s"] == []
 
     told = [t for k in range(40) for t in intake.warnings(mono_ns[-1] + k * 50_000_000)]
-    assert told == ["telemetry: gnss is overdue; states go on without"]
+    assert told == ["telemetry overdue: gnss; states go on without"]
     assert intake.record()["stale"] == {"gnss": 1}
 
 
