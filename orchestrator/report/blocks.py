@@ -6,6 +6,7 @@ and all their words can be looked through at once where places are to be left ou
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -14,6 +15,8 @@ import msgspec
 UNKNOWN = "\u2013"
 """Stands where a value is not known, or does not apply."""
 _UNBROKEN = "\u00a0"
+_DECIMAL = re.compile(rf"-?\d+(?:\.(?P<decimals>\d+))?(?P<unit>(?:{_UNBROKEN}\D+)?)")
+"""What `number` writes."""
 _RAISED = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
@@ -134,6 +137,20 @@ def scientific(value: float | None, *, tone: Tone = "") -> TableCell:
     if value is None or value != value:
         return TableCell(UNKNOWN, tone="quiet")
     return TableCell(power(value), order=float(value), tone=tone)
+
+
+def change_between(first: TableCell, last: TableCell) -> TableCell:
+    """Return by how much two cells of one row differ, written as they are."""
+    if first.order is None or last.order is None:
+        return number(None)
+    change = last.order - first.order
+    size, written = power(abs(change)), [_DECIMAL.fullmatch(one.text) for one in (first, last)]
+    if shown := [one for one in written if one is not None] if all(written) else []:
+        digits = max(len(one["decimals"] or "") for one in shown)
+        size = f"{abs(change):.{digits}f}{shown[0]['unit']}"
+    if not set(size) & set("123456789"):
+        return TableCell("same", order=0.0, tone="quiet")
+    return TableCell(f"{'+' if change > 0.0 else '-'}{size}", order=change)
 
 
 def power(value: float, digits: int = 1) -> str:

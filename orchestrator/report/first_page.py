@@ -13,7 +13,7 @@ from foretwin.orchestrator.report.blocks import (
     power,
 )
 from foretwin.orchestrator.report.junction_parts import scenario_of
-from foretwin.orchestrator.report.material import RunMaterial, part_of
+from foretwin.orchestrator.report.material import RunMaterial, in_lock_step, part_of
 from foretwin.orchestrator.report.passages import JunctionPassed, tone_of
 
 _LATE_SHARE = 0.1
@@ -88,18 +88,13 @@ def rounds_in_time(run: RunMaterial) -> tuple[int, int] | None:
 
     None where that is not known, and in lock step, where a drive waits for its rounds.
     """
-    if _in_lock_step(run):
+    if in_lock_step(run.record):
         return None
     told = part_of(run.record, "ledger", "rounds")
     if not told or any(told.get(name) is None for name in ("due", "run", "unseeded")):
         return None
     late = part_of(run.record, "futures", "late_rounds") or 0
     return told["run"] - late, told["due"] - told["unseeded"]
-
-
-def _in_lock_step(run: RunMaterial) -> bool:
-    config = run.record.get("config") or {}
-    return "speed" in config and config["speed"] is None
 
 
 def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[KeyFigure, ...]:
@@ -147,7 +142,7 @@ def _agreement_figure(overall: dict[str, int] | None) -> KeyFigure:
 
 def _pace_figure(run: RunMaterial) -> KeyFigure:
     name = "rounds in time"
-    if _in_lock_step(run):
+    if in_lock_step(run.record):
         return KeyFigure(UNKNOWN, name, "in lock step the drive waits for its rounds")
     found = rounds_in_time(run)
     if found is None or not found[1]:

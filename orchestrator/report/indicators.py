@@ -28,7 +28,7 @@ from foretwin.orchestrator.report.indicator_statistics import (
     share_of,
     trend_of,
 )
-from foretwin.orchestrator.report.material import RunMaterial, TableRow, part_of
+from foretwin.orchestrator.report.material import RunMaterial, TableRow, in_lock_step, part_of
 from foretwin.sim_worker.analysis.occurred.rows import THRESHOLDS
 
 ExposureUnit = Literal["km", "h", "pass", "trial"]
@@ -202,12 +202,17 @@ _SHARES = (
 """Of trials: what, how many, and of how many, as `run.json` has it."""
 
 
+_OF_ROUNDS = frozenset({"rounds too late", "rounds missed"})
+"""What a drive in lock step cannot tell: it waits for its rounds."""
+
+
 def _shares(record: Mapping[str, Any]) -> dict[IndicatorKey, CountedEvents]:
+    waited = in_lock_step(record)
     told = {name: (part_of(record, *of), part_of(record, *trials)) for name, of, trials in _SHARES}
     return {
         IndicatorKey(name, "trial"): CountedEvents(events, float(trials))
         for name, (events, trials) in told.items()
-        if events is not None and trials
+        if events is not None and trials and not (waited and name in _OF_ROUNDS)
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -162,6 +162,12 @@ class RunMaterial:
         """Return whose map it is."""
         told = self.record.get("map") or {}
         return str(told.get("attribution") or "")
+
+
+def in_lock_step(record: Mapping[str, Any]) -> bool:
+    """Whether a drive waited for its rounds: how long they took says nothing of it then."""
+    config = record.get("config") or {}
+    return "speed" in config and config["speed"] is None
 
 
 def part_of(record: Any, *path: str) -> Any:

@@ -16,6 +16,7 @@ from foretwin.orchestrator.report.blocks import (
     Report,
     TableCell,
     Tone,
+    change_between,
     listed_words,
     number,
     plural,
@@ -205,21 +206,9 @@ def _key_figures(seen: Sequence[_Seen]) -> Listed:
     rows = []
     for name, get in _ROWS:
         cells = [get(one) for one in seen]
-        rows.append(row(name, *cells, _change(cells)))
+        rows.append(row(name, *cells, change_between(cells[0], cells[-1])))
     columns = ("", *(one.name for one in seen), "last minus first")
     return Listed("What each came to", columns, tuple(rows), frozenset(range(1, len(seen) + 2)))
-
-
-def _change(cells: Sequence[TableCell]) -> TableCell:
-    first, last = cells[0].order, cells[-1].order
-    if first is None or last is None:
-        return number(None)
-    change = last - first
-    return TableCell(
-        "same" if change == 0.0 else f"{change:+.3g}",
-        order=change,
-        tone="quiet" if change == 0.0 else "",
-    )
 
 
 def _settings(seen: Sequence[_Seen], *, places: bool) -> Block:

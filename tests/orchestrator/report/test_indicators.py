@@ -89,6 +89,11 @@ def test_rounds_telemetry_and_jobs_are_shares_of_those_that_were_due() -> None:
     }
 
 
+def test_a_drive_in_lock_step_tells_nothing_of_rounds_in_time() -> None:
+    record = RECORD | {"config": {"speed": None}}
+    assert counted_in(record, None, RowCounts(marked=0, takeovers=None)) == {}
+
+
 def test_a_car_that_tells_of_nobody_adds_nothing_to_the_exposure_of_conflicts() -> None:
     found = counted_in(RECORD, driven(sees_others=False), RowCounts(marked=0, takeovers=None))
 
