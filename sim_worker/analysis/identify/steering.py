@@ -42,11 +42,6 @@ _LAG_STD_S = 0.05
 _BEND_STD_RAD, _BEND_S = 4e-4, 9.0
 """What a planar car leaves unexplained of the tyre angle in a bend, and the way to the next one:
 so little do a thousand instants of one bend tell."""
-_ANGLES_BELOW_MPS = 4.0
-"""A planar car leaves so much of the tyre angle unexplained, and sensors so much of the yaw rate,
-that an instant tells the angle best from this speed on, and no better when faster."""
-_ROLLING_MPS2 = 1.0
-"""Tyres that drive or brake by much more turn a car otherwise than those that roll."""
 
 
 class SteeringFit(NamedTuple):
@@ -116,9 +111,7 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
         Theta.PULL_BRAKED: (0.0, _PULL_STD_RAD_PER_MPS2),
     }
     centre, spread = np.array([priors[index] for index in Theta]).T.copy()
-    gaining = signals.given[Theta.PULL_DRIVEN, used] + signals.given[Theta.PULL_BRAKED, used]
-    weights = 1.0 / np.hypot(1.0, signals.speed_mps[used] / _ANGLES_BELOW_MPS)
-    weights /= np.hypot(1.0, gaining / _ROLLING_MPS2)
+    weights = signals.weights()
     # Play lasts: instants within the reach of the smoothing share it.
     period_s, angles = float(record.time_s[1]), float(np.mean(np.square(per_m * weights)))
     play = PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(ALIKE_S / period_s * angles)

@@ -35,8 +35,17 @@ SLOWEST_MPS = 2.0
 _LEAST_STOOD = 4.0
 _MAX_LATERAL_MPS2 = 4.0
 """Beyond it, tyres are no longer linear."""
+_MAX_TIRE_RAD = 0.25
+"""Beyond it, an axle's two wheels are not one: steered alike, by 0.25 they turn a car as one would
+by 1.5 % less, by 0.58 by 8 %; how nearly each points across the way to the bend's middle no file
+says."""
 _LEAST_FEED = 0.2
 """Of 1 + K v²/L, which is zero at the speed where an oversteering car loses its stability."""
+_ANGLES_BELOW_MPS = 4.0
+"""A planar car leaves so much of the tyre angle unexplained, and sensors so much of the yaw rate,
+that an instant tells the angle best from this speed on, and no better when faster."""
+_ROLLING_MPS2 = 1.0
+"""Tyres that drive or brake by much more turn a car otherwise than those that roll."""
 
 
 class Theta(IntEnum):
@@ -87,6 +96,16 @@ class SteeringSignals(NamedTuple):
         slopes[Theta.GYRO_BIAS] = 1.0
         return Unexplained(apart, slopes / feeds)
 
+    def gaining_mps2(self) -> Array:
+        """Return by how much the car speeds up (M,)."""
+        pulls = self.given[Theta.PULL_DRIVEN] + self.given[Theta.PULL_BRAKED]
+        return np.asarray(pulls[self.used])
+
+    def weights(self) -> Array:
+        """Return how much an instant's yaw rate (M,) counts, against one that rolls slowly."""
+        slow = 1.0 / np.hypot(1.0, self.speed_mps[self.used] / _ANGLES_BELOW_MPS)
+        return np.asarray(slow / np.hypot(1.0, self.gaining_mps2() / _ROLLING_MPS2))
+
     def steered_rad(self, values: Array) -> Array:
         """Return the tyre angle (N,) that the motion asks the steering wheel for."""
         turned = self.wheelbase_m * (self.yaw_rate_radps - values[Theta.GYRO_BIAS])
@@ -128,12 +147,13 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         for name in ("speed_mps", "yaw_rate_radps", "wheel_rad")
     )
     side = sideways(vehicle, speed, rate, turning, period_s=period_s)
+    base = vehicle.wheelbase_m.value
     known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
     moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
+    moving &= base * np.abs(rate) < math.tan(_MAX_TIRE_RAD) * speed
     if not moving.any():
         raise ValueError("the car did not drive")
     used = np.flatnonzero(moving)
-    base = vehicle.wheelbase_m.value
     standing = np.isfinite(rate) & (np.abs(speed) < 1e-3)
     given = {
         Theta.INVERSE_RATIO: wheel,
