@@ -15,6 +15,8 @@ Role = Literal["all", "twin", "shadow", "ghost"]
 was measured, and others run into it; the ghost stands there too and collides with nothing; all is
 the three at once."""
 ROLES: tuple[Role, ...] = get_args(Role)
+WHAT_STANDS = "world"
+"""In touches the name of buildings, islands and whatever else does not move."""
 
 Correction = Literal["free", "follow"]
 """A free twin runs on its commands alone and starts anew every few seconds; one that follows is

@@ -71,7 +71,7 @@ class Conductor:
         self.alive: set[str] = set()
         self.strangers = Strangers(expected_ids(plan), self.tell)
         self.questions = Questions(context, self.alive)
-        self.mirror = MirrorHandler(tables, self.tell)
+        self.mirror = MirrorHandler(tables, self.tell, plan.config.vehicle_id)
         self.roles = roles.RolesInForce(
             plan.config.roles,
             plan.config.correction,

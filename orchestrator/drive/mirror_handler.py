@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from foretwin.contracts.gap import limits_after
+from foretwin.contracts.roles import WHAT_STANDS
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.results import MIRROR, MIRRORED, ResultTables
@@ -24,6 +25,8 @@ class MirrorHandler:
 
     tables: ResultTables
     tell: Callable[[Notice], None]
+    vehicle_id: str
+    """Of the drive's own car."""
     stamp_ns: int = 0
     """Of the newest sample."""
     independent: bool | None = None
@@ -32,6 +35,8 @@ class MirrorHandler:
     beyond: int = 0
     touches: int = 0
     """Times that two began to touch."""
+    _gap_m: float = 0.0
+    """Between car and twin in the sample before: one that touches is set back to the car."""
     _touched_ns: dict[tuple[str, str], int] = field(default_factory=dict)
     _stamps_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_KNOWN))
 
@@ -62,8 +67,16 @@ class MirrorHandler:
             self._touched_ns[pair] = sample.stamp_ns
             if apart:
                 self.touches += 1
-                one, other = ("what stands" if name == "world" else name for name in pair)
-                self.tell(Notice("warning", f"in the mirror, {one} and {other} touch"))
+                self.tell(Notice("warning", f"in the mirror, {self._in_words(*pair)}"))
+        self._gap_m = sample.gap_m
+
+    def _in_words(self, one: str, other: str) -> str:
+        if WHAT_STANDS not in (one, other):
+            return f"{one} and {other} touch"
+        # Shadows go through what stands: only what physics moves can touch it.
+        name = other if one == WHAT_STANDS else one
+        apart = f", {self._gap_m:.1f} m off the car" if name == self.vehicle_id else ""
+        return f"the twin of {name} touches what stands{apart}"
 
     def record(self) -> dict[str, int]:
         """Return the `free_twin` of run.json."""

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.roles import Role
+from foretwin.contracts.roles import WHAT_STANDS, Role
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.slopes import slopes_of
@@ -25,8 +25,6 @@ from foretwin.sim_worker.vehicle.planar import CHASSIS, vehicle_spec
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
-WORLD = "world"
-"""Name of what stands: buildings, islands, kerbs."""
 _BOX = "box"
 
 
@@ -127,7 +125,7 @@ class RoleWorld:
         pairs = set()
         for index in range(self._data.ncon):
             geoms = self._data.contact[index].geom
-            one, other = (self._owner_of_geom.get(int(geom), WORLD) for geom in geoms)
+            one, other = (self._owner_of_geom.get(int(geom), WHAT_STANDS) for geom in geoms)
             if one != other:
                 pairs.add((min(one, other), max(one, other)))
         return pairs
