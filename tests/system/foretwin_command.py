@@ -20,6 +20,7 @@ from tests.log_lines import read_log
 from tests.system.warm_command import WarmCommand
 
 REPOSITORY = Path(__file__).parents[2]
+_BEGAN_NS = time.monotonic_ns()
 FRESH = ("-m", "foretwin")
 """What a fresh interpreter is given to run, as when a user starts the command."""
 
@@ -40,8 +41,16 @@ class Finished(NamedTuple):
         return pq.read_table(self.run / "results" / f"{table}.parquet").to_pylist()
 
 
-def environment(cache: Path) -> dict[str, str]:
-    return os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(REPOSITORY)}
+def environment(cache: Path, *, pace: float = 1.0) -> dict[str, str]:
+    """Return what processes are started with; by their clocks they live at `pace` (slow_motion).
+
+    A machine that has half of what a drive needs has all of it at half the pace, by its own time.
+    """
+    mine = os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(REPOSITORY)}
+    if pace == 1.0:
+        return mine
+    path = f"{REPOSITORY / 'tests' / 'system' / 'slow_motion'}{os.pathsep}{REPOSITORY}"
+    return mine | {"PYTHONPATH": path, "SLOW_MOTION": f"{pace}@{_BEGAN_NS}"}
 
 
 def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
@@ -51,21 +60,27 @@ def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
     return Finished(process.returncode, screen, run_folder(out))
 
 
+def slow_s(pace: float) -> float:
+    """Return the monotonic clock of processes that live at `pace`."""
+    began_s = _BEGAN_NS / 1e9
+    return began_s + (time.monotonic() - began_s) * pace
+
+
 @contextmanager
 def started(
-    out: Path, *arguments: str, entry: tuple[str, str] | None = None
+    out: Path, *arguments: str, entry: tuple[str, str] | None = None, pace: float = 1.0
 ) -> Iterator[subprocess.Popen[str] | WarmCommand]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
     `entry` is what a fresh interpreter is given to run, and so are its processes; None for forks
-    of an interpreter that has imported all. One worker and no tuning unless they are asked for:
-    each process takes a second of a core to start.
+    of an interpreter that has imported all, which knows no `pace` but 1. One worker and no tuning
+    unless they are asked for: each process takes a second of a core to start.
     """
     for option, value in (("--tuning", "off"), ("--workers", "1")):
         if option not in arguments:
             arguments = (*arguments, option, value)
     words = ["drive", "--view", "none", "--out", str(out), *arguments]
-    cwd, env = out.parent, environment(out.parent / "cache")
+    cwd, env = out.parent, environment(out.parent / "cache", pace=pace)
     process = WarmCommand(words, cwd=cwd, env=env) if entry is None else subprocess.Popen(
         [sys.executable, "-P", *entry, *words], cwd=cwd, env=env, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
