@@ -58,7 +58,7 @@ def begin(
 
 @kernel(
     types.void, OUT_ROWS, _FLAGS, IN, IN, IN, types.Array(REAL, 2, "A"), IN, REAL, REAL,
-    types.UniTuple(REAL, 4), BODY_TYPE, TYRE_TYPE, OUT_ROWS,
+    types.UniTuple(REAL, 5), BODY_TYPE, TYRE_TYPE, OUT_ROWS,
 )  # fmt: skip
 def advance(
     states: Array,
@@ -77,7 +77,7 @@ def advance(
 ) -> None:
     """Advance `states` (S, 29) through the steps of `angles` (steps, S); fill `out` (7, S) with
     base_link's. `slips` (S,) says who is in multi-body motion, and keeps it."""
-    front_stiffness, rear_stiffness, factor, spin_rate = car
+    front_stiffness, rear_stiffness, linkage, factor, spin_rate = car
     a, b = body[4], body[5]
     k1, k2, k3, k4 = np.empty(29), np.empty(29), np.empty(29), np.empty(29)
     for one in range(states.shape[0]):
@@ -95,7 +95,7 @@ def advance(
                 for _ in range(parts):
                     pull = climb[one] + rolling_mps2 + drag_pm * x[3] * x[3]
                     given = (rate, drive[one], brake[one], pull, grip[one])
-                    scales = (front_stiffness, rear_stiffness)
+                    scales = (front_stiffness, rear_stiffness, linkage)
                     slope(x, *given, *scales, body, tyre, k1)
                     slope(x + 0.5 * dt * k1, *given, *scales, body, tyre, k2)
                     slope(x + 0.5 * dt * k2, *given, *scales, body, tyre, k3)
@@ -161,7 +161,13 @@ class MultiBody:
             self._grip[:count],
             self._drag_pm,
             self._rolling_mps2,
-            (car.front_stiffness, car.rear_stiffness, car.inertia_factor, car.spin_rate_mps2),
+            (
+                car.front_stiffness,
+                car.rear_stiffness,
+                car.linkage,
+                car.inertia_factor,
+                car.spin_rate_mps2,
+            ),
             car.body,
             car.tyre,
             out,

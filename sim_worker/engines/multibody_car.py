@@ -24,7 +24,9 @@ class MultiBodyNumbers(NamedTuple):
 
     `front_stiffness` and `rear_stiffness` scale the tyres' cornering stiffness, `grip_per_friction`
     makes the tyres' scale of a friction coefficient; `spin_rate_mps2` over the speed is the
-    stiffest rate, that with which a wheel takes up the speed of the road.
+    stiffest rate, that with which a wheel takes up the speed of the road. `linkage` says how much
+    more the inner front wheel is turned than the outer one: 0 not at all, as in CommonRoad's model,
+    1 as both would roll on one circle.
     """
 
     body: tuple[float, ...]
@@ -34,6 +36,7 @@ class MultiBodyNumbers(NamedTuple):
     grip_per_friction: float
     inertia_factor: float
     spin_rate_mps2: float
+    linkage: float = 0.0
 
 
 @functools.cache

@@ -80,7 +80,9 @@ def tyre_forces(
     return along, across + shift * math.sin(vyk5 * math.atan(vyk6 * slip))
 
 
-@kernel(types.void, OUT, REAL, REAL, REAL, REAL, REAL, REAL, REAL, BODY_TYPE, TYRE_TYPE, OUT)
+@kernel(
+    types.void, OUT, REAL, REAL, REAL, REAL, REAL, REAL, REAL, REAL, BODY_TYPE, TYRE_TYPE, OUT
+)  # fmt: skip
 def slope(
     x: Array,
     rate: float,
@@ -90,6 +92,7 @@ def slope(
     grip: float,
     front_stiffness: float,
     rear_stiffness: float,
+    linkage: float,
     body: tuple[float, ...],
     tyre: tuple[float, ...],
     out: Array,
@@ -98,6 +101,8 @@ def slope(
 
     `rate` is the steering's, drive and brakes are torques at the wheels as accelerations of the
     whole mass, `pull_mps2` slows the body down; `grip` and the stiffnesses scale the tyres'.
+    `linkage` is by what share front wheels are turned as rolling on one circle asks for
+    (Ackermann): 0, as in the authors' program, turns both alike.
     """
     (m, m_s, m_uf, m_ur, a, b, i_roll, i_pitch, i_yaw, i_xz, k_sf, k_sdf, k_sr, k_sdr) = body[:14]
     (t_f, t_r, k_ras, k_tsf, k_tsr, k_rad, k_zt, h_raf, h_rar, h_s) = body[14:24]
@@ -105,17 +110,24 @@ def slope(
     g = GRAVITY_MPS2
     steer, u, psi, r, v = x[2], x[3], x[4], x[5], x[10]
     roll, pitch_rate, roll_rate = x[6], x[9], x[7]
-    cos_s, sin_s, cos_r, sin_r = math.cos(steer), math.sin(steer), math.cos(roll), math.sin(roll)
+    cos_r, sin_r = math.cos(roll), math.sin(roll)
+    # Its left is where the yaw rate is added: axes as in the authors' program, z down.
+    narrower = 0.5 * linkage * t_f / (a + b) * math.tan(steer)
+    steer_l = math.atan(math.tan(steer) / (1.0 + narrower))
+    steer_r = math.atan(math.tan(steer) / (1.0 - narrower))
+    cos_sl, sin_sl, cos_sr, sin_sr = (
+        math.cos(steer_l), math.sin(steer_l), math.cos(steer_r), math.sin(steer_r)
+    )  # fmt: skip
     low_f, low_r = x[16] + r_w * (math.cos(x[13]) - 1.0), x[21] + r_w * (math.cos(x[18]) - 1.0)
     lean_f, lean_r = 0.5 * t_f * math.sin(x[13]), 0.5 * t_r * math.sin(x[18])
     z_lf, z_rf = (low_f - lean_f) * k_zt, (low_f + lean_f) * k_zt
     z_lr, z_rr = (low_r - lean_r) * k_zt, (low_r + lean_r) * k_zt
-    u_lf = max((u + 0.5 * t_f * r) * cos_s + (v + a * r) * sin_s, 0.0)
-    u_rf = max((u - 0.5 * t_f * r) * cos_s + (v + a * r) * sin_s, 0.0)
+    u_lf = max((u + 0.5 * t_f * r) * cos_sl + (v + a * r) * sin_sl, 0.0)
+    u_rf = max((u - 0.5 * t_f * r) * cos_sr + (v + a * r) * sin_sr, 0.0)
     u_lr, u_rr = max(u + 0.5 * t_r * r, 0.0), max(u - 0.5 * t_r * r, 0.0)
     side_f, side_r = v + a * r - x[14] * (r_w - x[16]), v - b * r - x[19] * (r_w - x[21])
-    angle_lf = math.atan(side_f / (u + 0.5 * t_f * r)) - steer
-    angle_rf = math.atan(side_f / (u - 0.5 * t_f * r)) - steer
+    angle_lf = math.atan(side_f / (u + 0.5 * t_f * r)) - steer_l
+    angle_rf = math.atan(side_f / (u - 0.5 * t_f * r)) - steer_r
     angle_lr = math.atan(side_r / (u + 0.5 * t_r * r))
     angle_rr = math.atan(side_r / (u - 0.5 * t_r * r))
     up_f, up_r = h_s - r_w + x[16] - x[11], h_s - r_w + x[21] - x[11]
@@ -180,11 +192,12 @@ def slope(
     f_lr = rest_r - s_lr * k_sr - ds_lr * k_sdr + bar_r
     f_rr = rest_r - s_rr * k_sr - ds_rr * k_sdr - bar_r
     springs = f_lf + f_rf + f_lr + f_rr
-    front_x, front_y, rear_y = x_lf + x_rf, y_lf + y_rf, y_lr + y_rr
-    across_f = front_y * cos_s + front_x * sin_s
-    sum_x = x_lr + x_rr + front_x * cos_s - front_y * sin_s
+    along_lf, along_rf = x_lf * cos_sl - y_lf * sin_sl, x_rf * cos_sr - y_rf * sin_sr
+    rear_y = y_lr + y_rr
+    across_f = y_lf * cos_sl + x_lf * sin_sl + y_rf * cos_sr + x_rf * sin_sr
+    sum_x = x_lr + x_rr + along_lf + along_rf
     sum_n = across_f * a - rear_y * b + (x_lr - x_rr) * 0.5 * t_r
-    sum_n += ((y_rf - y_lf) * sin_s + (x_lf - x_rf) * cos_s) * 0.5 * t_f
+    sum_n += (along_lf - along_rf) * 0.5 * t_f
     sum_l = 0.5 * t_f * (f_lf - f_rf) + 0.5 * t_r * (f_lr - f_rr)
     sum_l -= pin_f / cos_r * (up_f - arm_f * math.cos(x[13]))
     sum_l -= pin_r / cos_r * (up_r - arm_r * math.cos(x[18]))

@@ -95,8 +95,9 @@ TERMS: dict[str, dict[str, float]] = {
     "springs ten times as stiff": dict.fromkeys(
         ("K_sf", "K_sr", "K_sdf", "K_sdr", "K_ras", "K_rad"), 10.0
     ),
+    "front wheels turned by a linkage": {"linkage": 1.0},
 }
-"""What the multi-body model has and the twin has not, each taken away; springs by a factor."""
+"""In what the multi-body model is not as the twin, each as there; springs by a factor."""
 
 
 def without(numbers: MultiBodyNumbers, term: str) -> MultiBodyNumbers:
@@ -111,7 +112,8 @@ def without(numbers: MultiBodyNumbers, term: str) -> MultiBodyNumbers:
         for names, values in ((BODY, numbers.body), (TYRE, numbers.tyre))
     )
     grip = numbers.grip_per_friction * change.get("grip", 1.0)
-    return numbers._replace(body=body, tyre=tyre, grip_per_friction=grip)
+    linkage = change.get("linkage", numbers.linkage)
+    return numbers._replace(body=body, tyre=tyre, grip_per_friction=grip, linkage=linkage)
 
 
 def multibody_without(job: Job, world: World, car: VehicleParameters, term: str) -> Array:

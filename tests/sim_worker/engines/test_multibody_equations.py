@@ -21,9 +21,11 @@ SWAY = np.array(
 """How far a state may be from rest, column by column."""
 
 
-def change(state: Array, *, rate: float = 0.0, accel: float = 0.0, pull: float = 0.0) -> Array:
+def change(
+    state: Array, *, rate: float = 0.0, accel: float = 0.0, pull: float = 0.0, linkage: float = 0.0
+) -> Array:
     out = np.empty(STATES)
-    given = rate, max(accel, 0.0), max(-accel, 0.0), pull, 1.0, 1.0, 1.0
+    given = rate, max(accel, 0.0), max(-accel, 0.0), pull, 1.0, 1.0, 1.0, linkage
     slope(state, *given, BODY_OF_320I, TYRE_OF_320I, out)
     return out
 
@@ -53,3 +55,21 @@ def test_a_locked_wheel_does_not_turn_back_and_a_pull_slows_the_body_alone() -> 
     pulled = change(state.copy(), pull=0.5) - change(state.copy())
     assert pulled[3] == -0.5
     assert np.count_nonzero(pulled) == 1
+
+
+def test_a_linkage_turns_the_front_wheels_onto_one_circle() -> None:
+    """There all wheels roll and no tyre pushes, but for what a tyre pulls aside by itself."""
+    for steer in (0.0, 0.3, -0.4):
+        bend = np.tan(steer) / (MODEL.a + MODEL.b)
+        state = np.empty(STATES)
+        speed = 3.0
+        begin(
+            state, 0.0, 0.0, 0.0, speed, MODEL.b * speed * bend, speed * bend, steer, BODY_OF_320I
+        )
+        state[6:10] = 0.0
+        wide = 0.5 * np.array([MODEL.T_f, -MODEL.T_f, MODEL.T_r, -MODEL.T_r]) * bend
+        ahead = np.array([1.0, 1.0, 0.0, 0.0]) * (MODEL.a + MODEL.b) * bend
+        state[FIRST_WHEEL:27] = speed * np.hypot(1.0 + wide, ahead) / MODEL.R_w
+        alike, linked = (change(state.copy(), linkage=one) for one in (0.0, 1.0))
+        assert abs(linked[5]) < 0.03
+        assert abs(linked[5]) <= 0.08 * abs(alike[5])
