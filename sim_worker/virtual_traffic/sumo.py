@@ -23,6 +23,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.polyline import densified
 from foretwin.sim_worker.driver_model import EMERGENCY_DECEL_MPS2
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
@@ -41,6 +42,8 @@ _UNSEEN_M, _FIRST_M = 100.0, 25.0
 _DECEL_MPS2 = 4.0
 _SPEED, _PLACE, _ANGLE, _INDEX, _TYPE, _ROAD = 0x40, 0x42, 0x43, 0x69, 0x4F, 0x50
 """SUMO's numbers of what is asked of a vehicle."""
+_NEXT_M = 10.0
+"""Between points of an edge that are held against the car's place."""
 _NOWHERE = -1e6
 _EVERY = 10
 """Steps between two looks at who is missing, and who nearly is where it was going."""
@@ -131,7 +134,9 @@ class SumoTraffic:
         self._holds = np.array(
             [self._sumo.lane.getLength(f"{one}_0") >= longest_m for one in self._edges]
         )
-        self._ends_m = np.array([(shape[0], shape[-1]) for shape in shapes])
+        dense = [densified(one, spacing_m=_NEXT_M) for one in shapes]
+        self._points_m = np.concatenate(dense)
+        self._first_of = np.cumsum([0, *(len(one) for one in dense[:-1])])
         self._sumo.route.add(_CAR, [self._edges[0]])
         self._sumo.vehicle.add(_CAR, _CAR, typeID=_CAR)
         self._sumo.vehicle.setSpeedMode(_CAR, 0)
@@ -211,7 +216,7 @@ class SumoTraffic:
         sumo, rng, begins = self._sumo, self._rng, self._steps == 0
         there = set(sumo.vehicle.getIDList()) | set(sumo.simulation.getPendingVehicles())
         missing = self._count - len(there - {_CAR})
-        away_m = np.hypot(*(self._ends_m - car_m).transpose(2, 0, 1)).min(axis=1)
+        away_m = np.minimum.reduceat(np.hypot(*(self._points_m - car_m).T), self._first_of)
         fits = np.flatnonzero(self._holds & (away_m > (_FIRST_M if begins else _UNSEEN_M)))
         kinds, _, shares = zip(*_CLASSES, strict=True)
         for _ in range(3 * missing if begins else min(missing, 3)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.errors import UserError
+from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.virtual_traffic.source import STEP_S
 from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, is_there, net_of
 from foretwin.sim_worker.virtual_traffic.sumo_lights import groups_of_signals
@@ -17,6 +20,8 @@ from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.orchestrator.trip import town_world
 from tests.sim_worker.scenarios.worlds import cross
 from tests.sim_worker.virtual_traffic.motions import G_MPS2, played, still, tracks
+
+CAR = load_vehicle()
 
 
 def test_a_network_of_sumo_is_taken_as_it_is(tmp_path: Path) -> None:
@@ -67,6 +72,38 @@ def test_who_is_close_to_a_light_brakes_in_the_step_in_which_it_turns_red(tmp_pa
     green, flipped = speeds(red_from=999, steps=161), speeds(red_from=160, steps=161)
     assert flipped[:160] == green[:160]
     assert any(flipped[160][name] < speed - 0.1 for name, speed in green[160].items())
+
+
+def outline(x: float, y: float, yaw: float, length_m: float, width_m: float) -> Rectangles:
+    return Rectangles(np.array([[x, y]]), np.array([yaw]), length_m, width_m)
+
+
+@pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
+@pytest.mark.parametrize(
+    ("x", "y", "yaw_deg"),
+    [(-40.0, -1.5, 17.0), (-40.0, -3.0, 90.0), (-40.0, -3.9, 60.0), (-40.0, 1.5, 0.0)],
+)
+def test_they_stand_before_a_car_that_stands_in_their_way(
+    tmp_path: Path, x: float, y: float, yaw_deg: float
+) -> None:
+    """Turned, across both lanes and on the wrong side; nobody appears on top of it either."""
+    yaw = math.radians(yaw_deg)
+    middle = np.array([x, y]) + box_centre_from_base_m(CAR) * np.array([np.cos(yaw), np.sin(yaw)])
+    mine = outline(*middle, yaw, CAR.length_m.value, CAR.width_m.value)
+    write_opendrive(cross(), tmp_path / "a.xodr")
+    traffic = SumoTraffic(CAR, net_of(tmp_path / "a.xodr", tmp_path), count=10, seed=3)
+    touched = stood = 0
+    try:
+        for scene in played(traffic, still(x, y, yaw), from_s=0.0, to_s=40.0):
+            for one in scene:
+                theirs = outline(one.x_m, one.y_m, one.yaw_rad, one.length_m, one.width_m)
+                apart_m = float(clearance(mine, theirs)[0])
+                touched += apart_m == 0.0
+                stood += apart_m < 10.0 and one.speed_mps < 0.1
+    finally:
+        traffic.close()
+    assert touched == 0
+    assert stood > 20
 
 
 def district(tmp_path: Path) -> SumoTraffic:
