@@ -54,9 +54,12 @@ class TurnsFile:
 
 def passed_over_text(turns: Turns) -> str:
     """Return what the engineer reads, empty where nothing was passed over."""
-    passed_over = sum(one.passed_over for one in turns.values())
-    total = passed_over + sum(one.told for one in turns.values())
-    return f"{passed_over} of {total} turns of sensors passed over" if passed_over else ""
+    of_each = ", ".join(
+        f"{one.passed_over} of {one.passed_over + one.told} of {name}"
+        for name, one in turns.items()
+        if one.passed_over
+    )
+    return f"turns passed over: {of_each}" if of_each else ""
 
 
 def _sum(one: SensorTurns, before: SensorTurns | None) -> SensorTurns:

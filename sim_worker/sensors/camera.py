@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, sensor_motion
 from foretwin.sim_worker.sensors.kinds import Camera
 from foretwin.sim_worker.sensors.moving_boxes import ModelAmongBoxes, MovingBoxes
-from foretwin.sim_worker.sensors.offscreen import drawing_context
+from foretwin.sim_worker.sensors.offscreen import DrawingError, drawing, drawing_context
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 from foretwin.world_gen.export.mjcf import world_spec
 
@@ -46,7 +47,8 @@ class CameraView(NamedTuple):
 class CameraWorld:
     """Draws a World, or nothing but road users, for one camera; of one thread, that which made it.
 
-    Raises UserError where nothing can be drawn. A World of pictures is flat, as that of rays.
+    All of it raises DrawingError where nothing can be drawn, or not any more. A World of pictures
+    is flat, as that of rays.
     """
 
     def __init__(self, world: World | None, sensor: SensorFile) -> None:
@@ -60,22 +62,25 @@ class CameraWorld:
 
     def close(self) -> None:
         """Give back what the driver holds."""
-        self._gl.free()
+        with contextlib.suppress(DrawingError), drawing():
+            self._gl.free()
 
     def view(self, motion: BaseMotion, bodies: MovingBoxes) -> CameraView:
         """Return what is seen at the instant of `motion` and `bodies`."""
-        geoms = self._look(motion, bodies)
-        rgb, depth_m = self._drawn_now()
-        flags = self._scene.flags
-        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
-        numbers, _ = self._read()
-        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 0
+        with drawing():
+            geoms = self._look(motion, bodies)
+            rgb, depth_m = self._drawn_now()
+            flags = self._scene.flags
+            flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
+            numbers, _ = self._read()
+            flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 0
         return CameraView(self.sensor, rgb, depth_m, self._bodies(numbers, geoms))
 
     def picture(self, motion: BaseMotion, bodies: MovingBoxes) -> Picture:
         """Return the colours alone (H, W, 3): half the work."""
-        self._look(motion, bodies)
-        return self._drawn_now()[0]
+        with drawing():
+            self._look(motion, bodies)
+            return self._drawn_now()[0]
 
     def _standing(self) -> mujoco.MjSpec:
         spec = mujoco.MjSpec() if self._world is None else world_spec(self._world)

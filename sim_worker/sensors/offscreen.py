@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 from foretwin.contracts.errors import UserError
@@ -13,20 +15,33 @@ _NEEDED = "cameras need EGL: a GPU's driver, or Mesa (on Debian: libegl1 libgl1-
 _WITHIN_S = 60.0
 
 
+class DrawingError(UserError):
+    """Nothing can be drawn here, or not any more."""
+
+
+@contextlib.contextmanager
+def drawing() -> Iterator[None]:
+    """Say in one line what a driver says; raises DrawingError."""
+    try:
+        yield
+    except DrawingError:
+        raise
+    except Exception as error:  # each library on the way raises what it likes
+        line = " ".join(str(error).split()) or type(error).__name__
+        raise DrawingError(f"{_NEEDED}: {line}") from error
+
+
 def drawing_context(width_px: int, height_px: int) -> Any:
-    """Return a context of OpenGL of this size, current in this thread; raises UserError where there
-    is none.
+    """Return a context of OpenGL of this size, current in this thread; raises DrawingError where
+    there is none.
 
     Whatever MUJOCO_GL says: commands switch it off, since they draw nothing.
     """
-    try:
+    with drawing():
         from mujoco.egl import GLContext
 
         context = GLContext(width_px, height_px)
         context.make_current()
-    except Exception as error:  # each library on the way raises what it likes
-        line = " ".join(str(error).split()) or type(error).__name__
-        raise UserError(f"{_NEEDED}: {line}") from error
     return context
 
 

@@ -43,9 +43,11 @@ class SensorsProcess:
         self._bus, self._run_id = bus, setup.run_id
         self._worlds_dir = Path(setup.worlds_dir)
         self._refusals = Refusals() if refusals is None else refusals
-        self._sensors = VirtualSensors(
-            [(sensor_of(one.text, one.name), one.sees) for one in setup.sensors], seed=setup.seed
-        )
+        sensors = [(sensor_of(one.text, one.name), one.sees) for one in setup.sensors]
+        self._sensors = VirtualSensors(sensors, seed=setup.seed)
+        self._names = [one.name for one, _ in sensors]
+        self._told_lost: set[int] = set()
+        self._dropped, self._left = 0, False
         self.mailbox = Mailbox(_LIVE, when_full="block" if setup.bus.lossless else "drop_oldest")
         # Apart from the states, which must not push out the one word on the World.
         self.news = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
@@ -59,16 +61,29 @@ class SensorsProcess:
     def step(self, wait_s: float = _IDLE_S) -> None:
         """Take all that has come, or wait a moment for it, and measure what is due; never raises.
 
-        Of turns that are over by now the newest is measured, the others are passed over.
+        Of turns that are over by now the newest is measured, the others are passed over. What has
+        come meanwhile is taken after each of them.
         """
+        self._take_all(0.0 if self._left else wait_s)
+        for _ in self._names:  # then who calls may look at its clock
+            one = self._sensors.next_measured()
+            self._left = one is not None
+            if one is None:
+                break
+            self._bus.publish(CHANNEL_OF[type(one)], one, run=self._run_id)
+            self._take_all(0.0)
+        for place in self._sensors.lost.keys() - self._told_lost:
+            self._told_lost.add(place)
+            name, why = self._names[place], self._sensors.lost[place]
+            log.warning("sensor %s gives nothing any more, the others go on: %s", name, why)
+
+    def _take_all(self, wait_s: float) -> None:
         item = self.mailbox.take(wait_s)
         while (one := self.news.take()) is not None:
             self._handle(one)
         while item is not None:
             self._handle(item)
             item = self.mailbox.take()
-        for one in self._sensors.measured():
-            self._bus.publish(CHANNEL_OF[type(one)], one, run=self._run_id)
 
     @property
     def turns(self) -> Turns:
@@ -85,7 +100,9 @@ class SensorsProcess:
         with passed_over_where_unfit(item, refusals=self._refusals, log=log):
             match item.message():
                 case VehicleState() as state:
-                    self._sensors.take_state(state)
+                    behind = self.mailbox.dropped > self._dropped
+                    self._dropped = self.mailbox.dropped
+                    self._sensors.take_state(state, behind=behind)
                 case PointCloud() as real:
                     self._sensors.take_real(real)
                 case RoadUsers() as users:

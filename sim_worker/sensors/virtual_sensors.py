@@ -24,6 +24,7 @@ from foretwin.sim_worker.sensors.kinds import Camera, Gnss, Imu, Lidar
 from foretwin.sim_worker.sensors.lidar import LidarScan, scan
 from foretwin.sim_worker.sensors.motion_sensors import MotionSensor
 from foretwin.sim_worker.sensors.moving_boxes import MovingBoxes, boxes_of
+from foretwin.sim_worker.sensors.offscreen import DrawingError
 from foretwin.sim_worker.sensors.radar import detect
 from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
@@ -32,6 +33,8 @@ LIVES_NS = 500_000_000
 """A road user of whom nothing was said for so long is gone, as for the gateway."""
 _LATE_TURNS = 3
 """Who hears nothing for longer was not driving: turns of that time are not missed."""
+_LATELY = 20
+"""Turns of a sensor by which it is seen who comes too short; chosen."""
 _STATES = 32
 """So many are kept, to know where the car was as a real turn began: over half a second."""
 
@@ -59,8 +62,10 @@ class VirtualSensors:
 
     Turns begin at whole periods of the car's clock, whenever the first state came: the same input
     and seed give the same clouds. Who is asked late measures the newest turn alone and counts the
-    others; receivers and inertial sensors measure them all. A sensor that sees the World measures
-    nothing while there is none. One with a delay is asked for its turns so much later.
+    others; receivers and inertial sensors measure them all. Where there is no time for all sensors
+    the one comes first that told the least share of its last turns. A sensor that sees the World
+    measures nothing while there is none. One with a delay is asked for its turns so much later. A
+    camera that cannot be drawn any more is left out from then on.
     """
 
     def __init__(self, sensors: Sequence[tuple[SensorFile, SensorSees]], *, seed: int = 0) -> None:
@@ -80,10 +85,14 @@ class VirtualSensors:
         self._rays: RayWorld | None = None
         self._no_world = RayWorld()
         self._pictures: dict[int, CameraWorld] = {}
+        self._lately: dict[int, deque[bool]] = {}
+        """Of each sensor, which of its last turns were told."""
         self.passed_over: Counter[str] = Counter()
         """By sensor, turns of which nothing was told."""
         self.told: Counter[str] = Counter()
         """By sensor."""
+        self.lost: dict[int, str] = {}
+        """By their place in the list, sensors that give nothing any more, and why."""
 
     def use_world(self, world: World | None) -> None:
         """Look into another World from now on, or into none."""
@@ -102,8 +111,11 @@ class VirtualSensors:
             if known is None or users.stamp_ns >= known.stamp_ns:
                 self._said[user.user_id] = _LastWord(users.stamp_ns, user)
 
-    def take_state(self, state: VehicleState) -> None:
-        """Take where the car is: turns that are over by then are due."""
+    def take_state(self, state: VehicleState, *, behind: bool = False) -> None:
+        """Take where the car is: turns that are over by then are due.
+
+        `behind`: states before this one were there and could not be taken.
+        """
         self._said = {
             name: one
             for name, one in self._said.items()
@@ -112,9 +124,11 @@ class VirtualSensors:
         self._states.append(state)
         for place, (sensor, sees) in enumerate(self._sensors):
             if sees != "real":
-                self._take_turn(place, sensor, state)
+                self._take_turn(place, sensor, state, behind=behind)
 
-    def _take_turn(self, place: int, sensor: SensorFile, state: VehicleState) -> None:
+    def _take_turn(
+        self, place: int, sensor: SensorFile, state: VehicleState, *, behind: bool
+    ) -> None:
         """Begin a turn where it is time to, and see which of those before are to be told."""
         period_ns = round(1e9 / sensor.kind.rate_hz)
         number = state.stamp_ns // period_ns
@@ -122,8 +136,9 @@ class VirtualSensors:
         if turn is None or turn.number != number:
             said = tuple(self._said.values())
             self._turns[place] = _Turn(number, number * period_ns, state, said)
-            if turn is not None and 0 < number - turn.number <= _LATE_TURNS:
-                self.passed_over[sensor.name] += number - turn.number - 1
+            missed = 0 if turn is None else number - turn.number - 1
+            if turn is not None and (0 <= missed < _LATE_TURNS or (behind and missed >= 0)):
+                self._passed_over(place, missed)
                 over.append(turn)
             else:
                 self._due.pop(place, None)
@@ -132,31 +147,59 @@ class VirtualSensors:
         while over and over[0].begun_ns <= told_ns:
             due = self._due.setdefault(place, [])
             if place not in self._of_motion:
-                self.passed_over[sensor.name] += len(due)
+                self._passed_over(place, len(due))
                 due.clear()
             due.append(over.popleft())
 
+    def _passed_over(self, place: int, turns: int) -> None:
+        self.passed_over[self._sensors[place][0].name] += turns
+        self._lately.setdefault(place, deque(maxlen=_LATELY)).extend([False] * min(turns, _LATELY))
+
     def measured(self) -> list[Measured]:
-        """Return what is due."""
-        real, self._real, due, self._due = self._real, {}, self._due, {}
-        found: list[Measured] = [self._merged(place, cloud) for place, cloud in real.items()]
-        for place, turn in ((place, turn) for place, turns in due.items() for turn in turns):
-            rays = self._rays if self._sensors[place][1] == "world" else self._no_world
-            if not turn.state.yaw_valid:
-                continue
-            if place in self._of_motion:
-                motion = self._of_motion[place]
-                found.append(motion.sample(turn.state, at_ns=turn.begun_ns))
-            elif rays is not None:
-                found.append(self._measure(rays, place, turn))
-        self.told.update(one.sensor for one in found)
-        return found
+        """Return all that is due."""
+        return list(iter(self.next_measured, None))
+
+    def next_measured(self) -> Measured | None:
+        """Return one thing that is due, None where nothing is."""
+        while self._due or self._real:
+            place = min(self._due.keys() | self._real.keys(), key=self._share_told)
+            if (found := self._measured_at(place)) is not None:
+                self.told[found.sensor] += 1
+                self._lately.setdefault(place, deque(maxlen=_LATELY)).append(True)
+                return found
+        return None
+
+    def _share_told(self, place: int) -> tuple[float, int]:
+        lately = self._lately.get(place)
+        return (sum(lately) / len(lately) if lately else 1.0), place
+
+    def _measured_at(self, place: int) -> Measured | None:
+        """Take the first turn that is due of a sensor, and measure it where that can be done."""
+        if (cloud := self._real.pop(place, None)) is not None:
+            return self._merged(place, cloud)
+        turn = self._due[place].pop(0)
+        if not self._due[place]:
+            del self._due[place]
+        rays = self._rays if self._sensors[place][1] == "world" else self._no_world
+        if not turn.state.yaw_valid:
+            return None
+        if place in self._of_motion:
+            return self._of_motion[place].sample(turn.state, at_ns=turn.begun_ns)
+        if rays is None:
+            return None
+        if place not in self.lost:
+            try:
+                return self._measure(rays, place, turn)
+            except DrawingError as why:
+                self.lost[place] = str(why)
+        self._passed_over(place, 1)
+        return None
 
     def take_real(self, cloud: PointCloud) -> None:
         """Take a turn of the car's own sensor, into which the road users are to be put."""
         for place, (sensor, sees) in enumerate(self._sensors):
             if sees == "real" and sensor.name == cloud.sensor:
-                self.passed_over[sensor.name] += place in self._real
+                self._passed_over(place, int(place in self._real))
                 self._real[place] = cloud
 
     def _merged(self, place: int, cloud: PointCloud) -> PointCloud:

@@ -17,7 +17,9 @@ def test_a_process_that_is_started_again_counts_on(tmp_path: Path) -> None:
     turns = read_turns(tmp_path)
 
     assert turns == {"a": SensorTurns(told=12, passed_over=3), "b": SensorTurns(told=2)}
-    assert passed_over_text(turns) == "3 of 17 turns of sensors passed over"
+    assert passed_over_text(turns) == "turns passed over: 3 of 15 of a"
+    both = turns | {"b": SensorTurns(told=1, passed_over=1)}
+    assert passed_over_text(both) == "turns passed over: 3 of 15 of a, 1 of 2 of b"
     assert passed_over_text({"b": SensorTurns(told=2)}) == ""
 
 

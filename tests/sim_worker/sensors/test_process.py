@@ -15,6 +15,7 @@ from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.sensor_turns import SensorTurns
 from foretwin.contracts.setup import BusSetup, SensorSetup, SensorsSetup
 from foretwin.contracts.simulation import ActiveWorld, RunEnd
+from foretwin.sim_worker.sensors.offscreen import DrawingError
 from foretwin.sim_worker.sensors.process import SensorsProcess, serve
 from foretwin.sim_worker.sensors.sensor_file import sensor_text
 from tests.contracts.memory_bus import MemoryBus
@@ -93,3 +94,53 @@ def test_what_a_radar_lists_goes_out_on_a_channel_of_its_own(tmp_path: Path) -> 
     assert item.message().sensor == "short_range_radar"
     assert item.message().returns[0, 0] == pytest.approx(10.0 - 3.0 - 3.5, abs=0.4)
     assert process.turns == {"short_range_radar": SensorTurns(told=1)}
+
+
+class BrokenDriver:
+    """A camera's, which draws one picture and no more."""
+
+    def __init__(self, *_: object) -> None:
+        self._drawn = 0
+
+    def picture(self, *_: object) -> np.ndarray:
+        self._drawn += 1
+        if self._drawn > 1:
+            raise DrawingError("the driver is gone")
+        return np.zeros((480, 640, 3), np.uint8)
+
+    def close(self) -> None: ...
+
+
+def test_a_camera_that_cannot_be_drawn_any_more_is_told_of_once_and_the_others_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("foretwin.sim_worker.sensors.virtual_sensors.CameraWorld", BrokenDriver)
+    bus, pictures, lists = MemoryBus(), Mailbox(64), Mailbox(64)
+    files = [sensor_text(name) for name in ("vga_camera", "short_range_radar")]
+    mine = tuple(SensorSetup(text=text, name=name, sees="users") for text, name in files)
+    process = SensorsProcess(replace(setup_in(tmp_path), sensors=mine), bus)
+    bus.subscribe("camera_image", pictures, **RUN)
+    bus.subscribe("radar_list", lists, **RUN)
+    for stamp_ms in range(0, 501, 50):
+        stamp_ns = stamp_ms * 1_000_000
+        bus.publish("state", state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ns), **CAR)
+        process.step(0.0)
+
+    assert (len(pictures), len(lists)) == (1, 10)
+    assert process.turns["vga_camera"] == SensorTurns(told=1, passed_over=4)
+    (line,) = caplog.messages
+    assert line == "sensor vga_camera gives nothing any more, the others go on: the driver is gone"
+
+
+def test_turns_that_came_while_it_was_away_are_counted(tmp_path: Path) -> None:
+    bus = MemoryBus()
+    text, name = sensor_text("short_range_radar")
+    one = SensorSetup(text=text, name=name, sees="users")
+    process = SensorsProcess(replace(setup_in(tmp_path), sensors=(one,)), bus)
+    for stamp_ms in range(0, 5000, 20):
+        bus.publish("state", state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ms * 1_000_000), **CAR)
+        if stamp_ms < 200:
+            process.step(0.0)
+    process.step(0.0)
+    turns = process.turns["short_range_radar"]
+    assert turns.told + turns.passed_over == pytest.approx(4980 // 50, abs=1)

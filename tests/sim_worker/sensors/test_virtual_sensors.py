@@ -209,3 +209,34 @@ def test_a_sensors_own_seed_makes_other_noise() -> None:
         return one.returns.tobytes()
 
     assert first(3) == first(3) != first(4)
+
+
+def told_under_load(takes_ms: dict[str, int]) -> VirtualSensors:
+    """Drive for 10 s, in which each turn takes as long as is said to be measured."""
+    kinds = (("slow", radar(rate_hz=10.0)), ("quick", radar(rate_hz=20.0)))
+    files = [(msgspec.structs.replace(one, name=name), "users") for name, one in kinds]
+    sensors = VirtualSensors(files)  # type: ignore[arg-type]
+    free_ms = 0
+    for stamp_ms in range(0, 10_001, 10):
+        sensors.take_state(state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ms * MS))
+        if stamp_ms >= free_ms and (one := sensors.next_measured()) is not None:
+            free_ms = stamp_ms + takes_ms[one.sensor]
+    return sensors
+
+
+def test_where_there_is_no_time_for_all_each_tells_the_same_share() -> None:
+    sensors = told_under_load({"slow": 100, "quick": 50})
+    shares = [sensors.told[name] / turns for name, turns in (("slow", 100), ("quick", 200))]
+    assert shares == pytest.approx([0.5, 0.5], abs=0.05)
+    for name, turns in (("slow", 100), ("quick", 200)):
+        assert sensors.told[name] + sensors.passed_over[name] == pytest.approx(turns, abs=2)
+    assert not told_under_load({"slow": 20, "quick": 20}).passed_over.total()
+
+
+def test_turns_are_counted_whose_states_could_not_be_taken() -> None:
+    sensors = VirtualSensors([(exact(), "users")])
+    driven(sensors, 200)
+    late = state_at(0.0, 0.0, speed=0.0, stamp_ns=1020 * MS)
+    sensors.take_state(late, behind=True)
+    assert [one.stamp_ns // MS for one in sensors.measured()] == [200]
+    assert sensors.passed_over == {"exact": 7}
