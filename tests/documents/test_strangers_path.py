@@ -14,7 +14,7 @@ import pytest
 from tests.documents.running import play_page
 from tests.documents.stage import Installed
 
-pytestmark = [pytest.mark.judge, pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.judge, pytest.mark.timeout(3600)]
 
 
 def test_the_tutorial_leads_from_the_wheel_to_a_sweep(tmp_path: Path, installed: Installed) -> None:

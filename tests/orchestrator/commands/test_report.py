@@ -54,7 +54,9 @@ def test_how_far_it_is_is_counted_section_by_section_to_the_last(
 ) -> None:
     monkeypatch.setattr(progress_bar, "PLAIN_PERIOD_S", 0.0)
     if of == "a sweep":
-        folders = [sweep_of(tmp_path / "swept", [case(number) for number in range(9)])]
+        grave = {"criticality": 1e-5, "likelihood": 0.1, "world_id": "gone", "progress_m": 9.0}
+        rows = [case(number, **(grave if number < 2 else {})) for number in range(9)]
+        folders = [sweep_of(tmp_path / "swept", rows)]
     else:
         names = ["0", "1"][: 1 + (of == "two runs")]
         folders = [told_run(tmp_path / name, run_id=f"20261123-12000{name}-t") for name in names]
