@@ -29,7 +29,7 @@ from foretwin.orchestrator.runner.ray_runner import RayRunner
 from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
 from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of
-from foretwin.orchestrator.sweep.plan import plan_sweep
+from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.sim_worker.seat import SeatSetup
@@ -103,9 +103,9 @@ def jobs_of_64(folder: Path) -> tuple[list[Task], WorkerSetup]:
     loaded = load_spec(small_sweep(folder, FULL))
     here = alone(loaded)
     world_id = next((folder / "drawn").glob("*.world")).stem
-    plan = plan_sweep(loaded, [places_of(here, loaded, world_id)])
-    planned = next(job for job in plan.jobs if len(job.cells) == FUTURES_PER_JOB)
-    job = JobMaker(loaded, plan.worlds).job(planned)
+    plan = SweepPlan(loaded, [places_of(here, loaded, world_id)])
+    planned = next(job for job in plan.planned() if len(job.cells) == FUTURES_PER_JOB)
+    job = JobMaker(loaded).job(planned)
     cells = cells_of(planned, plan.attribution)
     numbered = (msgspec.structs.replace(job, job_index=number) for number in range(JOBS))
     made = [job_task(one, job_bytes(one), cells=cells) for one in numbered]

@@ -188,7 +188,11 @@ while time.monotonic() < until_s:
     except OSError:
         time.sleep(0.1)
 import ray
-ray.init(address=address, log_to_driver=False, logging_level="error")
+while not ray.is_initialized():
+    try:
+        ray.init(address=address, log_to_driver=False, logging_level="error")
+    except ConnectionError:  # the head listens before it is a node
+        assert time.monotonic() < until_s
 while not any(one["Alive"] and one["NodeManagerAddress"] == node for one in ray.nodes()):
     assert time.monotonic() < until_s, ray.nodes()
     time.sleep(0.1)
