@@ -197,6 +197,8 @@ def test_an_answer_that_takes_longer_than_a_knock_is_taken() -> None:
         begun_s = time.monotonic()
         assert not door.opens()
         assert time.monotonic() - begun_s > 0.9 * KNOCK_EVERY_S
+        assert [door.opens() for _ in range(6)] == 6 * [False]
+        assert len(door._knocks) == 5, "each is waited for, the oldest no longer"
         server.accept()[0].close()
         wait_until(door.opens)
 
