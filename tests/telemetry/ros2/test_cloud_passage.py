@@ -11,29 +11,21 @@ from msgspec.structs import replace
 from foretwin.contracts.anchor import Anchor, AnchorPose
 from foretwin.contracts.arrays import Array32
 from foretwin.contracts.bus import Mailbox
-from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.point_cloud import Mount, PointCloud, mount_from_base_cloud
-from foretwin.contracts.towards_vehicle import Authority
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.clouds import cloud_from, cloud_of
-from foretwin.telemetry.ros_messages.objects import FROM_USERS, ObjectSpread
-from foretwin.telemetry.ros_messages.parts import POINT_CLOUD2, PREDICTED_OBJECTS, typestore
+from foretwin.telemetry.ros_messages.parts import POINT_CLOUD2, typestore
 from tests.telemetry.ros2.gateway_ground import FRAME, mapping_text
-from tests.telemetry.ros2.test_gateway import Ground
+from tests.telemetry.ros2.passing_ground import PERCEPTION, PassingGround, S
 from tests.telemetry.ros2.test_merged_objects import VAN, user
 
-S, MS = 10**9, 10**6
-MORE = """
+MORE = f"""{PERCEPTION}
 [[in]]
 topic = "/lidar/raw"
 type = "sensor_msgs/msg/PointCloud2"
 channel = "real_cloud"
 sensor = "top"
-[[in]]
-topic = "/perception/real"
-type = "autoware_perception_msgs/msg/PredictedObjects"
-channel = "objects"
 [[out]]
 topic = "/lidar/merged"
 type = "sensor_msgs/msg/PointCloud2"
@@ -52,29 +44,21 @@ POINTS = np.array([[6.0, 0.2, 2.0, 40.0, 3.0, 0.01], [1.0, 5.2, 1.0, 7.0, 9.0, 0
 RAW = "0/lidar/raw/sensor_msgs::msg::dds_::PointCloud2_/RIHS01_x"
 
 
-class Passing(Ground):
+class Passing(PassingGround):
     def __init__(self, *, flag: bool = True, anchor: Anchor | None = None) -> None:
-        super().__init__(enabled=True, flag=flag, more=MORE, anchor=anchor)
+        super().__init__(MORE, flag=flag, anchor=anchor)
         self.gateway = Gateway(
             parse_mapping(mapping_text(enabled=True, more=MORE), name="m.toml"),
             bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego", drive_frame=FRAME,
             flag_on=flag, order_keys=self.orders.keys, anchor=anchor, mounts={"top": MOUNT},
             mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18 + self.now_ns,
         )  # fmt: skip
-        self.real, self.objects = Mailbox(10), Mailbox(10)
+        self.real = Mailbox(10)
         self.bus.subscribe("real_cloud", self.real, vehicle="ego")
-        self.bus.subscribe("objects", self.objects, vehicle="ego")
         self.goes_on()
 
-    def goes_on(self, passed_ms: float = 0.0) -> None:
-        self.now_ns += round(passed_ms * MS)
-        self.orders.say(self.bus, Authority(sent_mono_ns=self.now_ns))
-        self.step()
-
     def told(self, points: Array32 = POINTS, stamp_ns: int = 5 * S, sensor: str = "top") -> None:
-        cloud = PointCloud(stamp_ns=stamp_ns, points=points, sensor=sensor)
-        self.bus.publish("point_cloud", cloud, run="r")
-        self.goes_on(100.0)
+        self.passes("point_cloud", PointCloud(stamp_ns=stamp_ns, points=points, sensor=sensor))
 
     def hears(
         self, points: Array32 = POINTS, *, stamp_ns: int = 5 * S, frame: str = "lidar"
@@ -83,7 +67,7 @@ class Passing(Ground):
         self.arrive(RAW, bytes(typestore().serialize_cdr(ros, POINT_CLOUD2)))
 
     def sent(self, topic: str = "/lidar/merged") -> list[Any]:
-        return [typestore().deserialize_cdr(one, POINT_CLOUD2) for one in self.foreign.on(topic)]
+        return self.heard_on(topic, POINT_CLOUD2)
 
 
 def test_a_cloud_goes_out_in_the_sensors_frame_and_in_base_link() -> None:
@@ -111,11 +95,7 @@ def test_without_the_second_switch_only_what_is_below_foretwin_goes_out() -> Non
 def test_when_the_word_is_overdue_no_cloud_goes_to_the_vehicle() -> None:
     ground = Passing()
     ground.told()
-    ground.now_ns += 200 * MS
-    ground.bus.publish(
-        "point_cloud", PointCloud(stamp_ns=6 * S, points=POINTS, sensor="top"), run="r"
-    )
-    ground.step()
+    ground.is_overdue("point_cloud", PointCloud(stamp_ns=6 * S, points=POINTS, sensor="top"))
     assert (len(ground.sent()), len(ground.sent("/foretwin/points"))) == (1, 2)
 
 
@@ -157,20 +137,12 @@ def test_a_cloud_that_was_sent_does_not_come_back_as_real() -> None:
 def test_whom_the_stack_perceives_in_our_points_is_not_real() -> None:
     """Perception gives them ids and sizes of its own."""
     ground = Passing()
-    van = user("ghost", 20.0, 8.0, van=True, virtual=True)
-    ground.bus.publish("virtual_objects", RoadUsers(stamp_ns=5 * S, users=(van,)), run="r")
-    ground.goes_on()
+    ground.holds_a_van_that_is_none()
     ground.told()
 
     def perceived(*places: tuple[float, float]) -> int:
         seen = [user(f"{k}" * 32, *at, van=True, virtual=False) for k, at in enumerate(places)]
-        users = RoadUsers(stamp_ns=5 * S, users=tuple(replace(one, length_m=3.7) for one in seen))
-        ros = FROM_USERS[PREDICTED_OBJECTS](users, FRAME, ObjectSpread())
-        key = "0/perception/real/autoware_perception_msgs::msg::dds_::PredictedObjects_/RIHS01_x"
-        ground.arrive(key, bytes(typestore().serialize_cdr(ros, PREDICTED_OBJECTS)))
-        item = ground.objects.take()
-        assert item is not None
-        return len(item.message().users)
+        return ground.perceives([replace(one, length_m=3.7) for one in seen])
 
     # The van points to the north: 5 m along y, 2 m along x.
     assert perceived((20.6, 10.0), (20.0, 5.5)) == 0

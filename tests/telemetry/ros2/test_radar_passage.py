@@ -9,25 +9,16 @@ import pytest
 from msgspec.structs import astuple
 
 from foretwin.contracts.anchor import Anchor, AnchorPose
-from foretwin.contracts.bus import Mailbox
-from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.radar_list import RadarList
-from foretwin.contracts.towards_vehicle import Authority
 from foretwin.telemetry.anchored import lot_from_world_message
 from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping
-from foretwin.telemetry.ros_messages.objects import FROM_USERS, ObjectSpread
-from foretwin.telemetry.ros_messages.parts import PREDICTED_OBJECTS, RADAR_SCAN, typestore
-from tests.telemetry.ros2.gateway_ground import FRAME, mapping_text
-from tests.telemetry.ros2.test_gateway import Ground
+from foretwin.telemetry.ros_messages.parts import RADAR_SCAN
+from tests.telemetry.ros2.gateway_ground import mapping_text
+from tests.telemetry.ros2.passing_ground import PERCEPTION, PassingGround, S
 from tests.telemetry.ros2.test_merged_objects import user
 
-S, MS = 10**9, 10**6
-MORE = """
-[[in]]
-topic = "/perception/real"
-type = "autoware_perception_msgs/msg/PredictedObjects"
-channel = "objects"
+MORE = f"""{PERCEPTION}
 [[out]]
 topic = "/sensing/radar/front/objects_raw"
 type = "radar_msgs/msg/RadarScan"
@@ -45,25 +36,20 @@ RETURNS = np.array([[20.0, 0.25, 0.0, -3.5, 10.0]], np.float32)
 MOUNT = Mount(forward_m=3.6, left_m=0.5, up_m=0.5, yaw_deg=30.0)
 
 
-class Passing(Ground):
+class Passing(PassingGround):
     def __init__(self, *, flag: bool = True, anchor: Anchor | None = None) -> None:
-        super().__init__(enabled=True, flag=flag, more=MORE, anchor=anchor)
-        self.objects = Mailbox(10)
-        self.bus.subscribe("objects", self.objects, vehicle="ego")
+        super().__init__(MORE, flag=flag, anchor=anchor)
         self.goes_on()
 
-    def goes_on(self, passed_ms: float = 0.0) -> None:
-        self.now_ns += round(passed_ms * MS)
-        self.orders.say(self.bus, Authority(sent_mono_ns=self.now_ns))
-        self.step()
-
     def told(self, sensor: str = "front") -> None:
-        one = RadarList(stamp_ns=5 * S, returns=RETURNS, sensor=sensor, mount=MOUNT)
-        self.bus.publish("radar_list", one, run="r")
-        self.goes_on(100.0)
+        self.passes("radar_list", seen_by(sensor))
 
     def sent(self, topic: str = "/sensing/radar/front/objects_raw") -> list[Any]:
-        return [typestore().deserialize_cdr(one, RADAR_SCAN) for one in self.foreign.on(topic)]
+        return self.heard_on(topic, RADAR_SCAN)
+
+
+def seen_by(sensor: str) -> RadarList:
+    return RadarList(stamp_ns=5 * S, returns=RETURNS, sensor=sensor, mount=MOUNT)
 
 
 def test_a_list_goes_out_in_the_radars_frame() -> None:
@@ -88,30 +74,16 @@ def test_without_the_second_switch_only_what_is_below_foretwin_goes_out() -> Non
 def test_when_the_word_is_overdue_no_list_goes_to_the_vehicle() -> None:
     ground = Passing()
     ground.told()
-    ground.now_ns += 200 * MS
-    ground.bus.publish(
-        "radar_list", RadarList(stamp_ns=6 * S, returns=RETURNS, sensor="front"), run="r"
-    )
-    ground.step()
+    ground.is_overdue("radar_list", seen_by("front"))
     assert (len(ground.sent()), len(ground.sent("/foretwin/radar"))) == (1, 2)
 
 
 def test_whom_the_stack_perceives_in_our_lists_is_not_real() -> None:
     ground = Passing()
-    van = user("ghost", 20.0, 8.0, van=True, virtual=True)
-    ground.bus.publish("virtual_objects", RoadUsers(stamp_ns=5 * S, users=(van,)), run="r")
-    ground.goes_on()
+    ground.holds_a_van_that_is_none()
 
     def perceived(x: float, y: float) -> int:
-        seen = user("0" * 32, x, y, van=True, virtual=False)
-        ros = FROM_USERS[PREDICTED_OBJECTS](
-            RoadUsers(stamp_ns=5 * S, users=(seen,)), FRAME, ObjectSpread()
-        )
-        key = "0/perception/real/autoware_perception_msgs::msg::dds_::PredictedObjects_/RIHS01_x"
-        ground.arrive(key, bytes(typestore().serialize_cdr(ros, PREDICTED_OBJECTS)))
-        item = ground.objects.take()
-        assert item is not None
-        return len(item.message().users)
+        return ground.perceives([user("0" * 32, x, y, van=True, virtual=False)])
 
     assert perceived(20.6, 10.0) == 1
     ground.told()
@@ -122,9 +94,7 @@ def test_whom_the_stack_perceives_in_our_lists_is_not_real() -> None:
 def test_a_car_on_a_small_mirrored_lot_has_small_mirrored_lists() -> None:
     lot = AnchorPose(lat_deg=52.5, lon_deg=13.4, yaw_deg=0.0)
     anchor = Anchor(lot=lot, world=lot, scale=10.0, mirrored=True)
-    there = lot_from_world_message(
-        anchor, RadarList(stamp_ns=5 * S, returns=RETURNS, sensor="front", mount=MOUNT)
-    )
+    there = lot_from_world_message(anchor, seen_by("front"))
 
     assert there.returns[0] == pytest.approx([2.0, -0.25, 0.0, -0.35, 10.0])
     small = Mount(forward_m=0.36, left_m=-0.05, up_m=0.05, yaw_deg=-30.0)
