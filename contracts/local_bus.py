@@ -77,11 +77,9 @@ def private_files() -> Iterator[None]:
         os.umask(before)
 
 
-def member_of(
-    role: BusRole, process_id: str, *, vehicle_id: str = "*", name: str | None = None
-) -> BusMember:
+def member_of(role: BusRole, process_id: str, *, vehicle_id: str = "*") -> BusMember:
     """Return one of a run's processes as somebody on its bus."""
-    name = name or (process_id if process_id == role else f"{role}-{process_id}")
+    name = process_id if process_id == role else f"{role}-{process_id}"
     return BusMember(name, role, process_id, vehicle_id)
 
 

@@ -79,7 +79,7 @@ class RoadLines:
             return None
         if key_of(route.edges[place]) != key_of(edge) or self._turns(state, match):
             return None
-        course = _straight(route, place, s_m)
+        course = _straight(route, s_m)
         side = self._side(edge)
         off_m = match.lateral_m - side.left_m
         if course is None or abs(off_m) > _SURE * math.hypot(std_m, side.spread_m):
@@ -125,7 +125,7 @@ class RoadLines:
         return False
 
 
-def _straight(route: Route, place: int, s_m: float) -> float | None:
+def _straight(route: Route, s_m: float) -> float | None:
     """Return the route's direction at `s_m`, None where it bends there or ends."""
     begin, end = s_m - _HALF_WINDOW_M, s_m + _HALF_WINDOW_M
     first, last = route.index_at(begin), route.index_at(end)

@@ -29,7 +29,7 @@ class VehicleHandler:
             elif value in _WORDS:
                 in_force(parameters.vehicle, name)
             else:
-                parameters.check_set(name, _number(name, value))
+                parameters.check_set(name, _number(value))
         except UserError as refused:
             raise RefusedError(f"vehicle.{name}={value}: {refused}") from refused
 
@@ -47,12 +47,12 @@ class VehicleHandler:
         if value == "rollback":
             change = parameters.rollback(name, stamp_ns=stamp_ns)
         else:
-            change = parameters.set(name, _number(name, value), stamp_ns=stamp_ns)
+            change = parameters.set(name, _number(value), stamp_ns=stamp_ns)
         self.parameters.note([change])
         return Made(f"{before:.6g}", f"{change.value:.6g}, pinned")
 
 
-def _number(name: str, value: str) -> float:
+def _number(value: str) -> float:
     try:
         return float(value)
     except ValueError:

@@ -9,6 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 _EXCESSES = 512
+_STRETCH_S, _STRETCHES = 0.25, 120
+"""The least delayed samples of so many stretches are the window."""
+_LEAST_SPAN_S = _STRETCHES * _STRETCH_S / 3.0
+"""The drift is taken as zero until points are so far apart."""
+_MOST_DRIFT = 200e-6
 
 
 class _Earliest(NamedTuple):
@@ -29,14 +34,7 @@ class ClockEstimator:
     without steps; `ClockSteps` takes them out.
     """
 
-    def __init__(
-        self, *, window_s: float = 30.0, stretch_s: float = 0.25, max_drift_ppm: float = 200.0
-    ) -> None:
-        """The drift is taken as zero until a third of the window is full."""
-        self._window = round(window_s / stretch_s)
-        self._stretch_s = stretch_s
-        self._max_slope = max_drift_ppm * 1e-6
-        self._least_span_s = window_s / 3.0
+    def __init__(self) -> None:
         self._origin: tuple[int, int] | None = None
         self._earliest: deque[_Earliest] = deque()
         self._excess_s: deque[float] = deque(maxlen=_EXCESSES)
@@ -51,11 +49,11 @@ class ClockEstimator:
         received_s = (received_ns - self._origin[1]) * 1e-9
         delay_s = received_s - stamp_s
         self._newest_s = max(self._newest_s, stamp_s)
-        stretch = int(received_s // self._stretch_s)
+        stretch = int(received_s // _STRETCH_S)
         point = _Earliest(stretch, stamp_s, delay_s)
         if not self._earliest or stretch > self._earliest[-1].stretch:
             self._earliest.append(point)
-            while self._earliest[0].stretch <= stretch - self._window:
+            while self._earliest[0].stretch <= stretch - _STRETCHES:
                 self._earliest.popleft()
             self._fit()
         elif delay_s - self._slope * stamp_s < self._earliest[-1].delay_s - (
@@ -72,9 +70,9 @@ class ClockEstimator:
     def _fit(self) -> None:
         points = sorted((point.stamp_s, point.delay_s) for point in self._earliest)
         slope = 0.0
-        if points[-1][0] - points[0][0] >= self._least_span_s:
+        if points[-1][0] - points[0][0] >= _LEAST_SPAN_S:
             slope = _supporting_slope(points)
-        self._slope = min(max(slope, -self._max_slope), self._max_slope)
+        self._slope = min(max(slope, -_MOST_DRIFT), _MOST_DRIFT)
         self._level_s = min(delay - self._slope * stamp for stamp, delay in points)
 
     @property

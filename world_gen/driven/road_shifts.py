@@ -82,7 +82,7 @@ def moved_roads(edges: Mapping[int, RoadEdge], seen: Iterable[Seen]) -> Shifted:
     if not seen:
         return Shifted({}, {})
     grid = _grid(edges)
-    rows = _rows(grid, edges, seen)
+    rows = _rows(grid, seen)
     away_m, lane_m, std_m = np.array([(s.away_m, s.lane_m, s.std_m) for s in seen]).T
     ways = np.array([edges[s.edge].way_id for s in seen])
     wider: dict[int, float] = {}
@@ -152,7 +152,7 @@ def _with_points(edge: RoadEdge) -> tuple[Array, tuple[int, ...]]:
     return points_at(edge.xy_m, every_m), (*nodes, edge.node_ids[-1])
 
 
-def _rows(grid: _Grid, edges: Mapping[int, RoadEdge], seen: list[Seen]) -> scipy.sparse.csr_matrix:
+def _rows(grid: _Grid, seen: list[Seen]) -> scipy.sparse.csr_matrix:
     """Return (S, 2 P): what of the points' shifts is seen."""
     rows, columns, values = [], [], []
     for row, one in enumerate(seen):

@@ -47,7 +47,7 @@ def road_element(road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion)
     profile = child(made, "elevationProfile")
     for s, height in road.height.pieces:
         child(profile, "elevation", s=s, **height._asdict())
-    _add_lanes(made, road, side=side, version=version)
+    _add_lanes(made, road, version=version)
     return made
 
 
@@ -94,9 +94,7 @@ def _add_plan_view(made: Element, curve: Curve) -> None:
         child(item, "paramPoly3", **along, **aside, pRange="normalized")
 
 
-def _add_lanes(
-    made: Element, road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion
-) -> None:
+def _add_lanes(made: Element, road: OdrRoad, *, version: OpenDriveVersion) -> None:
     lanes = child(made, "lanes")
     if any(road.offset):
         child(lanes, "laneOffset", s=0, **road.offset._asdict())

@@ -112,7 +112,7 @@ def _junction(
             control=control,
             driving_side=side_of(legs),
             osm_nodes=tuple(sorted(nodes)),
-            name=_name(cluster, arms, around),
+            name=_name(cluster, arms),
         ),
         centre_xy_m=centre,
         nodes=nodes,
@@ -194,7 +194,7 @@ def _is_staggered(arms: tuple[ArmChains, ...]) -> bool:
     return False
 
 
-def _name(cluster: JunctionCluster, arms: tuple[ArmChains, ...], around: ClusterRoads) -> str:
+def _name(cluster: JunctionCluster, arms: tuple[ArmChains, ...]) -> str:
     """Return the ring's own name, else the names of the roads that meet."""
     names = dict.fromkeys(item.arm.name for item in arms if item.arm.name)
     if cluster.ring is not None:

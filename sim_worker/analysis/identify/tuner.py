@@ -32,6 +32,7 @@ from foretwin.sim_worker.analysis.identify.window import examine
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 
 _PERIOD_S = 0.01
+_WINDOW_NS, _EVERY_NS = 60_000_000_000, 10_000_000_000
 _LEAST_S = 20.0
 _STEP_STDS = 4.0
 """Between two intervals' middles, over their common standard deviation: chance is one in 16,000."""
@@ -41,7 +42,7 @@ _CHECK_NS, _LOOK_BACK_NS = 2_000_000_000, 30_000_000_000
 
 
 class Tuner(ParametersInForce):
-    """Identifies every `every_s` of drive time from the last `window_s`, and holds what counts.
+    """Identifies every 10 s of drive time from the last 60, and holds what counts.
 
     `handle` takes samples in any order and returns an Identification when one is due; `take` makes
     its acceptable values count. A parameter that departs from what was identified before is a step,
@@ -55,15 +56,12 @@ class Tuner(ParametersInForce):
         vehicle: VehicleParameters,
         vehicle_id: str,
         frame: LocalFrame,
-        window_s: float = 60.0,
-        every_s: float = 10.0,
         roads: Slopes | None = None,
     ) -> None:
         """`roads` in `frame` tell grades where measured altitude does not."""
         self._roads = roads
         super().__init__(vehicle=vehicle, vehicle_id=vehicle_id)
-        self._window_ns, self._every_ns = round(window_s * 1e9), round(every_s * 1e9)
-        self._recorder = MotionRecorder(frame=frame, keep_s=window_s + 5.0)
+        self._recorder = MotionRecorder(frame=frame, keep_s=_WINDOW_NS * 1e-9 + 5.0)
         self._from_ns: int | None = None
         self._due_ns = self._check_ns = self._begun_ns = 0
         self._doubted = False
@@ -78,7 +76,7 @@ class Tuner(ParametersInForce):
             return None
         if self._from_ns is None:
             self._from_ns = newest_ns
-            self._due_ns = newest_ns + max(self._every_ns, round(_LEAST_S * 1e9))
+            self._due_ns = newest_ns + max(_EVERY_NS, round(_LEAST_S * 1e9))
         if newest_ns >= self._check_ns:
             self._check_ns = newest_ns + _CHECK_NS
             step = self._find_step(newest_ns)
@@ -88,14 +86,14 @@ class Tuner(ParametersInForce):
             self._doubted = step is not None
         if newest_ns < self._due_ns or self._doubted:
             return None
-        self._due_ns = newest_ns + self._every_ns
-        self._from_ns = max(self._from_ns, newest_ns - self._window_ns)
+        self._due_ns = newest_ns + _EVERY_NS
+        self._from_ns = max(self._from_ns, newest_ns - _WINDOW_NS)
         result = self._examined(newest_ns)
         noticed = self._steps(result)
         if not noticed:
             return result
         # What came before the step is of another car.
-        return self._anew(result, noticed, since_ns=newest_ns - self._every_ns)
+        return self._anew(result, noticed, since_ns=newest_ns - _EVERY_NS)
 
     def _examined(self, newest_ns: int) -> Identification:
         record = self._recorder.record(self._from_ns, newest_ns, period_s=_PERIOD_S)

@@ -63,12 +63,11 @@ class SideBySide:
         *,
         vehicle_id: str,
         place: Callable[[], DrivePlace],
-        limits: Limits | None = None,
     ) -> None:
         self._frame = frame
         self._vehicle_id = vehicle_id
         self._place = place
-        self._limits = limits or Limits()
+        self._limits = Limits()
         self._lowered = self._limits.lowered()
         self._driven: deque[tuple[int, tuple[float, float, float, float]]] = deque()
         self._last_plan_ns: int | None = None

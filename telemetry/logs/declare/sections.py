@@ -67,7 +67,7 @@ class Sections:
                 if section == "imu":
                     given |= self._upright(sensors, given, said[section])
                     given["axes"] = "forward-left-up"
-                given |= self._rows(section, given, sensors.late.get(section), said[section])
+                given |= self._rows(given, sensors.late.get(section), said[section])
                 others = {n for key, ns in sensors.others.items() if key.startswith(section)
                           for n in ns}  # fmt: skip
                 if others:
@@ -128,7 +128,7 @@ class Sections:
         return {"accel_z": col(name, given["accel_x"].unit, negate=mean_g < 0.0)}
 
     def _rows(
-        self, section: str, given: dict[str, Any], late: Lateness | None, said: list[str]
+        self, given: dict[str, Any], late: Lateness | None, said: list[str]
     ) -> dict[str, Any]:
         """Return which rows are new and how late they are, and mark the columns as used."""
         names = [column.column for column in given.values() if isinstance(column, Column)]
@@ -174,7 +174,7 @@ class Sections:
         if rate is not None and not taken and self.together([fit.column, rate.column]):
             given["yaw_rate"] = col(rate.column, rate.unit, negate=rate.negate)
             said.append(_said(rate))
-        given |= self._rows("heading", given, sensors.late.get("heading"), said)
+        given |= self._rows(given, sensors.late.get("heading"), said)
         if not self._steady(fit):
             given["min_speed_mps"] = _COURSE_MPS
             said.append("wanders or is nought while the car stands, or was not seen standing")

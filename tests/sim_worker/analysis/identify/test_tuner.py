@@ -33,8 +33,8 @@ CAR = read_parameters().car
 Sample = tuple[str, Any]
 
 
-def tuner(**options: float) -> Tuner:
-    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", frame=FRAME, **options)  # type: ignore[arg-type]
+def tuner() -> Tuner:
+    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", frame=FRAME)
 
 
 def through(taken: Tuner, samples: list[Sample]) -> list[Identification]:
@@ -86,7 +86,7 @@ def test_a_steering_ratio_that_changes_is_noticed_and_identified_anew() -> None:
             wheel = moved.steering_wheel_rad * 18.0 / 15.3
             moved = msgspec.structs.replace(moved, steering_wheel_rad=wheel)
         later.append((channel, moved))
-    taken = tuner(window_s=40.0)
+    taken = tuner()
     told = through(taken, once + later)
     noticed = [found for found in told if "steering_ratio" in found.step_noticed]
     assert noticed
