@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import cross, left_of
+from foretwin.geometry.polyline import cross, left_of, turn_rad, units
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.quintic_curves import control_vectors, displacements
 from foretwin.geometry.steering import MAX_CURVATURE_PM
@@ -15,6 +17,9 @@ _AHEAD_M, _PACE_M, _MIDDLE_PACE_M = 15.0, 12.0, 22.0
 there. By search the shortest turn of this kind whose radius is 4 m."""
 _PER_GAP = 0.67
 """So much shorter is each for every metre between the lanes."""
+_BOW_RAD = math.radians(135.0)
+_BOW_RADIUS_M, _BOW_POINTS = 4.5, 8
+"""A curve with these corners has a radius of some 4 m."""
 _REPEAT_M = 0.1
 _AT = np.concatenate([[0.0, 0.03], np.linspace(0.0, 1.0, 16)[1:]])
 """Where points lie on each half, one close to the lane, so that paths leave along it."""
@@ -58,3 +63,32 @@ def _points(start: Array, vectors: Array, *, backward: bool = False) -> Array:
     many = np.repeat(vectors, len(at), axis=1)
     found = displacements(many, np.tile(at, len(start)))
     return np.asarray(start[:, None] + found.reshape(len(start), len(at), 2))
+
+
+def with_bows(line: Array) -> Array:
+    """Return a line (N, 2) with a bow beyond each point where it turns back by more than 135°.
+
+    The corners of the bow, but for those next to the line's ends none is left, are for a curve
+    that passes between them.
+    """
+    steps = np.diff(line, axis=0)
+    ways, step_m = units(steps), np.hypot(steps[:, 0], steps[:, 1])
+    bends = turn_rad(ways[:-1], ways[1:])
+    has_room = np.minimum(step_m[:-1], step_m[1:]) > _BOW_RADIUS_M
+    sharp = np.nonzero((np.abs(bends) > _BOW_RAD) & has_room)[0]
+    # Next to its ends it lies on its lanes.
+    sharp = sharp[(sharp > 0) & (sharp < len(bends) - 1)]
+    if not len(sharp):
+        return line
+    side = np.sign(bends[sharp])[:, None]
+    ahead = units(ways[sharp] - ways[sharp + 1])
+    # From the side away from the turn around the middle to the other.
+    at = np.linspace(-0.6 * math.pi, 0.6 * math.pi, _BOW_POINTS)[:, None, None]
+    aside = side * left_of(ahead)
+    middle = line[sharp + 1] + 2.0 * _BOW_RADIUS_M * ahead
+    bows = middle + _BOW_RADIUS_M * (np.cos(at) * ahead + np.sin(at) * aside)
+    pieces = np.split(line, sharp + 1)
+    joined = [pieces[0]]
+    for bow, piece in zip(bows.transpose(1, 0, 2), pieces[1:], strict=True):
+        joined += [bow, piece[1:]]
+    return np.concatenate(joined)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -102,3 +104,47 @@ def test_a_transition_around_a_bend_leaves_along_the_next_lanes(bend_m):
 def test_lanes_meet_in_a_bend_between_two_short_pieces():
     world = _world(ONE_WAY, ONE_WAY, at=(25.0, -1.0), far=(25.4, 20.0))
     assert _leading_on(world) == {"w11.f0": {"w12.f0"}, "w11.f1": {"w12.f1"}}
+
+
+@pytest.mark.parametrize(
+    ("at", "far", "before_m", "behind_m"),
+    [
+        ((60.0, 0.0), (140.0, 0.0), 11.375, 11.375),
+        ((60.0, 0.0), (80.0, 0.0), 16.75, 6.0),  # what a short road has no room for
+        ((60.0, 0.0), (70.0, 0.0), 18.0, 3.0),  # and no more than a share of each
+    ],
+)
+def test_a_lane_more_begins_behind_a_taper_seven_times_as_long_as_it_is_wide(
+    at, far, before_m, behind_m
+):
+    wider = ONE_WAY | {"placement": "right_of:1", "lanes": "3"}
+    world = _world(ONE_WAY | {"placement": "right_of:1"}, wider, at=at, far=far)
+    lanes = {lane.id: lane for lane in world.lanes}
+    paths = [c for c in world.connections if c.place_id == "1"]
+    widest = max(paths, key=lambda c: abs(c.centerline[-1, 1] - c.centerline[0, 1]))
+    start, end = lanes[widest.from_lane_id].centerline[-1], lanes[widest.to_lane_id].centerline[0]
+    assert abs(end[1] - start[1]) == pytest.approx(3.25, abs=0.01)
+    assert at[0] - start[0] == pytest.approx(before_m, abs=0.1)
+    assert end[0] - at[0] == pytest.approx(behind_m, abs=0.1)
+    if before_m + behind_m > 22.0:
+        steps = np.diff(widest.centerline, axis=0)
+        assert np.abs(np.arctan2(steps[:, 1], steps[:, 0])).max() < math.radians(16.0)
+
+
+@pytest.mark.parametrize(
+    ("tags", "end_m"),
+    [
+        ({"highway": "traffic_signals", "traffic_signals:direction": "forward"}, 52.3),
+        ({"highway": "crossing", "crossing": "zebra"}, 54.0),  # 6 m before the place in any case
+        ({"highway": "give_way", "direction": "backward"}, 48.6),  # for those who come
+    ],
+)
+def test_a_taper_leaves_lanes_to_a_light_and_to_a_crossing(tags, end_m):
+    nodes = {0: (0.0, 0.0), 9: (52.0, 0.0), 1: (60.0, 0.0), 2: (140.0, 0.0)}
+    nodes |= {3: (-90.0, 0.0), 4: (0.0, -90.0)}
+    wider = ONE_WAY | {"placement": "right_of:1", "lanes": "3"}
+    ways = [(11, [0, 9, 1], ONE_WAY | {"placement": "right_of:1"}), (12, [1, 2], wider)]
+    ways += [(13, [3, 0], WIDE), (14, [4, 0], STREET)]
+    world = world_of(drawn_map(nodes, ways, node_tags={9: tags}))
+    ends = [lane.centerline[-1, 0] for lane in world.lanes if lane.id.startswith("w11.")]
+    assert max(ends) == pytest.approx(end_m, abs=0.1)

@@ -159,3 +159,18 @@ def test_every_junction_becomes_a_world_and_a_model(data_dir, name):
         except Exception as error:
             failures.append(f"{junction.summary.id}: {error!r}")
     assert not failures, f"{len(failures)} of {len(junctions)}: {failures[:5]}"
+
+
+@pytest.mark.real_data
+def test_who_goes_round_an_island_into_the_other_carriageway_turns_back(data_dir):
+    index, junctions = _place(data_dir, "moritzplatz")
+    (junction,) = (j for j in junctions if 1285251502 in j.nodes)
+    world = _build(index, junction)
+    turns = {
+        c.turn
+        for c in world.connections
+        if c.from_lane_id.startswith("w4612756.1287617237.1285251502")
+        and c.to_lane_id.startswith("w4612758.29217276.1285251472")
+    }
+    # By 210 degrees to the left, though both lanes have an angle of 150 to the right.
+    assert turns == {"u_turn"}

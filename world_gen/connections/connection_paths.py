@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.back_turns import back_turns
+from foretwin.geometry.back_turns import back_turns, with_bows
 from foretwin.geometry.polyline import (
     cross,
     offset,
@@ -32,6 +32,9 @@ _LONGEST_CHORD_M = 8.0
 _LANE_BENDS_PM = 0.02, 0.12
 """Lanes that bend less are all but straight; what bends more is a kink of the map."""
 _BACK_RAD = math.radians(165.0)
+"""Who turns farther may swing out first."""
+_ON_THE_SPOT_M = 0.75
+"""No car turns so tightly, be it in several moves."""
 
 
 def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
@@ -51,10 +54,17 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     turns = turn_curves(begins, headings, ends, end_headings, bend_pm=bends, end_bend_pm=end_bends)
     paths = turns.lines.split()
     back = np.abs(turn_rad(headings, end_headings)) > _BACK_RAD
-    back &= np.array([c.turn == "u_turn" for c in connections])
-    tight = np.nonzero(back & (turns.radius_m < LEAST_GRID_RADIUS_M))[0]
-    poses = (begins, headings, ends, end_headings)
-    drawn = dict(zip(tight.tolist(), back_turns(*(a[tight] for a in poses)).split(), strict=True))
+    # A bow takes room beside the road: who does not mean to turn back gets it but in need.
+    meant = np.array([c.turn == "u_turn" for c in connections])
+    on_the_spot = (turns.radius_m > 0.0) & (turns.radius_m < _ON_THE_SPOT_M)
+    back &= np.where(meant, turns.radius_m < LEAST_GRID_RADIUS_M, on_the_spot)
+    tight = np.nonzero(back)[0]
+    drawn: dict[int, Array] = {}
+    if len(tight):
+        poses = (begins, headings, ends, end_headings)
+        bows = back_turns(*(a[tight] for a in poses)).split()
+        wider = _tightest_m(bows) > turns.radius_m[tight]
+        drawn |= {i: bow for i, bow, ok in zip(tight.tolist(), bows, wider, strict=True) if ok}
     drawn |= paths_along_inner_lanes(connections, around)
     long = [i for i, c in enumerate(connections) if i not in drawn and _inner_m(c) > _LONG_PATH_M]
     guided = [
@@ -151,4 +161,5 @@ def _along_path(
             if (p - points[-1]) @ (p - begin) > 0.0 and np.hypot(*(p - points[-1])) > 3.0
         )
     points.extend([finish - 2.0 * end_heading, finish])
-    return without_repeats(np.array(points))
+    line = without_repeats(np.array(points))
+    return with_bows(line) if connection.turn == "u_turn" else line

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import heapq
 import math
+from itertools import pairwise
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts.world import DrivingSide, Turn
+from foretwin.geometry.bends import MIN_STEP_M
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, opposed
@@ -16,6 +19,8 @@ from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
 STRAIGHT_RAD = math.radians(45.0)
 U_TURN_RAD = math.radians(150.0)
+_FARTHEST_BACK_RAD = math.radians(240.0)
+"""Who turns farther, round a loop, goes on to the other side and not back."""
 _NOSE_COS = math.cos(math.radians(60.0))
 
 
@@ -152,10 +157,27 @@ def _with_turns(
             toward.edge.index == leg.edge.index
             or _parting(toward, leg)
             or (abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node))
+            or math.pi < abs(_turned_rad(toward, path, leg)) < _FARTHEST_BACK_RAD
         ):
             turn = "u_turn"
         found.append(Movement(toward=toward, away=leg, inside=path, turn=turn, angle_rad=angle))
     return found
+
+
+def _turned_rad(toward: DirectedEdge, path: tuple[DirectedEdge, ...], away: DirectedEdge) -> float:
+    """Return how far is turned in all along the roads inside a place, positive to the left.
+
+    That is more than half a turn where these lead around an island.
+    """
+    if not path:
+        return 0.0
+    into = heading_out(toward.back)
+    heads = [(-into[0], -into[1])]
+    for part in path:
+        steps = np.diff(part.xy_m, axis=0).tolist()
+        heads += [(x, y) for x, y in steps if math.hypot(x, y) > MIN_STEP_M]
+    heads.append(heading_out(away))
+    return sum(math.atan2(x * v - y * u, x * u + y * v) for (x, y), (u, v) in pairwise(heads))
 
 
 def _turn(angle: float, straightest: float, angles: list[float]) -> Turn:

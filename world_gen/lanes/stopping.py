@@ -46,6 +46,16 @@ def stop_line_m(leg: DirectedEdge, cluster: Cluster, node_tags: NodeTags) -> flo
     return line_m - LINE_SETBACK_M
 
 
+def before_crossings_m(leg: DirectedEdge, node_tags: NodeTags) -> float:
+    """Return how far along a leg the first crossing on foot begins: its line spans lanes."""
+    if not any(node in node_tags for node in leg.node_ids[1:]):
+        return math.inf
+    at_m = arc_lengths(leg.xy_m).tolist()
+    tagged = ((node_tags.get(node, {}), m) for node, m in zip(leg.node_ids, at_m, strict=False))
+    crossings = (m for tags, m in tagged if tags.get("highway") == "crossing" or "crossing" in tags)
+    return max(min(crossings, default=math.inf) - BEFORE_CROSSING_M, 0.0)
+
+
 def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:
     """Return whether a sign or light is for those who drive along (true) the way's nodes.
 

@@ -14,7 +14,7 @@ from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.fork_trims import fork_trims
 from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, lateral_positions
-from foretwin.world_gen.lanes.stopping import NodeTags, stop_line_m
+from foretwin.world_gen.lanes.stopping import NodeTags, before_crossings_m, stop_line_m
 from foretwin.world_gen.lanes.turning_room import turning_trims
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
@@ -27,8 +27,14 @@ _OWN_START_M = 15.0
 """What overlaps a leg farther out belongs to another place, unless it goes on from here."""
 TAPER_M = 6.0
 """Lanes end so far before, and begin so far behind, a place where their number changes."""
+TAPER_PER_SHIFT = 7.0
+"""So many times as long as lanes shift to the side is what lies between their ends, where roads
+have room for it: paths then turn from their lanes by 15°, a smoothest shift by 15/8 of its mean
+slope (Flash and Hogan 1985)."""
 SHARPEST_BEND_COS = math.cos(math.radians(75.0))
 """Lanes run on through bends; sharper ones are driven as turns."""
+TAPER_SHARE = 0.3
+"""Of an edge, that one taper may take."""
 MOST_CUT, MOST_WANTED = 0.8, 0.6
 """Shares of an edge that its two ends may take: to clear other roads, and for turns to be wider."""
 
@@ -48,6 +54,7 @@ def trims(
     """
     least: dict[tuple[int, bool], float] = {}
     wanted: dict[tuple[int, bool], float] = {}
+    tapers_m: dict[tuple[int, bool], float] = {}
     by_size: dict[int, list[tuple[Cluster, Array]]] = {}
     wide = [cluster for cluster in clusters if len(cluster.nodes) > 1]
     areas = dict(zip([c.key for c in wide], _area_trims(wide, edges, sections), strict=True))
@@ -55,6 +62,8 @@ def trims(
     for cluster in clusters:
         if cluster.plain:
             values = _plain_trims(cluster, sections, shifts_m, heads)
+            if values is not None:
+                tapers_m |= _tapers_m(cluster, sections, shifts_m, node_tags)
         else:
             values = areas[cluster.key] if len(cluster.nodes) > 1 else nodes[cluster.key]
         driven = np.array([driven_m.get(leg.key, 0.0) for leg in cluster.legs])
@@ -74,6 +83,8 @@ def trims(
     for cluster in clusters:
         for leg in cluster.legs:
             wanted.setdefault(leg.key, 0.0)
+    for key, metres in tapers_m.items():
+        wanted[key] = max(wanted[key], metres)
     for key, metres in fork_trims(clusters, sections, heads).items():
         least[key] = max(least.get(key, 0.0), metres)
         wanted[key] = max(wanted[key], metres)
@@ -110,17 +121,74 @@ def _plain_trims(
 ) -> Array | None:
     """Lanes of one road run on where they fit (None); where lanes change there is a taper."""
     first, second = cluster.legs
-    a, b = sections[first.edge.index], sections[second.edge.index]
-    by_first, by_second = (
-        shifts_m.get(leg.edge.index, (0.0, 0.0))[int(leg.reverse)] for leg in cluster.legs
-    )
-    fits = lateral_positions(first, a, outward=False, shift_m=by_first) == lateral_positions(
-        second, b, outward=True, shift_m=by_second
-    )
+    before, behind = _positions(cluster, sections, shifts_m)
+    fits = before == behind
     if fits and -dot(heads[first.key], heads[second.key]) > SHARPEST_BEND_COS:
         return None
-    room = (0.0 if fits else min(TAPER_M, 0.3 * leg.edge.length_m) for leg in cluster.legs)
+    room = (0.0 if fits else min(TAPER_M, TAPER_SHARE * leg.edge.length_m) for leg in cluster.legs)
     return np.array(list(room))
+
+
+def _positions(
+    cluster: Cluster,
+    sections: Mapping[int, CrossSection],
+    shifts_m: Mapping[int, tuple[float, float]],
+) -> tuple[list[tuple[float, bool]], list[tuple[float, bool]]]:
+    """Return where lanes lie before and behind a place where one road goes on, seen along it."""
+    before, behind = (
+        lateral_positions(
+            leg,
+            sections[leg.edge.index],
+            outward=outward,
+            shift_m=shifts_m.get(leg.edge.index, (0.0, 0.0))[int(leg.reverse)],
+        )
+        for leg, outward in zip(cluster.legs, (False, True), strict=True)
+    )
+    return before, behind
+
+
+def _tapers_m(
+    cluster: Cluster,
+    sections: Mapping[int, CrossSection],
+    shifts_m: Mapping[int, tuple[float, float]],
+    node_tags: NodeTags,
+) -> dict[tuple[int, bool], float]:
+    """Return what the lanes of both legs give way, by leg, so that none has to swerve.
+
+    What one leg has no room for the other one gives.
+    """
+    before, behind = _positions(cluster, sections, shifts_m)
+    length_m = TAPER_PER_SHIFT * max(
+        _farthest_m(
+            np.array([at_m for at_m, along in before if along == driven]),
+            np.array([at_m for at_m, along in behind if along == driven]),
+        )
+        for driven in (False, True)
+    )
+    rooms_m = [
+        min(
+            TAPER_SHARE * leg.edge.length_m,
+            stop_line_m(leg, cluster, node_tags),
+            before_crossings_m(leg, node_tags),
+            MAX_TRIM_M,
+        )
+        for leg in cluster.legs
+    ]
+    each_m = [min(length_m / 2.0, room_m) for room_m in rooms_m]
+    return {
+        leg.key: min(length_m - other_m, room_m)
+        for leg, room_m, other_m in zip(cluster.legs, rooms_m, each_m[::-1], strict=True)
+    }
+
+
+def _farthest_m(before: Array, behind: Array) -> float:
+    """Return how far lanes, from the right, lie aside of those that they pass into."""
+    if not (len(before) and len(behind)):
+        return 0.0
+    if len(before) == len(behind):
+        return float(np.abs(before - behind).max())
+    gaps = np.abs(before[:, None] - behind)
+    return float(max(gaps.min(axis=0).max(), gaps.min(axis=1).max()))
 
 
 def _node_trims(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from tests.world_gen.drawn_maps import roundabout, world_of
+from tests.world_gen.drawn_maps import AVENUE, STREET, drawn_map, roundabout, world_of
+from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 
 
 def test_cars_go_round_a_ring_without_straightening_at_its_nodes():
@@ -15,3 +18,20 @@ def test_cars_go_round_a_ring_without_straightening_at_its_nodes():
     for c in round_it:
         from_centre_m = np.hypot(*c.centerline.T)
         assert np.ptp(from_centre_m) < 0.1
+
+
+def test_who_turns_sharply_into_a_road_beside_swings_out_instead_of_turning_on_the_spot():
+    nodes = {0: (0.0, 0.0), 1: (100.0, 0.0), 2: (99.0, 14.0), 3: (-100.0, 0.0)}
+    ways = [(11, [0, 1], STREET), (12, [0, 2], AVENUE), (13, [0, 3], STREET)]
+    world = world_of(drawn_map(nodes, ways))
+    lanes = {lane.id: lane for lane in world.lanes}
+    sharp = [
+        c
+        for c in world.connections
+        if {lanes[c.from_lane_id].osm_way, lanes[c.to_lane_id].osm_way} == {11, 12}
+    ]
+    assert {c.turn for c in sharp} == {"left", "right"}
+    for c in sharp:
+        start, end = lanes[c.from_lane_id].centerline, lanes[c.to_lane_id].centerline
+        assert max(end_bends_rad(start, c.centerline, end)) < math.radians(1.0)
+        assert tightest_radius_m(c.centerline) > 2.5
