@@ -61,7 +61,7 @@ def why_undecided(
     if undecided:
         return undecided
     if driven_by == "commands":
-        return "nothing shows that the car or the model departs"
+        return "nothing shows that car or model departs beyond what parameters leave open"
     if driven_by == "estimated commands":
         return (
             "commands were not recorded: the gap is that of commands estimated from the motion "

@@ -50,7 +50,7 @@ def _why_none(gap: dict[str, Any]) -> str:
         return "whether vehicle or model departs cannot be said: no commands were recorded"
     if gap["alarms"]:
         return "the gap was beyond its limits, and nothing shows whether by vehicle or model"
-    return "nothing shows that vehicle or model departs"
+    return "nothing shows that vehicle or model departs beyond what parameters leave open"
 
 
 def summary_lines(
