@@ -131,6 +131,13 @@ def test_a_lane_more_begins_behind_a_taper_seven_times_as_long_as_it_is_wide(
         assert np.abs(np.arctan2(steps[:, 1], steps[:, 0])).max() < math.radians(16.0)
 
 
+def test_a_lane_that_ends_does_so_over_as_long_a_taper():
+    narrow = ONE_WAY | {"placement": "right_of:1"}
+    world = _world(narrow | {"lanes": "3"}, narrow, at=(60.0, 0.0), far=(140.0, 0.0))
+    ends = [lane.centerline[-1, 0] for lane in world.lanes if lane.id.startswith("w11.")]
+    assert ends == pytest.approx([60.0 - 11.375] * 3, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("tags", "end_m"),
     [
