@@ -30,7 +30,7 @@ import msgspec
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.drive import TimeBase
 from foretwin.contracts.toml_file import load_toml
-from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs import table_times, units
 from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
 from foretwin.telemetry.logs.log import LogError
 
@@ -65,7 +65,10 @@ class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     base: TimeBase
     """Whether it counts from 1970, from some start of the clock, or from the log's zero."""
     unit: str | None = None
-    """Needed: s, ms, us, ns, or iso8601 for dates (UTC where they name no zone)."""
+    """Needed: s, ms, us, ns, iso8601 for dates (UTC where they name no zone), or another of
+    table_times.UNITS."""
+    date: str | None = None
+    """Column of the day, where `column` tells the time of day alone."""
 
 
 class PositionSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -194,6 +197,8 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """What stands before the decimals of a number."""
     header: bool = True
     """Without a line of names the columns are called c1, c2 and so on."""
+    skip_lines: int = 0
+    """So many lines stand before the line of names, or before the first row without one."""
     speed: SpeedSection | None = None
     """Columns of speed."""
     heading: HeadingSection | None = None
@@ -229,7 +234,9 @@ def read_declaration(path: Path) -> Declaration:
 
 
 def _check(declaration: Declaration) -> None:
-    _known_unit("time", declaration.time, (*units.TIME_NS, units.ISO_TIME))
+    _known_unit("time", declaration.time, table_times.UNITS)
+    if declaration.time.date is not None and declaration.time.unit not in table_times.TEXTS:
+        raise ValueError("[time] date belongs to dates: " + ", ".join(table_times.TEXTS[:-1]))
     if declaration.position is not None:
         _check_position(declaration.position, declaration.heading)
     elif declaration.heading is not None and declaration.heading.north == "grid":
