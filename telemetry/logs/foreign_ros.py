@@ -4,8 +4,8 @@ Topics are chosen by message type, one topic per stream of `ros_messages.foreign
 that occurs, and among its topics the one with the most messages. The stamp is that of the header,
 and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
 a declaration tells the origin of their frame. Where static transforms lead from base_link to the
-frame of the fixes, the antenna's place is theirs. Without any fixes an Odometry in `map` gives
-positions and headings, where that frame is placed.
+frame of the fixes, the antenna's place is theirs; so are an inertial unit's axes (mountings.py).
+Without any fixes an Odometry in `map` gives positions and headings, where that frame is placed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,12 @@ from foretwin.telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Log, Log
 from foretwin.telemetry.logs.map_origin import RecordingDeclaration
 from foretwin.telemetry.logs.mcap_records import Contents, Record
 from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.mountings import (
+    NOT_UPRIGHT,
+    ImuMounting,
+    imu_mounting,
+    static_tree,
+)
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder
 from foretwin.telemetry.ros_messages.foreign import (
     FOREIGN,
@@ -29,9 +35,8 @@ from foretwin.telemetry.ros_messages.foreign import (
     channel_of,
     stamp_of,
 )
-from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY, TF
+from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY
 from foretwin.telemetry.ros_messages.status import StatusJoiner
-from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 WINDOW_NS = 2_000_000_000
 """How late a message may lie in its file and still be put in order."""
@@ -62,11 +67,18 @@ def open_foreign(
             + (hint if ODOMETRY in kinds and frame is None else "")
         )
     decode = decoder(recording, {one.topic for one in chosen})
+    tree = static_tree(recording)
+    imu = next((one.topic for one in chosen if "imu" in one.how.channels), None)
+    mounting = ImuMounting() if imu is None else imu_mounting(recording, imu, decode, tree)
+    if not mounting.upright:
+        chosen = [one for one in chosen if one.topic != imu]
 
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if contents.cut_short:
             skipped[FILE_CUT_SHORT] += 1
-        samples = _foreign_samples(recording, chosen, decode, frame, skipped)
+        if not mounting.upright:
+            skipped[NOT_UPRIGHT] += contents.counts[imu or ""]
+        samples = _foreign_samples(recording, chosen, decode, frame, mounting, skipped)
         return _joined(reordered(samples, window_ns=WINDOW_NS))
 
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
@@ -75,8 +87,8 @@ def open_foreign(
     antenna_m = declared.body_from_antenna_m
     if positions.how is POSE:
         antenna_m = (0.0, 0.0, 0.0)
-    elif antenna_m is None:
-        antenna_m = _antenna_m(recording, antenna_frame)
+    elif antenna_m is None and tree is not None and antenna_frame:
+        antenna_m = tree.place_of(antenna_frame, within=BASE_FRAME)
     return Log(
         info=drive.VehicleInfo(
             vehicle_id="car",
@@ -138,30 +150,12 @@ def _first_fix(recording: RosRecording, topic: str, decode: Decode) -> tuple[int
     return 0, ""
 
 
-def _antenna_m(recording: RosRecording, antenna_frame: str) -> drive.Vector3 | None:
-    schemas = recording.contents.schemas
-    topics = {
-        topic
-        for topic, schema in schemas.items()
-        if schema.name == TF and topic.endswith("tf_static")
-    }
-    if not topics or not antenna_frame:
-        return None
-    tree = TransformTree()
-    try:
-        decode = decoder(recording, topics)
-        for record in recording.chosen(topics, Counter()):
-            tree.add(decode(record))
-    except Exception:  # a place that cannot be read is one that is not known
-        return None
-    return tree.place_of(antenna_frame, within=BASE_FRAME)
-
-
 def _foreign_samples(
     recording: RosRecording,
     chosen: Sequence[_Chosen],
     decode: Decode,
     frame: LocalFrame | None,
+    mounting: ImuMounting,
     skipped: Counter[str],
 ) -> Iterator[Sample]:
     readers: dict[str, list[Foreign]] = {}
@@ -183,6 +177,8 @@ def _foreign_samples(
                 skipped[UNREADABLE_ROW] += 1
             else:
                 for message in messages:
+                    if isinstance(message, drive.ImuSample):
+                        message = mounting.in_the_cars_axes(message)
                     yield channel_of(message), message
 
 

@@ -35,6 +35,7 @@ TIME_DOUBLED = "time doubled"
 TIME_BEFORE_ZERO = "time before zero"
 UNREADABLE_ROW = "unreadable row"
 FILE_CUT_SHORT = "file cut short"
+PART_MISSING = "part of the recording that is not there"
 LAST_LINE_OPEN = "last line without its end, of which digits may be missing"
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import msgspec
 
-from foretwin.telemetry.logs.log import FILE_CUT_SHORT, Log, Sample
+from foretwin.telemetry.logs.log import FILE_CUT_SHORT, PART_MISSING, Log, Sample
 
 LATE_NS = 30_000_000_000
 """What a recorder catches up on, in a part of its own, is older than the end of the part before by
@@ -67,8 +67,11 @@ def together(first: Log, second: Log, *, stamp_ns: Callable[[int], int]) -> Log:
     return Log(info=msgspec.structs.replace(first.info, sends=sends), read=read)
 
 
-def in_parts(logs: Sequence[Log], *, unreadable: int = 0) -> Log:
-    """Return the parts of one recording as one drive; `unreadable` parts count as cut short."""
+def in_parts(logs: Sequence[Log], *, unreadable: int = 0, missing: int = 0) -> Log:
+    """Return the parts of one recording as one drive.
+
+    `unreadable` parts count as cut short, those that are not there as `missing`.
+    """
     ends = [log.info.end_stamp_ns for log in logs]
     sends = tuple(dict.fromkeys(name for log in logs for name in log.info.sends))
     info = msgspec.structs.replace(
@@ -80,6 +83,8 @@ def in_parts(logs: Sequence[Log], *, unreadable: int = 0) -> Log:
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if unreadable:
             skipped[FILE_CUT_SHORT] += unreadable
+        if missing:
+            skipped[PART_MISSING] += missing
         parts = (log.read(skipped) for log in logs)
         return reordered(itertools.chain.from_iterable(parts), window_ns=LATE_NS)
 

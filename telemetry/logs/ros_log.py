@@ -61,9 +61,11 @@ def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     first = first_name(path)
     later = segments_of(first)[1:] if first_left(first) == path else []
     parts = [path, *(part for part in later if _is_part(first, part))]
-    if len(parts) > 1:
+    oldest = first_left(first) == path and (path == first or _is_part(first, path))
+    missing = (number_of(first, parts[-1]) or 1) - len(parts) if oldest else 0
+    if len(parts) > 1 or missing:
         check_undeclared(path, declaration, "foretwin's own recording")
-        return _open_parts(parts)
+        return _open_parts(parts, missing=missing)
     recording = mcap_recording(path)
     own = _metadata_of(recording)
     if FORMAT_METADATA in recording.contents.metadata:
@@ -81,8 +83,11 @@ def _is_part(first: Path, path: Path) -> bool:
     return said == str(number_of(first, path))
 
 
-def _open_parts(parts: Sequence[Path]) -> Log:
-    """Open the parts of a recording as one drive; a kill can leave one with nothing in it yet."""
+def _open_parts(parts: Sequence[Path], *, missing: int) -> Log:
+    """Open the parts of a recording as one drive; a kill can leave one with nothing in it yet.
+
+    How many are `missing`, before the first that is there or between them, is said.
+    """
     recordings, logs, problems = [], [], []
     for part in parts:
         try:
@@ -98,7 +103,7 @@ def _open_parts(parts: Sequence[Path]) -> Log:
             problems.append(problem)
     if not logs:
         raise problems[0]
-    return in_parts(logs, unreadable=len(problems))
+    return in_parts(logs, unreadable=len(problems), missing=missing)
 
 
 def _metadata_of(recording: RosRecording) -> _OwnMetadata:

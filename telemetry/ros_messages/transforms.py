@@ -24,15 +24,24 @@ class TransformTree:
 
     def place_of(self, child: str, *, within: str) -> Vector3 | None:
         """Return the origin of `child` in the axes of `within`, metres; None where unconnected."""
+        found = self._within_from(child, within)
+        if found is None:
+            return None
+        x, y, z = found[:3, 3].tolist()
+        return (x, y, z)
+
+    def turn_of(self, child: str, *, within: str) -> Array | None:
+        """Return the matrix (3, 3) from the axes of `child` into those of `within`, or None."""
+        found = self._within_from(child, within)
+        return None if found is None else found[:3, :3]
+
+    def _within_from(self, child: str, within: str) -> Array | None:
         child, within = child.lstrip("/"), within.lstrip("/")
         to_child, to_within = self._to_root(child), self._to_root(within)
         if child == within:
-            return (0.0, 0.0, 0.0)
+            return np.eye(4)
         shared = next((name for name in to_child if name in to_within), None)
-        if shared is None:
-            return None
-        place = np.linalg.solve(to_within[shared], to_child[shared])[:3, 3]
-        return (float(place[0]), float(place[1]), float(place[2]))
+        return None if shared is None else np.linalg.solve(to_within[shared], to_child[shared])
 
     def _to_root(self, name: str) -> dict[str, Array]:
         """Return the transforms into each ancestor of a frame, nearest first."""

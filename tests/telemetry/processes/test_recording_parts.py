@@ -6,6 +6,7 @@ from pathlib import Path
 
 from foretwin.contracts.segments import Roll, first_left, segments_of
 from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.logs.log import PART_MISSING
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.telemetry.drive_messages import INFO, START_NS
 from tests.telemetry.own_recordings import read_drive
@@ -47,10 +48,19 @@ def test_what_is_left_of_a_recording_whose_oldest_parts_are_gone_is_one_drive(
     second.unlink()
     oldest = first_left(path)
     assert oldest.name == "drive-003.mcap"
-    messages = [message for _, message in open_log(oldest).samples()]
+    left = open_log(oldest)
+    messages = [message for _, message in left.samples()]
     assert messages == [imu(number) for number in range(gone, 300)]
+    assert left.skipped == {PART_MISSING: 2}
     alone = list(open_log(segments_of(path)[1]).samples())
     assert 0 < len(alone) < len(messages), "a later part is that part"
+    for part in segments_of(path)[1:-1]:
+        part.unlink()
+    oldest.unlink()
+    last = open_log(first_left(path))
+    assert 0 < len(list(last.samples())) < len(messages)
+    number = int(first_left(path).stem[-3:])
+    assert last.skipped == {PART_MISSING: number - 1}
 
 
 def test_an_old_part_is_ended_however_small_it_is(tmp_path: Path) -> None:
