@@ -18,6 +18,13 @@ from foretwin.contracts import drive
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.geometry.shifted_fit import shifted_fit
+from foretwin.telemetry.logs.clock_evenness import (
+    MOST_DRIFT_PPM,
+    drift_ppm_of,
+    leap_of,
+    stretches_of,
+    unevenness_s,
+)
 from foretwin.telemetry.logs.declare.motion import GRID_S, motion_of, smoothed
 from foretwin.telemetry.logs.log import Log, LogError
 
@@ -28,8 +35,6 @@ _LEAST_LIKE, _PLAINLY, _ELSEWHERE_S = 0.6, 1.4, 5.0
 _LEAST_UNLIKE = 0.02
 """Two recordings are never more alike than that: what would be is a drive that repeats itself."""
 _MOST_STD_S = 0.1
-_STRETCH_S, _LEAST_STRETCHES, _LEAST_EVEN = 90.0, 4, 3
-"""Fitted on its own; so many tell a drift, and so many that a clock runs evenly."""
 _SURE = 3.0
 _HALF = round(0.5 / GRID_S)
 """Ticks on either side over which a sensor is smoothed."""
@@ -123,11 +128,23 @@ def clock_between(first: Log, second: Log) -> ClockBetween:
             " drives that turn and brake more would tell it"
         )
     middle_s = float(np.mean(np.flatnonzero(np.isfinite(x) & np.isfinite(y)))) * GRID_S
-    stretches = _stretches(y, x)
-    drift, drift_std = _drift(stretches)
+    stretches = stretches_of(y, x, _fitted)
+    drift, drift_std = drift_ppm_of(stretches)
+    if (leap := leap_of(stretches)) is not None:
+        raise LogError(
+            f"{second.info.source}: its clock leaps by {leap.by_s:+.2f} s beside"
+            f" {first.info.source}'s between {leap.before_s:.0f} and {leap.after_s:.0f} s into"
+            " that; cut it there"
+        )
     base_s = (second.info.start_stamp_ns - first.info.start_stamp_ns) * 1e-9
     drift = drift if abs(drift) > _SURE * drift_std else 0.0
-    std_s = math.hypot(std_s, _unevenness_s(stretches, drift))
+    if abs(drift) > MOST_DRIFT_PPM:
+        raise LogError(
+            f"{second.info.source}: its clock drifts by {drift:+.0f} ppm beside"
+            f" {first.info.source}'s, and no clock does by more than {MOST_DRIFT_PPM:.0f}: it leaps"
+            " somewhere"
+        )
+    std_s = math.hypot(std_s, unevenness_s(stretches, drift))
     if std_s > _MOST_STD_S:
         sure = np.hypot(stretches[1:, 2], stretches[:-1, 2])
         where = int(np.argmax(np.abs(np.diff(stretches[:, 1])) / sure))
@@ -250,44 +267,3 @@ def _fitted(y: Array, x: Array) -> tuple[float, float] | None:
     if fit is None:
         return None
     return fit.shift_s, math.hypot(fit.shift_std_s, GRID_S / math.sqrt(12.0))
-
-
-def _stretches(y: Array, x: Array) -> Array:
-    """Return (N, 3): when a stretch is, the offset by it alone, and that one's deviation; in s."""
-    known = np.flatnonzero(np.isfinite(y) & np.isfinite(x))
-    most = int(len(known) * GRID_S // _STRETCH_S)
-    rows = []
-    for stretch in np.array_split(known, max(most, 1)):
-        part = slice(int(stretch[0]), int(stretch[-1]) + 1)
-        fit = _fitted(y[part], x[part])
-        if fit is not None:
-            rows.append((float(np.mean(stretch)) * GRID_S, *fit))
-    return np.array(rows).reshape(-1, 3)
-
-
-def _unevenness_s(stretches: Array, drift_ppm: float) -> float:
-    """Return the deviation of stretches' offsets from an even clock beyond their own, 0 where there
-    are too few: by moments, as DerSimonian and Laird (1986), Meta-analysis in clinical trials."""
-    if len(stretches) < _LEAST_EVEN:
-        return 0.0
-    at_s, shift_s, std_s = stretches.T
-    weight = std_s**-2.0
-    left = shift_s - drift_ppm * 1e-6 * at_s
-    left -= np.average(left, weights=weight)
-    beyond = float(np.sum(weight * left**2)) - (len(stretches) - 1)
-    whole = float(np.sum(weight))
-    return math.sqrt(max(beyond, 0.0) / (whole - float(np.sum(weight**2)) / whole))
-
-
-def _drift(stretches: Array) -> tuple[float, float]:
-    """Return in ppm how the offset grows, and the standard deviation of that."""
-    if len(stretches) < _LEAST_STRETCHES:
-        return 0.0, math.inf
-    at_s, shift_s, std_s = stretches.T
-    weight = std_s**-2.0
-    around = at_s - np.average(at_s, weights=weight)
-    spread = float(np.sum(weight * around**2))
-    slope = float(np.sum(weight * around * shift_s)) / spread
-    left = shift_s - np.average(shift_s, weights=weight) - slope * around
-    scatter = max(float(np.sum(weight * left**2)) / (len(stretches) - 2), 1.0)
-    return slope * 1e6, math.sqrt(scatter / spread) * 1e6

@@ -18,7 +18,7 @@ from foretwin.telemetry.logs.merge import together
 from tests.telemetry.logs import merge_pairs
 from tests.telemetry.logs.declare.disguised import Drive
 
-COVERS = ("foretwin.telemetry.logs.merge",)
+COVERS = ("foretwin.telemetry.logs.merge", "foretwin.telemetry.logs.clock_evenness")
 
 
 def drive(*, lasts_s: float = 420.0, busy: float = 1.0) -> Drive:
@@ -88,32 +88,47 @@ def test_stretches_that_differ_as_their_noise_does_are_no_unevenness() -> None:
     assert clock.std_s < 0.02
 
 
-@pytest.mark.parametrize(("jump_s", "at_s"), [(0.5, 600.0), (1.0, 300.0), (2.0, 450.0)])
-def test_a_clock_that_jumps_is_refused_and_it_is_told_where(jump_s: float, at_s: float) -> None:
+def that_leaps(of: Drive, *, by_s: float, at_s: float) -> Drive:
+    return {
+        name: Stream(
+            one.stamps_ns + np.where(one.stamps_ns > at_s * 1e9, round(by_s * 1e9), 0), one.columns
+        )
+        for name, one in of.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("jump_s", "at_s"),
+    [(0.2, 270.0), (-0.3, 450.0), (0.3, 720.0), (0.5, 600.0), (1.0, 300.0), (2.0, 450.0)],
+)
+def test_a_clock_that_leaps_is_refused_and_it_is_told_where(jump_s: float, at_s: float) -> None:
     whole = drive(lasts_s=900.0)
     first = recording(whole, "imu", "speed", source="A", noise=0.02)
-    late = {
-        name: Stream(
-            one.stamps_ns + np.where(one.stamps_ns > at_s * 1e9, round(jump_s * 1e9), 0),
-            one.columns,
-        )
-        for name, one in whole.items()
-    }
+    late = that_leaps(whole, by_s=jump_s, at_s=at_s)
     second = recording(late, "speed", source="B", offset_s=50.0, noise=0.1)
     with pytest.raises(LogError) as caught:
         clock_between(first, second)
     told = re.fullmatch(
-        r"B: its clock does not run evenly beside A's: it changes by \+(\S+) s between (\d+) and"
-        r" (\d+) s into that; if it jumps, cut it there",
+        r"B: its clock leaps by ([+-]\S+) s beside A's between (\d+) and (\d+) s into that; cut it"
+        " there",
         str(caught.value),
     )
     if told is None:  # a jump so long and early leaves two offsets that fit
-        assert jump_s == 2.0
-        assert re.match("B: (its clock cannot be told|more than one offset)", str(caught.value))
+        assert abs(jump_s) >= 1.0
+        assert re.match("B: (its clock|more than one offset)", str(caught.value))
         return
-    assert 0.3 * jump_s < float(told[1]) < 1.2 * jump_s
+    assert float(told[1]) == pytest.approx(jump_s, rel=0.2)
     assert float(told[2]) < at_s + 90.0
     assert float(told[3]) > at_s - 90.0
+
+
+def test_a_leap_that_passes_for_a_drift_is_none_of_a_clock() -> None:
+    whole = drive()
+    first = recording(whole, "imu", "speed", source="A", noise=0.02)
+    late = that_leaps(whole, by_s=0.5, at_s=126.0)
+    second = recording(late, "speed", source="B", offset_s=50.0, noise=1.0)
+    with pytest.raises(LogError, match=r"B: its clock (drifts by \+\d+ ppm|leaps|does not run)"):
+        clock_between(first, second)
 
 
 def test_what_the_first_lacks_is_taken_on_its_clock() -> None:
