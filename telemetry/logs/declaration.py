@@ -4,7 +4,7 @@
 reference_point = "GNSS antenna"            # and body_from_antenna_m = [x, y, z] where known
 [time]
 column = "millis"
-unit = "ms"                                 # s, ms, us, ns, iso8601
+unit = "ms"
 base = "utc"                                # utc, boot, log
 [position]
 frame = "wgs84"                             # wgs84: latitude, longitude; ecef: x, y, z;
@@ -58,15 +58,13 @@ class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The clock of the rows."""
+    """The clock of the rows, by its `column`."""
 
     column: str
-    """The rows' time."""
     base: TimeBase
     """Whether it counts from 1970, from some start of the clock, or from the log's zero."""
     unit: str | None = None
-    """Needed: s, ms, us, ns, iso8601 for dates (UTC where they name no zone), or another of
-    table_times.UNITS."""
+    """Needed: one of table_times.UNITS, such as ms, or iso8601 (UTC where dates tell no zone)."""
     date: str | None = None
     """Column of the day, where `column` tells the time of day alone."""
 
@@ -234,9 +232,9 @@ def read_declaration(path: Path) -> Declaration:
 
 
 def _check(declaration: Declaration) -> None:
-    _known_unit("time", declaration.time, table_times.UNITS)
-    if declaration.time.date is not None and declaration.time.unit not in table_times.TEXTS:
-        raise ValueError("[time] date belongs to dates: " + ", ".join(table_times.TEXTS[:-1]))
+    unit = _known_unit("time", declaration.time, table_times.UNITS)
+    if declaration.time.date is not None and unit not in table_times.DATE_UNITS:
+        raise ValueError(f"[time] date belongs to {', '.join(table_times.DATE_UNITS)}")
     if declaration.position is not None:
         _check_position(declaration.position, declaration.heading)
     elif declaration.heading is not None and declaration.heading.north == "grid":
@@ -252,8 +250,8 @@ def _check(declaration: Declaration) -> None:
 
 def sections_of(declaration: Declaration) -> dict[str, Section]:
     """Return the present sections by the channel that they feed."""
-    given = ((name, getattr(declaration, row.section)) for name, row in CHANNEL_COLUMNS.items())
-    return {channel: section for channel, section in given if section is not None}
+    given = {name: getattr(declaration, row.section) for name, row in CHANNEL_COLUMNS.items()}
+    return {channel: section for channel, section in given.items() if section is not None}
 
 
 def columns_of(section: Section) -> dict[str, Column]:
@@ -276,12 +274,12 @@ def factor_of(field: str, column: Column, *, place: str = "") -> float:
 
 
 def _known_unit(place: str, given: Column | TimeSection, valid: Collection[str]) -> str:
-    if given.unit is None or given.unit not in valid:
-        text = f"{place}: column {given.column!r}: ".removeprefix(": ")
-        if given.unit is None:
-            raise ValueError(f"{text}no unit; one of {', '.join(valid)}")
-        raise ValueError(f"{text}unknown unit {given.unit!r}; {one_of(given.unit, valid)}")
-    return given.unit
+    if given.unit in valid:
+        return given.unit  # type: ignore[return-value]
+    text = f"{place}: column {given.column!r}: ".removeprefix(": ")
+    if given.unit is None:
+        raise ValueError(f"{text}no unit; one of {', '.join(valid)}")
+    raise ValueError(f"{text}unknown unit {given.unit!r}; {one_of(given.unit, valid)}")
 
 
 def _check_position(position: PositionSection, heading: HeadingSection | None) -> None:

@@ -20,7 +20,8 @@ CLOCK, HHMMSS = "clock", "hhmmss"
 """Times of the day: hh:mm:ss, and digits without anything between."""
 DAYS = {"days1900": 25_569, "datenum": 719_529}
 """Days: as spreadsheets count them, and as MATLAB does; with what 1970-01-01 is."""
-TEXTS = (units.ISO_TIME, *DATES, CLOCK)
+DATE_UNITS = (units.ISO_TIME, *DATES)
+TEXTS = (*DATE_UNITS, CLOCK)
 UNITS = (*units.TIME_NS, *TEXTS, HHMMSS, *DAYS)
 """What the unit of a time may be."""
 

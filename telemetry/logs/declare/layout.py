@@ -23,7 +23,7 @@ _NUMBERS = 0.3
 """So many filled cells of a row are numbers; of names and units none, but for a year or so."""
 
 
-class Layout(NamedTuple):
+class TextLayout(NamedTuple):
     """What a declaration says of a table's text; `rows_from` is the line that the rows begin at."""
 
     delimiter: str
@@ -33,7 +33,7 @@ class Layout(NamedTuple):
     rows_from: int
 
 
-def layout_of(path: Path, text: str) -> Layout:
+def layout_of(path: Path, text: str) -> TextLayout:
     """Return how a text is laid out; raises LogError where it has no two lines."""
     lines = text[: 1 << 18].splitlines()[:_LINES_LOOKED_AT]
     if len(lines) < 2:
@@ -61,8 +61,8 @@ def layout_of(path: Path, text: str) -> Layout:
     above = [number for number in above if all(one in above for one in range(number, first))]
     apart = [number for number in above if len(set(rows[number])) == len(rows[number])]
     if not above:
-        return Layout(delimiter, decimal, False, first if first < len(rows) else 0, first)
-    return Layout(delimiter, decimal, True, (apart or above)[0], first)
+        return TextLayout(delimiter, decimal, False, first if first < len(rows) else 0, first)
+    return TextLayout(delimiter, decimal, True, (apart or above)[0], first)
 
 
 def is_number(cell: str) -> bool:

@@ -15,7 +15,7 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array, Stamps
-from foretwin.telemetry.logs.declare.layout import Layout, layout_of
+from foretwin.telemetry.logs.declare.layout import TextLayout, layout_of
 from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.table_cells import (
     BLANKS,
@@ -65,7 +65,7 @@ class LooseTable(NamedTuple):
     """
 
     path: Path
-    layout: Layout
+    layout: TextLayout
     columns: dict[str, Array]
     times: dict[str, TimeTexts]
     texts: tuple[str, ...]
@@ -80,7 +80,7 @@ def read_loose_table(path: Path) -> LooseTable:
     """Read a table of numbers; raises LogError where the file is none."""
     if is_parquet(path):
         try:
-            table, layout = pq.read_table(path), Layout(",", ".", True, 0, 1)
+            table, layout = pq.read_table(path), TextLayout(",", ".", True, 0, 1)
         except (OSError, pa.ArrowException) as error:
             raise LogError(f"{path}: no Parquet table that can be read: {error}") from error
     else:
@@ -110,7 +110,7 @@ def read_loose_table(path: Path) -> LooseTable:
     return LooseTable(path, layout, columns, times, tuple(texts))
 
 
-def _parsed(path: Path, text: str, layout: Layout) -> pa.Table:
+def _parsed(path: Path, text: str, layout: TextLayout) -> pa.Table:
     lines = itertools.islice(io.StringIO(text), layout.skip_lines, None)
     first = next(rows_of(lines, layout.delimiter))
     names = names_apart(first) if layout.header else names_without_header(len(first))

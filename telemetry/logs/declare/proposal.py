@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.telemetry.logs.declaration import Declaration, PositionSection, TimeSection
-from foretwin.telemetry.logs.declare.choice import Chosen, CountryOf, OpenQuestion, chosen_place
-from foretwin.telemetry.logs.declare.clock import ClockColumn, clocks_of
+from foretwin.telemetry.logs.declare.choice import Chosen, CountryOf, OpenQuestion
+from foretwin.telemetry.logs.declare.clock import ClockColumn
 from foretwin.telemetry.logs.declare.loose_table import LooseTable, read_loose_table
 from foretwin.telemetry.logs.declare.motion import GRID_S
-from foretwin.telemetry.logs.declare.names import altitude_of, epsg_of, std_of
-from foretwin.telemetry.logs.declare.places import Place, in_grid, places_of
+from foretwin.telemetry.logs.declare.names import altitude_of, std_of
+from foretwin.telemetry.logs.declare.places import Place
 from foretwin.telemetry.logs.declare.rasters import check_one_time, without_copies
+from foretwin.telemetry.logs.declare.readings import grid_of, readings_of, unit_of_time
 from foretwin.telemetry.logs.declare.repeats import new_when, same_source
 from foretwin.telemetry.logs.declare.sections import Sections, col
-from foretwin.telemetry.logs.declare.sensors import FoundSensors, columns_beside, sensors_of
+from foretwin.telemetry.logs.declare.sensors import FoundSensors
 from foretwin.telemetry.logs.log import LogError
 
 ANSWERS = {
@@ -35,9 +36,6 @@ ANSWERS = {
 }
 """What a user may answer beforehand, by key."""
 _UNKNOWN_POINT = "unknown: positions do not tell what on the car they are of"
-_CLOCKS_TRIED = 4
-_BY_CHANCE = ("local", "wgs84", "projected", "ecef")
-"""Frames, that which columns fit by chance first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,11 +66,7 @@ def propose(
             raise LogError(f"--answer {key}: no such question; {one_of(key, ANSWERS)}")
     table, copies = without_copies(read_loose_table(path))
     check_one_time(table)
-    readings = [
-        _reading(table, clock, places, country_of, answers)
-        for clock, places in _clocks_and_places(table, answers)
-    ]
-    readings.sort(key=lambda reading: reading.plainness, reverse=True)
+    readings = readings_of(table, country_of=country_of, answers=answers)
     question = unit_of_time(readings)
     if question is not None:
         return Proposal(declaration=None, question=question)
@@ -96,102 +90,12 @@ def propose(
     return found
 
 
-class Reading(NamedTuple):
-    """A table by one clock in one unit: what positions it leaves, and the sensors beside them."""
-
-    clock: ClockColumn
-    frame: str
-    chosen: Chosen
-    sensors: FoundSensors | None
-
-    @property
-    def plainness(self) -> tuple[int, int]:
-        """How many sensors go with the positions; then, how unlikely their frame is by chance."""
-        found = self.sensors
-        fits = -1 if self.chosen.place is None and self.chosen.question is None else 0
-        if found is not None:
-            fits = len(found.fits) + (found.heading is not None)
-        return fits, _BY_CHANCE.index(self.frame)
-
-
-def unit_of_time(readings: list[Reading]) -> OpenQuestion | None:
-    """Return what to ask where a time moves the car as cars do in several units, and as plainly."""
-    plainest = [one for one in readings if one.plainness == readings[0].plainness]
-    found = dict.fromkeys(one.clock.unit for one in plainest)
-    if len(found) < 2:
-        return None
-    text = f"{plainest[0].clock.column} may count in several units: in which does it?"
-    return OpenQuestion("time_unit", text, tuple(found))
-
-
-def _reading(
-    table: LooseTable, clock: ClockColumn, places: list[Place], country_of: CountryOf | None,
-    answers: dict[str, str],
-) -> Reading:  # fmt: skip
-    everything = columns_beside(table.columns, clock.time_s, {clock.column})
-    chosen = chosen_place(places, everything, country_of=country_of, answers=answers)
-    sensors = None
-    if (place := chosen.place) is not None:
-        without = {clock.column, *place.fields.values()}
-        sensors = sensors_of(place, {n: c for n, c in everything.items() if n not in without})
-    return Reading(clock, places[0].frame, chosen, sensors)
-
-
-def _clocks_and_places(
-    table: LooseTable, answers: dict[str, str]
-) -> list[tuple[ClockColumn, list[Place]]]:
-    """Return the likeliest clock that leaves positions, in each unit in which it does."""
-    clocks = clocks_of(table)
-    if (named := answers.get("time")) is not None:
-        clocks = [clock for clock in clocks if clock.column == named]
-        if not clocks:
-            raise LogError(f"{table.path}: --answer time={named}: no column that is a time")
-    if (unit := answers.get("time_unit")) is not None:
-        clocks = [clock for clock in clocks if clock.unit == unit]
-        if not clocks:
-            raise LogError(f"{table.path}: --answer time_unit={unit}: no column is a time in that")
-    if not clocks:
-        raise LogError(
-            f"{table.path}: no column that rises as a time does (seconds to nanoseconds, or"
-            f" ISO 8601 dates); columns: {', '.join([*table.columns, *table.times, *table.texts])}"
-        )
-    epsg = _epsg(table, answers)
-    found: list[tuple[ClockColumn, list[Place]]] = []
-    for clock in clocks[:_CLOCKS_TRIED]:
-        if found and (clock.column, clock.base) != (found[0][0].column, found[0][0].base):
-            continue
-        columns = {name: column for name, column in table.columns.items() if name != clock.column}
-        for places in places_of(columns, clock.time_s):
-            if epsg is not None and places[0].frame == "projected":
-                places = in_grid(places, epsg, clock.time_s)
-            if places:
-                found.append((clock, places))
-    if found:
-        return found
-    if epsg is not None:
-        raise LogError(
-            f"{table.path}: no columns that lie where EPSG {epsg} is used, and move as a car does"
-        )
-    raise LogError(
-        f"{table.path}: no columns that move as a car does (degrees, radians, ECEF or metres, at a"
-        f" time of {clocks[0].column!r} in {clocks[0].unit}): nothing to declare"
-    )
-
-
-def _epsg(table: LooseTable, answers: dict[str, str]) -> int | None:
-    if "epsg" in answers:
-        if not answers["epsg"].isdigit():
-            raise LogError(f"--answer epsg={answers['epsg']}: no number such as 32633")
-        return int(answers["epsg"])
-    return epsg_of(table.columns, northern=True)
-
-
 def _frame(
     place: Place, table: LooseTable, answers: dict[str, str]
 ) -> tuple[dict[str, Any], OpenQuestion | None, str]:
     """Return what the frame needs beside columns, or the question for it, and how it is known."""
     if place.frame == "projected":
-        code = _epsg(table, answers)
+        code = grid_of(table, answers)
         if code is not None:
             said = "as answered" if "epsg" in answers else "by a column's name alone"
             return {"epsg": code}, None, f"EPSG {code} {said}; the drive lies where that is used"

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from foretwin.telemetry.logs.declare.clock import clocks_of
-from foretwin.telemetry.logs.declare.layout import Layout
+from foretwin.telemetry.logs.declare.layout import TextLayout
 from foretwin.telemetry.logs.declare.loose_table import LooseTable, TimeTexts
 from foretwin.telemetry.logs.units import TIME_NS
 
-COMMAS = Layout(",", ".", True, 0, 1)
+COMMAS = TextLayout(",", ".", True, 0, 1)
 SPRING_S = 1_523_201_497.0
 
 

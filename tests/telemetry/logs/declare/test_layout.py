@@ -12,7 +12,7 @@ import pytest
 from foretwin.contracts.drive import GnssFix, SpeedSample
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.declare import propose
-from foretwin.telemetry.logs.declare.layout import Layout, layout_of
+from foretwin.telemetry.logs.declare.layout import TextLayout, layout_of
 from foretwin.telemetry.logs.write_declaration import declaration_toml
 from tests.telemetry.logs.declare.test_propose import country, drawn_drive
 
@@ -174,6 +174,6 @@ def test_of_two_columns_with_one_name_the_second_is_numbered(tmp_path: Path) -> 
 
 def test_cells_with_delimiters_in_quotes_and_half_lines_do_not_mislead(tmp_path: Path) -> None:
     lines = ['"a, b",c', *['1.5,"2"'] * 40, "3"]
-    assert layout_of(tmp_path, "\n".join(lines)) == Layout(",", ".", True, 0, 1)
+    assert layout_of(tmp_path, "\n".join(lines)) == TextLayout(",", ".", True, 0, 1)
     lines = ["a b", *["1,5\t2"] * 40]
     assert layout_of(tmp_path, "\n".join(lines))[:2] == ("\t", ",")

@@ -9,7 +9,8 @@ import pytest
 
 from foretwin.telemetry.logs.declare.choice import Chosen, OpenQuestion
 from foretwin.telemetry.logs.declare.clock import ClockColumn
-from foretwin.telemetry.logs.declare.proposal import Reading, propose, unit_of_time
+from foretwin.telemetry.logs.declare.proposal import propose
+from foretwin.telemetry.logs.declare.readings import Reading, unit_of_time
 from foretwin.telemetry.logs.log import LogError
 from tests.telemetry.logs.declare.test_propose import country
 
@@ -63,7 +64,7 @@ def test_a_unit_of_time_can_be_answered(tmp_path: Path) -> None:
     found = propose(path, country_of=country, answers={"time_unit": "ms"})
     assert found.declaration is not None
     assert found.declaration.time.unit == "ms"
-    with pytest.raises(LogError, match="at a time of 'c2' in us"):
+    with pytest.raises(LogError, match="time_unit=us: no column is a time in that"):
         propose(path, answers={"time_unit": "us"})
     with pytest.raises(LogError, match="time_unit=days1900: no column is a time in that"):
         propose(path, answers={"time_unit": "days1900"})
