@@ -21,7 +21,7 @@ empty cell is no change. docs/logs.md has all keys; `foretwin declare` writes a 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 from typing import Literal
 
@@ -58,9 +58,10 @@ class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The clock of the rows, by its `column`."""
+    """The clock of the rows."""
 
     column: str
+    """The rows' time."""
     base: TimeBase
     """Whether it counts from 1970, from some start of the clock, or from the log's zero."""
     unit: str | None = None
@@ -209,14 +210,7 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Columns of commands."""
 
 
-UNITS: dict[str, Mapping[str, float]] = {
-    **dict.fromkeys(("latitude", "longitude"), units.GEOGRAPHIC_ANGLE),
-    **dict.fromkeys(("easting", "northing", "x", "y", "z", "altitude", "std"), units.LENGTH),
-    **dict.fromkeys(("forward", "east", "north"), units.SPEED),
-    **dict.fromkeys(("accel", "accel_x", "accel_y", "accel_z"), units.ACCELERATION),
-    **dict.fromkeys(("rate_x", "rate_y", "rate_z", "yaw_rate"), units.ANGULAR_RATE),
-    **dict.fromkeys(("yaw", "wheel", "tire"), units.ANGLE),
-}
+UNITS = units.BY_FIELD
 """Valid units by field, the project's own first, with the factor into it."""
 
 

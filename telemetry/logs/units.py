@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from decimal import Decimal
 
 import numpy as np
@@ -51,3 +52,13 @@ TIME_NS = {"s": Decimal(10**9), "ms": Decimal(10**6), "us": Decimal(1000), "ns":
 
 ISO_TIME = "iso8601"
 """The time unit of dates such as 2026-03-01T10:00:00Z."""
+
+BY_FIELD: dict[str, Mapping[str, float]] = {
+    **dict.fromkeys(("latitude", "longitude"), GEOGRAPHIC_ANGLE),
+    **dict.fromkeys(("easting", "northing", "x", "y", "z", "altitude", "std"), LENGTH),
+    **dict.fromkeys(("forward", "east", "north"), SPEED),
+    **dict.fromkeys(("accel", "accel_x", "accel_y", "accel_z"), ACCELERATION),
+    **dict.fromkeys(("rate_x", "rate_y", "rate_z", "yaw_rate"), ANGULAR_RATE),
+    **dict.fromkeys(("yaw", "wheel", "tire"), ANGLE),
+}
+"""Units of a declaration's fields, the project's own first, with the factor into it."""

@@ -41,7 +41,9 @@ class TransformTree:
         if child == within:
             return np.eye(4)
         shared = next((name for name in to_child if name in to_within), None)
-        return None if shared is None else np.linalg.solve(to_within[shared], to_child[shared])
+        if shared is None:
+            return None
+        return np.asarray(np.linalg.solve(to_within[shared], to_child[shared]), dtype=np.float64)
 
     def _to_root(self, name: str) -> dict[str, Array]:
         """Return the transforms into each ancestor of a frame, nearest first."""

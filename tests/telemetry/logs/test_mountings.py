@@ -19,7 +19,6 @@ from tests.telemetry.autoware_messages import transform_message
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix
 
 COVERS = (
-    "foretwin.telemetry.logs.mountings",
     "foretwin.telemetry.logs.foreign_ros",
     "foretwin.telemetry.ros_messages.transforms",
 )

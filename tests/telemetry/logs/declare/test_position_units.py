@@ -19,7 +19,6 @@ from foretwin.telemetry.logs.write_declaration import declaration_toml
 from tests.telemetry.logs.declare.test_propose import country, drawn_drive
 
 COVERS = (
-    "foretwin.telemetry.logs.declare.places",
     "foretwin.telemetry.logs.declare.choice",
     "foretwin.telemetry.logs.units",
 )

@@ -14,6 +14,8 @@ from foretwin.telemetry.logs.declare.readings import Reading, unit_of_time
 from foretwin.telemetry.logs.log import LogError
 from tests.telemetry.logs.declare.test_propose import country
 
+COVERS = ("foretwin.telemetry.logs.declare.readings",)
+
 
 def straight_table(folder: Path) -> Path:
     """Write an all but straight minute at 100 Hz, by a clock in ms, with a heading in radians.
