@@ -17,6 +17,7 @@ from foretwin.telemetry.logs.table_cells import BLANKS, rows_of
 _DELIMITERS = (";", "\t", ",", "|", BLANKS)
 """A semicolon first: with it commas are decimal. Blanks last: they stand in dates and names too."""
 _LINES_LOOKED_AT = 200
+_VBO = {"[column names]", "[data]"}
 _LEAST_LIKE = 0.5
 """So many lines have as many cells."""
 _NUMBERS = 0.3
@@ -34,10 +35,15 @@ class TextLayout(NamedTuple):
 
 
 def layout_of(path: Path, text: str) -> TextLayout:
-    """Return how a text is laid out; raises LogError where it has no two lines."""
+    """Return how a text is laid out; raises LogError where it is no table."""
     lines = text[: 1 << 18].splitlines()[:_LINES_LOOKED_AT]
     if len(lines) < 2:
         raise LogError(f"{path}: no table: {len(lines)} lines")
+    if {line.strip().lower() for line in lines} >= _VBO:
+        raise LogError(
+            f"{path}: Racelogic's VBO, which is not read: its longitudes grow to the west; export"
+            " it as CSV with degrees"
+        )
     delimiter, width = max(
         ((sign, *_usual_width(lines, sign)) for sign in _DELIMITERS),
         key=lambda one: (one[2] > _LEAST_LIKE * len(lines), one[0] != BLANKS, one[2]),

@@ -13,6 +13,7 @@ from foretwin.contracts.drive import GnssFix, SpeedSample
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.declare import propose
 from foretwin.telemetry.logs.declare.layout import TextLayout, layout_of
+from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.write_declaration import declaration_toml
 from tests.telemetry.logs.declare.test_propose import country, drawn_drive
 
@@ -177,3 +178,12 @@ def test_cells_with_delimiters_in_quotes_and_half_lines_do_not_mislead(tmp_path:
     assert layout_of(tmp_path, "\n".join(lines)) == TextLayout(",", ".", True, 0, 1)
     lines = ["a b", *["1,5\t2"] * 40]
     assert layout_of(tmp_path, "\n".join(lines))[:2] == ("\t", ",")
+
+
+def test_racelogics_vbo_is_refused_by_its_name(tmp_path: Path) -> None:
+    """Its longitudes grow to the west: read as a table the drive lay in the Atlantic."""
+    head = "[header]\nlatitude\n\n[column names]\ntime lat long velocity\n\n[data]\n"
+    path = tmp_path / "drive.vbo"
+    path.write_text(text_of(rows_of_a_drive(seconds), between=" ", head=head))
+    with pytest.raises(LogError, match=r"Racelogic's VBO, which is not read: .* to the west"):
+        propose(path)

@@ -63,3 +63,15 @@ def test_a_car_that_never_reverses_is_not_said_to(tmp_path: Path) -> None:
     columns = {name: values[:900] for name, values in there_and_back().items()}
     found = propose(written(tmp_path, columns))
     assert not any("negative" in line for line in found.unknown)
+
+
+def test_a_heading_against_the_compass_is_told_as_a_track_that_may_be_mirrored(
+    tmp_path: Path,
+) -> None:
+    columns = there_and_back()
+    assert not any("to the west" in line for line in propose(written(tmp_path, columns)).unknown)
+    columns["lon"] = -columns["lon"]
+    found = propose(written(tmp_path, columns))
+    assert found.declaration is not None
+    assert found.declaration.heading is not None
+    assert any("if lon grew to the west" in line for line in found.unknown)
