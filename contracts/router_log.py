@@ -193,8 +193,10 @@ class RouterLog:
         if not word.startswith("Undeclare"):  # of what was refused when it was declared
             word = word if word in _DOES else f"Declare {word}"
             what, full_key = _DOES.get(word, word), key.decode(errors="replace")
-            if what == _IS_ALIVE:  # of whatever life
-                full_key, _ = life_of_key(full_key)
+            if what == _IS_ALIVE:
+                alive_key, life = life_of_key(full_key)
+                if "/" not in life:  # else it is no life, and told as it was tried
+                    full_key = alive_key
             self._count(name, what, full_key)
 
     def _handshake(self, text: bytes) -> None:

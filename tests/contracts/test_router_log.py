@@ -115,6 +115,21 @@ def test_all_that_somebody_may_not_do_has_a_word(does: str, word: str) -> None:
     assert counted(decided(does, MINE)) == {("worker-w0", word, MINE): 1}
 
 
+@pytest.mark.parametrize(
+    ("token", "told"),
+    [
+        ("run/r1/alive/w0/00a1-b2", "run/r1/alive/w0"),
+        ("run/r1/alive/w0", "run/r1/alive/w0"),
+        ("run/r1/alive/../../etc/passwd", "run/r1/alive/../../etc/passwd"),
+    ],
+)
+def test_all_lives_of_a_process_are_one_and_a_path_is_told_as_it_was_tried(
+    token: str, told: str
+) -> None:
+    refused = counted(decided("Liveliness Token", f"foretwin/v1/{token}"))
+    assert refused == {("worker-w0", "be alive as", f"foretwin/v1/{told}"): 1}
+
+
 def test_a_name_without_rules_is_counted() -> None:
     text = "ca80 did not match any configured ACL subject. Default permission `Deny` will be …"
     assert counted(record(text, level="INFO")) == {("", NO_RULE, ""): 1}

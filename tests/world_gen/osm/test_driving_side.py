@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import World
@@ -69,9 +70,15 @@ def test_a_car_park_driven_on_the_left_mirrors_no_junction_beside_it() -> None:
     plain, stray = world(ramp), world(ramp | {"driving_side": "left"})
     assert stray.intersection == plain.intersection
     assert "way 15: traffic keeps left, around it right" in stray.notes
-    lines = {lane.id: lane.centerline.tolist() for lane in plain.lanes}
-    changed = {lane.osm_way for lane in stray.lanes if lane.centerline.tolist() != lines[lane.id]}
-    assert changed == {15}
+    lines = {lane.id: shapely.LineString(lane.centerline) for lane in plain.lanes}
+    # Street may end sooner, for cars to change over to the other side; it lies where it did.
+    moved = {
+        lane.osm_way
+        for lane in stray.lanes
+        if shapely.LineString(lane.centerline).hausdorff_distance(lines[lane.id]) > 10.0
+        or shapely.distance(shapely.points(lane.centerline), lines[lane.id]).max() > 1e-6
+    }
+    assert moved == {15}
 
 
 @pytest.mark.parametrize("word", ["both", "", "LEFT"])
