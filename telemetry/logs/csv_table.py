@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,19 +21,21 @@ from foretwin.contracts.frames import (
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.columns import Stream, stream_of, table_log
 from foretwin.telemetry.logs.declaration import (
+    Column,
     Declaration,
     HeadingSection,
     ImuSection,
     PositionSection,
     Section,
+    TimeSection,
     columns_of,
     factor_of,
     read_declaration,
     sections_of,
 )
-from foretwin.telemetry.logs.gpx import representable_ns, stamp_ns_from_iso
 from foretwin.telemetry.logs.log import LAST_LINE_OPEN, Log, LogError
 from foretwin.telemetry.logs.table_cells import Cells, read_cells
+from foretwin.telemetry.logs.table_times import days_counted, is_of_day, stamp_reader
 
 _MANY_ROWS = 20_000
 """From so many on another parser is worth its import."""
@@ -120,6 +120,8 @@ def _stream(
 
 def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Table:
     wanted = {declared.time.column}
+    if declared.time.date is not None:
+        wanted.add(declared.time.date)
     for section in sections_of(declared).values():
         wanted.update(column.column for column in columns_of(section).values())
         wanted.update(section.new_when)
@@ -129,9 +131,9 @@ def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Ta
         declared_in=declaration_path.name,
         delimiter=declared.delimiter,
         header=declared.header,
+        skip_lines=declared.skip_lines,
     )
-    stamp_of = _stamp_reader(declared.time.unit or "", declared.decimal)
-    stamps = [stamp_of(text) for text in cells[declared.time.column]]
+    stamps = _stamps(declared.time, cells, declared.decimal)
     if None in stamps:
         kept = [row for row, stamp_ns in enumerate(stamps) if stamp_ns is not None]
         unreadable += len(stamps) - len(kept)
@@ -142,19 +144,14 @@ def _read_table(path: Path, declared: Declaration, declaration_path: Path) -> Ta
     return Table(path, known, cells, declared.decimal, unreadable, open_end)
 
 
-def _stamp_reader(unit: str, decimal: str) -> Callable[[str], int | None]:
-    if unit == units.ISO_TIME:
-        return lambda text: stamp_ns_from_iso(text.strip())
-    factor = units.TIME_NS[unit]
-
-    def read(text: str) -> int | None:
-        try:
-            number = Decimal(text.strip().replace(decimal, "."))
-            return representable_ns(int((number * factor).to_integral_value()))
-        except (InvalidOperation, ValueError, OverflowError):
-            return None
-
-    return read
+def _stamps(time: TimeSection, cells: dict[str, Cells], decimal: str) -> list[int | None]:
+    texts = cells[time.column]
+    if time.date is not None:
+        texts = [f"{day} {text}" for day, text in zip(cells[time.date], texts, strict=True)]
+    unit = time.unit or ""
+    stamp_of = stamp_reader(unit, decimal)
+    stamps = [stamp_of(text) for text in texts]
+    return days_counted(stamps) if is_of_day(unit) else stamps
 
 
 def _numbers(table: Table, section: Section) -> tuple[dict[str, Array], Flags, int]:
@@ -167,12 +164,19 @@ def _numbers(table: Table, section: Section) -> tuple[dict[str, Array], Flags, i
     broken, empties = np.zeros(rows, dtype=bool), np.zeros(rows, dtype=int)
     for field, column in columns_of(section).items():
         numbers, empty, no_number = _floats(table.cells[column.column], table.decimal)
-        arrays[field] = numbers * factor_of(field, column)
+        arrays[field] = _in_our_unit(numbers, field, column)
         empties += empty
         broken |= no_number
     all_empty = empties == len(arrays)
     broken |= (empties > 0) & ~all_empty
     return arrays, ~broken & ~all_empty, int(broken.sum())
+
+
+def _in_our_unit(numbers: Array, field: str, column: Column) -> Array:
+    if field in ("latitude", "longitude"):
+        degrees = units.degrees_of(numbers, column.unit or "")
+        return -degrees if column.negate else degrees
+    return numbers * factor_of(field, column)
 
 
 def _floats(cells: Cells, decimal: str) -> tuple[Array, Flags, Flags]:

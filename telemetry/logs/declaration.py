@@ -4,7 +4,7 @@
 reference_point = "GNSS antenna"            # and body_from_antenna_m = [x, y, z] where known
 [time]
 column = "millis"
-unit = "ms"                                 # s, ms, us, ns, iso8601
+unit = "ms"
 base = "utc"                                # utc, boot, log
 [position]
 frame = "wgs84"                             # wgs84: latitude, longitude; ecef: x, y, z;
@@ -21,7 +21,7 @@ empty cell is no change. docs/logs.md has all keys; `foretwin declare` writes a 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 from typing import Literal
 
@@ -30,7 +30,7 @@ import msgspec
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.drive import TimeBase
 from foretwin.contracts.toml_file import load_toml
-from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs import table_times, units
 from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
 from foretwin.telemetry.logs.log import LogError
 
@@ -65,7 +65,9 @@ class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     base: TimeBase
     """Whether it counts from 1970, from some start of the clock, or from the log's zero."""
     unit: str | None = None
-    """Needed: s, ms, us, ns, or iso8601 for dates (UTC where they name no zone)."""
+    """Needed: one of table_times.UNITS, such as ms, or iso8601 (UTC where dates tell no zone)."""
+    date: str | None = None
+    """Column of the day, where `column` tells the time of day alone."""
 
 
 class PositionSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -194,6 +196,8 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """What stands before the decimals of a number."""
     header: bool = True
     """Without a line of names the columns are called c1, c2 and so on."""
+    skip_lines: int = 0
+    """So many lines stand before the line of names, or before the first row without one."""
     speed: SpeedSection | None = None
     """Columns of speed."""
     heading: HeadingSection | None = None
@@ -206,14 +210,7 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Columns of commands."""
 
 
-UNITS: dict[str, Mapping[str, float]] = {
-    **dict.fromkeys(("latitude", "longitude"), units.GEOGRAPHIC_ANGLE),
-    **dict.fromkeys(("easting", "northing", "x", "y", "z", "altitude", "std"), units.LENGTH),
-    **dict.fromkeys(("forward", "east", "north"), units.SPEED),
-    **dict.fromkeys(("accel", "accel_x", "accel_y", "accel_z"), units.ACCELERATION),
-    **dict.fromkeys(("rate_x", "rate_y", "rate_z", "yaw_rate"), units.ANGULAR_RATE),
-    **dict.fromkeys(("yaw", "wheel", "tire"), units.ANGLE),
-}
+UNITS = units.BY_FIELD
 """Valid units by field, the project's own first, with the factor into it."""
 
 
@@ -229,7 +226,9 @@ def read_declaration(path: Path) -> Declaration:
 
 
 def _check(declaration: Declaration) -> None:
-    _known_unit("time", declaration.time, (*units.TIME_NS, units.ISO_TIME))
+    unit = _known_unit("time", declaration.time, table_times.UNITS)
+    if declaration.time.date is not None and unit not in table_times.DATE_UNITS:
+        raise ValueError(f"[time] date belongs to {', '.join(table_times.DATE_UNITS)}")
     if declaration.position is not None:
         _check_position(declaration.position, declaration.heading)
     elif declaration.heading is not None and declaration.heading.north == "grid":
@@ -245,8 +244,8 @@ def _check(declaration: Declaration) -> None:
 
 def sections_of(declaration: Declaration) -> dict[str, Section]:
     """Return the present sections by the channel that they feed."""
-    given = ((name, getattr(declaration, row.section)) for name, row in CHANNEL_COLUMNS.items())
-    return {channel: section for channel, section in given if section is not None}
+    given = {name: getattr(declaration, row.section) for name, row in CHANNEL_COLUMNS.items()}
+    return {channel: section for channel, section in given.items() if section is not None}
 
 
 def columns_of(section: Section) -> dict[str, Column]:
@@ -269,12 +268,12 @@ def factor_of(field: str, column: Column, *, place: str = "") -> float:
 
 
 def _known_unit(place: str, given: Column | TimeSection, valid: Collection[str]) -> str:
-    if given.unit is None or given.unit not in valid:
-        text = f"{place}: column {given.column!r}: ".removeprefix(": ")
-        if given.unit is None:
-            raise ValueError(f"{text}no unit; one of {', '.join(valid)}")
-        raise ValueError(f"{text}unknown unit {given.unit!r}; {one_of(given.unit, valid)}")
-    return given.unit
+    if given.unit in valid:
+        return given.unit  # type: ignore[return-value]
+    text = f"{place}: column {given.column!r}: ".removeprefix(": ")
+    if given.unit is None:
+        raise ValueError(f"{text}no unit; one of {', '.join(valid)}")
+    raise ValueError(f"{text}unknown unit {given.unit!r}; {one_of(given.unit, valid)}")
 
 
 def _check_position(position: PositionSection, heading: HeadingSection | None) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import itertools
 import os
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +16,9 @@ from foretwin.telemetry.logs.log import LogError
 Cells = list[str]
 
 PARQUET_MAGIC = b"PAR1"
+BLANKS = " "
+"""The delimiter that stands for any run of blanks and tabs."""
+_HEAD_BYTES = 1 << 16
 
 
 class CellTable(NamedTuple):
@@ -31,6 +36,27 @@ def is_parquet(path: Path) -> bool:
         return file.read(len(PARQUET_MAGIC)) == PARQUET_MAGIC
 
 
+def encoding_of(path: Path) -> str:
+    """Return in which encoding a text is: UTF-16 by its mark, UTF-8, else that of Windows."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    try:
+        # A character may be cut where the head ends.
+        codecs.getincrementaldecoder("utf-8-sig")().decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
+    """Yield the cells of each line."""
+    if delimiter == BLANKS:
+        return (line.split() for line in lines)
+    return csv.reader(lines, delimiter=delimiter)
+
+
 def whole_lines(text: str) -> str:
     """Return a text without its last line where that has no end."""
     return text[: 1 + max(text.rfind("\n"), text.rfind("\r"))]
@@ -41,27 +67,47 @@ def names_without_header(count: int) -> list[str]:
     return [f"c{number}" for number in range(1, count + 1)]
 
 
+def names_apart(names: Iterable[str]) -> list[str]:
+    """Return names of columns without blanks around them; of equal ones all but the first numbered.
+
+    The second `v` is called `v (2)`.
+    """
+    seen: Counter[str] = Counter()
+    found = []
+    for name in map(str.strip, names):
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return found
+
+
 def read_cells(
-    path: Path, *, wanted: Collection[str], declared_in: str, delimiter: str, header: bool
+    path: Path,
+    *,
+    wanted: Collection[str],
+    declared_in: str,
+    delimiter: str,
+    header: bool,
+    skip_lines: int = 0,
 ) -> CellTable:
-    """Read the wanted columns of a table.
+    """Read the wanted columns of a table, whose names stand after `skip_lines` lines.
 
     Without `header` the columns are called c1, c2, …. Raises LogError naming a column that
     `declared_in` names and the table lacks.
     """
     if is_parquet(path):
         return CellTable(_parquet_cells(path, wanted, declared_in))
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as text:
-        reader = csv.reader(text, delimiter=delimiter)
+    encoding = encoding_of(path)
+    with path.open(encoding=encoding, errors="replace", newline="") as text:
+        reader = rows_of(itertools.islice(text, skip_lines, None), delimiter)
         first = next(reader, [])
-        names = [name.strip() for name in first] if header else names_without_header(len(first))
+        names = names_apart(first) if header else names_without_header(len(first))
         _check(path, wanted, names, declared_in)
         places = {name: names.index(name) for name in wanted}
         cells: dict[str, Cells] = {name: [] for name in wanted}
         kept = [(cells[name].append, place) for name, place in places.items()]
         width, short = len(names), 0
         rows: Iterable[list[str]] = reader if header else itertools.chain([first], reader)
-        open_end = not _ends_its_last_line(path)
+        open_end = not _ends_its_last_line(path, encoding)
         if open_end:
             rows = _all_but_last(rows)
         for row in rows:
@@ -75,10 +121,10 @@ def read_cells(
     return CellTable(cells, short, open_end)
 
 
-def _ends_its_last_line(path: Path) -> bool:
+def _ends_its_last_line(path: Path, encoding: str) -> bool:
     with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        return file.read() in (b"\n", b"\r")
+        file.seek(-2 if encoding == "utf-16" else -1, os.SEEK_END)
+        return file.read().strip(b"\0") in (b"\n", b"\r")
 
 
 def _all_but_last(rows: Iterable[list[str]]) -> Iterator[list[str]]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.telemetry.logs.declare.motion import GridMotion, on_grid
-from foretwin.telemetry.logs.declare.names import FIELDS
+from foretwin.telemetry.logs.declare.names import called
 from foretwin.telemetry.logs.declare.places import Place
 from foretwin.telemetry.logs.declare.roles import ROLES, fits_of, heading_of
 from foretwin.telemetry.logs.declare.sensors import ChangingColumn
@@ -71,7 +71,7 @@ def chosen_place(
     rivals = [one for one in wanted if one & group]
     if len(rivals) > 1 and best_of(rivals[1])[0] < _PLAINLY * best_of(group)[0]:
         named = {
-            one: max(p.called(FIELDS) for p in places if frozenset(p.fields.values()) == one)
+            one: max(called(p.fields) for p in places if frozenset(p.fields.values()) == one)
             for one in rivals
         }
         rivals.sort(key=lambda one: -named[one])
@@ -101,6 +101,12 @@ def _order_of(
     rows: list[tuple[float, Place]], *, country_of: CountryOf | None, answers: dict[str, str]
 ) -> Chosen:
     rows = sorted(rows, key=lambda row: row[0])
+    unit, question = _unit_of(rows, country_of=country_of, answers=answers)
+    if question is not None:
+        return Chosen(None, "", False, question)
+    rows = [row for row in rows if row[1].unit == unit]
+    if not rows:
+        return Chosen(None, f"positions cannot be in {unit!r}", False)
     first = next(iter(rows[0][1].fields))
     if first in answers:
         for _, place in rows:
@@ -118,16 +124,45 @@ def _order_of(
             True,
         )
     if country_of is not None and rows[0][1].middle_deg is not None:
-        on_land = [place for _, place in rows if country_of(*(place.middle_deg or (0.0, 0.0)))]
+        on_land = [place for _, place in rows if _on_land(place, country_of)]
         if len(on_land) == 1:
             return Chosen(on_land[0], "the other order lies in the sea, or nowhere", True)
-    named = sorted(((place.called(FIELDS), place) for _, place in rows), key=lambda row: -row[0])
+    named = sorted(((called(place.fields), place) for _, place in rows), key=lambda row: -row[0])
     if named[0][0] > named[1][0]:
         said = "by names alone: nothing in the table proves the order of its columns"
         return Chosen(named[0][1], said, False)
+    if rows[0][1].middle_deg is None:
+        # The one question that a plane leaves is where it lies.
+        return Chosen(rows[0][1], "in this order by nothing but the columns' own", False)
     names = tuple(dict.fromkeys(place.fields[first] for _, place in rows))
     text = f"positions lie in {', '.join(rows[0][1].fields.values())}: which of them is {first}?"
     return Chosen(None, "", False, OpenQuestion(first, text, names))
+
+
+def _unit_of(
+    rows: list[tuple[float, Place]], *, country_of: CountryOf | None, answers: dict[str, str]
+) -> tuple[str, OpenQuestion | None]:
+    """Return in which unit columns are positions, or the question where two move as a car does."""
+    best: dict[str, float] = {}
+    for score, place in rows:
+        best.setdefault(place.unit, score)
+    if (said := answers.get("position_unit")) is not None:
+        return said, None
+    ranked = sorted(best, key=lambda unit: best[unit])
+    if len(ranked) > 1 and best[ranked[0]] * _PLAINLY < best[ranked[1]]:
+        return ranked[0], None
+    if len(ranked) > 1 and country_of is not None and rows[0][1].middle_deg is not None:
+        ashore = dict.fromkeys(place.unit for _, place in rows if _on_land(place, country_of))
+        ranked = list(ashore) if len(ashore) == 1 else ranked
+    if len(ranked) == 1:
+        return ranked[0], None
+    names = " and ".join(rows[0][1].fields.values())
+    text = f"{names} move as a car does in several units: in which are they?"
+    return "", OpenQuestion("position_unit", text, tuple(sorted(ranked)))
+
+
+def _on_land(place: Place, country_of: CountryOf) -> bool:
+    return bool(country_of(*(place.middle_deg or (0.0, 0.0))))
 
 
 def _misfits(places: list[Place], sensors: dict[str, ChangingColumn]) -> list[float]:

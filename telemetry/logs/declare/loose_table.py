@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import io
+import itertools
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -14,20 +15,47 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array, Stamps
-from foretwin.telemetry.logs.gpx import stamp_ns_from_iso
+from foretwin.telemetry.logs.declare.layout import TextLayout, layout_of
 from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.table_cells import (
+    BLANKS,
+    encoding_of,
     is_parquet,
+    names_apart,
     names_without_header,
+    rows_of,
     whole_lines,
 )
+from foretwin.telemetry.logs.table_times import (
+    CLOCK,
+    TEXTS,
+    days_counted,
+    is_of_day,
+    stamp_reader,
+    tells_zone,
+)
+from foretwin.telemetry.logs.units import ISO_TIME
 
-_DELIMITERS = (";", "\t", ",", "|")
-"""A semicolon first: with it commas are decimal."""
-_LINES_LOOKED_AT = 50
 _LEAST_ROWS = 20
+_NO_TIMES = 0.1
+"""So many cells of a column of times may be none."""
+_NEVER = "%Y-%m-%d-no-date"
 _NUMBERS = 0.5
 """So many of a column's filled cells are numbers, else it is a text."""
+
+
+class TimeTexts(NamedTuple):
+    """A column of times: stamps (N,), in which of table_times.TEXTS, and whether it tells its zone.
+
+    `date` is the column of its days, where that is another one; `either` tells that day and month
+    could stand the other way round.
+    """
+
+    stamps_ns: Stamps
+    unit: str
+    zone: bool
+    date: str | None = None
+    either: bool = False
 
 
 class LooseTable(NamedTuple):
@@ -37,102 +65,74 @@ class LooseTable(NamedTuple):
     """
 
     path: Path
-    delimiter: str
-    decimal: Literal[".", ","]
-    header: bool
+    layout: TextLayout
     columns: dict[str, Array]
-    times: dict[str, Stamps]
+    times: dict[str, TimeTexts]
     texts: tuple[str, ...]
 
     @property
     def rows(self) -> int:
         """How many rows there are."""
-        return len(next(iter((self.columns or self.times).values())))
+        return len(next(iter(self.columns.values())))
 
 
 def read_loose_table(path: Path) -> LooseTable:
     """Read a table of numbers; raises LogError where the file is none."""
     if is_parquet(path):
         try:
-            table, shape = pq.read_table(path), _Shape(",", ".", True)
+            table, layout = pq.read_table(path), TextLayout(",", ".", True, 0, 1)
         except (OSError, pa.ArrowException) as error:
             raise LogError(f"{path}: no Parquet table that can be read: {error}") from error
     else:
-        text = whole_lines(path.read_bytes().decode("utf-8-sig", errors="replace"))
-        try:
-            shape = _shape(path, text)
-            table = _parsed(path, text, *shape)
-        except csv.Error as error:
-            raise LogError(f"{path}: no table of text: {error}") from error
+        # Line breaks of all kinds become one.
+        text = whole_lines(path.read_text(encoding=encoding_of(path), errors="replace"))
+        layout = layout_of(path, text)
+        table = _parsed(path, text, layout)
     columns: dict[str, Array] = {}
-    times: dict[str, Stamps] = {}
+    times: dict[str, TimeTexts] = {}
     texts = []
+    cells: dict[str, list[str]] = {}
     for name, column in zip(table.column_names, table.columns, strict=True):
-        numbers = _numbers(column, shape.decimal)
+        numbers = _numbers(column, layout.decimal)
         if numbers is not None:
             columns[name] = numbers
-        elif (stamps_ns := _stamps(column)) is not None:
-            times[name] = stamps_ns
+        elif (said := _time_texts(column)) is not None:
+            times[name] = said
+            cells[name] = [str(cell or "") for cell in column.to_pylist()]
         else:
             texts.append(name)
+    times |= _with_dates(cells, times)
     if table.num_rows < _LEAST_ROWS or not columns:
         raise LogError(
             f"{path}: no table of a drive: {table.num_rows} rows, {len(columns)} columns of numbers"
-            f" (separated by {shape.delimiter!r}); a drive has {_LEAST_ROWS} rows and more"
+            f" (separated by {layout.delimiter!r}); a drive has {_LEAST_ROWS} rows and more"
         )
-    return LooseTable(path, *shape, columns, times, tuple(texts))
+    return LooseTable(path, layout, columns, times, tuple(texts))
 
 
-class _Shape(NamedTuple):
-    """How values are separated, and whether the first line names the columns."""
-
-    delimiter: str
-    decimal: Literal[".", ","]
-    header: bool
-
-
-def _shape(path: Path, text: str) -> _Shape:
-    lines = text[: 1 << 16].splitlines()[:_LINES_LOOKED_AT]
-    if len(lines) < 2:
-        raise LogError(f"{path}: no table: {len(lines)} lines")
-    for delimiter in _DELIMITERS:
-        widths = {len(row) for row in csv.reader(lines[1:-1] or lines[1:], delimiter=delimiter)}
-        if len(widths) == 1 and max(widths) > 1:
-            break
-    else:
-        delimiter = max(_DELIMITERS, key=lambda sign: sum(line.count(sign) for line in lines))
-    rows = list(csv.reader(lines, delimiter=delimiter))
-    cells = [cell for row in rows[1:] for cell in row]
-    comma = delimiter != "," and any(
-        _is_number(cell.replace(",", ".")) for cell in cells if cell.count(",") == 1
-    )
-    decimal: Literal[".", ","] = "," if comma else "."
-    header = not any(_is_number(cell.replace(decimal, ".")) for cell in rows[0])
-    return _Shape(delimiter, decimal, header)
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _parsed(path: Path, text: str, delimiter: str, decimal: str, header: bool) -> pa.Table:
-    first = next(csv.reader(io.StringIO(text), delimiter=delimiter))
-    names = [name.strip() for name in first] if header else names_without_header(len(first))
-    if len(set(names)) < len(names):
-        doubled = next(name for name in names if names.count(name) > 1)
-        raise LogError(f"{path}: line 1: two columns are called {doubled!r}; name them apart")
+def _parsed(path: Path, text: str, layout: TextLayout) -> pa.Table:
+    lines = itertools.islice(io.StringIO(text), layout.skip_lines, None)
+    first = next(rows_of(lines, layout.delimiter))
+    names = names_apart(first) if layout.header else names_without_header(len(first))
+    delimiter = layout.delimiter
+    if delimiter == BLANKS:
+        delimiter, text = (
+            "\t",
+            "".join("\t".join(line.split()) + "\n" for line in text.splitlines()),
+        )
     try:
         return pacsv.read_csv(
             pa.BufferReader(text.encode()),
-            read_options=pacsv.ReadOptions(column_names=names, skip_rows=int(header)),
+            read_options=pacsv.ReadOptions(column_names=names, skip_rows=layout.rows_from),
             parse_options=pacsv.ParseOptions(
                 delimiter=delimiter, invalid_row_handler=lambda _: "skip"
             ),
-            convert_options=pacsv.ConvertOptions(decimal_point=decimal, strings_can_be_null=True),
+            convert_options=pacsv.ConvertOptions(
+                decimal_point=layout.decimal,
+                strings_can_be_null=True,
+                # Dates stay texts: whether they name a zone is theirs to tell.
+                timestamp_parsers=[_NEVER],
+            ),
         )
     except (pa.ArrowException, ValueError) as error:
         raise LogError(f"{path}: no table that can be read: {error}") from error
@@ -157,15 +157,49 @@ def _number(cell: str | None, decimal: str) -> float:
         return np.nan
 
 
-def _stamps(column: pa.ChunkedArray) -> Stamps | None:
-    """Return the stamps of a column of dates and times, the earliest there is where one is none."""
+def _time_texts(column: pa.ChunkedArray) -> TimeTexts | None:
+    """Return the stamps of a column of dates or times, the earliest there is where one is none."""
     if pa.types.is_timestamp(column.type):
         # Naive ones are UTC, as in ISO 8601 texts.
-        return np.asarray(pc.cast(column, pa.timestamp("ns")).to_numpy().astype("int64"))
-    if not pa.types.is_string(column.type):
+        stamps = pc.cast(column, pa.timestamp("ns")).to_numpy().astype("int64")
+        return TimeTexts(np.asarray(stamps), ISO_TIME, column.type.tz is not None)
+    return time_texts([str(cell or "") for cell in column.to_pylist()])
+
+
+def time_texts(cells: Sequence[str]) -> TimeTexts | None:
+    """Return the stamps of texts in the unit in which the first and most of them are times.
+
+    Where day and month could stand either way, the month is first beside AM and PM alone.
+    """
+    first = next((cell for cell in cells if cell.strip()), "")
+    found = {}
+    for unit in (unit for unit in TEXTS if stamp_reader(unit)(first) is not None):
+        stamp_of = stamp_reader(unit)
+        stamps = [stamp_of(cell) for cell in cells]
+        if sum(one is None for one in stamps) <= _NO_TIMES * len(stamps):
+            found[unit] = days_counted(stamps) if is_of_day(unit) else stamps
+    if not found:
         return None
-    cells = column.to_pylist()
-    if stamp_ns_from_iso(str(cells[0]).strip()) is None:
-        return None
-    found = [stamp_ns_from_iso((cell or "").strip()) for cell in cells]
-    return np.array([np.iinfo(np.int64).min if one is None else one for one in found])
+    either = {"dmy", "mdy"} <= found.keys()
+    unit = "mdy" if either and first.strip().lower().endswith("m") else next(iter(found))
+    lacks = np.iinfo(np.int64).min
+    stamps_ns = np.array([lacks if one is None else one for one in found[unit]], dtype=np.int64)
+    return TimeTexts(stamps_ns, unit, tells_zone(first), either=either)
+
+
+def _with_dates(columns: dict[str, list[str]], times: dict[str, TimeTexts]) -> dict[str, TimeTexts]:
+    """Return times of the day that have a column of days beside them, read with it."""
+    days = [name for name, said in times.items() if said.unit != CLOCK and _is_daily(said)]
+    found = {}
+    for name, said in times.items():
+        if said.unit == CLOCK and days:
+            pairs = zip(columns[days[0]], columns[name], strict=True)
+            joined = time_texts([f"{day} {text}" for day, text in pairs])
+            if joined is not None:
+                found[name] = joined._replace(date=days[0])
+    return found
+
+
+def _is_daily(said: TimeTexts) -> bool:
+    known = said.stamps_ns[said.stamps_ns > np.iinfo(np.int64).min]
+    return bool(np.all(known % (86_400 * 10**9) == 0))

@@ -20,11 +20,24 @@ FIELDS = {
     "z": re.compile(r"^z|z$", re.IGNORECASE),
 }  # fmt: skip
 """By field of a position: what a column of it may be called, in English and German."""
+EAST = re.compile(r"(?:^|[\W_])e(?:$|[\W_\d])|east|ost(?!en)|rechts", re.IGNORECASE)
+NORTH = re.compile(r"(?:^|[\W_])n(?:$|[\W_\d])|north|nord|hoch", re.IGNORECASE)
+"""What says which axis a column lies along, more plainly than x and y, which change places."""
 ALTITUDE = re.compile(r"alt(?!er)|h..?he|^h$|height|elev|^hgt|^z$", re.IGNORECASE)
 STD = re.compile(r"std|sigma|stdev|h_?acc|accuracy|genauigkeit|^acc$|eph$", re.IGNORECASE)
 FEET = re.compile(r"ft\b|feet|fu.{1,2}$", re.IGNORECASE)
 EPSG = re.compile(r"epsg\D{0,3}(\d{4,5})", re.IGNORECASE)
 ZONE = re.compile(r"(?:utm|zone)\D{0,2}(\d{1,2})\s*([C-X]?)", re.IGNORECASE)
+
+
+def called(fields: dict[str, str]) -> int:
+    """Return how well the columns of fields are called as these would be."""
+    found = 0
+    for field, column in fields.items():
+        found += bool(field in FIELDS and FIELDS[field].search(column))
+        along = 2 * (bool(EAST.search(column)) - bool(NORTH.search(column)))
+        found += {"x": along, "easting": along, "y": -along, "northing": -along}.get(field, 0)
+    return found
 
 
 def altitude_of(columns: dict[str, Array]) -> str | None:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pyproj
 
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_ecef, local_from_geo
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.declare.motion import FASTEST_MPS, GridMotion, changes, motion_of
 from foretwin.telemetry.logs.declare.names import FEET
+from foretwin.telemetry.logs.log import LogError
 
 _LEAST_P90_MPS = 1.5
 """A drive is faster than that for a tenth of its time, and never faster than 90 m/s for long."""
@@ -24,11 +25,17 @@ _ROUGH = 1.6
 _LEAST_CHANGES = 15
 _OWN_TIMES = 0.9
 """So many positions have a time of their own; fewer by a clock that is too coarse for them."""
-_TOGETHER = 0.6
-"""Columns of one receiver change in the same rows, of all in which one does."""
+_TOGETHER, _TOGETHER_COARSE, _FEW_STEPS = 0.6, 0.2, 8.0
+"""Columns of one receiver change in the same rows, of all in which one does; in fewer where both
+are rounded so that they change by a few steps at most: along a street one hardly changes."""
 _EVENLY = 0.9
-_WHOLE_UNIT, _LEAST_WHOLE = "1e-7 deg", 20_000.0
+_WHOLE_UNITS, _LEAST_WHOLE = ("1e-7 deg", "1e-6 deg", "1e-5 deg", "mas"), 20_000.0
 """Smaller whole numbers are revolutions and the like: 200 m around where both are nought."""
+_PLAIN_ANGLES, _FEW_WRONG = ("deg", "rad"), 0.01
+_BESIDE_DEG = 2.0
+"""So far beyond the area in which a projected system is used may a drive lie in it."""
+_FAR_M = 3.0e4
+"""A plane's zero lies nearer to the drive: what is farther off counts from a grid's."""
 _ROWS_LOOKED_AT = 20_000
 _EARTH_M, _ELLIPSOID_M = (6.33e6, 6.40e6), (-500.0, 9000.0)
 _WITHIN_M = 3.0e5
@@ -51,20 +58,15 @@ class Place(NamedTuple):
     """Latitude and longitude, where the frame tells them."""
     alike: float
     """Share of changes that all columns have together."""
-
-    def called(self, names: dict[str, re.Pattern[str]]) -> int:
-        """Return how many columns have the name that their field would have."""
-        return sum(
-            bool(names[field].search(column))
-            for field, column in self.fields.items()
-            if field in names
-        )
+    centre_m: tuple[float, float] = (0.0, 0.0)
+    """Of a plane: where in it the drive's middle lies."""
 
 
-def places_of(columns: dict[str, Array], time_s: Array) -> list[Place]:
-    """Return every reading that moves as a car does, in the frame that takes most to fit by chance.
+def places_of(columns: dict[str, Array], time_s: Array) -> list[list[Place]]:
+    """Return every reading that moves as a car does, of one kind of frame in each list.
 
-    `time_s` (N,) may be any scale's: a wrong one leaves none, since speeds are no car's.
+    Where a frame takes much to fit by chance, no other is looked for. `time_s` (N,) may be any
+    scale's: a wrong one leaves none, since speeds are no car's.
     """
     lively = {
         name: values
@@ -72,9 +74,42 @@ def places_of(columns: dict[str, Array], time_s: Array) -> list[Place]:
         if len(changes([values])) >= _LEAST_CHANGES and not counts(values)
     }
     new = _Changes(lively)
-    plane = _plane(lively, time_s, new)
-    grid = [place for place in plane if place.frame == "projected"]
-    return _ecef(lively, time_s, new) or grid or _geographic(lively, time_s, new) or plane
+    if ecef := _ecef(lively, time_s, new):
+        return [ecef]
+    utm, plane = _plane(lively, time_s, new)
+    if utm:
+        return [utm]
+    angles = _geographic(lively, time_s, new)
+    if any(place.unit in _PLAIN_ANGLES for place in angles):
+        return [angles]
+    return [found for found in (angles, plane) if found]
+
+
+def in_grid(places: list[Place], epsg: int, time_s: Array) -> list[Place]:
+    """Return positions of a projected system where they are on Earth, in true metres.
+
+    Those beyond where the system is used are none. Raises LogError where there is no such system.
+    """
+    try:
+        area = pyproj.CRS.from_epsg(epsg).area_of_use
+        convert = pyproj.Transformer.from_crs(epsg, 4326, always_xy=True)
+    except pyproj.exceptions.CRSError as error:
+        raise LogError(f"EPSG {epsg}: {error}") from None
+    found = []
+    for place in places:
+        lon, lat = convert.transform(*(place.xy_m + place.centre_m).T)
+        middle = (float(np.median(lat)), float(np.median(lon)))
+        inside = area is None or (
+            area.south - _BESIDE_DEG <= middle[0] <= area.north + _BESIDE_DEG
+            and area.west - _BESIDE_DEG <= middle[1] <= area.east + _BESIDE_DEG
+        )
+        if not inside or not np.isfinite([lat, lon]).all():
+            continue
+        xy_m = local_from_geo(LocalFrame(GeoPoint(*middle)), np.asarray(lat), np.asarray(lon))
+        found += _place(
+            place.frame, place.fields, place.unit, place.rows, xy_m, time_s, middle, place.alike
+        )
+    return found
 
 
 def counts(values: Array) -> bool:
@@ -86,14 +121,17 @@ def counts(values: Array) -> bool:
 
 def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
     found = []
-    for unit, degrees in units.GEOGRAPHIC_ANGLE.items():
+    for unit in units.GEOGRAPHIC_ANGLE:
         fits = {}
         for name, values in columns.items():
+            if unit in _WHOLE_UNITS and not _are_whole(values, unit):
+                continue
+            if unit == units.DDMM and not _are_ddmm(values):
+                continue
             # The middle, since (0, 0) is what receivers say without a fix.
-            angle = values * degrees
+            angle = units.degrees_of(values, unit)
             low, high = np.nanpercentile(angle, (5.0, 95.0))
-            whole = unit != _WHOLE_UNIT or abs(np.nanmedian(values)) > _LEAST_WHOLE
-            if whole and low >= -180.0 and high <= 180.0 and 1e-5 < high - low < 4.0:
+            if low >= -180.0 and high <= 180.0 and 1e-5 < high - low < 4.0:
                 fits[name] = angle
         for lat, lon in itertools.permutations(fits, 2):
             if abs(np.nanmedian(fits[lat])) >= 89.0:
@@ -102,7 +140,7 @@ def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list
             if alike < _TOGETHER:
                 continue
             lat_deg, lon_deg = fits[lat][rows], fits[lon][rows]
-            middle = (float(np.median(lat_deg)), float(np.median(lon_deg)))
+            middle = (float(np.nanmedian(lat_deg)), float(np.nanmedian(lon_deg)))
             at = (np.abs(lat_deg - middle[0]) < 3.0) & (np.abs(lon_deg - middle[1]) < 3.0)
             rows, lat_deg, lon_deg = rows[at], lat_deg[at], lon_deg[at]
             if not _moves_like_a_car(
@@ -115,6 +153,19 @@ def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list
             fields = {"latitude": lat, "longitude": lon}
             found += _place("wgs84", fields, unit, rows, xy_m, time_s, middle, alike)
     return found
+
+
+def _are_whole(values: Array, unit: str) -> bool:
+    """Tell whether numbers can be whole parts of degrees; of the smallest there may be decimals."""
+    known = values[np.isfinite(values)]
+    whole = unit == _WHOLE_UNITS[0] or np.mean(known == np.round(known)) > 1.0 - _FEW_WRONG
+    return bool(whole and abs(np.median(known)) > _LEAST_WHOLE)
+
+
+def _are_ddmm(values: Array) -> bool:
+    """Tell whether numbers can be degrees times a hundred and minutes: never 60 and more."""
+    known = np.abs(values[np.isfinite(values)])
+    return bool(np.median(known) >= 100.0 and np.mean(known % 100.0 >= 60.0) < _FEW_WRONG)
 
 
 def _ecef(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
@@ -144,26 +195,38 @@ def _ecef(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place
     return found
 
 
-def _plane(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place]:
-    """Return readings as UTM or the like, else as lengths from somewhere: feet where so called."""
-    grid, near = [], []
+def _plane(
+    columns: dict[str, Array], time_s: Array, new: _Changes
+) -> tuple[list[Place], list[Place]]:
+    """Return readings as UTM or the like; those as another grid, else as lengths from somewhere.
+
+    They are feet where they are called so, else metres; the latter may be km, cm or mm.
+    """
+    utm: list[Place] = []
+    grid: list[Place] = []
+    near: list[Place] = []
     for east, north in itertools.permutations(columns, 2):
         rows, alike = new.common((east, north))
         if alike < _TOGETHER:
             continue
-        unit = "ft" if FEET.search(east) and FEET.search(north) else "m"
-        xy_m = np.stack([columns[east][rows], columns[north][rows]], axis=1) * units.LENGTH[unit]
-        if not _moves_like_a_car(time_s[rows], xy_m):
-            continue
-        x_m, y_m = (float(value) for value in np.median(xy_m, axis=0))
-        xy_m = xy_m - (x_m, y_m)
-        if _UTM_EAST_M[0] < x_m < _UTM_EAST_M[1] and _UTM_NORTH_M[0] < y_m < _UTM_NORTH_M[1]:
+        raw = np.stack([columns[east][rows], columns[north][rows]], axis=1)
+        feet = FEET.search(east) and FEET.search(north)
+        for unit in ("ft",) if feet else ("m", "km", "cm", "mm"):
+            xy_m = raw * units.LENGTH[unit]
+            if not _moves_like_a_car(time_s[rows], xy_m):
+                continue
+            x_m, y_m = (float(value) for value in np.median(xy_m, axis=0))
             fields = {"easting": east, "northing": north}
-            grid += _place("projected", fields, unit, rows, xy_m, time_s, None, alike)
-        else:
-            fields = {"x": east, "y": north}
-            near += _place("local", fields, unit, rows, xy_m, time_s, None, alike)
-    return grid or near
+            kind, found = "projected", grid
+            if math.hypot(x_m, y_m) < _FAR_M:
+                kind, fields, found = "local", {"x": east, "y": north}, near
+            elif unit not in ("m", "ft"):
+                continue
+            elif _UTM_EAST_M[0] < x_m < _UTM_EAST_M[1] and _UTM_NORTH_M[0] < y_m < _UTM_NORTH_M[1]:
+                found = utm
+            places = _place(kind, fields, unit, rows, xy_m - (x_m, y_m), time_s, None, alike)
+            found += [place._replace(centre_m=(x_m, y_m)) for place in places]
+    return utm, grid or near
 
 
 def _place(
@@ -184,16 +247,22 @@ class _Changes:
     def __init__(self, columns: dict[str, Array]) -> None:
         self._known = {name: np.isfinite(values) for name, values in columns.items()}
         self._new: dict[str, Flags] = {}
+        self._coarse: dict[str, bool] = {}
         for name, values in columns.items():
             new = np.zeros(len(values), dtype=bool)
-            new[changes([values])] = True
+            rows = changes([values])
+            new[rows] = True
             self._new[name] = new
+            steps = np.abs(np.diff(values[rows]))
+            self._coarse[name] = bool(np.median(steps) < _FEW_STEPS * steps.min())
 
     def common(self, names: Sequence[str]) -> tuple[Indices, float]:
         """Return the rows in which any is new and all are known; and how many are new in all."""
         any_new = np.any([self._new[name] for name in names], axis=0)
         all_new = np.all([self._new[name] for name in names], axis=0)
         alike = float(all_new.sum() / max(any_new.sum(), 1))
+        if alike >= _TOGETHER_COARSE and all(self._coarse[name] for name in names):
+            alike = max(alike, _TOGETHER)
         if alike < _TOGETHER:
             return np.zeros(0, dtype=np.intp), alike
         known = np.all([self._known[name] for name in names], axis=0)

@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.did_you_mean import one_of
 from foretwin.telemetry.logs.declaration import Declaration, PositionSection, TimeSection
-from foretwin.telemetry.logs.declare.choice import Chosen, CountryOf, OpenQuestion, chosen_place
-from foretwin.telemetry.logs.declare.clock import ClockColumn, clocks_of
+from foretwin.telemetry.logs.declare.choice import Chosen, CountryOf, OpenQuestion
+from foretwin.telemetry.logs.declare.clock import ClockColumn
 from foretwin.telemetry.logs.declare.loose_table import LooseTable, read_loose_table
 from foretwin.telemetry.logs.declare.motion import GRID_S
-from foretwin.telemetry.logs.declare.names import altitude_of, epsg_of, std_of
-from foretwin.telemetry.logs.declare.places import Place, places_of
+from foretwin.telemetry.logs.declare.names import altitude_of, std_of
+from foretwin.telemetry.logs.declare.places import Place
+from foretwin.telemetry.logs.declare.rasters import check_one_time, without_copies
+from foretwin.telemetry.logs.declare.readings import grid_of, readings_of, unit_of_time
 from foretwin.telemetry.logs.declare.repeats import new_when, same_source
 from foretwin.telemetry.logs.declare.sections import Sections, col
-from foretwin.telemetry.logs.declare.sensors import FoundSensors, columns_beside, sensors_of
+from foretwin.telemetry.logs.declare.sensors import FoundSensors
 from foretwin.telemetry.logs.log import LogError
 
 ANSWERS = {
     "time": "the column of the rows' time",
+    "time_unit": "the unit of that time, such as ms",
     "latitude": "the column of latitudes",
+    "position_unit": "the unit of positions, such as 1e-7 deg or km",
     "x": "the column of x, of ECEF or of a plane",
     "epsg": "the code of a projected system, such as 32633",
     "origin": "LATITUDE,LONGITUDE of a plane's zero",
@@ -32,9 +36,6 @@ ANSWERS = {
 }
 """What a user may answer beforehand, by key."""
 _UNKNOWN_POINT = "unknown: positions do not tell what on the car they are of"
-_CLOCKS_TRIED = 4
-_BY_CHANCE = ("local", "wgs84", "projected", "ecef")
-"""Frames, that which columns fit by chance first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,12 +64,12 @@ def propose(
     for key in answers:
         if key not in ANSWERS:
             raise LogError(f"--answer {key}: no such question; {one_of(key, ANSWERS)}")
-    table = read_loose_table(path)
-    readings = [
-        _reading(table, clock, places, country_of, answers)
-        for clock, places in _clocks_and_places(table, answers)
-    ]
-    readings.sort(key=lambda reading: reading.plainness, reverse=True)
+    table, copies = without_copies(read_loose_table(path))
+    check_one_time(table)
+    readings = readings_of(table, country_of=country_of, answers=answers)
+    question = unit_of_time(readings)
+    if question is not None:
+        return Proposal(declaration=None, question=question)
     clock, _, chosen, sensors = readings[0]
     if chosen.question is not None:
         return Proposal(declaration=None, question=chosen.question)
@@ -84,67 +85,9 @@ def propose(
             f"{path}: column {clock.column!r} counts rows, and no other is their time: nothing says"
             " how long a row lasts"
         )
-    return _written(table, clock, chosen, frame, framed, sensors, answers)
-
-
-class _Reading(NamedTuple):
-    """A table by one clock in one unit: what positions it leaves, and the sensors beside them."""
-
-    clock: ClockColumn
-    frame: str
-    chosen: Chosen
-    sensors: FoundSensors | None
-
-    @property
-    def plainness(self) -> tuple[int, int]:
-        """How many sensors go with the positions; then, how unlikely their frame is by chance."""
-        found = self.sensors
-        fits = -1 if self.chosen.place is None and self.chosen.question is None else 0
-        if found is not None:
-            fits = len(found.fits) + (found.heading is not None)
-        return fits, _BY_CHANCE.index(self.frame)
-
-
-def _reading(
-    table: LooseTable, clock: ClockColumn, places: list[Place], country_of: CountryOf | None,
-    answers: dict[str, str],
-) -> _Reading:  # fmt: skip
-    everything = columns_beside(table.columns, clock.time_s, {clock.column})
-    chosen = chosen_place(places, everything, country_of=country_of, answers=answers)
-    sensors = None
-    if (place := chosen.place) is not None:
-        without = {clock.column, *place.fields.values()}
-        sensors = sensors_of(place, {n: c for n, c in everything.items() if n not in without})
-    return _Reading(clock, places[0].frame, chosen, sensors)
-
-
-def _clocks_and_places(
-    table: LooseTable, answers: dict[str, str]
-) -> list[tuple[ClockColumn, list[Place]]]:
-    """Return the likeliest clock that leaves positions, in each unit in which it does."""
-    clocks = clocks_of(table)
-    if (named := answers.get("time")) is not None:
-        clocks = [clock for clock in clocks if clock.column == named]
-        if not clocks:
-            raise LogError(f"{table.path}: --answer time={named}: no column that is a time")
-    if not clocks:
-        raise LogError(
-            f"{table.path}: no column that rises as a time does (seconds to nanoseconds, or"
-            f" ISO 8601 dates); columns: {', '.join([*table.columns, *table.times, *table.texts])}"
-        )
-    found: list[tuple[ClockColumn, list[Place]]] = []
-    for clock in clocks[:_CLOCKS_TRIED]:
-        if found and (clock.column, clock.base) != (found[0][0].column, found[0][0].base):
-            continue
-        columns = {name: column for name, column in table.columns.items() if name != clock.column}
-        if places := places_of(columns, clock.time_s):
-            found.append((clock, places))
-    if found:
-        return found
-    raise LogError(
-        f"{table.path}: no columns that move as a car does (degrees, radians, ECEF or metres, at a"
-        f" time of {clocks[0].column!r} in {clocks[0].unit}): nothing to declare"
-    )
+    found = _written(table, clock, chosen, frame, framed, sensors, answers)
+    found.unknown.extend(f"{copy}: the same as {first}" for copy, first in copies.items())
+    return found
 
 
 def _frame(
@@ -152,13 +95,10 @@ def _frame(
 ) -> tuple[dict[str, Any], OpenQuestion | None, str]:
     """Return what the frame needs beside columns, or the question for it, and how it is known."""
     if place.frame == "projected":
-        if "epsg" in answers:
-            if not answers["epsg"].isdigit():
-                raise LogError(f"--answer epsg={answers['epsg']}: no number such as 32633")
-            return {"epsg": int(answers["epsg"])}, None, "EPSG code as answered"
-        code = epsg_of(table.columns, northern=True)
+        code = grid_of(table, answers)
         if code is not None:
-            return {"epsg": code}, None, f"EPSG {code} by a column's name alone"
+            said = "as answered" if "epsg" in answers else "by a column's name alone"
+            return {"epsg": code}, None, f"EPSG {code} {said}; the drive lies where that is used"
         text = "positions are eastings and northings: of which projected system (EPSG code)?"
         return {}, OpenQuestion("epsg", text), ""
     if place.frame == "local":
@@ -204,21 +144,26 @@ def _written(
     }
     used |= sections.used
     rest = [name for name in table.columns if name not in used]
+    unknown += sensors.notes
     for name, text in sensors.doubts.items():
         unknown.append(f"{name}: {text}")
     left = [name for name in rest if name not in sensors.doubts]
     if left:
         unknown.append(f"not taken: {', '.join(left)}")
+    if place.frame == "local":
+        x, y = place.fields.values()
+        unknown.insert(0, f"position: that {x} points east and {y} north (odometry's axes do not)")
     point = answers.get("reference_point", _UNKNOWN_POINT)
     if "reference_point" not in answers:
         unknown.insert(0, "reference_point: what on the car the positions are of (antenna, box, …)")
     declaration = Declaration(
-        time=TimeSection(column=clock.column, unit=clock.unit, base=clock.base),
+        time=TimeSection(column=clock.column, unit=clock.unit, base=clock.base, date=clock.date),
         position=position,
         reference_point=point,
-        delimiter=table.delimiter,
-        decimal=table.decimal,
-        header=table.header,
+        delimiter=table.layout.delimiter,
+        decimal=table.layout.decimal,
+        header=table.layout.header,
+        skip_lines=table.layout.skip_lines,
         **more,
     )
     kept = {name: [line for line in lines if line] for name, lines in (evidence | said).items()}

@@ -28,6 +28,14 @@ UNDERSTEER_S2PM2 = (0.0, 0.0015, 0.003, 0.005)
 0.0015 is a saloon's (0.004 rad per m/s² on 2.7 m)."""
 
 
+_ODD_LEFT, _ODD_LEVEL = 0.03, 0.5
+"""So little of a column stays unexplained by the speed, and so far from zero, in m/s, does it stand
+where the car does, that it has to do with it whatever its size."""
+_TURNED_RAD, _MOST_REVERSE = 2.6, 0.3
+"""A heading that differs so much from the course is that of a car in reverse, for a smaller part of
+a drive than that."""
+
+
 class Role(NamedTuple):
     """A role: signals of the motion that make it, the first of which tells its size."""
 
@@ -139,14 +147,16 @@ def fits_of(
     steering = [likeness(values, _steering(motion, one)) for one in UNDERSTEER_S2PM2]
     steered = min(filter(None, steering), key=lambda like: like.left, default=None)
     for role in roles:
-        like = steered if role.section == "steering" else likeness(values, role.signals(motion))
+        if role.field == "forward":
+            like = likeness(without_reverse(values), role.signals(motion))
+        else:
+            like = steered if role.section == "steering" else likeness(values, role.signals(motion))
         if like is None or like.chance < SURE or like.left > role.most_left:
             continue
         size = float(like.sizes[0])
         if role.field == "forward":
             # Speeds have no level: what they are at a standstill is no other unit.
-            both = np.isfinite(values) & motion.moves
-            size = float(np.median(values[both] / motion.speed_mps[both]))
+            size = _speed_size(motion, values)
         # Noise of positions makes sizes too small, by no more than what it leaves unexplained.
         most = 0.0 if role.section == "speed" else -math.log1p(-like.left)
         beyond = {
@@ -159,6 +169,35 @@ def fits_of(
             continue
         found.append(RoleFit(role, column, unit, size < 0.0, like))
     return sorted(found, key=lambda fit: fit.like.left)
+
+
+def without_reverse(speed: Array) -> Array:
+    """Return speeds as positions tell them: a car that reverses is as fast as one that does not."""
+    return np.abs(speed)
+
+
+def _speed_size(motion: GridMotion, values: Array) -> float:
+    """Return a speed column's size per m/s, negative where it is so most of the way."""
+    both = np.isfinite(values) & motion.moves
+    size = float(np.median(np.abs(values[both]) / motion.speed_mps[both]))
+    return -size if float(np.sum(values[both])) < 0.0 else size
+
+
+def odd_speed(motion: GridMotion, values: Array) -> str | None:
+    """Return in words how a column (G,) goes with the speed, but is it in none of its units."""
+    like = likeness(without_reverse(values), motion.speed_mps[:, None])
+    if like is None or like.chance < SURE or like.left > _ODD_LEFT:
+        return None
+    size = abs(_speed_size(motion, values))
+    if abs(float(like.sizes[-1])) > _ODD_LEVEL * size:
+        return None
+    factors = {unit: size * factor for unit, factor in units.SPEED.items()}
+    unit = min(factors, key=lambda one: abs(math.log(max(factors[one], 1e-12))))
+    return (
+        f"goes with the way per time (r = {math.sqrt(1.0 - like.left):.4f}), but is"
+        f" {factors[unit]:.3g} times what {unit} would be: something else, or the unit of positions"
+        " or of time is another than said below"
+    )
 
 
 def _beyond(off: float, most: float) -> float:
@@ -189,6 +228,8 @@ class HeadingFit(NamedTuple):
     """Were it growing the other way."""
     late_s: float
     swings_rad: float
+    reverse_s: float
+    """So long the car drove backwards by it."""
 
 
 def heading_of(motion: GridMotion, column: str, angle: Array, lates: Indices) -> HeadingFit | None:
@@ -199,7 +240,7 @@ def heading_of(motion: GridMotion, column: str, angle: Array, lates: Indices) ->
     found = []
     for unit, factor in units.ANGLE.items():
         for sign in (1.0, -1.0):
-            best = (math.inf, 0.0, 0)
+            best = (math.inf, 0.0, 0, 0.0)
             for late in lates.tolist():
                 mine = angle[max(late, 0) : len(angle) + min(late, 0)] * factor * sign
                 course = motion.course_rad[max(-late, 0) : len(angle) - max(late, 0)]
@@ -209,16 +250,23 @@ def heading_of(motion: GridMotion, column: str, angle: Array, lates: Indices) ->
                 left = np.exp(1j * (course[both] - mine[both]))
                 middle = np.mean(left)
                 off = np.angle(left * np.conj(middle))
+                back = np.abs(off) > _TURNED_RAD
+                if 0.0 < back.mean() < _MOST_REVERSE:
+                    off = np.where(back, off - np.copysign(math.pi, off), off)
                 spread = float(np.sqrt(np.mean(np.clip(off, -0.5, 0.5) ** 2)))
-                best = min(best, (spread, float(np.angle(middle)), late))
+                best = min(
+                    best, (spread, float(np.angle(middle)), late, float(back.sum()) * GRID_S)
+                )
             found.append((*best, unit, sign))
-    spread, offset, late, unit, sign = min(found)
+    spread, offset, late, reverse_s, unit, sign = min(found)
     if not math.isfinite(spread):
         return None
-    other = min(one[0] for one in found if one[3] == unit and one[4] == -sign)
-    next_unit = min(one[0] for one in found if one[3] != unit)
+    other = min(one[0] for one in found if one[4] == unit and one[5] == -sign)
+    next_unit = min(one[0] for one in found if one[4] != unit)
     known = motion.course_rad[np.isfinite(motion.course_rad) & np.isfinite(angle)]
     swings = float(np.std(known)) if len(known) else 0.0
     if spread > 0.14 or spread > 0.4 * min(other, next_unit, swings):
         return None
-    return HeadingFit(column, unit, sign < 0, offset, spread, other, late * GRID_S, swings)
+    return HeadingFit(
+        column, unit, sign < 0, offset, spread, other, late * GRID_S, swings, reverse_s
+    )

@@ -79,6 +79,7 @@ class Sections:
             unknown.append("heading: no column that is plainly one")
         else:
             made["heading"], said["heading"] = self._heading(sensors, sensors.heading, place)
+            unknown += _mirrored(made["heading"], place)
         return made, said, unknown
 
     def _speed(self, sensors: FoundSensors) -> dict[str, RoleFit]:
@@ -199,6 +200,17 @@ class Sections:
         # What does not move at all is a course that is held: as good as none.
         lives = np.mean(steps > 0.0) > 0.1
         return bool(lives and np.percentile(steps, 99) < 1.0 and steps.max() < _STEADY_DEG)
+
+
+def _mirrored(heading: HeadingSection, place: Place) -> list[str]:
+    """Return what to say of a heading that grows against the compass: the track may be mirrored."""
+    if heading.zero != "north" or heading.direction == "clockwise" or heading.offset_deg != 0.0:
+        return []
+    x = [*place.fields.values()][1 if place.frame == "wgs84" else 0]
+    return [
+        f"heading: that {heading.yaw.column} grows counterclockwise from north; a compass does not,"
+        f" and would not here either if {x} grew to the west"
+    ]
 
 
 def _said(fit: RoleFit) -> str:

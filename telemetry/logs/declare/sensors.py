@@ -16,7 +16,15 @@ from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.declare.likeness import Lateness, lateness
 from foretwin.telemetry.logs.declare.motion import GRID_S, MOVES_MPS, GridMotion, changes, on_grid
 from foretwin.telemetry.logs.declare.places import Place
-from foretwin.telemetry.logs.declare.roles import ROLES, HeadingFit, RoleFit, fits_of, heading_of
+from foretwin.telemetry.logs.declare.roles import (
+    ROLES,
+    HeadingFit,
+    RoleFit,
+    fits_of,
+    heading_of,
+    odd_speed,
+    without_reverse,
+)
 
 _FINER_HALF = round(0.4 / GRID_S)
 _PLAINLY = 1.3
@@ -24,6 +32,7 @@ _PLAINLY = 1.3
 _LEAST_CHANGES = 12
 _LATE_TICKS = np.arange(-24, 25, 4)
 _GRAVITY_WITHIN = 0.08
+_LEAST_REVERSE_S = 1.0
 
 
 class ChangingColumn(NamedTuple):
@@ -36,7 +45,8 @@ class ChangingColumn(NamedTuple):
 class FoundSensors(NamedTuple):
     """What was found, by section and field; `late` by section. `others` could be the same.
 
-    `doubts` are columns that could be several things, each said in words.
+    `doubts` are columns that could be several things, each said in words; `notes` what is not as
+    it should be with columns that are taken.
     """
 
     fits: dict[str, RoleFit]
@@ -46,6 +56,7 @@ class FoundSensors(NamedTuple):
     """The column that gravity is in, and its mean in g."""
     others: dict[str, list[str]]
     doubts: dict[str, str]
+    notes: list[str]
 
 
 def columns_beside(
@@ -93,7 +104,27 @@ def sensors_of(place: Place, beside: dict[str, ChangingColumn]) -> FoundSensors:
     used = {fit.column for fit in fits.values()}
     doubts = {name: said for name, said in (doubts | more_doubts).items() if name not in used}
     others = {key: names for key, names in (others | more_others).items() if key in fits}
-    return FoundSensors(fits, heading, late, _gravity(beside, fits), others, doubts)
+    if speed is None:
+        for name, column in _less(beside, fits).items():
+            odd = odd_speed(motion, on_grid(motion, column.time_s, column.values))
+            doubts |= {} if odd is None else {name: odd}
+    notes = _never_backwards(beside, speed, heading)
+    return FoundSensors(fits, heading, late, _gravity(beside, fits), others, doubts, notes)
+
+
+def _never_backwards(
+    beside: dict[str, ChangingColumn], speed: RoleFit | None, heading: HeadingFit | None
+) -> list[str]:
+    """Return what to say where the heading tells of driving backwards, and the speed does not."""
+    if speed is None or heading is None or heading.reverse_s < _LEAST_REVERSE_S:
+        return []
+    values = beside[speed.column].values * (-1.0 if speed.negate else 1.0)
+    if values.min() < -0.1 * values.max():
+        return []
+    return [
+        f"{speed.column}: never negative, though by {heading.column} the car drove backwards for"
+        f" {heading.reverse_s:.0f} s: told forwards there"
+    ]
 
 
 def _less(beside: dict[str, ChangingColumn], fits: dict[str, RoleFit]) -> dict[str, ChangingColumn]:
@@ -224,6 +255,7 @@ def _add_late(
 ) -> None:
     column = beside[fit.column]
     values = on_grid(motion, column.time_s, column.values)
+    values = without_reverse(values) if fit.role.field == "forward" else values
     lever = None if fit.role.lever is None else fit.role.lever(motion)
     size = float(fit.like.sizes[0])
     found = lateness(motion, values, fit.role.signals(motion), size=size, lever=lever)

@@ -146,7 +146,7 @@ def jumped(drives: _Drives) -> Iterator[_Strangers]:
         stamps_ns = np.concatenate([stream.stamps_ns for stream in drive.values()])
         if np.ptp(stamps_ns) < _TOLD_NS:
             continue
-        for jump_s, share in ((1.0, 0.5), (1.0, 0.8), (2.0, 0.5), (2.0, 0.8)):
+        for jump_s, share in ((0.3, 0.5), (1.0, 0.5), (1.0, 0.8), (2.0, 0.5), (2.0, 0.8)):
             at_ns = stamps_ns.min() + share * np.ptp(stamps_ns)
             late = {
                 name: Stream(

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from foretwin.telemetry.logs.declare.clock import clocks_of
-from foretwin.telemetry.logs.declare.loose_table import LooseTable
+from foretwin.telemetry.logs.declare.layout import TextLayout
+from foretwin.telemetry.logs.declare.loose_table import LooseTable, TimeTexts
 from foretwin.telemetry.logs.units import TIME_NS
 
+COMMAS = TextLayout(",", ".", True, 0, 1)
 SPRING_S = 1_523_201_497.0
 
 
@@ -21,7 +23,7 @@ SPRING_S = 1_523_201_497.0
 def test_a_clock_is_found_in_its_unit(unit: str, hz: float, zero_s: float, base: str) -> None:
     time_s = np.arange(0.0, 60.0, 1.0 / hz)
     counted = (zero_s + time_s) / float(Fraction(TIME_NS[unit]) / 10**9)
-    table = LooseTable(Path("log.csv"), ",", ".", True, {"when": counted}, {}, ())
+    table = LooseTable(Path("log.csv"), COMMAS, {"when": counted}, {}, ())
     found = {clock.unit: clock for clock in clocks_of(table)}
     assert found[unit].base == base
     assert found[unit].time_s == pytest.approx(time_s, abs=1e-3)
@@ -35,6 +37,8 @@ def test_rows_of_several_sensors_share_a_stamp_and_come_behind_a_finer_clock() -
     fine = 9_000.0 + np.cumsum(np.full(len(shared), 1 / 15.0))
     dates = np.round(shared * 1e9).astype(np.int64)
     columns = {"shared": shared, "fine": fine, "coarse": np.floor(fine)}
-    table = LooseTable(Path("log.csv"), ",", ".", True, columns, {"date": dates}, ())
+    table = LooseTable(
+        Path("log.csv"), COMMAS, columns, {"date": TimeTexts(dates, "iso8601", False)}, ()
+    )
     found = [clock.column for clock in clocks_of(table) if clock.unit in ("s", "iso8601")]
     assert found == ["fine", "date", "shared"]

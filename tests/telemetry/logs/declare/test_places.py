@@ -26,7 +26,11 @@ def test_latitude_and_longitude_are_of_one_receiver() -> None:
         for which, first in (("one", 0), ("another", 5))
         for name, values in (("lat", lat), ("lon", lon))
     }
-    found = {tuple(sorted(place.fields.values())) for place in places_of(columns, time_s)}
+    found = {
+        tuple(sorted(place.fields.values()))
+        for places in places_of(columns, time_s)
+        for place in places
+    }
     assert ("lat of one", "lon of one") in found
     assert ("lat of another", "lon of another") in found
     assert ("lat of one", "lon of another") not in found

@@ -210,7 +210,9 @@ def test_what_is_no_drive_is_refused_in_one_line(
 
 
 def test_an_answer_to_no_question_names_the_questions(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="no such question; one of time, latitude, x, epsg"):
+    with pytest.raises(
+        LogError, match="no such question; one of time, time_unit, latitude, position_unit, x, epsg"
+    ):
         propose(tmp_path / "none.csv", answers={"colour": "red"})
 
 

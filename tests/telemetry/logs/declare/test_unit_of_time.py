@@ -5,9 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from foretwin.telemetry.logs.declare.choice import Chosen, OpenQuestion
+from foretwin.telemetry.logs.declare.clock import ClockColumn
 from foretwin.telemetry.logs.declare.proposal import propose
+from foretwin.telemetry.logs.declare.readings import Reading, unit_of_time
+from foretwin.telemetry.logs.log import LogError
 from tests.telemetry.logs.declare.test_propose import country
+
+COVERS = ("foretwin.telemetry.logs.declare.readings",)
 
 
 def straight_table(folder: Path) -> Path:
@@ -39,3 +46,27 @@ def test_a_heading_is_no_latitude_by_a_clock_that_is_a_thousand_times_slower(
     place = found.declaration.position
     assert place is not None
     assert (getattr(place.latitude, "column", ""), place.frame) == ("c4", "wgs84")
+
+
+def reading(unit: str, frame: str) -> Reading:
+    clock = ClockColumn("t", unit, "log", np.arange(3.0), False, "")
+    return Reading(clock, frame, Chosen(None, "", False, OpenQuestion("origin", "where?")), None)
+
+
+def test_a_unit_of_time_that_nothing_tells_is_asked_for() -> None:
+    asked = unit_of_time([reading("s", "wgs84"), reading("ms", "wgs84"), reading("us", "local")])
+    assert asked is not None
+    assert (asked.key, asked.choices) == ("time_unit", ("s", "ms"))
+    assert unit_of_time([reading("s", "wgs84"), reading("ms", "local")]) is None
+    assert unit_of_time([reading("s", "wgs84"), reading("s", "wgs84")]) is None
+
+
+def test_a_unit_of_time_can_be_answered(tmp_path: Path) -> None:
+    path = straight_table(tmp_path)
+    found = propose(path, country_of=country, answers={"time_unit": "ms"})
+    assert found.declaration is not None
+    assert found.declaration.time.unit == "ms"
+    with pytest.raises(LogError, match="time_unit=us: no column is a time in that"):
+        propose(path, answers={"time_unit": "us"})
+    with pytest.raises(LogError, match="time_unit=days1900: no column is a time in that"):
+        propose(path, answers={"time_unit": "days1900"})
