@@ -80,8 +80,9 @@ def places_of(columns: dict[str, Array], time_s: Array) -> list[list[Place]]:
     if utm:
         return [utm]
     angles = _geographic(lively, time_s, new)
-    if any(place.unit in _PLAIN_ANGLES for place in angles):
-        return [angles]
+    # Plain degrees as minutes, and a heading beside them, move as a car does now and then.
+    if plain := [place for place in angles if place.unit in _PLAIN_ANGLES]:
+        return [plain]
     return [found for found in (angles, plane) if found]
 
 
