@@ -54,7 +54,7 @@ def chosen_place(
     `sensors` are all columns that change, those of positions among them.
     """
     scores = _misfits(places, sensors)
-    groups = {frozenset(place.fields.values()) for place in places}
+    groups = list(dict.fromkeys(frozenset(place.fields.values()) for place in places))
 
     def best_of(group: frozenset[str]) -> tuple[float, int]:
         mine = [row for row in zip(scores, places, strict=True)
@@ -87,7 +87,7 @@ def chosen_place(
         for score, place in zip(scores, places, strict=True)
         if frozenset(place.fields.values()) == group
     ]
-    others = sorted(_listed(other) for other in groups - {group} if not other & group)
+    others = sorted(_listed(other) for other in groups if not other & group)
     also = f"; other positions: {'; '.join(others)}" if others else ""
     chosen = _order_of(rows, country_of=country_of, answers=answers)
     return chosen._replace(evidence=chosen.evidence + also)
