@@ -31,6 +31,7 @@ are rounded so that they change by a few steps at most: along a street one hardl
 _EVENLY = 0.9
 _WHOLE_UNITS, _LEAST_WHOLE = ("1e-7 deg", "1e-6 deg", "1e-5 deg", "mas"), 20_000.0
 """Smaller whole numbers are revolutions and the like: 200 m around where both are nought."""
+_IN_PARTS_TOO = ("1e-7 deg", "mas")
 _PLAIN_ANGLES, _FEW_WRONG = ("deg", "rad"), 0.01
 _BESIDE_DEG = 2.0
 """So far beyond the area in which a projected system is used may a drive lie in it."""
@@ -125,7 +126,7 @@ def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list
     for unit in units.GEOGRAPHIC_ANGLE:
         fits = {}
         for name, values in columns.items():
-            if unit in _WHOLE_UNITS and not _are_whole(values, unit):
+            if not _are_whole(values, unit):
                 continue
             if unit == units.DDMM and not _are_ddmm(values):
                 continue
@@ -153,14 +154,17 @@ def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list
             xy_m = local_from_geo(LocalFrame(GeoPoint(*middle)), lat_deg, lon_deg)
             fields = {"latitude": lat, "longitude": lon}
             found += _place("wgs84", fields, unit, rows, xy_m, time_s, middle, alike)
-    return found
+    if any(place.unit == _IN_PARTS_TOO[0] for place in found):
+        return found
+    # With decimals they only rival those: alone they are some larger unit's, as speeds would say.
+    return [p for p in found if all(_are_whole(columns[n], p.unit, ()) for n in p.fields.values())]
 
 
-def _are_whole(values: Array, unit: str) -> bool:
-    """Tell whether numbers can be whole parts of degrees; of the smallest there may be decimals."""
+def _are_whole(values: Array, unit: str, in_parts_too: Sequence[str] = _IN_PARTS_TOO) -> bool:
+    """Tell whether numbers can be whole parts of degrees; of small ones there may be decimals."""
     known = values[np.isfinite(values)]
-    whole = unit == _WHOLE_UNITS[0] or np.mean(known == np.round(known)) > 1.0 - _FEW_WRONG
-    return bool(whole and abs(np.median(known)) > _LEAST_WHOLE)
+    whole = unit in in_parts_too or np.mean(known == np.round(known)) > 1.0 - _FEW_WRONG
+    return unit not in _WHOLE_UNITS or bool(whole and abs(np.median(known)) > _LEAST_WHOLE)
 
 
 def _are_ddmm(values: Array) -> bool:

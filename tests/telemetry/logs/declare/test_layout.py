@@ -143,6 +143,7 @@ def test_clocks_as_people_write_them(
     path.write_text(text_of(rows_of_a_drive(clock), between=";", head="when;lat;lon;v\n"))
     declared = checked(path, first_s=first_s)
     assert f'unit = "{unit}"' in declared
+    assert ('base = "boot"' in declared) == (unit in ("clock", "hhmmss"))
     assert ("no zone told" in declared) == (unit in ("dmy", "ymd", "mdy"))
     assert ("by usage alone" in declared) == (unit in ("dmy", "mdy"))
 

@@ -177,3 +177,14 @@ def test_a_column_that_goes_with_the_way_in_no_unit_is_told(tmp_path: Path) -> N
     said = next(line for line in told if line.startswith("rpm: "))
     assert "goes with the way per time" in said
     assert "unit of positions or of time is another" in said
+
+
+def test_decimals_of_a_thousandth_of_a_second_do_not_make_it_another_unit(tmp_path: Path) -> None:
+    """Without a speed or a coast, nothing tells it from ten millionths of a degree."""
+    truth = drive_columns()
+    fine = {name: truth[name] * 3.6e6 for name in ("lat", "lon")}
+    assert 'unit = "mas"' in read_again(written(tmp_path, {**truth, **fine}, decimals=4))
+    alone = propose(written(tmp_path, {"t": truth["t"], **fine}, decimals=4))
+    assert alone.question is not None
+    assert alone.question.key == "position_unit"
+    assert {"1e-7 deg", "mas"} <= set(alone.question.choices)
