@@ -55,7 +55,10 @@ def declare(
     ] = None,
     answer: Annotated[
         list[str] | None,
-        typer.Option(help="KEY=VALUE of time, latitude, x, epsg, origin or reference_point"),
+        typer.Option(
+            help="KEY=VALUE of time, time_unit, latitude, position_unit, x, epsg, origin or "
+            "reference_point"
+        ),
     ] = None,
 ) -> CommandResult:
     """Find out what a table's columns are, prove it, and write the declaration it is read by.

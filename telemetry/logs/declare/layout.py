@@ -7,6 +7,8 @@ lines are, and names are the first line of as many cells that stands before them
 from __future__ import annotations
 
 import csv
+import io
+import itertools
 from collections import Counter
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -36,7 +38,9 @@ class TextLayout(NamedTuple):
 
 def layout_of(path: Path, text: str) -> TextLayout:
     """Return how a text is laid out; raises LogError where it is no table."""
-    lines = text[: 1 << 18].splitlines()[:_LINES_LOOKED_AT]
+    # Lines as they are read: other line breaks of Unicode stand in cells.
+    head = itertools.islice(io.StringIO(text[: 1 << 18]), _LINES_LOOKED_AT)
+    lines = [line.rstrip("\n") for line in head]
     if len(lines) < 2:
         raise LogError(f"{path}: no table: {len(lines)} lines")
     if {line.strip().lower() for line in lines} >= _VBO:
@@ -71,7 +75,7 @@ def layout_of(path: Path, text: str) -> TextLayout:
     return TextLayout(delimiter, decimal, True, (apart or above)[0], first)
 
 
-def is_number(cell: str) -> bool:
+def _is_number(cell: str) -> bool:
     """Tell whether a cell is a number written with a point."""
     try:
         float(cell)
@@ -97,10 +101,10 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _commas_are_decimal(rows: list[list[str]], delimiter: str) -> bool:
     return delimiter != "," and any(
-        is_number(cell.replace(",", ".")) for row in rows for cell in row if cell.count(",") == 1
+        _is_number(cell.replace(",", ".")) for row in rows for cell in row if cell.count(",") == 1
     )
 
 
 def _numbers(row: list[str], decimal: str) -> float:
     filled = [cell for cell in row if cell.strip()]
-    return sum(is_number(cell.replace(decimal, ".")) for cell in filled) / max(len(filled), 1)
+    return sum(_is_number(cell.replace(decimal, ".")) for cell in filled) / max(len(filled), 1)

@@ -118,7 +118,7 @@ def _parsed(path: Path, text: str, layout: TextLayout) -> pa.Table:
     if delimiter == BLANKS:
         delimiter, text = (
             "\t",
-            "".join("\t".join(line.split()) + "\n" for line in text.splitlines()),
+            "".join("\t".join(line.split()) + "\n" for line in io.StringIO(text)),
         )
     try:
         return pacsv.read_csv(
@@ -173,8 +173,10 @@ def time_texts(cells: Sequence[str]) -> TimeTexts | None:
     """
     first = next((cell for cell in cells if cell.strip()), "")
     found = {}
-    for unit in (unit for unit in TEXTS if stamp_reader(unit)(first) is not None):
+    for unit in TEXTS:
         stamp_of = stamp_reader(unit)
+        if stamp_of(first) is None:
+            continue
         stamps = [stamp_of(cell) for cell in cells]
         if sum(one is None for one in stamps) <= _NO_TIMES * len(stamps):
             found[unit] = days_counted(stamps) if is_of_day(unit) else stamps

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from foretwin.orchestrator.commands import declare as command
 from foretwin.orchestrator.commands.cli import app
 from foretwin.orchestrator.commands.recordings import merge_logs
 from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.logs.declare.proposal import ANSWERS
 from tests.telemetry.logs.declare.test_propose import drawn_drive
 
 COVERS = ("foretwin.orchestrator.commands.recordings",)
@@ -43,6 +45,11 @@ def test_a_table_is_declared_and_read(tmp_path: Path) -> None:
     assert sum(1 for _ in log.samples()) == 1500
     command.declare(path, out=None, answers=())
     assert "unknown" in (tmp_path / "drive.csv.toml").read_text()
+
+
+def test_help_names_all_that_can_be_answered() -> None:
+    said = CliRunner().invoke(app, ["declare", "--help"]).stdout
+    assert [key for key in ANSWERS if not re.search(rf"\b{key}\b", said)] == []
 
 
 def test_what_somebody_wrote_is_kept(tmp_path: Path) -> None:

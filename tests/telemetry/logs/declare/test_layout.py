@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +24,23 @@ SPRING = datetime.datetime(2024, 5, 3, 23, 58, 40, tzinfo=datetime.UTC)
 
 Row = tuple[str, str, str, str]
 """Time, latitude, longitude, speed in km/h."""
+
+
+@pytest.mark.parametrize("other", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028"])
+def test_what_breaks_lines_in_unicode_alone_breaks_none_here(tmp_path: Path, other: str) -> None:
+    """Readers of tables do not break there: lines that are left out would be others."""
+    (path := tmp_path / "drive.csv").write_text(
+        "by" + f"{other}me" * 30 + "\nt,v,w\n1,2,3\n4,5,6\n"
+    )
+    layout = layout_of(path, path.read_text())
+    assert (layout.skip_lines, layout.rows_from) == (1, 2)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_no_table_is_refused_in_a_line(tmp_path: Path, seed: int) -> None:
+    (path := tmp_path / "drive.csv").write_bytes(random.Random(seed).randbytes(4000))
+    with pytest.raises(LogError):
+        propose(path)
 
 
 def rows_of_a_drive(clock: Callable[[float], str]) -> list[Row]:
