@@ -46,15 +46,16 @@ class Lives:
     """
 
     def __init__(self) -> None:
-        self._living: dict[str, set[str]] = {}
+        self._living: dict[str, frozenset[str]] = {}
 
     def take(self, full_key: str, *, up: bool) -> Word | None:
         """Return what a token that came or went says of its process, None where nothing."""
         alive_key, life = life_of_key(full_key)
-        living = self._living.setdefault(alive_key, set())
-        before = max(living, default=None)
-        (living.add if up else living.discard)(life)
-        counts = max(living, default=None)
-        if counts == before and not (up and life == counts):
+        before = self._living.pop(alive_key, frozenset())
+        after = before | {life} if up else before - {life}
+        if after:
+            self._living[alive_key] = after
+        counted, counts = max(before, default=None), max(after, default=None)
+        if counts == counted and not (up and life == counts):
             return None
         return Word(alive_key, counts is not None)

@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import closing
 from pathlib import Path
 from typing import TypeVar
 
@@ -153,7 +153,7 @@ def run_process(
     serve: Callable[[_Setup, Bus, ProcessLife], None],
     argv: list[str] | None = None,
     *,
-    join: Callable[[BusSetup], AbstractContextManager[Bus]] = ZenohBus,
+    join: Callable[[BusSetup], Bus] = ZenohBus,
 ) -> None:
     """Run `serve` as this process's work, with `--setup FILE` from the command line; it is on the
     bus as `join` says.
@@ -171,7 +171,7 @@ def run_process(
     meter, code = CpuMeter(file.parent, setup.process_id), 0
     refusal_file = RefusalFile(file.parent, setup.process_id)
     try:
-        with join(setup.bus) as bus:
+        with closing(join(setup.bus)) as bus:
             life = ProcessLife(setup, bus, meter=meter, refusal_file=refusal_file)
             on_end_signals(life.terminated.set)
             serve(setup, bus, life)

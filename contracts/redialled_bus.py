@@ -15,8 +15,7 @@ import socket
 import threading
 from collections import deque
 from collections.abc import Callable
-from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import msgspec
 
@@ -76,7 +75,7 @@ class TcpDoor:
 
 
 class RedialledBus:
-    """One Zenoh session after the other, as one bus; use it as a context manager.
+    """One Zenoh session after the other, as one bus.
 
     Raises BusUnreachable where there is no router at first, OSError where its name is not known.
     """
@@ -99,17 +98,6 @@ class RedialledBus:
         self._thread = threading.Thread(target=self._stand_by, name="redial", daemon=True)
         if self._door is not None:
             self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; see Bus."""

@@ -85,7 +85,7 @@ class VirtualSensors:
         self._rays: RayWorld | None = None
         self._no_world = RayWorld()
         self._pictures: dict[int, CameraWorld] = {}
-        self._lately: dict[int, deque[bool]] = {}
+        self._lately = [deque[bool](maxlen=_LATELY) for _ in sensors]
         """Of each sensor, which of its last turns were told."""
         self.passed_over: Counter[str] = Counter()
         """By sensor, turns of which nothing was told."""
@@ -153,7 +153,7 @@ class VirtualSensors:
 
     def _passed_over(self, place: int, turns: int) -> None:
         self.passed_over[self._sensors[place][0].name] += turns
-        self._lately.setdefault(place, deque(maxlen=_LATELY)).extend([False] * min(turns, _LATELY))
+        self._lately[place].extend([False] * min(turns, _LATELY))
 
     def measured(self) -> list[Measured]:
         """Return all that is due."""
@@ -165,12 +165,12 @@ class VirtualSensors:
             place = min(self._due.keys() | self._real.keys(), key=self._share_told)
             if (found := self._measured_at(place)) is not None:
                 self.told[found.sensor] += 1
-                self._lately.setdefault(place, deque(maxlen=_LATELY)).append(True)
+                self._lately[place].append(True)
                 return found
         return None
 
     def _share_told(self, place: int) -> tuple[float, int]:
-        lately = self._lately.get(place)
+        lately = self._lately[place]
         return (sum(lately) / len(lately) if lately else 1.0), place
 
     def _measured_at(self, place: int) -> Measured | None:

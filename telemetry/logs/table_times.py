@@ -28,10 +28,11 @@ UNITS = (*units.TIME_NS, *TEXTS, HHMMSS, *DAYS)
 StampOf = Callable[[str], int | None]
 
 _DAY_NS = 86_400 * 10**9
+_ZONE = r"(Z|UTC|GMT|[+-]\d{2}:?\d{2})"
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2})\2(\d{1,4})(?:[T ,;]+(.+))?")
 _TIME = re.compile(
     r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,:](\d{1,9}))?\s*([AaPp])?(?:\.?[Mm]\.?)?"
-    r"\s*(Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
+    rf"\s*{_ZONE}?"
 )
 _EPOCH = datetime.date(1970, 1, 1)
 
@@ -71,7 +72,7 @@ def days_counted(stamps_ns: Sequence[int | None]) -> list[int | None]:
 
 def tells_zone(text: str) -> bool:
     """Tell whether a date and time name their zone."""
-    return re.search(r"(Z|UTC|GMT|[+-]\d{2}:?\d{2})$", text.strip()) is not None
+    return re.search(rf"{_ZONE}$", text.strip()) is not None
 
 
 def _number_reader(factor: Decimal, zero: Decimal, decimal: str) -> StampOf:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from typing import NamedTuple
 
 import pytest
@@ -83,7 +83,7 @@ def far() -> Iterator[Far]:
         assert place == ("far", 7447)
         return door
 
-    with RedialledBus(SETUP, dial=dial, door=at) as bus:
+    with closing(RedialledBus(SETUP, dial=dial, door=at)) as bus:
         yield Far(bus, lines, door, refuses)
     assert all(line.closed for line in lines)
     assert door.left
@@ -168,7 +168,7 @@ def test_a_bus_without_a_port_is_one_session(far: Far) -> None:
         lines.append(Line())
         return lines[-1]
 
-    with RedialledBus(setup, dial=dial):
+    with closing(RedialledBus(setup, dial=dial)):
         assert len(lines) == 1
     assert lines[0].closed
 
@@ -213,9 +213,8 @@ def test_over_zenoh_a_worker_answers_again_through_another_router() -> None:
         before = stack.enter_context(python("-c", ROUTER, first.endpoint))
         asker = stack.enter_context(ZenohBus(second, router=True))
         asker.watch_alive(alive_key(run="r1", process="*"), tokens)
-        far = stack.enter_context(
-            RedialledBus(first, dial=lambda _: ZenohBus(next(dialled)), door=lambda _: door)
-        )
+        bus = RedialledBus(first, dial=lambda _: ZenohBus(next(dialled)), door=lambda _: door)
+        far = stack.enter_context(closing(bus))
         far.serve("clock", questions, **W0)
         far.declare_alive(TOKEN)
 
