@@ -68,7 +68,7 @@ class Conductor:
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
         )
         self.ads = SideBySideHandler(context, self.intake, mission)
-        self.alive: set[str] = set()
+        self.alive: dict[str, float] = {}  # and when each was last heard to come, monotonic
         self.strangers = Strangers(expected_ids(plan), self.tell)
         self.questions = Questions(context, self.alive)
         self.mirror = MirrorHandler(tables, self.tell, plan.config.vehicle_id)
@@ -263,10 +263,10 @@ class Conductor:
         if self.fleet.takes(process_id):
             self.fleet.alive(process_id, up=item.up)
         elif process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
+            self.alive |= {process_id: item.received_mono_ns * 1e-9} if item.up else {}
             (self._process_up if item.up else self.process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:
-        self.alive.add(process_id)
         if not self.tuning.process_up(process_id):
             self._worker_up(process_id)
         self.traffic.process_up(process_id)
@@ -291,7 +291,7 @@ class Conductor:
     def process_down(self, process_id: str) -> None:
         """Count with a process no more: its token is gone, or it has died."""
         if process_id in self.alive:
-            self.alive.discard(process_id)
+            del self.alive[process_id]
             self.tuning.process_down(process_id)
             log.info("lost %s", process_id)
             self.rounds.siblings.process_down(process_id)

@@ -168,7 +168,7 @@ class Foreground:
 
     def _look_after_processes(self) -> None:
         for one in self._supervisor.poll(time.monotonic()):
-            told = ToldDeath(one.process_id, one.exit_code, one.restarted, one.pause_s)
+            told = ToldDeath(one.process_id, one.exit_code, one.restarted, one.pause_s, one.seen_s)
             self._deaths.append(told)
 
     def _next_life(self, how: str, before: Life) -> Life | None:

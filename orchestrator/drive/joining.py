@@ -40,11 +40,11 @@ class Joining:
         conductor = self.conductor
         expected = conductor.strangers.expected
         deadline = time.monotonic() + START_TIMEOUT_S
-        while not expected <= conductor.alive:
+        while not expected <= conductor.alive.keys():
             self.look_after(conductor, time.monotonic())
             if self.stop():
                 return False
-            missing = ", ".join(sorted(expected - conductor.alive))
+            missing = ", ".join(sorted(expected - conductor.alive.keys()))
             if self.watch.given_up & expected:
                 dead = ", ".join(sorted(self.watch.given_up & expected))
                 raise self._no_start(f"cannot be started: {dead}; see log.jsonl")

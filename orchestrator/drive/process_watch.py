@@ -80,8 +80,9 @@ class ProcessWatch:
         """Take notice of deaths and of who hangs."""
         for death in self.supervisor.poll(now_s):
             # One that is started again is not silent before it was heard, and the token of the one
-            # before it may still be there.
-            conductor.process_down(death.process_id)
+            # before it may still be there; or its successor is, already, and counts.
+            if conductor.alive.get(death.process_id, death.seen_s) <= death.seen_s:
+                conductor.process_down(death.process_id)
             self._seen_alive.discard(death.process_id)
             self._silent_since_s.pop(death.process_id, None)
             if death.process_id == ROUTER:

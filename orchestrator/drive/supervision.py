@@ -47,6 +47,7 @@ class ToldDeath(msgspec.Struct, frozen=True, array_like=True):
     exit_code: int
     restarted: bool
     pause_s: float
+    seen_s: float
 
 
 class Running(msgspec.Struct, frozen=True, tag=True):

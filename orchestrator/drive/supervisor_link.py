@@ -98,7 +98,7 @@ class SupervisorLink:
 
     def _death(self, one: ToldDeath) -> Death:
         row = self._rows[one.process_id]
-        return Death(one.process_id, row, one.exit_code, one.restarted, one.pause_s)
+        return Death(one.process_id, row, one.exit_code, one.restarted, one.pause_s, one.seen_s)
 
     def running(self) -> list[str]:
         """Return who ran when the supervisor last told."""

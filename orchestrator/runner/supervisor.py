@@ -118,7 +118,9 @@ class Death:
     exit_code: int
     restarted: bool
     """Whether it is started again, `pause_s` after its death."""
-    pause_s: float = 0.0
+    pause_s: float
+    seen_s: float
+    """When that was seen, monotonic: what came of it later is its successor's."""
 
 
 @dataclass(slots=True)
@@ -166,7 +168,8 @@ class Supervisor:
                 managed.gone = pause_s is None
                 managed.due_s = None if pause_s is None else now_s + pause_s
                 again = not managed.gone
-                deaths.append(Death(process_id, managed.row, exit_code, again, pause_s or 0.0))
+                died = Death(process_id, managed.row, exit_code, again, pause_s or 0.0, now_s)
+                deaths.append(died)
             if managed.due_s is not None and now_s >= managed.due_s:
                 self._start_again(managed, now_s)
         return deaths

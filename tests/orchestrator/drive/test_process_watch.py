@@ -65,7 +65,7 @@ class Watched:
             self.watch.look_after(self.house.conductor, self.now_s)
 
     def alive(self, *process_ids: str) -> None:
-        self.house.conductor.alive = set(process_ids)
+        self.house.conductor.alive = dict.fromkeys(process_ids, self.now_s)
 
     def started(self, process_id: str) -> int:
         return len(self.children[process_id])
@@ -96,6 +96,19 @@ def test_the_token_of_a_dead_process_is_not_that_of_the_next_one(watched: Watche
     watched.house.conductor.process_down("w0")
     watched.look(10.0 * HUNG_AFTER_S)
     assert watched.started("w0") == 2
+
+
+@pytest.mark.parametrize(("heard_after_s", "counts"), [(-EVERY_S, False), (1.0, True)])
+def test_a_death_that_is_told_late_is_not_that_of_the_next_one(
+    watched: Watched, heard_after_s: float, counts: bool
+) -> None:
+    """Who hears the successor before it is told of the death counts with it, and goes on to."""
+    watched.look(RECONNECT_S + 0.5)
+    watched.children["w0"][0].exit_code = -9
+    watched.house.conductor.alive = {"w0": watched.now_s + heard_after_s}
+    watched.look(2.0 * EVERY_S)
+    assert watched.started("w0") == 2
+    assert ("w0" in watched.house.conductor.alive) == counts
 
 
 def test_nobody_is_silent_while_the_link_is_away_and_a_little_longer(watched: Watched) -> None:

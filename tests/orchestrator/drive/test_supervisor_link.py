@@ -26,7 +26,7 @@ COVERS = (
     "foretwin.orchestrator.drive.supervision",
 )
 
-DIED = ToldDeath("w0", -9, True, 0.0)
+DIED = ToldDeath("w0", -9, True, 0.0, 5.0)
 
 
 class Line:
@@ -55,7 +55,7 @@ def test_each_death_is_told_once(line: Line) -> None:
     line.supervisor.tell(Running({"w0": 7, "w1": 8}, 0, 0, [DIED]))
     (death,) = line.orchestrator.poll(0.0)
     assert (death.process_id, death.exit_code, death.row.when_dead) == ("w0", -9, "restart")
-    later = ToldDeath("vehicle", 1, False, 0.0)
+    later = ToldDeath("vehicle", 1, False, 0.0, 6.0)
     line.supervisor.tell(Running({"w1": 8}, 1, 0, [DIED, later]))
     line.supervisor.tell(Running({"w1": 8}, 1, 1, [later]))
     assert [one.process_id for one in line.orchestrator.poll(0.0)] == ["vehicle"]
@@ -65,7 +65,7 @@ def test_each_death_is_told_once(line: Line) -> None:
 
 @pytest.mark.parametrize("line", [1], indirect=True)
 def test_deaths_that_another_orchestrator_told_of_are_not_told_again(line: Line) -> None:
-    line.supervisor.tell(Running({}, 1, 0, [DIED, ToldDeath("mirror", -11, True, 1.0)]))
+    line.supervisor.tell(Running({}, 1, 0, [DIED, ToldDeath("mirror", -11, True, 1.0, 5.0)]))
     assert [one.process_id for one in line.orchestrator.poll(0.0)] == ["mirror"]
     line.orchestrator.keep(b"standing")
     assert line.supervisor.hear() == [HandOver(2)]
