@@ -210,7 +210,8 @@ def serve(setup: CopilotSetup, bus: Bus, life: ProcessLife) -> None:
     if setup.awaited:
         life.ready()
     while not life.over:
-        server.publish(display.turn())
+        begun_s = time.monotonic()
+        server.publish(display.turn(), begun_s)
         life.terminated.wait(FRAME_S)
     why = "the run has ended" if life.run_ended else "the display was ended"
     server.publish(display.ended(why))

@@ -22,15 +22,15 @@ class Feed:
     """Lives on one event loop; `publish` is called there too."""
 
     def __init__(self) -> None:
-        self._newest, self._number = b"", 0
+        self._newest, self._made_s, self._number = b"", 0.0, 0
         self._news = asyncio.Event()
         self._over = False
         self.pages = 0
         """How many pages listen."""
 
-    def publish(self, frame: bytes) -> None:
-        """Let `frame`, one line of JSON, be the newest one."""
-        self._newest = frame
+    def publish(self, frame: bytes, made_s: float) -> None:
+        """Let `frame`, one line of JSON, be the newest one; it goes out with when it was made."""
+        self._newest, self._made_s = frame, made_s
         self._number += 1
         self._wake()
 
@@ -57,7 +57,7 @@ class Feed:
             while True:
                 if self._number > seen:
                     seen = self._number
-                    yield b"data: " + self._newest + b"\n\n"
+                    yield b"id: %.3f\ndata: %b\n\n" % (self._made_s, self._newest)
                 elif self._over:
                     return
                 else:

@@ -95,7 +95,12 @@ class PageFrame(msgspec.Struct, frozen=True, kw_only=True):
     roles: dict[str, str]
     marks: int
     round_age_s: float | None
+    """How old the car's state is that the round began with, in drive time."""
     pace: str
     """How many futures are run, where the machine is too slow for all."""
     virtual: str = ""
     """Whether a car on a lot is shown what is virtual, and why not."""
+    round_old: bool = False
+    """It is shown still, and said to be old."""
+    round_for_s: float | None = None
+    """For how long after this frame its round may be shown at all."""

@@ -27,10 +27,9 @@ from foretwin.viewer.copilot.alerts import Alerts
 from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
 from foretwin.viewer.copilot.lights_now import LightsNow
 from foretwin.viewer.copilot.right_of_way import RightOfWay, of_junction, right_of_way
-from foretwin.viewer.danger import Danger, SteadyLevel, dangers_of, instant_of
+from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S, RoundNow
+from foretwin.viewer.danger import Danger, instant_of
 
-ROUND_FOR_S = 3.0
-"""So long a round is shown; the slowest pace is one in two seconds."""
 SEEN_FOR_NS = 1_000_000_000
 MOST_SEEN = 60
 _OTHERS_SHOWN = 10
@@ -53,12 +52,10 @@ class DriveNow:
         self._frame, self._start_ns, self._load_world = drive_frame, start_stamp_ns, load_world
         self.alerts = Alerts(now_s)
         self.marks = 0
-        self._level = SteadyLevel()
         self._state: VehicleState | None = None
         self._mirror: MirrorSample | None = None
         self._progress: Progress | None = None
-        self._round: tuple[RoundView, float] | None = None
-        self._dangers: tuple[Danger, ...] = ()
+        self._round = RoundNow()
         self._seen: RoadUsers | None = None
         self._lights = LightsNow()
         self._injection: tuple[Injection | None, float] = None, 0.0
@@ -99,6 +96,7 @@ class DriveNow:
         if self._start_ns == 0:
             self._start_ns = state.stamp_ns
         self._state = state
+        self._round.state(state, now_s)
         self.alerts.state(state, now_s)
 
     def _take_progress(self, progress: Progress, now_s: float) -> None:
@@ -112,7 +110,7 @@ class DriveNow:
     def _take_active(self, active: ActiveWorld, now_s: float) -> None:
         self._active = active.world_id
         if active.world_id is None:
-            self._forget_round()
+            self._round.forget()
 
     def _take_world(self, notice: WorldNotice, now_s: float) -> None:
         self._worlds[notice.intersection_id] = notice.world_id
@@ -122,8 +120,7 @@ class DriveNow:
         if view.late or not len(view.names):
             return
         self._worlds[view.intersection_id] = view.world_id
-        self._round, self._dangers = (view, now_s), dangers_of(view)
-        self._level.take(self._dangers[0].level if self._dangers else "calm")
+        self._round.take(view, now_s)
         world = self._world(view.world_id)
         if world is not None:
             line_m = np.asarray(view.xy_m[view.nominal_index], dtype=np.float64)
@@ -131,10 +128,6 @@ class DriveNow:
             way = right_of_way(world, view.intersection_id, path_m)
             if way is not None:
                 self._way = view.intersection_id, way
-
-    def _forget_round(self) -> None:
-        self._round, self._dangers = None, ()
-        self._level.forget()
 
     def _world(self, world_id: str) -> World | None:
         """Return a World, None where its file cannot be read; of old ones nothing is kept."""
@@ -154,16 +147,13 @@ class DriveNow:
 
     def frame(self, now_s: float, *, linked: bool = True) -> PageFrame:
         """Return what the display shows now."""
-        if self._round is not None and now_s - self._round[1] > ROUND_FOR_S:
-            self._forget_round()
-        danger = self._dangers[0] if self._dangers else None
-        age_s = None if self._round is None else now_s - self._round[1]
+        age_s = self._round.age_s(now_s)
+        view, danger = self._round.view, self._round.danger
         standing = words.standing_of(self._mirror, self.alerts.accused)
         ahead = self._ahead()
-        view = None if self._round is None else self._round[0]
         return PageFrame(
             drive_s=0.0 if self._state is None else self._drive_s(self._state.stamp_ns),
-            level=self._level.shown,
+            level=self._round.level,
             sentence=words.sentence(
                 self._progress,
                 "" if ahead is None else " ".join(filter(None, (ahead.control, ahead.colour))),
@@ -177,7 +167,7 @@ class DriveNow:
             twin_pose=None if self._mirror is None else _posed(self._mirror.twin),
             ahead=ahead,
             danger=None if view is None or danger is None else _danger(view, danger, age_s or 0.0),
-            more=max(0, len(self._dangers) - 1),
+            more=max(0, len(self._round.dangers) - 1),
             twin=standing.text,
             twin_detail=standing.detail,
             twin_well=standing.well,
@@ -189,7 +179,7 @@ class DriveNow:
             nominal=[] if view is None else _points(view.xy_m[view.nominal_index]),
             others=[]
             if view is None
-            else [_points(view.xy_m[one.future]) for one in self._dangers[1:_OTHERS_SHOWN]],
+            else [_points(view.xy_m[one.future]) for one in self._round.dangers[1:_OTHERS_SHOWN]],
             seen=self._seen_now(),
             lights=self._lights_now(),
             roles=self._roles(),
@@ -197,6 +187,8 @@ class DriveNow:
             round_age_s=age_s,
             pace="" if self._progress is None else plain(self._progress.too_slow),
             virtual=words.virtual_objects(self._injection[0], age_s=now_s - self._injection[1]),
+            round_old=age_s is not None and age_s > OLD_ROUND_S,
+            round_for_s=None if age_s is None else ROUND_FOR_S - age_s,
         )
 
     @property

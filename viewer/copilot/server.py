@@ -120,6 +120,10 @@ def page_app(key: str, feed: Feed, actions: PageActions, *, about: dict[str, Any
             return _said(503, f"{MOST_PAGES} pages are open already")
         return StreamingResponse(feed.events(), media_type="text/event-stream", headers=_HEADERS)
 
+    async def clock(request: Request) -> Response:
+        # Pages tell by it how old a frame is that waited on its way.
+        return _json(b'{"now_s": %.3f}' % time.monotonic())
+
     async def frame(request: Request) -> Response:
         at = request.query_params.get("at")
         at_s = None if at is None else float(at)
@@ -148,6 +152,7 @@ def page_app(key: str, feed: Feed, actions: PageActions, *, about: dict[str, Any
     app = Starlette(
         routes=[
             Route("/{key}/events", guarded(events)),
+            Route("/{key}/clock", guarded(clock)),
             Route("/{key}/frame", guarded(frame)),
             Route("/{key}/about", guarded(what)),
             Route("/{key}/plan/{world}", guarded(plan)),
@@ -215,9 +220,11 @@ class CopilotServer:
         """How many pages are open."""
         return 0 if self._feed is None else self._feed.pages
 
-    def publish(self, frame: bytes) -> None:
-        """Show a frame on all pages; never waits."""
-        self._call(lambda feed: feed.publish(frame))
+    def publish(self, frame: bytes, made_s: float | None = None) -> None:
+        """Show a frame on all pages; never waits. Pages hold one for old by when it was made, of
+        the monotonic clock; without that it is made now."""
+        at_s = time.monotonic() if made_s is None else made_s
+        self._call(lambda feed: feed.publish(frame, at_s))
 
     def close(self, within_s: float) -> None:
         """Let pages have the newest frame, and end; who does not take it is left."""

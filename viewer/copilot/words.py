@@ -8,6 +8,7 @@ from foretwin.contracts.gap import Culprit, LimitedQuantity, Verdict, limits_aft
 from foretwin.contracts.simulation import MirrorSample, Progress
 from foretwin.contracts.terminal import plain
 from foretwin.contracts.towards_vehicle import Injection
+from foretwin.viewer.copilot.round_now import OLD_ROUND_S
 from foretwin.viewer.danger import Danger
 
 FAR_S = 99.0
@@ -137,6 +138,9 @@ def sentence(
     else:
         where = [arrival(progress), plain(progress.next_intersection), control]
     threat = danger_text(danger, elapsed_s=elapsed_s) if known else "no futures now"
+    ago = f" {elapsed_s:.0f} s ago" if elapsed_s > OLD_ROUND_S else ""
     if danger is not None:
-        threat = f"likeliest danger: {threat}"
+        threat = f"likeliest danger{ago}: {threat}"
+    elif known:
+        threat += ago
     return " · ".join(part for part in (*where, threat, standing.text) if part)

@@ -88,6 +88,20 @@ class Pages:
         assert self._asked
         return [one for one in self._asked if urlsplit(one).netloc != self._host]
 
+    def count_changes(self, selector: str) -> None:
+        """Count from now on how often an element's text changes."""
+        self._page.evaluate(
+            """one => {
+              window.changes = 0;
+              new MutationObserver(() => { window.changes += 1; })
+                .observe(document.querySelector(one), { childList: true });
+            }""",
+            selector,
+        )
+
+    def changes(self) -> int:
+        return int(self._page.evaluate("window.changes"))
+
     def heap_mb(self) -> float:
         session = self._context.new_cdp_session(self._page)
         session.send("HeapProfiler.collectGarbage")

@@ -17,16 +17,16 @@ async def taken(events: AsyncIterator[bytes]) -> str:
 def test_a_page_that_comes_late_gets_the_newest_frame_and_each_one_once() -> None:
     async def story() -> None:
         feed = Feed()
-        feed.publish(b"1")
+        feed.publish(b"1", 7.25)
         events = feed.events()
         assert await taken(events) == f"retry: {BEGIN_AGAIN_MS}"
-        feed.publish(b"2")
-        assert await taken(events) == "data: 2"
+        feed.publish(b"2", 8.5)
+        assert await taken(events) == "id: 8.500\ndata: 2"
         waits = asyncio.ensure_future(anext(events))
         await asyncio.sleep(0)
         assert not waits.done()
-        feed.publish(b"3")
-        assert await waits == b"data: 3\n\n"
+        feed.publish(b"3", 9.0)
+        assert await waits == b"id: 9.000\ndata: 3\n\n"
 
     asyncio.run(story())
 
@@ -38,9 +38,9 @@ def test_a_frozen_page_misses_frames_and_others_do_not() -> None:
         await taken(frozen)
         await taken(quick)
         for number in range(1000):
-            feed.publish(b"%d" % number)
-            assert await taken(quick) == f"data: {number}"
-        assert await taken(frozen) == "data: 999"
+            feed.publish(b"%d" % number, float(number))
+            assert await taken(quick) == f"id: {number}.000\ndata: {number}"
+        assert await taken(frozen) == "id: 999.000\ndata: 999"
 
     asyncio.run(story())
 
@@ -51,9 +51,9 @@ def test_at_the_end_each_page_has_the_last_frame_and_goes() -> None:
         events = feed.events()
         await taken(events)
         assert feed.pages == 1
-        feed.publish(b"ended")
+        feed.publish(b"ended", 1.0)
         feed.close()
-        assert await taken(events) == "data: ended"
+        assert await taken(events) == "id: 1.000\ndata: ended"
         with pytest.raises(StopAsyncIteration):
             await anext(events)
         assert feed.pages == 0

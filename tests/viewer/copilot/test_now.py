@@ -15,7 +15,7 @@ from foretwin.contracts.simulation import ActiveWorld, RunEnd, WorldNotice
 from foretwin.contracts.world import World
 from foretwin.viewer.copilot.frame import AheadFrame, AheadLight, PageFrame
 from foretwin.viewer.copilot.lights_now import LIGHT_FOR_NS
-from foretwin.viewer.copilot.now import ROUND_FOR_S, SEEN_FOR_NS, DriveNow
+from foretwin.viewer.copilot.now import SEEN_FOR_NS, DriveNow
 from foretwin.viewer.copilot.words import INJECTION_FOR_S
 from tests.viewer import scene
 from tests.viewer.copilot.rounds import line, round_of
@@ -63,12 +63,18 @@ class Drive:
         return self.now.frame(self.now_s)
 
 
-def a_round(**how: Any) -> Any:
+def a_round(at_s: float = 4.0, **how: Any) -> Any:
     right = line((20.0, -20.0), (0.0, 10.0))
     view = round_of(("car", right, 1e-3), ("bicycle", right, 1e-5), **how)
     own = scene.round_at(4.0).xy_m[scene.round_at(4.0).nominal_index]
     xy = np.repeat(own[None, np.linspace(0, len(own) - 1, 25).astype(int)], 3, axis=0)
-    return msgspec.structs.replace(view, intersection_id="x1", world_id=WORLD_ID, xy_m=xy)
+    return msgspec.structs.replace(
+        view,
+        stamp_ns=state_at(at_s).stamp_ns,
+        intersection_id="x1",
+        world_id=WORLD_ID,
+        xy_m=xy,
+    )
 
 
 def test_before_anything_came_it_says_so() -> None:
@@ -141,20 +147,6 @@ def test_a_pose_is_where_the_mirror_has_the_car() -> None:
     twin = mirror_at(7.0).twin
     assert frame.twin_pose is not None
     assert frame.twin_pose[:2] == pytest.approx([twin.x_m, twin.y_m], abs=0.02)
-
-
-def test_a_round_ages_and_is_gone_when_none_follows() -> None:
-    drive = Drive()
-    drive.goes_on(4.0)
-    drive.take("round", a_round())
-    drive.goes_on(5.5)
-    aged = drive.frame()
-    assert aged.danger is not None
-    assert aged.danger.in_s == 0.5
-    drive.goes_on(4.1 + ROUND_FOR_S)
-    gone = drive.frame()
-    assert (gone.danger, gone.level, gone.nominal) == (None, "none", [])
-    assert "no futures now" in gone.sentence
 
 
 def test_a_late_round_changes_nothing_but_the_alerts() -> None:

@@ -6,6 +6,7 @@ A judge; what it needs is in `test_page_read.py`.
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,16 +18,20 @@ from foretwin.contracts.bus import Mailbox, Request, ZenohBus
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
-from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.page_address import page_address
+from foretwin.contracts.ports import LOOPBACK, free_endpoint, free_port
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.contracts.tuning import SetReply, SetRequest
+from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S
+from foretwin.viewer.copilot.server import CopilotServer, PageActions, page_app
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.copilot.chromium import Browser, judges_python
 from tests.viewer.copilot.display import RUN, DisplayRun
+from tests.viewer.copilot.page_heap import FRAMES_OF_AN_HOUR, measured
 from tests.viewer.copilot.test_alerts import gap, worker
-from tests.viewer.copilot.test_now import AHEAD_OF_X1, a_round
+from tests.viewer.copilot.test_now import AHEAD_OF_X1, Drive, a_round
 from tests.viewer.copilot.test_right_of_way import drawn
 from tests.viewer.copilot.test_words import verdict
 
@@ -88,6 +93,68 @@ def test_an_alarm_is_on_the_first_screen_within_half_a_second(
     assert took_s <= 0.5
     assert inside["top"] >= 0
     assert inside["bottom"] <= 600
+
+
+def test_a_danger_older_than_its_bound_is_said_to_be_old_and_then_is_gone(
+    live: DisplayRun, browser: Browser
+) -> None:
+    browser.do("open", url=live.address, size=(1024, 600))
+    go_on(live, 4.0)
+    live.send("round", a_round(4.0))
+    browser.do("wait", selector="body[data-level=danger][data-old=no]")
+    assert browser.do("text", selector="#odds").startswith("12 % · ")
+    assert "old" not in browser.do("text", selector="#odds")
+    # As on a busy machine: the newest round began long before the car is where it is.
+    go_on(live, 4.1 + OLD_ROUND_S)
+    browser.do("wait", selector="body[data-level=danger][data-old=yes]")
+    assert browser.do("text", selector="#odds") == "12 % · 2 s old"
+    go_on(live, 4.1 + ROUND_FOR_S)
+    browser.do("wait", selector="body[data-level=none][data-current=yes]")
+    said = browser.do("text", selector="#danger"), browser.do("text", selector="#odds")
+    browser.do("close")
+    assert said == ("no futures now", "")
+
+
+def test_a_frame_that_waited_on_its_way_is_not_shown_as_current(browser: Browser) -> None:
+    drive = Drive()
+    drive.goes_on(4.0)
+    drive.take("round", a_round())
+    frame = msgspec.json.encode(drive.frame())
+    actions = PageActions(frame_at=lambda _: frame, plan_of=lambda _: None, mark=lambda _: None)
+    port = free_port()
+    server = CopilotServer(
+        lambda feed: page_app("key", feed, actions, about={"attribution": "", "run": ""}),
+        host=LOOPBACK,
+        port=port,
+    )
+    server.start()
+    stop = threading.Event()
+    late_s = 0.0
+
+    def go_on() -> None:
+        while not stop.wait(0.1):
+            server.publish(frame, time.monotonic() - late_s)
+
+    feeding = threading.Thread(target=go_on)
+    feeding.start()
+    try:
+        browser.do("open", url=page_address("key", port=port), size=(1024, 600))
+        browser.do("wait", selector="body[data-level=danger][data-current=yes]")
+        late_s = 20.0
+        browser.do("wait", selector="body[data-level=none][data-current=no]")
+        browser.do("wait", selector="#alert:not([hidden])")
+        assert browser.do("text", selector="#danger") == "do not rely on this"
+        assert browser.do("text", selector="#alert-text") == "this display is 20 s behind"
+        late_s = 0.0
+        browser.do("wait", selector="body[data-level=danger][data-current=yes]")
+        assert browser.do("text", selector="#danger").startswith("car ")
+        stop.set()
+        browser.do("wait", selector="body[data-level=none][data-current=no]")
+        browser.do("close")
+    finally:
+        stop.set()
+        feeding.join()
+        server.close(DEADLINE_S)
 
 
 @pytest.mark.parametrize("operator", [True, False], ids=["operator", "another seat"])
@@ -177,7 +244,7 @@ def test_the_server_is_small_and_idle(live: DisplayRun, browser: Browser) -> Non
         if number % 12 == 0:
             live.send("progress", AHEAD_OF_X1)
         if number % 25 == 0:
-            live.send("round", a_round())
+            live.send("round", a_round(time_s))
         number += 1
         while time.monotonic() - begun_s < number / 50.0:
             time.sleep(0.002)
@@ -189,6 +256,17 @@ def test_the_server_is_small_and_idle(live: DisplayRun, browser: Browser) -> Non
     assert share <= 0.03
     assert resident_mb <= 150.0
     assert heap_mb <= 200.0
+
+
+def test_an_hours_frames_leave_nothing_in_the_page(browser: Browser) -> None:
+    """An hour's frames, at twenty times their pace: what is kept comes with frames alone.
+
+    `python -m tests.viewer.copilot.page_heap` takes the hour itself.
+    """
+    seen = list(measured(browser, count=FRAMES_OF_AN_HOUR, rate_hz=100.0, looks=6))
+    print(*(f"{one.frames} frames: {one.heap_mb:.2f} MB" for one in seen), sep="\n")
+    assert max(one.heap_mb for one in seen) < 200.0
+    assert seen[-1].heap_mb - seen[0].heap_mb < 1.0
 
 
 def cpu_s(pid: int) -> float:

@@ -163,6 +163,13 @@ def test_what_is_no_mark_is_refused(page: Page, actions: Actions, body: bytes) -
     assert actions.marked == []
 
 
+def test_the_clock_by_which_frames_are_made_can_be_asked(page: Page) -> None:
+    before_s = time.monotonic()
+    told_s = page.get(f"/{KEY}/clock").json()["now_s"]
+    assert before_s - 0.001 <= told_s <= time.monotonic() + 0.001
+    assert page.get("/another/clock").status_code == 404
+
+
 def test_roles_are_changed_by_who_may(page: Page, actions: Actions) -> None:
     asked = {"key": "role.ego", "value": "twin"}
     assert page.post(f"/{KEY}/change", json=asked).json() == {"text": "role.ego: all -> twin"}

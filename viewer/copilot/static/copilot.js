@@ -2,7 +2,9 @@
 import { Plan } from "./drawing.js";
 
 const element = (id) => document.getElementById(id);
-const LOST_MS = 1200;     // without a frame for so long, what is shown is not current
+const OLD_S = 1.2;        // a frame that was made so long ago is not current
+const AGAIN_MS = 5000;    // between two calls for the newest frame in place of those that wait
+const CLOCK_MS = 5000, DRIFT = 2e-4;
 const NOTE_MS = 15000;
 const LEVELS = ["none", "calm", "watch", "danger"];
 const WORDS = { none: "no futures", calm: "calm", watch: "watch", danger: "danger" };
@@ -18,31 +20,63 @@ const SIGNS = {
 
 const plan = new Plan(element("canvas"));
 const fixed = new URLSearchParams(location.search).get("at");
-const own = { frame: null, at: 0, level: "none", said: "", mark: null, over: false, sign: null, light: null, operator: false };
+// The server's clock is ahead of the page's by at most so much, as was known at a time of the page.
+const clock = { ahead: Infinity, at: 0 };
+const own = { frame: null, at: 0, made: 0, level: "none", said: "", mark: null, over: false, sign: null, light: null, operator: false };
 
 function put(id, text) {
   const found = element(id);
   if (found.textContent !== text) found.textContent = text;
 }
 
-function show(frame) {
-  own.frame = frame;
-  own.at = performance.now();
-  own.over = frame.alerts.some((one) => one.kind === "ended");
-  const grave = frame.alerts.find((one) => one.grave);
-  const level = grave ? "none" : frame.level;
+// How long ago the frame was made, at most: a busy machine hands over frames that have waited.
+function age() {
+  return fixed !== null ? 0 : performance.now() / 1000 + clock.ahead - own.made;
+}
+
+async function compareClocks() {
+  const asked = performance.now() / 1000;
+  try {
+    const { now_s } = await (await fetch("clock")).json();
+    clock.ahead = Math.min(clock.ahead + DRIFT * (asked - clock.at), now_s - asked);
+    clock.at = asked;
+  } catch { /* the server is gone, and the frame ages */ }
+}
+
+// What threatens, as far as it is current; returns the level.
+function band() {
+  const frame = own.frame, age_s = age();
+  const silent_s = (performance.now() - own.at) / 1000, late = !own.over && age_s > OLD_S;
+  const grave = late || frame.alerts.some((one) => one.grave);
+  const lapsed = frame.round_for_s !== null && age_s > frame.round_for_s;
+  const level = grave || lapsed ? "none" : frame.level, danger = lapsed ? null : frame.danger;
   document.body.dataset.level = level;
-  document.body.dataset.twin = frame.twin_well ? "well" : "off";
   document.body.dataset.current = grave ? "no" : "yes";
-  put("level", grave ? "not current" : frame.danger && !frame.danger.hits ? "near miss" : WORDS[level]);
+  document.body.dataset.old = frame.round_old && level !== "none" ? "yes" : "no";
+  put("level", grave ? "not current" : danger && !danger.hits ? "near miss" : WORDS[level]);
   if (grave || level === "none") {
     put("danger", grave ? "do not rely on this" : "no futures now");
     put("odds", "");
   } else {
-    put("danger", frame.danger ? frame.danger.what : "no danger found");
-    put("odds", frame.danger ? `${frame.danger.odds} · ${frame.danger.in_s.toFixed(1)} s` : "");
+    put("danger", danger ? danger.what : "no danger found");
+    const left = frame.round_old ? `${(frame.round_age_s + age_s).toFixed(0)} s old` : danger && `${danger.in_s.toFixed(1)} s`;
+    put("odds", [danger && danger.odds, left].filter(Boolean).join(" · "));
   }
-  alertOf(frame.alerts);
+  if (!late) alertOf(frame.alerts);
+  else if (silent_s > OLD_S) alertOf([{ text: `the display's server does not answer: ${silent_s.toFixed(0)} s` }]);
+  else alertOf([{ text: Number.isFinite(age_s) ? `this display is ${age_s.toFixed(0)} s behind` : "how old this is, is not known" }]);
+  return level;
+}
+
+function show(frame, made) {
+  own.frame = frame;
+  own.at = performance.now();
+  own.made = made;
+  // Younger than now: one of the clocks stood still, as those of tablets do that sleep.
+  if (age() < -0.1) { clock.ahead = Infinity; compareClocks(); }
+  own.over = frame.alerts.some((one) => one.kind === "ended");
+  document.body.dataset.twin = frame.twin_well ? "well" : "off";
+  const level = band();
   const ahead = frame.ahead;
   put("arrival", ahead ? ahead.arrival : "–");
   element("arrival").className = ahead && ahead.in_s === null ? "word" : "";
@@ -254,14 +288,14 @@ element("change").addEventListener("click", openRoles);
 element("flip").addEventListener("click", flip);
 
 // Frames.
-function lost() {
-  if (fixed !== null || own.over || performance.now() - own.at < LOST_MS) return;
-  document.body.dataset.level = "none";
-  document.body.dataset.current = "no";
-  put("level", "not current");
-  put("danger", "do not rely on this");
-  put("odds", "");
-  alertOf([{ text: `the display's server does not answer: ${((performance.now() - own.at) / 1000).toFixed(0)} s` }]);
+function listen() {
+  const events = new EventSource("events"), begun = performance.now();
+  events.onmessage = (event) => {
+    show(JSON.parse(event.data), Number(event.lastEventId));
+    document.body.dataset.ready = "yes";
+    if (own.over) events.close();
+    else if (age() > OLD_S && own.at - begun > AGAIN_MS) { events.close(); listen(); }
+  };
 }
 
 async function begin() {
@@ -272,19 +306,15 @@ async function begin() {
   element("change").hidden = !own.operator;
   document.title = `foretwin co-pilot · ${about.run}`;
   if (fixed !== null) {
-    show(await (await fetch(`frame?at=${encodeURIComponent(fixed)}`)).json());
+    show(await (await fetch(`frame?at=${encodeURIComponent(fixed)}`)).json(), 0);
     await plan.still();
     document.body.dataset.ready = "yes";
     return;
   }
-  own.at = performance.now();
-  const events = new EventSource("events");
-  events.onmessage = (event) => {
-    show(JSON.parse(event.data));
-    document.body.dataset.ready = "yes";
-    if (own.over) events.close();
-  };
-  setInterval(lost, 250);
+  await compareClocks();
+  listen();
+  setInterval(() => { if (own.frame) band(); }, 250);
+  setInterval(compareClocks, CLOCK_MS);
   plan.run();
 }
 begin();
