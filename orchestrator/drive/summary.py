@@ -60,11 +60,11 @@ def summary_text(record: dict[str, object]) -> str:
     assert isinstance(futures, dict)
     junctions = record["intersections"]
     assert isinstance(junctions, list)
-    latency_ms: Any = record["state_to_result_ms_p95"]
+    config: dict[str, Any] = record["config"]  # type: ignore[assignment]
     lines = [
         f"{record['exit']}: {_counted(len(junctions), 'junction')} passed, {futures['count']} "
         f"futures in {_counted(futures['rounds'], 'round')} ({futures['missed_rounds']} missed)"
-        + ("" if latency_ms is None else f", 95 % within {latency_ms / 1e3:.2g} s of the state")
+        + _pace(record["state_to_result_ms_p95"], lock_step=config["speed"] is None)
     ]
     if futures["smaller_rounds"] or futures["spared_rounds"]:
         sizes = [f"{n} had {size}" for size, n in futures["rounds_by_futures"].items()]
@@ -72,7 +72,6 @@ def summary_text(record: dict[str, object]) -> str:
             f"  the machine was too slow for {futures['wanted_per_round']} futures in every round: "
             f"{', '.join(sizes)}, {futures['spared_rounds']} were left out"
         )
-    config: dict[str, Any] = record["config"]  # type: ignore[assignment]
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction_name(junction)} ({junction['kind']}): "
         f"{_readiness(junction, config)}"
@@ -87,6 +86,15 @@ def summary_text(record: dict[str, object]) -> str:
     lines += _free_twin_lines(record.get("free_twin"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join(plain(line) for line in (*lines, attribution))
+
+
+def _pace(latency_ms: Any, *, lock_step: bool) -> str:
+    """Say how soon results were there; in lock step the car waited for them, however long."""
+    if latency_ms is None:
+        return ""
+    if lock_step:
+        return ", in lock step: the drive waited for each"
+    return f", 95 % within {latency_ms / 1e3:.2g} s of the state"
 
 
 def _share_of_core(record: dict[str, Any]) -> float | None:

@@ -21,7 +21,7 @@ from foretwin.orchestrator.report.blocks import (
     plural,
     row,
 )
-from foretwin.orchestrator.report.material import RunMaterial, TableRow, part_of
+from foretwin.orchestrator.report.material import RunMaterial, TableRow, in_lock_step, part_of
 from foretwin.orchestrator.report.passages import JunctionPassed
 from foretwin.orchestrator.report.plots import latency_plot
 
@@ -153,9 +153,13 @@ def losses_part(run: RunMaterial) -> Chapter:
     blocks: list[Block] = []
     ledger = record.get("ledger") or {}
     blocks += _ledger(ledger)
-    pace = (
+    live = not in_lock_step(record)
+    took = (
         ("state to result, median", _ms(record.get("state_to_result_ms_p50"))),
         ("state to result, 95 % within", _ms(record.get("state_to_result_ms_p95"))),
+    )
+    pace = (
+        *(took if live else (("pace", "in lock step: the drive waited for each round"),)),
         ("rounds complete too late", str(part_of(record, "futures", "late_rounds") or 0)),
         (
             "rounds with fewer futures than asked",
@@ -169,7 +173,6 @@ def losses_part(run: RunMaterial) -> Chapter:
         columns = ("drive_time_s", "latency_ms", "late")
         time_s, latency, late = (np.array([one[name] for one in run.rounds]) for name in columns)
         rate = part_of(record, "config", "rate_hz")
-        live = part_of(record, "config", "speed") is not None
         period_ms = 1000.0 / rate if rate and live else None
         blocks.append(
             Plotted(
@@ -177,7 +180,8 @@ def losses_part(run: RunMaterial) -> Chapter:
                 "What each round took from the measured state to its result; the dashed line is "
                 "when the next one was due."
                 if period_ms
-                else "What each round took; in lock step nothing waits for it.",
+                else "What each round took of this machine's time; in lock step the drive waits "
+                "for it.",
             )
         )
     blocks += [Prose(str(trouble), "bad") for trouble in record.get("troubles") or []]

@@ -26,7 +26,7 @@ from foretwin.orchestrator.report.blocks import (
 from foretwin.orchestrator.report.first_page import rounds_in_time, verdict_of
 from foretwin.orchestrator.report.indicators import indicators_over
 from foretwin.orchestrator.report.indicators_part import indicators_part
-from foretwin.orchestrator.report.material import RunMaterial, part_of
+from foretwin.orchestrator.report.material import RunMaterial, in_lock_step, part_of
 from foretwin.orchestrator.report.passages import JunctionPassed, passages, tone_of
 from foretwin.orchestrator.report.provenance_part import provenance_part
 from foretwin.orchestrator.report.route_picture import route_svg
@@ -156,6 +156,11 @@ def _share_in_time(one: _Seen) -> TableCell:
     return number(None if not found or not found[1] else 100.0 * found[0] / found[1], 0, "%")
 
 
+def _latency(one: _Seen) -> TableCell:
+    record = {} if in_lock_step(one.run.record) else one.run.record
+    return number(record.get("state_to_result_ms_p95"), 0, "ms")
+
+
 def _agreeing(one: _Seen) -> TableCell:
     told = part_of(one.run.record, "agreement", "overall")
     if not told:
@@ -178,7 +183,7 @@ _ROWS: tuple[tuple[str, _Get], ...] = (
     ),
     ("futures", _recorded("futures", "count")),
     ("rounds in time", _share_in_time),
-    ("state to result, 95 % within", _recorded("state_to_result_ms_p95", unit="ms")),
+    ("state to result, 95 % within", _latency),
     ("gravest foreseen", _gravest),
     ("futures that collide", lambda one: number(float(sum(p.collided for p in one.passed)), 0)),
     ("nominal future off after 2 s", _recorded("comparison", "ade_m", "2", digits=2, unit="m")),

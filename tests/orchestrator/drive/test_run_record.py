@@ -205,6 +205,17 @@ def test_the_summary_says_when_a_world_was_ready(
     assert said in summary_text(record)
 
 
+def test_the_summary_says_how_soon_results_came_where_a_clock_ran(ended: House) -> None:
+    record = record_of(ended) | {"state_to_result_ms_p95": 9123.4}
+    first = summary_text(record).splitlines()[0]
+    assert first.endswith("missed), 95 % within 9.1 s of the state")
+    record["config"]["speed"] = None
+    first = summary_text(record).splitlines()[0]
+    assert first.endswith("missed), in lock step: the drive waited for each")
+    record["state_to_result_ms_p95"] = None
+    assert summary_text(record).splitlines()[0].endswith("missed)")
+
+
 def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(ended: House) -> None:
     record = record_of(ended)
     record["config"]["speed"] = None

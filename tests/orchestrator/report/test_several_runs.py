@@ -44,3 +44,13 @@ def test_runs_and_sweeps_do_not_go_together(tmp_path: Path) -> None:
 
     with pytest.raises(UserError, match="of one sweep, or of runs"):
         report_of_folders([one, tmp_path / "sweep"])
+
+
+def test_how_soon_results_came_is_compared_of_drives_with_a_clock_alone(tmp_path: Path) -> None:
+    live = told_run(tmp_path / "live", state_to_result_ms_p95=123.0)
+    stepped = told_run(tmp_path / "step", state_to_result_ms_p95=9100.0, config={"speed": None})
+
+    page = html_of(report_of_folders([live, stepped]))
+
+    assert 'data-order="123"' in page
+    assert 'data-order="9100"' not in page

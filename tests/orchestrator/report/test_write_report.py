@@ -64,6 +64,7 @@ def test_it_stands_alone(page: str) -> None:
 
 
 def test_it_says_what_was_foreseen_and_what_came(page: str) -> None:
+    assert "state to result, 95 % within" in page
     assert f"1 · {NAME}" in page
     assert "The car was there at 15.0 s with 29 km/h" in page
     assert "9 futures of that round, played again to the recorded hash" in page
@@ -84,6 +85,9 @@ def test_a_drive_in_lock_step_has_no_rounds_in_time_since_it_waits_for_them(tmp_
 
     report = report_of_folders([folder])
 
+    page = html_of(report)
+    assert "state to result, 95" not in page
+    assert "in lock step: the drive waited for each round" in page
     assert report.figures[-1].value == UNKNOWN
     assert report.figures[-1].note == "in lock step the drive waits for its rounds"
     assert "in time" not in report.verdict
