@@ -169,19 +169,18 @@ def losses_part(run: RunMaterial) -> Chapter:
         ("refused: messages, senders", _refused(record)),
     )
     blocks.append(Facts(pace))
-    if run.rounds:
+    if run.rounds and live:
         columns = ("drive_time_s", "latency_ms", "late")
         time_s, latency, late = (np.array([one[name] for one in run.rounds]) for name in columns)
         rate = part_of(record, "config", "rate_hz")
-        period_ms = 1000.0 / rate if rate and live else None
+        period_ms = 1000.0 / rate if rate else None
         blocks.append(
             Plotted(
                 latency_plot(time_s, latency, late.astype(bool), period_ms),
                 "What each round took from the measured state to its result; the dashed line is "
                 "when the next one was due."
                 if period_ms
-                else "What each round took of this machine's time; in lock step the drive waits "
-                "for it.",
+                else "What each round took from the measured state to its result.",
             )
         )
     blocks += [Prose(str(trouble), "bad") for trouble in record.get("troubles") or []]

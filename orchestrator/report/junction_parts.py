@@ -28,7 +28,7 @@ from foretwin.orchestrator.report.blocks import (
     row,
     scientific,
 )
-from foretwin.orchestrator.report.junction_picture import junction_svg
+from foretwin.orchestrator.report.junction_picture import is_touching, junction_svg
 from foretwin.orchestrator.report.material import RunMaterial, TableRow
 from foretwin.orchestrator.report.passages import JunctionPassed, WhatCame, tone_of, what_came
 from foretwin.orchestrator.report.replayed import ReplayedRound, replayed
@@ -48,15 +48,18 @@ _OUTCOMES = {
 }
 
 
-def junction_table(passed: Sequence[JunctionPassed]) -> Listed:
+def junction_table(passed: Sequence[JunctionPassed], *, lock_step: bool) -> Listed:
     """Return all junctions of a run, one a row, each leading to its section."""
+    ready = "“World ready before” is how long before the car came within its radius;"
+    if lock_step:
+        ready = "In lock step the drive waits for Worlds, so that none is late;"
     rows = [
         row(
             TableCell(str(one.number), order=one.number),
             TableCell(one.name, to=one.anchor),
             str(one.place.get("control") or UNKNOWN).replace("_", " "),
             number(one.arrived_s, 1, "s"),
-            _ready(one),
+            number(None) if lock_step else _ready(one),
             number(float(len(one.rounds)), 0),
             number(float(one.futures), 0),
             number(float(one.collided), 0),
@@ -79,9 +82,8 @@ def junction_table(passed: Sequence[JunctionPassed]) -> Listed:
         ),
         tuple(rows),
         frozenset({0, 3, 4, 5, 6, 7, 8}),
-        note="“World ready before” is how long before the car came within its radius; "
-        "“gravest” is the highest criticality foreseen: likelihood times the risk that somebody "
-        "dies.",
+        note=f"{ready} “gravest” is the highest criticality foreseen: likelihood times the risk "
+        "that somebody dies.",
     )
 
 
@@ -240,6 +242,7 @@ def _picture(run: RunMaterial, one: JunctionPassed, world: World) -> Drawn:
         "meet"
         if again.futures
         else "",
+        "yellow where they touch" if any(map(is_touching, again.futures)) else "",
         f"black what the car did in the {_SHOWN_S:g} s after, a dot each second"
         if len(driven_m) > 1
         else "what the car did is not recorded",

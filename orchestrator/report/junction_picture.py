@@ -42,12 +42,18 @@ def junction_svg(
         canvas.line(driven_m, f'stroke="{_DRIVEN}" {thin}', title="what the car did")
         canvas.dots(seconds_m, 0.005 * canvas.width_m, f'fill="{_DRIVEN}"')
     for one in futures:
-        if one.touch_m is not None and (one.row["criticality"] or 0.0) > 0.0:
+        if is_touching(one):
+            assert one.touch_m is not None
             mark = f'fill="#ffd400" stroke="{_DRIVEN}" stroke-width="{_stroke(canvas, 0.0012)}"'
             canvas.dots(one.touch_m[None], 0.006 * canvas.width_m, mark)
     canvas.scale_bar()
     name = world.intersection.name or world.intersection.id
     return canvas.svg(f"{name} from above, with {len(futures)} futures", style.GROUND)
+
+
+def is_touching(one: SeenFuture) -> bool:
+    """Whether a future's touch is marked."""
+    return one.touch_m is not None and (one.row["criticality"] or 0.0) > 0.0
 
 
 def _stroke(canvas: Canvas, share: float) -> int:

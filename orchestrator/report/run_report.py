@@ -22,7 +22,7 @@ from foretwin.orchestrator.report.conduct_parts import (
 from foretwin.orchestrator.report.first_page import figures_of, verdict_of
 from foretwin.orchestrator.report.gap_rows import HumanRow
 from foretwin.orchestrator.report.junction_parts import junction_parts, junction_table
-from foretwin.orchestrator.report.material import RunMaterial
+from foretwin.orchestrator.report.material import RunMaterial, in_lock_step
 from foretwin.orchestrator.report.occurred_part import occurred_part
 from foretwin.orchestrator.report.passages import JunctionPassed, passages
 from foretwin.orchestrator.report.plots import drive_plot
@@ -133,4 +133,5 @@ def _junctions(
     for part in junction_parts(run, passed, pictures=pictures):
         parts.append(part)
         advance(part.title)
-    return Chapter("junctions", title, (junction_table(passed),), tuple(parts))
+    table = junction_table(passed, lock_step=in_lock_step(run.record))
+    return Chapter("junctions", title, (table,), tuple(parts))

@@ -27,8 +27,8 @@ def vehicle_part(run: RunMaterial) -> Chapter:
     rows = tuple(
         row(
             one["name"],
-            number(one["in_use"], 3),
-            number(one["identified"], 3),
+            _value(one["in_use"]),
+            _value(one["identified"]),
             _interval(one),
             _fits(one),
             one.get("reason") or "",
@@ -44,6 +44,11 @@ def vehicle_part(run: RunMaterial) -> Chapter:
     changes = part_of(run.record, "tuning", "changes") or []
     said = Prose(f"{plural(len(changes), 'change')} of parameters took effect in this drive.")
     return Chapter("vehicle", title, (table, said))
+
+
+def _value(value: float | None) -> TableCell:
+    # Some are a thousandth of others, and decimals alone would show them as 0.
+    return number(None) if value is None else TableCell(f"{value:.4g}", order=float(value))
 
 
 def _interval(one: dict[str, Any]) -> str:

@@ -87,10 +87,30 @@ def test_a_drive_in_lock_step_has_no_rounds_in_time_since_it_waits_for_them(tmp_
 
     page = html_of(report)
     assert "state to result, 95" not in page
+    assert "state to result, ms" not in page
     assert "in lock step: the drive waited for each round" in page
+    assert "In lock step the drive waits for Worlds, so that none is late" in page
     assert report.figures[-1].value == UNKNOWN
     assert report.figures[-1].note == "in lock step the drive waits for its rounds"
     assert "in time" not in report.verdict
+
+
+def test_pictures_and_commands_in_sentences_are_explained(page: str) -> None:
+    assert "; yellow where they touch; black what the car did" in page
+    assert "foretwin report … --against LOG" in ReadPage(page).codes
+    assert "<p>`" not in page
+
+
+def test_a_small_parameter_is_not_shown_as_nothing(tmp_path: Path) -> None:
+    one = {
+        "name": "understeer_gradient_rad_per_mps2", "in_use": -0.000234, "identified": None,
+        "low": None, "high": None, "departs": False, "reason": "too slow",
+    }  # fmt: skip
+    tuning = {"verdicts": [], "parameters": [one], "changes": []}
+
+    page = html_of(report_of_folders([told_run(tmp_path, tuning=tuning)]))
+
+    assert '<td class="n " data-order="-0.000234">-0.000234</td>' in page
 
 
 def test_worst_futures_come_with_a_command_that_plays_them_again(run: Path, page: str) -> None:
