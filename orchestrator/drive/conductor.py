@@ -116,7 +116,7 @@ class Conductor:
             "set": lambda item: self.changes.take(item, stamp_ns=self.intake.now_stamp_ns),
             "mark": MarkHandler(context, self.intake, mission).take,
             "join": self.beside.take_join,
-            "world_file": self.fleet.give_world,
+            "world_file": self.worlds.give,
         }
 
     def join(self) -> None:
@@ -153,8 +153,7 @@ class Conductor:
                 case Received(channel=channel) if channel in self._on_message:
                     self._on_message[channel](item)
                 case Reply(channel=channel) if channel in self._on_reply:
-                    if item.refused is not None:
-                        self.refusals.take(item.refused)
+                    self.refusals.take_reply(item)
                     far = isinstance(item.tag, FleetTag)
                     (self.fleet.reply if far else self._on_reply[channel])(item)
                 case Request(channel=channel) if channel in self._on_question:

@@ -14,13 +14,12 @@ from typing import Any
 
 import msgspec
 
-from foretwin.contracts.bus import Reply, Request
+from foretwin.contracts.bus import Reply
 from foretwin.contracts.fleet import (
     Admittance,
     ClockQuestion,
     EnlistRequest,
     MachineInfo,
-    WorldBytes,
     is_far,
 )
 from foretwin.contracts.simulation import PrepareRequest
@@ -125,16 +124,6 @@ class FleetHandler:
                 silent = self._far.is_silent(member.worker_id)
                 member.next_clock_s = now_s + (SILENT_EVERY_S if silent else HEARD_EVERY_S)
                 self._ask_clock(member)
-
-    def give_world(self, request: Request) -> None:
-        """Give a World's file to who asks for it by its id."""
-        world_id = request.message().world_id
-        try:
-            data = (self._context.plan.worlds_dir / f"{world_id}.world").read_bytes()
-        except OSError as error:
-            request.refuse(f"World {world_id}: {error.strerror}")
-        else:
-            request.reply(WorldBytes(data=data))
 
     def reply(self, reply: Reply) -> None:
         """Take an answer to a question of ours."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from foretwin.contracts.guard import Refused
+from foretwin.contracts.mailbox import Reply
 from foretwin.contracts.refusals import Refusals
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.record.refused_elsewhere import lines_to_tell, refused_elsewhere
@@ -29,6 +30,13 @@ class RefusalHandler:
     def take(self, refused: Refused) -> None:
         """Count something that was not let in."""
         self._say("error", self.counted.take(refused))
+
+    def take_reply(self, reply: Reply) -> None:
+        """Count an answer that was not let in; of one to a job its worker is told of, as sick."""
+        if reply.refused is not None and reply.channel == "job":
+            self.counted.take(reply.refused)
+        elif reply.refused is not None:
+            self.take(reply.refused)
 
     def leave_out(self, key: str, count: int) -> None:
         """Count road users that were left out of a message on `key`."""

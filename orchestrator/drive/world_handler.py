@@ -8,8 +8,11 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from foretwin.contracts.bus import Reply
+from foretwin.contracts.bus import Reply, Request
 from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.fleet import WorldBytes
+from foretwin.contracts.guard import Refused
 from foretwin.contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
 from foretwin.contracts.world import World
 from foretwin.orchestrator.context import DriveContext
@@ -72,6 +75,22 @@ class WorldHandler:
         while len(self._worlds) > KEPT_WORLDS:
             self._worlds.popitem(last=False)
         return world
+
+    def give(self, request: Request) -> None:
+        """Give a World's file to who asks for it by its id.
+
+        Raises Refused, once answered, for what is no such question.
+        """
+        try:
+            world_id = request.message().world_id
+            data = (self.context.plan.worlds_dir / f"{world_id}.world").read_bytes()
+        except Refused as refused:
+            request.refuse(one_line(refused))
+            raise
+        except OSError as error:
+            request.refuse(f"World {world_id}: {error.strerror}")
+        else:
+            request.reply(WorldBytes(data=data))
 
     def want(self, junction_id: str, *, load: bool, workers: tuple[str, ...]) -> None:
         """Have a World built, and loaded by `workers` where `load` says so."""

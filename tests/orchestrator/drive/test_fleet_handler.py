@@ -76,6 +76,30 @@ def test_its_worlds_are_given_by_their_hash(house: House) -> None:
     assert asked.take().error == "World none: No such file or directory"  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("world_id", ["../../etc/passwd", "/etc/passwd", "", "*"])
+def test_who_asks_for_what_is_no_world_is_told_so(house: House, world_id: str) -> None:
+    asked, question = Mailbox(1), WorldQuestion(world_id=world_id)
+    for _ in range(2):
+        house.bus.request("world_file", question, asked, run=house.plan.run_id)
+        house.settle()
+        assert "world_file: WorldQuestion: world_id" in asked.take().error  # type: ignore[union-attr]
+    assert sum(text.startswith("refused: ") for text in events(house)) == 1
+
+
+def test_rubbish_of_one_that_plays_is_counted_and_told_as_its_sickness(house: House) -> None:
+    far = FarAway(house)
+    settle(house, far)
+    assert house.conductor.start_round()
+    for request in far.take():
+        request._answer(b"\xc1 rubbish", "")
+    settle(house, far)
+    told = [text for text in events(house) if f"{FAR}" in text and "plays" not in text]
+    assert house.conductor.rounds.tally.run == 1
+    assert house.conductor.refusals.record()["refused"]["count"] == 1
+    (line,) = told
+    assert line.startswith(f"{FAR} is sick, it refuses jobs: ")
+
+
 def other_bits(result: FuturesResult) -> FuturesResult:
     result.trajectory.states[-1, -1, 0] += 1e-3
     return result
