@@ -29,7 +29,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.log_file import JsonLines, LogFile
 from foretwin.contracts.one_heap import share_one_heap
-from foretwin.contracts.process_setup import BusSetup, setup_given
+from foretwin.contracts.process_setup import BusSetup, parent_pid, setup_given
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile
 from foretwin.contracts.refusals import Refusals
 from foretwin.contracts.setup import ProcessSetup
@@ -62,7 +62,7 @@ class ProcessLife:
         self._meter, self._refusal_file = meter, refusal_file
         self._bus = bus
         self._mono_s = mono_s
-        self._parent = os.getppid()
+        self._parent = parent_pid()
         self._mailbox = Mailbox(16)
         self.refusals = Refusals()
         """What of what came to this process it cannot use, for the run's record."""

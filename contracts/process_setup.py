@@ -6,6 +6,7 @@ The router must start at once and stay small: nothing here knows frames, vehicle
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,6 +14,9 @@ import msgspec
 
 from foretwin.contracts.campaign import TlsFiles
 
+STARTED_BY = "FORETWIN_STARTED_BY"
+"""The variable in which a process is told the id of who started it: who asks for its parent as the
+first thing it does asks too late where that was killed just then."""
 _Setup = TypeVar("_Setup", bound="ProcessSetup")
 
 
@@ -71,6 +75,14 @@ def write_setup(setup: ProcessSetup, path: Path) -> None:
 def read_setup(path: Path, kind: type[_Setup]) -> _Setup:
     """Read a setup of type `kind`; raises msgspec.ValidationError naming the field at fault."""
     return msgspec.json.decode(path.read_bytes(), type=kind)
+
+
+def parent_pid() -> int:
+    """Return whom this process ends with: who started it, though that may have died since.
+
+    What it starts itself is told nothing of it.
+    """
+    return int(os.environ.pop(STARTED_BY, "") or os.getppid())
 
 
 def setup_given(kind: type[_Setup], argv: list[str] | None = None) -> tuple[Path, _Setup]:

@@ -21,7 +21,7 @@ from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.own_log import OwnLog
 from foretwin.contracts.partial_file import partial_file
-from foretwin.contracts.process_setup import RouterSetup, setup_given
+from foretwin.contracts.process_setup import RouterSetup, parent_pid, setup_given
 from foretwin.contracts.refusal_counts import RefusalFile
 from foretwin.contracts.router_log import FILTER, RouterLog
 from foretwin.contracts.terminal import say
@@ -36,7 +36,7 @@ def run_router(argv: list[str] | None = None) -> None:
     """Be the router until told to end. Exit codes: 0 done, 2 it cannot listen, in one line."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.umask(0o077)  # a socket is then its user's alone
-    parent = os.getppid()
+    parent = parent_pid()
     ended = threading.Event()
     on_end_signals(ended.set)
     file, setup = setup_given(RouterSetup, argv)

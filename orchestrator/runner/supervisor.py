@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
-from foretwin.contracts.setup import ProcessSetup, write_setup
+from foretwin.contracts.process_setup import STARTED_BY, ProcessSetup, write_setup
 from foretwin.orchestrator.runner.priorities import gives_way
 
 log = logging.getLogger("orchestrator")
@@ -98,6 +98,7 @@ class FreshInterpreter:
         setup_file = self._folder / f"{setup.process_id}.json"
         name = f"{self._package}.{module}"
         write_setup(setup, setup_file)
+        own = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", STARTED_BY: f"{os.getpid()}"}
         with (self._folder / f"{setup.process_id}.stderr").open("ab") as stderr:
             return subprocess.Popen(
                 [sys.executable, "-P", "-m", name, "--setup", str(setup_file)],
@@ -105,7 +106,7 @@ class FreshInterpreter:
                 stdout=stderr,
                 stderr=stderr,
                 start_new_session=True,
-                env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+                env=os.environ | own,
             )
 
 

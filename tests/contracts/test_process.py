@@ -17,6 +17,7 @@ from foretwin.contracts.keys import alive_key, key
 from foretwin.contracts.mailbox import Received
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife, hold, is_held
+from foretwin.contracts.process_setup import STARTED_BY
 from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, take
@@ -179,6 +180,21 @@ def test_a_process_holds_its_setup_as_long_as_it_lives(tmp_path: Path) -> None:
     assert is_held(file), "asking changes nothing"
     os.close(holds)
     assert not is_held(file)
+
+
+def test_whose_starter_has_died_before_it_could_ask_for_it_leaves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setup = ProcessSetup(
+        run_id="r1", process_id="p0", vehicle_id="ego", bus=BusSetup(endpoint="none"),
+        log_file=str(tmp_path / "log.jsonl"),
+    )  # fmt: skip
+    monkeypatch.setenv(STARTED_BY, f"{os.getppid()}")
+    assert not ProcessLife(setup, MemoryBus()).over
+    monkeypatch.setenv(STARTED_BY, f"{os.getpid()}")  # as good as any that is not its parent
+    assert ProcessLife(setup, MemoryBus()).over
+    assert STARTED_BY not in os.environ, "what it starts itself has another parent"
+    assert not ProcessLife(setup, MemoryBus()).over
 
 
 def test_bytes_that_are_no_end_of_a_run_end_nothing(tmp_path: Path) -> None:

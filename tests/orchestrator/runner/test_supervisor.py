@@ -23,6 +23,7 @@ from foretwin.orchestrator.runner.supervisor import (
     fold_stderr,
 )
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.system.foretwin_command import REPOSITORY
 
 
 class FakeChild:
@@ -165,12 +166,14 @@ def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:
     stubborn.write_text(
         "import signal, sys, time\n"
         "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
-        "print('up', flush=True)\n"
+        "from foretwin.contracts.process_setup import parent_pid\n"
+        "print(f'up, started by {parent_pid()}, then {parent_pid()}', flush=True)\n"
         "time.sleep(600)\n"
     )
     launch = FreshInterpreter(tmp_path, package="package")
     supervisor = Supervisor(launch)
-    os.environ["PYTHONPATH"], before = str(tmp_path), os.environ.get("PYTHONPATH")
+    path = os.pathsep.join((str(tmp_path), str(REPOSITORY)))
+    os.environ["PYTHONPATH"], before = path, os.environ.get("PYTHONPATH")
     try:
         supervisor.start(row("w")._replace(module="stubborn"), setup("w0"))
     finally:
@@ -183,6 +186,7 @@ def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:
     while "up" not in said.read_text() and time.monotonic() < deadline:
         assert supervisor.running() == ["w0"]
         time.sleep(0.01)
+    assert f"started by {os.getpid()}, then {os.getpid()}" in said.read_text()
     pid = supervisor.pid("w0")
     assert supervisor.stop(grace_s=0.0, term_s=0.2) == ["w0"]
     with pytest.raises(ProcessLookupError):
