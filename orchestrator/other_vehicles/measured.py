@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.roles import OtherVehicle
-from foretwin.telemetry.estimator.estimator import StateEstimator
+
+if TYPE_CHECKING:  # its arithmetic is compiled, and who makes the estimator loads the compiler
+    from foretwin.telemetry.estimator.estimator import StateEstimator
 
 MOST_HEARD = 1000
 """States that wait for one of the car, and commands for one of their vehicle: the newest."""

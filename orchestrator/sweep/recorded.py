@@ -21,7 +21,6 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import kept_apart, length
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
-from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
@@ -128,6 +127,9 @@ def _states(
     """Return the states that the drive had, estimated from what was recorded as it was then, and
     who was detected."""
     recorded = open_log(file)
+    # Its arithmetic is compiled, and a sweep over no drive loads no compiler.
+    from foretwin.telemetry.estimator.estimator import estimator_of
+
     estimator = estimator_of(recorded.info, vehicle)
     states, seen = [], []
     for channel, message in recorded.samples():

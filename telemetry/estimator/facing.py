@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from foretwin.geometry.steering import MAX_CURVATURE_PM
-from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.filter_state import SPEED, YAW
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.position_gate import PositionGate
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 

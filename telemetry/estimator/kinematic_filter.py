@@ -15,16 +15,24 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.steering import MAX_CURVATURE_PM
-from foretwin.telemetry.estimator import motion_noise
+from foretwin.telemetry.estimator import compiled, motion_noise
+from foretwin.telemetry.estimator.filter_state import (
+    ACCEL,
+    ACCEL_BIAS,
+    CURVATURE,
+    GNSS_X,
+    GNSS_Y,
+    GYRO_BIAS,
+    SIZE,
+    SLIP,
+    SPEED,
+    SPEED_SCALE,
+    YAW,
+    X,
+    Y,
+)
 from foretwin.telemetry.estimator.innovations import PositionInnovation
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
-
-X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
-GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
-SIZE = 12
-ROAD_OFFSET = SIZE
-"""Metres to the left of the map's line; only in a filter that has been told of one."""
-_IDENTITIES = {size: np.eye(size) for size in (SIZE, SIZE + 1)}
 
 _MAX_STEP_S = 0.05
 _STANDING_CURVATURE_PM = 0.1
@@ -33,7 +41,7 @@ _STANDING_CURVATURE_PM = 0.1
 class KinematicFilter:
     """Predicts with constant acceleration and curvature, and is corrected by each measurement.
 
-    `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices;
+    `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of `filter_state`;
     (13,) and (13, 13) once a map helps.
     The point is base_link. Speed stays at or above zero unless `may_reverse`. What no sensor has
     spoken of yet (receiver's error, scale, slip) has no variance and so no effect.
@@ -73,60 +81,20 @@ class KinematicFilter:
             self._step(duration_s / steps)
 
     def _step(self, dt: float) -> None:
-        values = self.mean.tolist()
-        x, y, yaw, speed, accel, curvature = values[: CURVATURE + 1]
-        slip, size = values[SLIP], len(values)
-        if not self.may_reverse and speed + accel * dt < 0.0:
-            accel = min(0.0, -speed / dt)  # it stops within the step
-        distance = (speed + 0.5 * accel * dt) * dt
-        # The rear axle moves outwards of where the body points, the more the harder it turns.
-        heading = yaw + 0.5 * curvature * distance - slip * speed * speed * curvature
-        cos, sin = math.cos(heading), math.sin(heading)
-        half = 0.5 * dt * dt
-        side = distance * (0.5 * curvature * dt - 2.0 * slip * speed * curvature)
-        by_accel = 0.5 * distance * curvature * half
-        by_curvature = distance * (0.5 * distance - slip * speed * speed)
-        by_slip = -distance * speed * speed * curvature
-        # Number by number: to put two into a slice takes numpy eight times as long.
-        jacobian = _IDENTITIES[size].copy()
-        jacobian[X, YAW], jacobian[X, SPEED] = -distance * sin, dt * cos - side * sin
-        jacobian[Y, YAW], jacobian[Y, SPEED] = distance * cos, dt * sin + side * cos
-        jacobian[X, ACCEL], jacobian[X, CURVATURE] = (
-            half * cos - by_accel * sin,
-            -by_curvature * sin,
-        )
-        jacobian[Y, ACCEL], jacobian[Y, CURVATURE] = half * sin + by_accel * cos, by_curvature * cos
-        jacobian[X, SLIP], jacobian[Y, SLIP] = -by_slip * sin, by_slip * cos
-        jacobian[YAW, SPEED], jacobian[YAW, ACCEL] = curvature * dt, curvature * half
-        jacobian[YAW, CURVATURE], jacobian[SPEED, ACCEL] = distance, dt
-        fading = math.exp(-dt / motion_noise.GNSS_CORRELATION_S)
-        jacobian[GNSS_X, GNSS_X] = jacobian[GNSS_Y, GNSS_Y] = fading
-        values[X], values[Y] = x + distance * cos, y + distance * sin
-        values[YAW] = yaw + curvature * distance
-        values[SPEED], values[ACCEL] = speed + accel * dt, accel
-        values[GNSS_X] *= fading
-        values[GNSS_Y] *= fading
-        self.mean = np.array(values)
-        covariance = jacobian @ self.covariance @ jacobian.T
-        noise = covariance.reshape(-1)[:: size + 1]  # a view of the diagonal
-        wandering = motion_noise.densities(
+        speed = self.mean.item(SPEED)
+        densities = motion_noise.densities(
             speed, slip=self._slip_density, calm=self.calm, steady=self.steady
         )
-        for index, density in enumerate(wandering, start=YAW):
-            noise[index] += dt * density
-        if self._gnss_std_m:
-            noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
-        self.covariance = covariance
+        compiled.predict(
+            self.mean, self.covariance, dt, self.may_reverse, densities, self._gnss_std_m
+        )
 
     def correct(self, row: Array, residual: float, std: float) -> float:
         """Apply one scalar measurement; return its normalised square.
 
         `row` is its derivative by the state.
         """
-        cross = self.covariance @ row
-        variance = float(row @ cross) + std * std
-        self.mean += cross * (residual / variance)
-        self.covariance -= cross[:, None] * (cross / variance)
+        variance: float = compiled.correct(self.mean, self.covariance, row, residual, std)
         self._limit()
         return float(residual * residual) / variance
 

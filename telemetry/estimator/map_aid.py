@@ -15,16 +15,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint
-from foretwin.telemetry.estimator.kinematic_filter import (
-    GNSS_X,
-    GNSS_Y,
-    ROAD_OFFSET,
-    SIZE,
-    YAW,
-    KinematicFilter,
-    X,
-    Y,
-)
+from foretwin.telemetry.estimator.filter_state import GNSS_X, GNSS_Y, ROAD_OFFSET, SIZE, YAW, X, Y
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 
 ALIKE_M = 0.5

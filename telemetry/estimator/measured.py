@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import sys
 from collections import Counter
 from typing import Any
+
+import msgspec
 
 from foretwin.contracts.drive import SpeedSample, SteeringSample
 from foretwin.geometry.steering import SteeringColumn
@@ -140,16 +144,19 @@ class Doubt:
 
 def _fault(message: Any) -> str | None:
     """Return why a sample cannot be a road vehicle's, or None."""
-    for name in message.__struct_fields__:
+    kind_of_message: type[msgspec.Struct] = type(message)
+    for name, most in _bounds(kind_of_message):
         value = getattr(message, name)
         kind = type(value)
         if kind is not float and kind is not tuple:
             continue
         for number in value if kind is tuple else (value,):
-            if type(number) is not float:
-                continue
-            if not math.isfinite(number):
-                return "not_finite"
-            if abs(number) > _LIMITS.get(name, math.inf):
-                return "implausible"
+            if type(number) is float and not -most <= number <= most:
+                return "implausible" if math.isfinite(number) else "not_finite"
     return None
+
+
+@functools.cache
+def _bounds(kind: type[msgspec.Struct]) -> tuple[tuple[str, float], ...]:
+    """Return each field of a message with the most that it can be."""
+    return tuple((name, _LIMITS.get(name, sys.float_info.max)) for name in kind.__struct_fields__)

@@ -7,16 +7,10 @@ from typing import Any
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
+from foretwin.telemetry.estimator.filter_state import ACCEL, ACCEL_BIAS, GYRO_BIAS, SPEED, YAW
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.innovations import LINE_95, SurpriseCount
-from foretwin.telemetry.estimator.kinematic_filter import (
-    ACCEL,
-    ACCEL_BIAS,
-    GYRO_BIAS,
-    SPEED,
-    YAW,
-    KinematicFilter,
-)
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
 from foretwin.telemetry.estimator.mounting import MountingLearner
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy

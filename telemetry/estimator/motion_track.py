@@ -11,8 +11,9 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
 from foretwin.contracts.frames import GeoPoint, base_from_sensor
+from foretwin.telemetry.estimator.filter_state import GYRO_BIAS, SPEED, YAW
 from foretwin.telemetry.estimator.innovations import SurpriseCount
-from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from foretwin.telemetry.estimator.measured import MotionSamples

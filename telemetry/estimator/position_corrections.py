@@ -14,12 +14,13 @@ from typing import NamedTuple
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
 from foretwin.telemetry.estimator.facing import BACKING_MPS, CREEPING_MPS, Facing
+from foretwin.telemetry.estimator.filter_state import SPEED, YAW
 from foretwin.telemetry.estimator.innovations import (
     PLANE_95,
     PositionInnovation,
     SurpriseCount,
 )
-from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.map_aid import MapAid
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_noise import CALMEST

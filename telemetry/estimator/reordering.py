@@ -11,7 +11,10 @@ from foretwin.telemetry.estimator.motion_track import MotionTrack
 
 WINDOW_NS = 300_000_000
 """A sample that comes later than this behind the newest is too late to count."""
-_CHECKPOINT_NS = 20_000_000
+_CHECKPOINT_NS, _CALM_CHECKPOINT_NS = 20_000_000, 100_000_000
+"""How far apart copies of the track lie, and where no sample came late for `_CALM_NS`: a copy costs
+more than to take three samples again."""
+_CALM_NS = 5_000_000_000
 _MOST_WAITING = 2048
 _ORDER = ("imu", "heading", "speed", "steering", "gnss")
 
@@ -32,7 +35,7 @@ class _Checkpoint(NamedTuple):
 
 
 class Reordering:
-    """Keeps the last samples and a track at every 20 ms of them, to begin anew from any.
+    """Keeps the last samples and a track every now and then, to begin anew from any.
 
     In order a sample costs what it costs the track; one that is late makes those after it be taken
     once more, at the next state. `late` and `doubled` count what was left out, by channel.
@@ -51,6 +54,8 @@ class Reordering:
         """The first lies before all samples that may yet come."""
         self._seen: set[tuple[str, int]] = set()
         self._number = 0
+        self._late_ns: int | None = None
+        """The newest stamp as a sample came before others that were taken already."""
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be computed again: from the first checkpoint all samples are."""
@@ -94,6 +99,7 @@ class Reordering:
     def _go_back(self, place: int) -> None:
         """Begin anew before the sample at `place`."""
         stamp_ns = self._samples[place].stamp_ns
+        self._late_ns = self._samples[-1].stamp_ns
         while len(self._checkpoints) > 1 and self._checkpoints[-1].stamp_ns >= stamp_ns:
             self._checkpoints.pop()
         checkpoint = self._checkpoints[-1]
@@ -108,13 +114,18 @@ class Reordering:
             sample = self._samples[self._taken]
             if self._taken:
                 before_ns = self._samples[self._taken - 1].stamp_ns
-                due_ns = self._checkpoints[-1].stamp_ns + _CHECKPOINT_NS
+                due_ns = self._checkpoints[-1].stamp_ns + self._apart_ns(before_ns)
                 if due_ns <= before_ns < sample.stamp_ns:
                     self._keep(before_ns)
             self._head.take(sample.channel, sample.message)
             self._taken += 1
         self._forget()
         return self._head
+
+    def _apart_ns(self, stamp_ns: int) -> int:
+        """Return how far apart copies shall lie."""
+        calm = self._late_ns is None or stamp_ns - self._late_ns > _CALM_NS
+        return _CALM_CHECKPOINT_NS if calm else _CHECKPOINT_NS
 
     def _keep(self, stamp_ns: int) -> None:
         self._checkpoints.append(_Checkpoint(stamp_ns, self._head.copy()))

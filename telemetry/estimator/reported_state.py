@@ -7,16 +7,9 @@ from typing import NamedTuple
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, wrap_angle
+from foretwin.telemetry.estimator.filter_state import ACCEL, CURVATURE, SPEED, YAW, X, Y
 from foretwin.telemetry.estimator.innovations import Surprises
-from foretwin.telemetry.estimator.kinematic_filter import (
-    ACCEL,
-    CURVATURE,
-    SPEED,
-    YAW,
-    KinematicFilter,
-    X,
-    Y,
-)
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.map_aid import ALIKE_M
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.mounting import Mounting

@@ -8,7 +8,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.steering import MAX_CURVATURE_PM
-from foretwin.telemetry.estimator.kinematic_filter import YAW, KinematicFilter
+from foretwin.telemetry.estimator.filter_state import YAW
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 
 _DRIFT_M = 0.03
 _LEAST_TURN_RAD = 0.002

@@ -12,7 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from foretwin.telemetry.estimator.kinematic_filter import ACCEL, SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.filter_state import ACCEL, SPEED, YAW
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.position_gate import LocalFix
 
 _SPARSE_S, _LONGEST_S = 0.4, 3.0

@@ -14,15 +14,9 @@ import math
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
+from foretwin.telemetry.estimator.filter_state import CURVATURE, SPEED, YAW, X, Y
 from foretwin.telemetry.estimator.innovations import LINE_95, PLANE_95
-from foretwin.telemetry.estimator.kinematic_filter import (
-    CURVATURE,
-    SPEED,
-    YAW,
-    KinematicFilter,
-    X,
-    Y,
-)
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 _PLACE_NOISE, _SLOPE_NOISE = math.sqrt(7.0 / 21.0), math.sqrt(16_674.0) / 252.0

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.drive import ImuSample, SpeedSample
+from foretwin.telemetry.estimator.filter_state import YAW, X
 from foretwin.telemetry.estimator.gyro import Gyro
-from foretwin.telemetry.estimator.kinematic_filter import YAW, KinematicFilter, X
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from tests.telemetry.position_track import fix, info
 

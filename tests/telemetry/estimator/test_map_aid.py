@@ -15,14 +15,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ImuSample, SpeedSample
 from foretwin.contracts.frames import GeoPoint, geo_from_local
 from foretwin.telemetry.estimator.estimator import StateEstimator
-from foretwin.telemetry.estimator.kinematic_filter import (
-    GNSS_X,
-    ROAD_OFFSET,
-    SIZE,
-    KinematicFilter,
-    X,
-    Y,
-)
+from foretwin.telemetry.estimator.filter_state import GNSS_X, ROAD_OFFSET, SIZE, X, Y
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from tests.telemetry.position_track import FRAME, Sample, fix, info, xy

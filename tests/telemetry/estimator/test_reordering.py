@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import functools
 import pickle
+from unittest import mock
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -69,6 +71,34 @@ def test_what_is_too_late_is_counted_and_left_out() -> None:
     assert not reordering.add("gnss", late)
     assert reordering.late == {"gnss": 1}
     assert reordering.track().state(end_ns(4.0)) == in_order()
+
+
+def copies_in(seconds: float, *, late_at: int | None = None) -> int:
+    """Return how often a track is copied, one sample coming after the three that follow it."""
+    reordering = Reordering(MotionTrack(info()))
+    order = list(samples(seconds))
+    if late_at is not None:
+        order.insert(late_at + 3, order.pop(late_at))
+    with mock.patch.object(MotionTrack, "copy", autospec=True, side_effect=MotionTrack.copy) as one:
+        for channel, message in order:
+            reordering.add(channel, message)
+            reordering.track()
+    assert reordering.track().state(end_ns(seconds)) == in_order(seconds)
+    return one.call_count
+
+
+def test_where_nothing_comes_late_a_track_is_copied_every_tenth_of_a_second() -> None:
+    assert copies_in(4.0) == pytest.approx(4.0 / 0.1, abs=2)
+
+
+def test_for_some_seconds_after_a_late_sample_it_is_copied_oftener() -> None:
+    """The speeds come every 50 ms: each of them has a copy before it."""
+    assert copies_in(4.0, late_at=20) == pytest.approx(0.8 / 0.1 + 3.2 / 0.05, abs=4)
+
+
+def test_later_on_it_is_copied_as_before() -> None:
+    few, calm = copies_in(9.0, late_at=20), copies_in(9.0)
+    assert few - calm == pytest.approx(5.0 / 0.05 - 5.0 / 0.1, abs=5)
 
 
 def test_a_flood_between_two_states_stays_bounded() -> None:

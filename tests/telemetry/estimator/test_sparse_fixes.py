@@ -9,13 +9,8 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.drive import VehicleState
-from foretwin.telemetry.estimator.kinematic_filter import (
-    ACCEL,
-    CURVATURE,
-    SPEED,
-    YAW,
-    KinematicFilter,
-)
+from foretwin.telemetry.estimator.filter_state import ACCEL, CURVATURE, SPEED, YAW
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.position_gate import LocalFix
 from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse, turned_m
 from tests.telemetry.position_track import along, circle, states_of, xy, yaw

@@ -11,7 +11,8 @@ import pytest
 
 from foretwin.contracts.drive import HeadingSample
 from foretwin.telemetry.estimator.estimator import StateEstimator
-from foretwin.telemetry.estimator.kinematic_filter import CURVATURE, SPEED, KinematicFilter, X, Y
+from foretwin.telemetry.estimator.filter_state import CURVATURE, SPEED, X, Y
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reported_state import moving_state
