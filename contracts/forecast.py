@@ -34,6 +34,12 @@ class ProgressForecast(msgspec.Struct, frozen=True, kw_only=True):
 
     def at(self, level: float) -> Array:
         """Return (T,) the distance that is not exceeded with this probability."""
+        if self.levels[0] <= level < self.levels[-1]:
+            # All instants at once, by the very formula of np.interp.
+            place = int(np.searchsorted(self.levels, level, side="right"))
+            low, high = self.levels[place - 1 : place + 1]
+            below, above = self.distance_m[:, place - 1], self.distance_m[:, place]
+            return np.asarray((above - below) / (high - low) * (level - low) + below)
         shares = np.full((len(self.time_s), 1), level)
         return value_at(self.levels, self.distance_m, shares)[:, 0]
 

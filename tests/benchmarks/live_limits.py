@@ -1,7 +1,8 @@
 """`python -m tests.benchmarks.live_limits [town berlin loaded crowd]` says whether live drives keep
 their limits on two cores that do nothing else: each with its figure.
 
-Berlin needs FORETWIN_DATA. Exit code 1 where a limit does not hold, 2 for an unknown name.
+Nothing is traced: to measure spans takes processor time of its own. Berlin needs FORETWIN_DATA.
+Exit code 1 where a limit does not hold, 2 for an unknown name.
 """
 
 from __future__ import annotations

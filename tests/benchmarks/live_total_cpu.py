@@ -7,7 +7,8 @@ from tests.benchmarks.measuring import Measurement
 
 
 def measure() -> Measurement:
-    """Return shares of a core, after the drive's beginning; `others_cores` is everybody else's."""
+    """Return shares of a core, after the drive's beginning, tracing included; `others_cores` is
+    everybody else's."""
     found = live_drive()
     workers = sum(share for name, share in found.shares.items() if name.startswith("w"))
     more = found.shares | {"others_cores": found.others_cores}

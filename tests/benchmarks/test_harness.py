@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +110,7 @@ def test_a_live_drive_is_read_from_its_trace_and_its_record(tmp_path: Path) -> N
     (tmp_path / "run.json").write_text(json.dumps({"ledger": {"rounds": {"missed": 2}}}))
     rows = [
         {"round_id": n, "drive_time_s": 9.0 + n, "late": n == 2, "latency_ms": 100.0 + n,
-         "futures": 64 - n}
+         "futures": 64 - n, "cpu_seconds": 0.19}
         for n in range(4)
     ]  # fmt: skip
     (tmp_path / "results").mkdir()
@@ -125,6 +126,12 @@ def test_a_live_drive_is_read_from_its_trace_and_its_record(tmp_path: Path) -> N
     assert (found.jobs_cpu_ms, found.slowest_job_cpu_ms) == pytest.approx((190.0, 100.0), abs=0.01)
     assert found.orchestrator_cpu_ms == 10.0
     assert found.shares == pytest.approx({"orchestrator": 0.1, "w0": 1.0})
+
+    (tmp_path / "trace.json").unlink()
+    untraced = read_live_drive(tmp_path, looks)
+    assert (untraced.p95_ms, untraced.jobs_cpu_ms) == (found.p95_ms, found.jobs_cpu_ms)
+    assert math.isnan(untraced.slowest_job_cpu_ms)
+    assert math.isnan(untraced.orchestrator_cpu_ms)
 
 
 def look(age_s: float, *, machine_s: float, **cpu_s: float) -> CpuLook:

@@ -37,6 +37,18 @@ def test_a_median_lies_in_the_middle_and_other_levels_where_they_are() -> None:
     assert forecast.at(0.125) == pytest.approx([11.5])
 
 
+@given(
+    level=st.one_of(st.sampled_from(PROGRESS_LEVELS), st.floats(0.001, 0.999)),
+    seed=st.integers(0, 99),
+)
+def test_a_level_is_the_same_to_the_last_bit_as_among_many_shares(level: float, seed: int) -> None:
+    distance_m = rising(np.random.default_rng(seed).uniform(0.0, 90.0, (8, len(LEVELS))))
+    forecast = ProgressForecast(time_s=np.arange(8.0), levels=LEVELS, distance_m=distance_m)
+
+    alone = value_at(LEVELS, distance_m, np.full((8, 1), level))[:, 0]
+    assert forecast.at(level).tolist() == alone.tolist()
+
+
 @given(share=st.floats(1e-6, 1.0 - 1e-6), width_m=st.floats(0.5, 80.0))
 def test_a_share_and_its_value_undo_each_other_in_the_tails_too(
     share: float, width_m: float
