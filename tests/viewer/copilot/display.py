@@ -24,11 +24,14 @@ from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 
 RUN, VEHICLE = "run1", "car"
-OF_VEHICLE = ("state", "gnss", "plan", "end", "objects", "signals")
+OF_VEHICLE = ("state", "gnss", "plan", "end", "objects", "signals", "injection")
 
 
 class DisplayRun:
     """A router that plays the drive, and one display."""
+
+    another: ZenohBus
+    """Of a further process of the run, for who starts one."""
 
     def __init__(self, folder: Path, **settings: Any) -> None:
         self.folder = folder

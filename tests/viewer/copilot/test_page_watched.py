@@ -17,11 +17,12 @@ import pytest
 from foretwin.contracts.bus import Mailbox, Request, ZenohBus
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.keys import alive_key
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
 from foretwin.contracts.page_address import page_address
 from foretwin.contracts.ports import LOOPBACK, free_endpoint, free_port
 from foretwin.contracts.setup import BusSetup
-from foretwin.contracts.simulation import RunEnd
+from foretwin.contracts.simulation import Event, RunEnd
 from foretwin.contracts.tuning import SetReply, SetRequest
 from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S
 from foretwin.viewer.copilot.server import CopilotServer, PageActions, page_app
@@ -30,7 +31,7 @@ from tests.viewer import scene
 from tests.viewer.copilot.chromium import Browser, judges_python
 from tests.viewer.copilot.display import RUN, DisplayRun
 from tests.viewer.copilot.page_heap import FRAMES_OF_AN_HOUR, measured
-from tests.viewer.copilot.test_alerts import gap, worker
+from tests.viewer.copilot.test_alerts import gap, injection, worker
 from tests.viewer.copilot.test_now import AHEAD_OF_X1, Drive, a_round
 from tests.viewer.copilot.test_right_of_way import drawn
 from tests.viewer.copilot.test_words import verdict
@@ -71,6 +72,12 @@ FORCED = {
         "progress", msgspec.structs.replace(AHEAD_OF_X1, mission_state="off_map")
     ),
     "worker": lambda run: run.send("worker_status", worker("sick")),
+    "injection": lambda run: run.send("injection", injection("shut")),
+    "event": lambda run: run.send(
+        "event", Event(stamp_ns=1, level="error", source="x", text="no world for n4")
+    ),
+    "process": lambda run: run.another.close(),
+    "link": lambda run: run.bus.close(),
 }
 
 
@@ -82,12 +89,14 @@ def test_an_alarm_is_on_the_first_screen_within_half_a_second(
     live.send("round", a_round())
     go_on(live, 4.1)
     browser.do("open", url=live.address, size=(1024, 600))
-    go_on(live, 4.2)
-    browser.do("wait", selector="#alert[hidden]")
-    begun_s = time.monotonic()
-    FORCED[kind](live)
-    browser.do("wait", selector="#alert:not([hidden])")
-    took_s = time.monotonic() - begun_s
+    with ZenohBus(live.setup.bus) as live.another:
+        live.another.declare_alive(alive_key(run=RUN, process="w1"))
+        go_on(live, 4.2)
+        browser.do("wait", selector="#alert[hidden]")
+        begun_s = time.monotonic()
+        FORCED[kind](live)
+        browser.do("wait", selector="#alert:not([hidden])")
+        took_s = time.monotonic() - begun_s
     inside = browser.do("box", selector="#alert")
     browser.do("close")
     assert took_s <= 0.5
