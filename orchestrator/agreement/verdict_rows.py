@@ -68,7 +68,11 @@ def agreement_lines(
     return lines
 
 
-_ALONG = {"along": "along the road", "across": "across it", "both": "along and across together"}
+_ALONG = {
+    "along": "along the road",
+    "across": "across the road",
+    "both": "along and across together",
+}
 
 
 def _turned(flip: dict[str, Any], direction: str, intersections: Sequence[dict[str, Any]]) -> str:
@@ -77,9 +81,15 @@ def _turned(flip: dict[str, Any], direction: str, intersections: Sequence[dict[s
     becomes = f"a fail by {fails.replace('_', ' ')}" if fails else "a pass"
     when = instant(flip["smallest_factor_at_s"], intersections)
     gap_m = flip["smallest_factor_gap_m"]
+    measured_m, where = gap_m / factor, _ALONG[direction]
+    if factor < 1.0:  # the whole of it need not turn the verdict: the way between is another one
+        return (
+            f"  least room {when}: with {gap_m:.2f} of the {measured_m:.2f} m of gap that were "
+            f"measured {where} the verdict would be {becomes}"
+        )
     return (
-        f"  least room {when}: with a gap of {gap_m:.2f} m {_ALONG[direction]} the verdict would "
-        f"be {becomes}; {gap_m / factor:.2f} m were measured"
+        f"  least room {when}: with a gap of {gap_m:.2f} m {where} the verdict would "
+        f"be {becomes}; {measured_m:.2f} m were measured"
     )
 
 

@@ -85,7 +85,9 @@ def play(block: Block, page: Page, folder: Path, installed: Installed) -> bool:
         commands = "\n".join(page.in_place(line) for line in block.commands())
         run_shell(commands, block, folder, installed)
     elif block.language == "python":
-        (folder / "page.py").write_text(text, encoding="utf-8")
+        # A block goes on with what those before it on the page have made, as in a notebook.
+        with (folder / "page.py").open("a", encoding="utf-8") as program:
+            program.write(text + "\n")
         run_shell("python page.py", block, folder, installed)
     elif runs := block.marks.get("query"):
         for question in filter(str.strip, text.split(";")):

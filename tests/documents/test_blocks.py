@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import builtins
 import re
 import tomllib
 from functools import cache
@@ -60,6 +62,31 @@ def foretwin_lines(block: Block) -> list[str]:
         for line in block.commands()
         if (words := words_of(line)) and words[0] in PROGRAM_WORDS
     ]
+
+
+def unknown_names(program: str) -> set[str]:
+    """Return the names that a program uses and nothing in it makes."""
+    nodes = list(ast.walk(ast.parse(program)))
+    made = {one.id for one in nodes if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)}
+    made |= {one.arg for one in nodes if isinstance(one, ast.arg)}
+    made |= {one.name for one in nodes if isinstance(one, ast.FunctionDef | ast.ClassDef)}
+    for one in nodes:
+        if isinstance(one, ast.Import | ast.ImportFrom):
+            made |= {(name.asname or name.name).partition(".")[0] for name in one.names}
+    used = {one.id for one in nodes if isinstance(one, ast.Name)}
+    return used - made - set(dir(builtins))
+
+
+@pytest.mark.parametrize("name", pages())
+def test_the_python_of_a_page_uses_what_the_page_has_made(name: str) -> None:
+    blocks = [one.text for one in read_page(name).blocks if one.language == "python"]
+
+    for count in range(1, len(blocks) + 1):
+        assert unknown_names("\n".join(blocks[:count])) == set()
+
+
+def test_a_name_that_nobody_made_is_seen() -> None:
+    assert unknown_names("import a.b\nc = a.b\nd(c)") == {"d"}
 
 
 def test_every_block_says_what_it_is() -> None:

@@ -80,6 +80,19 @@ def test_a_page_is_played_in_order_in_its_folder(tmp_path: Path, bare: Installed
     assert {one.name for one in tmp_path.iterdir()} == {"given.txt", "later.toml"}
 
 
+def test_a_block_of_python_goes_on_with_what_those_before_it_made(
+    tmp_path: Path, bare: Installed
+) -> None:
+    first, second = (
+        fenced("python", "made = 2"),
+        fenced("python", "open('it', 'w').write('x' * made)"),
+    )
+
+    assert play_blocks(page(*first, *second), tmp_path, bare) == 2
+
+    assert (tmp_path / "it").read_text() == "xx"
+
+
 @pytest.mark.parametrize(
     ("marks", "command"),
     [((), "false\ntrue"), ((), "false | true"), (("<!-- exit: 3 -->",), "true")],

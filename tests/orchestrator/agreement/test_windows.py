@@ -112,6 +112,11 @@ def test_the_least_gap_that_would_turn_a_verdict_is_told_with_its_place() -> Non
         "  least room at 50.0 s, after Mill Lane \u00d7 High Street: with a gap of 6.00 m along "
         "and across together the verdict would be a pass; 3.00 m"
     )
+    record["flips"] = {"across": turned(0.25, 1.5, 50.0, "comfort")}
+    assert agreement_lines(record, [reached])[-1].endswith(
+        "with 1.50 of the 6.00 m of gap that were measured across the road the verdict would "
+        "be a fail by comfort"
+    )
 
 
 def test_who_was_seen_and_what_was_heard_counts_for_reality() -> None:
