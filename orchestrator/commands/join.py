@@ -8,6 +8,7 @@ import math
 import secrets
 import tempfile
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.anchor_file import AnchorFile, read_anchor
-from foretwin.contracts.bus import Bus, BusUnreachable, ZenohBus, ask
+from foretwin.contracts.bus import Bus, BusUnreachable, ask
 from foretwin.contracts.certificates import read_certificate
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.exit_codes import USER
@@ -25,6 +26,7 @@ from foretwin.contracts.joining import newest_running, running_drive
 from foretwin.contracts.local_bus import CAR_OF
 from foretwin.contracts.ports import trouble_with_bus
 from foretwin.contracts.process_setup import BusSetup, ProcessSetup
+from foretwin.contracts.redialled_bus import RedialledBus
 from foretwin.contracts.roles import JoinReply, JoinRequest
 from foretwin.contracts.setup import ReplaySetup, Ros2Setup, StandinSetup
 from foretwin.contracts.terminal import say
@@ -92,7 +94,10 @@ def join(asked: JoinAsked) -> int:
     if place is None:
         return EXIT_DONE
     request = JoinRequest(instance=secrets.token_hex(8), scale=anchor.scale)
-    with _bus(place) as bus, tempfile.TemporaryDirectory(prefix="foretwin-join-") as folder:
+    with (
+        closing(_bus(place)) as bus,
+        tempfile.TemporaryDirectory(prefix="foretwin-join-") as folder,
+    ):
         seat = _AskedSeat(bus, place.run_id, asked.vehicle_id, request)
         frame = seat.take(ended)
         if frame is None:
@@ -107,9 +112,9 @@ def join(asked: JoinAsked) -> int:
             seat.leave()
 
 
-def _bus(place: _Place) -> ZenohBus:
+def _bus(place: _Place) -> RedialledBus:
     try:
-        return ZenohBus(place.bus)
+        return RedialledBus(place.bus)
     except BusUnreachable:
         raise UserError(
             f"run {place.run_id}: nobody listens at {place.bus.endpoint}, though the drive goes on"

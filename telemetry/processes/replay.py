@@ -11,6 +11,7 @@ import msgspec
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.redialled_bus import RedialledBus
 from foretwin.contracts.setup import ReplaySetup
 from foretwin.telemetry.logs.log import Log, Sample
 from foretwin.telemetry.logs.merge import stamp_ns_of
@@ -92,4 +93,4 @@ def serve(setup: ReplaySetup, bus: Bus, life: ProcessLife) -> None:
 
 
 if __name__ == "__main__":
-    run_process(ReplaySetup, serve)
+    run_process(ReplaySetup, serve, join=RedialledBus)

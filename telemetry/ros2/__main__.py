@@ -8,6 +8,7 @@ import math
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.foreign_bus import ZenohForeignBus
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.redialled_bus import RedialledBus
 from foretwin.contracts.setup import BusSetup, Ros2Setup
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.lot_guard import LotGuard
@@ -59,4 +60,4 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
 
 
 if __name__ == "__main__":
-    run_process(Ros2Setup, serve)
+    run_process(Ros2Setup, serve, join=RedialledBus)

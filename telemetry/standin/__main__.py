@@ -7,6 +7,7 @@ from pathlib import Path
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.drive import OthersAround
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.redialled_bus import RedialledBus
 from foretwin.contracts.setup import StandinSetup
 from foretwin.telemetry.anchored import lot_from_world_message
 from foretwin.telemetry.processes.vehicle_process import VehicleProcess
@@ -49,4 +50,4 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
 
 
 if __name__ == "__main__":
-    run_process(StandinSetup, serve)
+    run_process(StandinSetup, serve, join=RedialledBus)

@@ -18,6 +18,7 @@ import msgspec
 
 from foretwin.contracts.bus import Bus
 from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.redialled_bus import RedialledBus
 from foretwin.contracts.setup import StandinSetup
 from foretwin.telemetry.processes.vehicle_process import VehicleSource, serve_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
@@ -99,4 +100,4 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
 
 
 if __name__ == "__main__":
-    run_process(StandinSetup, serve)
+    run_process(StandinSetup, serve, join=RedialledBus)

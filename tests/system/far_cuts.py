@@ -1,8 +1,8 @@
-"""How soon a worker on another machine is heard again after its link was cut.
+"""How soon a worker or a car on another machine is heard again after its link was cut.
 
-`python -m tests.system.far_cuts --cuts 10 --seconds 5` prints it as JSON. The router and who asks
-are in one network, the worker is in another, over TLS; asked is for the worker's clock, over and
-over.
+`python -m tests.system.far_cuts --cuts 10 --seconds 5` prints it as JSON, with `--car` of the
+stand-in car. The router and who listens are in one network, who is heard in another, over TLS; a
+worker is asked for its clock over and over, a car says how fast it is.
 """
 
 from __future__ import annotations
@@ -19,35 +19,43 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from foretwin.contracts.bus import Alive, Mailbox, Reply, ZenohBus
+from foretwin.contracts.bus import Alive, Mailbox, Received, Reply, ZenohBus
 from foretwin.contracts.campaign import role_files
 from foretwin.contracts.fleet import ClockQuestion, far_id
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.setup import BusSetup, FarWorkerSetup, write_setup
+from foretwin.contracts.setup import (
+    BusSetup,
+    FarWorkerSetup,
+    ProcessSetup,
+    StandinSetup,
+    write_setup,
+)
 from foretwin.orchestrator.campaign.issuing import issue
 from foretwin.orchestrator.record.machine import this_machine
 from tests.chaos.link import PacketLink, own_network
 from tests.chaos.outsiders import Outsider
+from tests.chaos.parts import path_file
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.orchestrator.campaign.campaigns import campaign, now
 
-PORT, RUN, WORKER = 7447, "r1", far_id("laptop", 0)
+PORT, RUN, WORKER, CAR = 7447, "r1", far_id("laptop", 0), "ego"
 SLOW_S = 0.2
 _ASKS_EVERY_S, _WAITS_S, _APART_S = 0.05, 0.5, 3.0
 
 
 class Heard(NamedTuple):
-    """When a worker was heard first after a link was back, in seconds from then."""
+    """When somebody was heard first after a link was back, in seconds from then: a worker by its
+    answer, a car by a sample."""
 
     token_s: float
     answer_s: float
 
 
 class FarLink:
-    """A worker in a network of its own, and who asks it; use it as a context."""
+    """A worker, or a car, in a network of its own, and who listens; use it as a context."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder, self._stack = folder, contextlib.ExitStack()
+    def __init__(self, folder: Path, *, car: bool = False) -> None:
+        self._folder, self._stack, self._is_car = folder, contextlib.ExitStack(), car
 
     def __enter__(self) -> FarLink:
         stack, folder = self._stack, self._folder
@@ -63,32 +71,46 @@ class FarLink:
                 str(files), str(self._file))  # fmt: skip
         self._asker = Outsider("asker", ("nsenter", "-t", str(near), "-n", *asks), folder)
         stack.callback(self._asker.close)
-        setup = FarWorkerSetup(
-            run_id=RUN, process_id=WORKER, vehicle_id="far", log_file=str(folder / "far.jsonl"),
-            bus=BusSetup(endpoint=endpoint, tls=role_files(files, "worker-laptop")),
-            machine=this_machine(), cache_dir=str(folder / "worlds"),
-        )  # fmt: skip
-        write_setup(setup, folder / "far.json")
-        plays = (sys.executable, "-m", "foretwin.sim_worker.far", "--setup",
-                 str(folder / "far.json"))  # fmt: skip
-        self._worker = Outsider("far", (*self.link.prefix, *plays), folder)
-        stack.callback(self._worker.close)
+        self._far = Outsider("far", (*self.link.prefix, *self._plays(endpoint, files)), folder)
+        stack.callback(self._far.close)
         self.heard_after(0.0)
         return self
+
+    def _plays(self, endpoint: str, files: Path) -> tuple[str, ...]:
+        """Return the words that start who is heard."""
+        role = "car" if self._is_car else "worker-laptop"
+        given = {
+            "run_id": RUN, "log_file": str(self._folder / "far.jsonl"),
+            "bus": BusSetup(endpoint=endpoint, tls=role_files(files, role)),
+        }  # fmt: skip
+        setup: ProcessSetup
+        if self._is_car:
+            path = str(path_file(self._folder))
+            setup = StandinSetup(**given, process_id=CAR, vehicle_id=CAR, path_file=path)
+        else:
+            cache = str(self._folder / "worlds")
+            machine = this_machine()
+            setup = FarWorkerSetup(
+                **given, process_id=WORKER, vehicle_id="far", machine=machine, cache_dir=cache
+            )
+        file = self._folder / "far.json"
+        write_setup(setup, file)
+        module = "telemetry.standin" if self._is_car else "sim_worker.far"
+        return (sys.executable, "-m", f"foretwin.{module}", "--setup", str(file))
 
     def __exit__(self, *what: object) -> None:
         self._stack.close()
 
     @property
     def pids(self) -> list[int]:
-        """Of who asks and who answers."""
-        return [one.process.pid for one in (self._asker, self._worker)]
+        """Of who listens and who is heard."""
+        return [one.process.pid for one in (self._asker, self._far)]
 
     def heard_after(self, at_s: float) -> Heard:
-        """Wait until the worker was heard after a time on the monotonic clock."""
+        """Wait until somebody was heard after a time on the monotonic clock."""
         deadline_s = time.monotonic() + DEADLINE_S
         while time.monotonic() < deadline_s:
-            self._worker.look()
+            self._far.look()
             self._asker.look()
             since = [one for one in self._events() if one["mono_s"] > at_s]
             answers = [one["mono_s"] for one in since if one["what"] == "answer"]
@@ -100,7 +122,7 @@ class FarLink:
         raise AssertionError(f"not heard: {self._events()[-3:]} {screens}")
 
     def cut(self, seconds: float) -> Heard:
-        """Cut the link for a while; returns when the worker was heard again."""
+        """Cut the link for a while; returns when somebody was heard again."""
         self.link.befall("cut")
         _pause(seconds)
         self.link.mend()
@@ -126,7 +148,9 @@ def ask_on(endpoint: str, files: str, out: Path) -> None:
     tokens, replies = Mailbox(256), Mailbox(256)
     setup = BusSetup(endpoint=endpoint, tls=role_files(Path(files), "router"))
     with ZenohBus(setup, router=True) as bus, out.open("a") as file:
-        bus.watch_alive(alive_key(run=RUN, process=WORKER), tokens)
+        bus.declare_alive(alive_key(run=RUN, process="orchestrator"))  # a car waits for it
+        bus.watch_alive(alive_key(run=RUN, process="*"), tokens)
+        bus.subscribe("speed", replies, vehicle=CAR)
         for item in _heard(bus, tokens, replies):
             file.write(json.dumps(item) + "\n")
             file.flush()
@@ -137,11 +161,13 @@ def _heard(bus: ZenohBus, tokens: Mailbox, replies: Mailbox) -> Iterator[dict[st
         bus.request("clock", ClockQuestion(), replies, timeout_s=_WAITS_S, run=RUN, process=WORKER)
         _pause(_ASKS_EVERY_S)
         while isinstance(token := tokens.take(), Alive):
+            if token.key.endswith("orchestrator"):
+                continue
             what = "up" if token.up else "down"
             yield {"what": what, "mono_s": token.received_mono_ns * 1e-9}
-        while isinstance(reply := replies.take(), Reply):
-            if reply.message is not None:
-                yield {"what": "answer", "mono_s": reply.received_mono_ns * 1e-9}
+        while isinstance(item := replies.take(), Reply | Received):
+            if isinstance(item, Received) or item.message is not None:
+                yield {"what": "answer", "mono_s": item.received_mono_ns * 1e-9}
 
 
 def main() -> None:
@@ -149,12 +175,13 @@ def main() -> None:
     parser.add_argument("--cuts", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--delay", action="store_true", help=f"of {SLOW_S:g} s each way")
+    parser.add_argument("--car", action="store_true", help="the stand-in car instead of a worker")
     parser.add_argument("--ask", nargs=3, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.ask:
         endpoint, files, out = given.ask
         ask_on(endpoint, files, Path(out))
-    with tempfile.TemporaryDirectory() as folder, FarLink(Path(folder)) as far:
+    with tempfile.TemporaryDirectory() as folder, FarLink(Path(folder), car=given.car) as far:
         if given.delay:
             far.link.befall("delay")
         # TCP calls once a second: where in it a link is back must differ.

@@ -1,4 +1,4 @@
-"""A worker on another machine is heard again soon after its link is back."""
+"""A worker and a car on another machine are heard again soon after their link is back."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from tests.system.far_cuts import FarLink
 
 @pytest.mark.judge
 @pytest.mark.timeout(280)
-def test_a_worker_is_heard_again_soon_after_its_link_is_back(tmp_path: Path) -> None:
+@pytest.mark.parametrize("car", [False, True], ids=["worker", "car"])
+def test_who_was_cut_off_is_heard_soon_after_the_link_is_back(tmp_path: Path, car: bool) -> None:
     with contextlib.ExitStack() as stack:
         try:
-            far = stack.enter_context(FarLink(tmp_path))
+            far = stack.enter_context(FarLink(tmp_path, car=car))
         except OSError as error:
             pytest.skip(f"no networks of their own here: {error}")
         with kept_waiting(*far.pids) as kept:
