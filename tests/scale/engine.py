@@ -11,6 +11,10 @@ from collections.abc import Callable
 Call = Callable[[], None]
 
 
+LEAST_CORES = 0.05
+"""However much others take, so much of a machine is left."""
+
+
 class Clock:
     """Simulated time: what is due is called in order."""
 
@@ -34,15 +38,16 @@ class Host:
     """Cores that all who want to run share evenly.
 
     Each core is slowed to 1 / (1 + `contention`) while all its neighbours are busy, and by as much
-    less as fewer of them are: caches, memory and hyper-threads are shared. `others` threads of
-    somebody else always want to run.
+    less as fewer of them are: caches, memory and hyper-threads are shared. Somebody else takes so
+    many cores (`others_cores`), whatever is done here; how that slows a core is in all works.
     """
 
     def __init__(
-        self, clock: Clock, cores: int, *, contention: float = 0.0, others: float = 0.0
+        self, clock: Clock, cores: int, *, contention: float = 0.0, others_cores: float = 0.0
     ) -> None:
         self._clock, self._cores = clock, cores
-        self._contention, self._others = contention, others
+        self._contention = contention
+        self._left_cores = max(cores - others_cores, LEAST_CORES)
         self._done_at: list[tuple[float, int, Call]] = []
         """By how much work each must have had since the beginning to be done."""
         self._work_s, self._looked_s = 0.0, 0.0
@@ -51,18 +56,20 @@ class Host:
 
     def rate(self, running: int) -> float:
         """Return seconds of work done in a second by each of so many."""
-        wanting = running + self._others
-        if not wanting:
+        if not running:
             return 1.0
-        neighbours = max(self._cores - 1, 1)
-        busy = min(max(wanting - 1.0, 0.0) / neighbours, 1.0) if self._cores > 1 else 0.0
-        return min(1.0, self._cores / wanting) / (1.0 + self._contention * busy)
+        busy = min((running - 1.0) / (self._cores - 1), 1.0) if self._cores > 1 else 0.0
+        return self._share(running) / (1.0 + self._contention * busy)
 
     def run(self, work_s: float, done: Call) -> None:
         """Do so much work beside what is being done, then call."""
         self._look()
         heapq.heappush(self._done_at, (self._work_s + work_s, next(self._number), done))
         self._wake()
+
+    def _share(self, running: int) -> float:
+        """Return the share of a core that each of so many has."""
+        return min(1.0, self._left_cores / running)
 
     def _look(self) -> None:
         """Bring what was done up to now."""
@@ -71,8 +78,7 @@ class Host:
         self._looked_s = self._clock.now_s
         if running:
             self._work_s += passed_s * self.rate(running)
-            share = min(1.0, self._cores / (running + self._others))
-            self.busy_core_s += passed_s * running * share
+            self.busy_core_s += passed_s * running * self._share(running)
 
     def _wake(self) -> None:
         """Be called when the next one is done, unless others come in between."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +13,6 @@ from tests.scale.measured import FITTED, HELD_OUT, Measured
 from tests.scale.sweep_model import SweepCosts, SweepModel
 from tests.scale.sweep_runs import SweepRun
 
-BESIDE = (2, 16)
-"""What tells the load of a repeat: a fitted configuration in which all cores were wanted."""
-
 
 class Prediction(NamedTuple):
     """A sweep that was not fitted: what was predicted and what its repeats took, in seconds."""
@@ -24,7 +21,7 @@ class Prediction(NamedTuple):
     futures_per_job: int
     what: str
     predicted_s: tuple[float, ...]
-    """One for each repeat: only the load of the machine differs."""
+    """One for each repeat: only what others took of the machine differs."""
     measured_s: tuple[float, ...]
 
     @property
@@ -111,34 +108,31 @@ def predictions(measured: Measured) -> list[Prediction]:
     """Return what the model, fitted on some sweeps, says of the others.
 
     CPU time of the jobs; wall time on idle cores, held against the measured one less what jobs were
-    kept from a processor; and wall time beside as many others as the fitted sweeps of the same
-    repeat had.
+    kept from a processor; and wall time as it was. What others took of the machine during a sweep
+    is given to the model for each.
     """
     runs = [run for pair in FITTED for run in measured.runs_of(*pair)]
     costs = fitted_costs(measured, runs)
-    found = []
+    cores, found = measured.cores, []
     for workers, size in HELD_OUT:
         held = measured.runs_of(workers, size)
         shapes = measured.jobs_of(size)
-        idle = SweepModel(costs, workers=workers, cores=measured.cores).play(shapes)
+
+        def told(what: str, said: Iterable[float], was: Iterable[float]) -> None:
+            found.append(Prediction(workers, size, what, tuple(said), tuple(was)))  # noqa: B023
+
+        idle = SweepModel(costs, workers=workers, cores=cores).play(shapes)
         # Beside another job, all of them take longer.
-        cpu_s = (idle.jobs_cpu_s * (1.0 + costs.contention),) * len(held)
-        jobs_cpu_s = tuple(run.jobs_cpu_s for run in held)
-        found.append(Prediction(workers, size, "CPU of the jobs", cpu_s, jobs_cpu_s))
-        if workers <= measured.cores:
-            unhindered_s = tuple(run.unhindered_s for run in held)
-            alone_s = (idle.wall_s,) * len(held)
-            found.append(Prediction(workers, size, "wall, idle cores", alone_s, unhindered_s))
-        beside = []
-        for repeat in range(len(held)):
-            others = _others(measured.runs_of(*BESIDE)[repeat], measured.cores)
-            model = SweepModel(costs, workers=workers, cores=measured.cores, others=others)
-            beside.append(model.play(shapes).wall_s)
-        walls = tuple(run.makespan_s for run in held)
-        found.append(Prediction(workers, size, "wall, as loaded", tuple(beside), walls))
+        cpu_s = (idle.jobs_cpu_s * (1.0 + costs.contention) for _ in held)
+        told("CPU of the jobs", cpu_s, (run.jobs_cpu_s for run in held))
+        if workers <= cores:
+            told(
+                "wall, idle cores", (idle.wall_s for _ in held), (run.unhindered_s for run in held)
+            )
+        beside = (
+            SweepModel(costs, workers=workers, cores=cores, others_cores=run.others_cores)
+            for run in held
+        )
+        walls = (run.makespan_s for run in held)
+        told("wall, as it was", (model.play(shapes).wall_s for model in beside), walls)
     return found
-
-
-def _others(run: SweepRun, cores: int) -> float:
-    """Return how many threads of others wanted a core, by the share of one that a job had."""
-    return max(cores / run.share_of_core - run.workers, 0.0)

@@ -23,7 +23,7 @@ from tests.scale.plan import (
 )
 
 PICTURE = Path(__file__).parents[2] / "docs" / "scale.png"
-_MARKS = {"CPU of the jobs": "o", "wall, idle cores": "s", "wall, as loaded": "^"}
+_MARKS = {"CPU of the jobs": "o", "wall, idle cores": "s", "wall, as it was": "^"}
 
 
 def draw(measured: Measured, file: Path = PICTURE) -> None:

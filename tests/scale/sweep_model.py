@@ -80,7 +80,7 @@ class SweepModel:
         workers: int,
         cores: int,
         hosts: int = 1,
-        others: float = 0.0,
+        others_cores: float = 0.0,
         ahead: int | None = None,
         local: bool = True,
     ) -> None:
@@ -88,7 +88,7 @@ class SweepModel:
         # As `contracts.runner.answers` has it: twice what can be at workers, where that is more.
         self._ahead = max(AHEAD, 2 * IN_FLIGHT * workers) if ahead is None else ahead
         made = [
-            Host(self._clock, cores, contention=costs.contention, others=others)
+            Host(self._clock, cores, contention=costs.contention, others_cores=others_cores)
             for _ in range(hosts)
         ]
         names = [f"w{n}" for n in range(workers)]

@@ -19,6 +19,7 @@ from foretwin.contracts.runner import Answer, Task, TaskCount
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
 from tests.scale.workload import Workload
+from tests.starvation import children
 
 PARTS = (
     "decode a job", "compile a World", "rehearse", "cast", "step", "collisions", "metrics",
@@ -63,7 +64,8 @@ class SweepRun(msgspec.Struct, frozen=True, kw_only=True):
     answer_bytes: float
     """On average of a job."""
     others_cores: float
-    """What everybody else took of the machine meanwhile."""
+    """What everybody else took of the machine from the first answer to the last: before it, workers
+    start."""
 
     @property
     def jobs_cpu_s(self) -> float:
@@ -120,13 +122,30 @@ class WorkerTime(NamedTuple):
     gaps_s: tuple[float, ...]
 
 
+class Taken(NamedTuple):
+    """A time, and the CPU seconds that were taken until then: by this process, by it with all that
+    it has started and that lives, and by the whole machine."""
+
+    at_s: float
+    parent_s: float
+    own_s: float
+    machine_s: float
+
+
+def taken_so_far() -> Taken:
+    """Return what is taken now."""
+    parent_s = time.process_time()
+    own_s = parent_s + sum(_cpu_s(pid) for pid in children(os.getpid()))
+    return Taken(time.perf_counter(), parent_s, own_s, _machine_cpu_s())
+
+
 class _Noting:
     """A runner that notes when it is given its first job, and what the answers weigh."""
 
     def __init__(self, runner: WorkerProcesses) -> None:
         self._runner = runner
-        self.began: tuple[float, float] | None = None
-        self.answered = (0.0, 0.0)
+        self.began: Taken | None = None
+        self.answers: list[Taken] = []
 
     @property
     def capacity(self) -> int:
@@ -142,7 +161,7 @@ class _Noting:
 
     def submit(self, task: Task) -> None:
         if self.began is None:
-            self.began = time.perf_counter(), time.process_time()
+            self.began = taken_so_far()
         self._runner.submit(task)
 
     def cancel(self, key: str) -> None:
@@ -150,7 +169,8 @@ class _Noting:
 
     def take(self, timeout_s: float | None = 0.0) -> Answer | None:
         answer = self._runner.take(timeout_s)
-        self.answered = time.perf_counter(), time.process_time()
+        if answer is not None:
+            self.answers.append(taken_so_far())
         return answer
 
 
@@ -166,16 +186,13 @@ def play(workload: Workload, name: str, *, workers: int) -> SweepRun:
         WorkerProcesses(workers, setup, task_timeout_s=600.0, folder=files) as runner,
     ):
         noting = _Noting(runner)
-        looked = _machine_cpu_s(), time.perf_counter(), time.process_time()
         run_sweep(workload.loaded, out, noting)
-        machine_s, passed_s = _machine_cpu_s() - looked[0], time.perf_counter() - looked[1]
-        parent_s = time.process_time() - looked[2]
-    assert noting.began is not None
+    began, first, last = noting.began, noting.answers[0], noting.answers[-1]
+    assert began is not None
     uses = cpu_uses(files)
     jobs, parts, answers = _read(traces, workload)
-    own_s = sum(job.cpu_s for job in jobs) + parent_s
-    own_s += sum(one.starting_cpu_s for one in uses.values())
-    playing_cpu_s = noting.answered[1] - noting.began[1]
+    playing_cpu_s = last.parent_s - began.parent_s
+    others_s = (last.machine_s - first.machine_s) - (last.own_s - first.own_s)
     run = SweepRun(
         workers=workers,
         futures_per_job=workload.futures_per_job,
@@ -183,12 +200,12 @@ def play(workload: Workload, name: str, *, workers: int) -> SweepRun:
         futures=workload.futures,
         jobs=jobs,
         parts_s=parts,
-        wall_s=noting.answered[0] - noting.began[0],
+        wall_s=last.at_s - began.at_s,
         parent_cpu_s=playing_cpu_s,
         summary_cpu_s=time.process_time() - began_cpu_s - playing_cpu_s,
         starting_cpu_s=sum(one.starting_cpu_s for one in uses.values()) / max(len(uses), 1),
         answer_bytes=sum(answers) / max(len(answers), 1),
-        others_cores=max(machine_s - own_s, 0.0) / passed_s,
+        others_cores=max(others_s, 0.0) / (last.at_s - first.at_s),
     )
     for folder in (out, traces, files):
         shutil.rmtree(folder, ignore_errors=True)
@@ -202,6 +219,15 @@ def _traced(folder: Path) -> Iterator[None]:
         yield
     finally:
         trace.end()
+
+
+def _cpu_s(pid: int) -> float:
+    """Return the CPU time of a process, 0 of one that is gone."""
+    try:
+        words = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    except OSError:
+        return 0.0
+    return (int(words[11]) + int(words[12])) / _TICKS_PER_S
 
 
 def _machine_cpu_s() -> float:

@@ -39,7 +39,14 @@ def test_busy_neighbours_slow_a_core() -> None:
 
 
 def test_others_take_their_share() -> None:
-    assert ends(2, [1.0, 1.0], others=2.0) == pytest.approx([2.0, 2.0])
+    assert ends(2, [1.0, 1.0], others_cores=1.0) == pytest.approx([2.0, 2.0])
+    # Of one and a half cores two have three quarters each, and then the last all that it can use.
+    assert ends(2, [0.75, 1.75], others_cores=0.5) == pytest.approx([1.0, 2.0])
+    assert ends(2, [1.0], others_cores=1.0) == pytest.approx([1.0])
+
+
+def test_others_who_take_all_leave_a_little() -> None:
+    assert ends(2, [1.0], others_cores=2.0) == pytest.approx([20.0])
 
 
 def test_a_thread_does_one_thing_after_another() -> None:

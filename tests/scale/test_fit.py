@@ -22,8 +22,11 @@ def shapes(size: int) -> tuple[tuple[str, int], ...]:
     return tuple((f"w{n // 6}", size // 2 if n < 6 else size) for n in range(24))
 
 
-def sweep(workers: int, size: int, *, vehicles: int = 1, slower: float = 1.0) -> SweepRun:
-    """Return a sweep that takes what the costs say, each worker its own share of the Worlds."""
+def sweep(
+    workers: int, size: int, *, vehicles: int = 1, slower: float = 1.0, others: float = 0.0
+) -> SweepRun:
+    """Return a sweep that takes what the costs say, each worker its own share of the Worlds, while
+    others take so many cores."""
     jobs, at_s, known = [], [0.0] * workers, [set[str]() for _ in range(workers)]
     own = [JobShape._make(one) for one in shapes(size) * vehicles]
     slowed = slower * (1.0 + COSTS.contention * min(workers - 1.0, 1.0))
@@ -32,8 +35,8 @@ def sweep(workers: int, size: int, *, vehicles: int = 1, slower: float = 1.0) ->
         first = shape.world not in known[place]
         known[place].add(shape.world)
         cpu_s = slowed * (COSTS.job_s + COSTS.future_s * shape.futures + COSTS.first_s * first)
-        # More workers than cores: each waits for a core as long as it has one.
-        ready_s = cpu_s * max(workers / CORES - 1.0, 0.0)
+        # More workers than cores that are left: each waits for one of them.
+        ready_s = cpu_s * max(workers / (CORES - others) - 1.0, 0.0)
         ended_s = at_s[place] + cpu_s + ready_s
         jobs.append(PlayedJob(f"w{place}", *shape, first, at_s[place], ended_s, cpu_s, ready_s))
         at_s[place] = ended_s
@@ -43,7 +46,7 @@ def sweep(workers: int, size: int, *, vehicles: int = 1, slower: float = 1.0) ->
         workers=workers, futures_per_job=size, vehicles=vehicles, futures=futures,
         jobs=tuple(jobs), parts_s=dict.fromkeys((*PARTS, "other"), 0.01), wall_s=max(at_s),
         parent_cpu_s=parent_s * (1.0 + COSTS.contention * min(workers - 1.0, 1.0)),
-        summary_cpu_s=0.1, starting_cpu_s=0.9, answer_bytes=1e5, others_cores=0.0,
+        summary_cpu_s=0.1, starting_cpu_s=0.9, answer_bytes=1e5, others_cores=others,
     )  # fmt: skip
 
 
@@ -64,10 +67,10 @@ def measured(runs: list[SweepRun]) -> Measured:
     )  # fmt: skip
 
 
-def all_runs(*, slower: float = 1.0) -> list[SweepRun]:
-    """Return two repeats of each configuration; held-out ones may be slower."""
+def all_runs(*, slower: float = 1.0, others: float = 0.0) -> list[SweepRun]:
+    """Return two repeats of each configuration; held-out ones may be slower, or beside others."""
     runs = [sweep(*pair) for pair in FITTED for _ in range(2)]
-    runs += [sweep(*pair, slower=slower) for pair in HELD_OUT for _ in range(2)]
+    runs += [sweep(*pair, slower=slower, others=others) for pair in HELD_OUT for _ in range(2)]
     return [*runs, sweep(2, 16, vehicles=3)]
 
 
@@ -88,6 +91,14 @@ def test_sweeps_of_the_same_costs_are_predicted() -> None:
     for one in predictions(measured(all_runs())):
         # Who plays which job is told by the program's state machine, here by turns.
         assert abs(one.median_error) < 0.15, one
+
+
+def test_what_others_take_is_known_to_the_model_and_no_error_of_it() -> None:
+    quiet, busy = (predictions(measured(all_runs(others=others))) for others in (0.0, 0.8))
+    for one, beside in zip(quiet, busy, strict=True):
+        assert abs(beside.median_error) < 0.15, beside
+        if one.what == "wall, as it was":
+            assert beside.predicted_s[0] == pytest.approx(one.predicted_s[0] / 0.6, rel=0.05)
 
 
 def test_a_sweep_that_takes_half_as_long_again_is_not() -> None:
