@@ -4,9 +4,8 @@
 prints one row for each map, one for all, and one for the tracks, which are measured alike:
 
 - `turned`: connections whose heading leaves the angle from lane to lane by more than 30°; then
-  those of them that leave it so far beyond the direction from their start to their end, which some
-  piece of any path has, as where two arms of a crossing lie aside of one another; then those at
-  places of one node, without roads inside to drive along; then U-turns;
+  those of them that leave so far the angle of lanes and of all the map's roads between them too,
+  which turn where two arms of a crossing lie aside of one another; then U-turns;
 - `loops`: connections that turn by more than 270° from their lane, U-turns counted after them;
 - `radius`: quartiles of the least radius of near-side turns at lights, as `least_radius_m` has it,
   of those that turn by 45 to 135°, then of those by 50 to 85° as the tracks do;
@@ -39,6 +38,7 @@ from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.roads_driven import RoadsDriven
 
 MAPS = {
     "austin": "osm-austin-downtown/austin.osm.gz",
@@ -71,10 +71,9 @@ class Turn(NamedTuple):
 
     name: str
     kind: str
-    roads_inside: bool
     turned_rad: float
     left_rad: float
-    left_needlessly_rad: float
+    left_roads_rad: float
     radius_m: float
     near_side_at_lights_rad: float
     """How far is turned; 0 for all others."""
@@ -128,23 +127,24 @@ def curvature_changes(path: np.ndarray) -> tuple[float, float]:
     return float(step.max()), float(rate.max())
 
 
-def region_of(path: Path) -> World:
-    """Return all of a map as one World without its ground."""
+def region_of(path: Path) -> tuple[World, RoadsDriven]:
+    """Return all of a map as one World without its ground, and the map's roads."""
     osm = read_map(path)
     graph = build_road_graph(osm)
     index = index_map(osm, graph, find_intersections(osm, graph))
     lat, lon = np.array(list(osm.locations.values())).T
     bounds = LatLonBounds(lat.min(), lon.min(), lat.max(), lon.max())
-    return build_region(osm, graph, bounds, index=index, ground=False)
+    world = build_region(osm, graph, bounds, index=index, ground=False)
+    return world, RoadsDriven(graph.edges)
 
 
-def turns_of(world: World) -> Iterator[Turn]:
+def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
     """Yield what is measured of each connection of a World."""
     lanes = {lane.id: lane for lane in world.lanes}
     near_side = world.intersection.driving_side
-    wide = {j.summary.id for j in world.junctions if len(j.summary.osm_nodes) > 1}
     for c in world.connections:
-        start, end = lanes[c.from_lane_id].centerline, lanes[c.to_lane_id].centerline
+        from_lane, to_lane = lanes[c.from_lane_id], lanes[c.to_lane_id]
+        start, end = from_lane.centerline, to_lane.centerline
         whole = np.concatenate([start[-2:-1], c.centerline, end[1:2]])
         before, behind = start[-1] - start[-2], end[1] - end[0]
         angle = abs(math.remainder(_yaw(behind) - _yaw(before), math.tau))
@@ -153,10 +153,11 @@ def turns_of(world: World) -> Iterator[Turn]:
         yield Turn(
             name=c.id,
             kind=_kind(c, angle),
-            roads_inside=c.junction_id in wide,
             turned_rad=turned_rad(whole),
             left_rad=left_interval_rad(c.centerline, before, behind),
-            left_needlessly_rad=left_interval_rad(c.centerline, before, behind, end[0] - start[-1]),
+            left_roads_rad=left_interval_rad(
+                c.centerline, before, behind, *roads.directions(from_lane, to_lane)
+            ),
             radius_m=least_radius_m(longer),
             near_side_at_lights_rad=angle if counts else 0.0,
             step_pm=curvature_changes(whole)[0],
@@ -203,8 +204,7 @@ def tracked_radii_m(folder: Path) -> list[float]:
 def row_of(turns: list[Turn]) -> str:
     """Return the figures of one map, or of several, as a row."""
     turned = [t for t in turns if t.kind == "turn" and t.left_rad > ALLOWED_RAD]
-    needless = [t for t in turned if t.left_needlessly_rad > ALLOWED_RAD]
-    alone = [t for t in needless if not t.roads_inside]
+    off_roads = [t for t in turned if t.left_roads_rad > ALLOWED_RAD]
     u_turned = [t for t in turns if t.kind == "u_turn" and t.left_rad > ALLOWED_RAD]
     radii = "  ".join(
         _quartiles([t.radius_m for t in turns if low <= t.near_side_at_lights_rad <= high])
@@ -214,7 +214,7 @@ def row_of(turns: list[Turn]) -> str:
     rate = np.percentile([t.rate_pm2 for t in turns], [50, 90, 99])
     looped = [t.kind for t in turns if t.turned_rad > LOOP_RAD]
     loops = f"loops {looped.count('turn')} + {looped.count('u_turn')} U"
-    counts = f"{len(turned):4d} {len(needless):4d} {len(alone):3d} + {len(u_turned):3d} U  {loops}"
+    counts = f"{len(turned):4d} {len(off_roads):4d} + {len(u_turned):3d} U  {loops}"
     shape = f"step {_words(step)}  rate {_words(rate)}"
     return f"{len(turns):7d} turned {counts}  radius {radii}  {shape}"
 
@@ -238,12 +238,12 @@ def main() -> None:
     every: list[Turn] = []
     for name in chosen.names or MAPS:
         begin_s = time.process_time()
-        turns = list(turns_of(region_of(data / MAPS[name])))
+        turns = list(turns_of(*region_of(data / MAPS[name])))
         every += turns
         print(f"{name:14}{row_of(turns)}  ({time.process_time() - begin_s:.0f} s)", flush=True)
-        worst = sorted(turns, key=lambda t: -t.left_needlessly_rad)
+        worst = sorted(turns, key=lambda t: -t.left_roads_rad)
         for t in [t for t in worst if t.kind == "turn"][: chosen.worst]:
-            print(f"    {math.degrees(t.left_needlessly_rad):5.0f}°  {t.radius_m:5.1f} m  {t.name}")
+            print(f"    {math.degrees(t.left_roads_rad):5.0f}°  {t.radius_m:5.1f} m  {t.name}")
     print(f"{'all':14}{row_of(every)}")
     print(f"{'tracks':14}{'':62}radius {_quartiles(tracked_radii_m(data / TRACKS))}")
 

@@ -1,0 +1,87 @@
+"""The roads of the map that a connection is driven along, found without what laid its path."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+import shapely.ops
+
+from foretwin.contracts.world import Lane
+from foretwin.world_gen.roads.road_graph import RoadEdge
+
+FARTHEST_M = 150.0
+"""Of roads between two lanes; no place is wider."""
+LEAST_M = 0.5
+"""A shorter piece has no direction that one would drive in."""
+
+
+class _Along(NamedTuple):
+    """An edge as it is driven."""
+
+    start_node: int
+    end_node: int
+    xy_m: np.ndarray
+
+
+class RoadsDriven:
+    """Answers along which pieces of a map's roads one comes from lane to lane."""
+
+    def __init__(self, edges: Iterable[RoadEdge]) -> None:
+        """Index the edges by their way and nodes, and by where they end."""
+        self._by_name: dict[tuple[int, int, int], np.ndarray] = {}
+        self._onward: dict[int, list[tuple[int, np.ndarray, float]]] = {}
+        for edge in edges:
+            for a, b, xy_m in (
+                (edge.start_node, edge.end_node, edge.xy_m),
+                (edge.end_node, edge.start_node, edge.xy_m[::-1]),
+            ):
+                self._by_name[edge.way_id, a, b] = xy_m
+                self._onward.setdefault(a, []).append((b, xy_m, edge.length_m))
+
+    def directions(self, start: Lane, end: Lane) -> Iterator[np.ndarray]:
+        """Yield the direction (2,) of each piece of road from the end of one lane to another.
+
+        They are the shortest way between the nodes at the ends of both lanes' edges, and what the
+        lanes leave of these edges.
+        """
+        first, last = self._edge_of(start), self._edge_of(end)
+        yield from _pieces(first.xy_m, start.centerline[-1], behind=True)
+        for line in self._between(first.end_node, last.start_node):
+            yield from np.diff(line, axis=0)
+        yield from _pieces(last.xy_m, end.centerline[0], behind=False)
+
+    def _edge_of(self, lane: Lane) -> _Along:
+        way, start, end, side = lane.id.split(".")
+        nodes = int(start), int(end)
+        a, b = nodes if side[0] == "f" else nodes[::-1]
+        return _Along(a, b, self._by_name[int(way[1:]), a, b])
+
+    def _between(self, start: int, end: int) -> list[np.ndarray]:
+        order = itertools.count()
+        heap: list[tuple[float, int, int, list[np.ndarray]]] = [(0.0, next(order), start, [])]
+        seen: set[int] = set()
+        while heap:
+            at_m, _, node, lines = heapq.heappop(heap)
+            if node == end:
+                return lines
+            if node in seen or at_m > FARTHEST_M:
+                continue
+            seen.add(node)
+            for other, line, length_m in self._onward.get(node, ()):
+                if other not in seen:
+                    heapq.heappush(heap, (at_m + length_m, next(order), other, [*lines, line]))
+        return []
+
+
+def _pieces(xy_m: np.ndarray, at: np.ndarray, *, behind: bool) -> Iterator[np.ndarray]:
+    """Yield the directions of a road's pieces behind, or before, where a lane ends, or begins."""
+    road = shapely.LineString(xy_m)
+    at_m = road.project(shapely.Point(at))
+    part = shapely.ops.substring(road, *((at_m, road.length) if behind else (0.0, at_m)))
+    if part.length > LEAST_M:
+        yield from np.diff(np.array(part.coords), axis=0)
