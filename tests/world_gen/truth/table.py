@@ -20,8 +20,12 @@ from tests.world_gen.truth.karlsruhe import karlsruhe_map
 from tests.world_gen.truth.lane_model import LaneModel, of_hd_map
 from tests.world_gen.truth.mcity import drawn_map, mcity_passes
 from tests.world_gen.truth.reduced_map import reduced
+from tests.world_gen.truth.registration import laid_on
 from tests.world_gen.truth.scores import map_score
 from tests.world_gen.truth.tracks import beside, corner_radius_m, extended
+
+LEAST_TO_LAY = 20
+"""Fewer tracks tell nothing of how their recorder and the map differ."""
 
 
 class Row(NamedTuple):
@@ -45,11 +49,16 @@ def rows(data: Path, work: Path) -> Iterator[Row]:
         models = [*_models(map_file, hd.frame, work), of_hd_map(hd)]
         for model in models:
             yield from _map_rows(hd, model)
-        yield from _track_rows(hd.name, models, [t.xy_m for t in hd.tracks])
+        tracks = [t.xy_m for t in hd.tracks]
+        yield from _track_rows(hd.name, "track", models, tracks)
+        if len(tracks) >= LEAST_TO_LAY:
+            move = laid_on(models[-1], tracks)
+            moved = [move.of(xy_m) for xy_m in tracks]
+            yield from _track_rows(hd.name, "laid track", models, moved)
         yield from _driven_turns(hd)
     berlin = berlin_truth(data)
     models = list(_models(berlin.map_file, berlin.frame, work))
-    yield from _track_rows("berlin", models, berlin.tracks, berlin.within_m)
+    yield from _track_rows("berlin", "track", models, berlin.tracks, berlin.within_m)
     once = once_driven(data, work)
     for name, again in once.passes.items():
         yield from _again_rows(name, again)
@@ -120,7 +129,11 @@ def _map_rows(hd: HdMap, model: LaneModel) -> Iterator[Row]:
 
 
 def _track_rows(
-    truth: str, models: Sequence[LaneModel], tracks: list[Array], within: Array | None = None
+    truth: str,
+    name: str,
+    models: Sequence[LaneModel],
+    tracks: list[Array],
+    within: Array | None = None,
 ) -> Iterator[Row]:
     """Yield how far tracks lie from each model's lanes, where all models have one near."""
     found = [beside(model, tracks, within=within) for model in models]
@@ -128,7 +141,7 @@ def _track_rows(
     for word, asked in (("straight", ~found[0].turning), ("turning", found[0].turning)):
         for model, one in zip(models, found, strict=True):
             text = f"{quartiles(one.away_m[known & asked])}, {_known(one.away_m[asked])} near"
-            yield Row(truth, f"track, {word}, m", model.name, text)
+            yield Row(truth, f"{name}, {word}, m", model.name, text)
 
 
 def _known(values: Array) -> str:

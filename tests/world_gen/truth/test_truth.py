@@ -15,6 +15,7 @@ from tests.world_gen.truth.generators import by_foretwin
 from tests.world_gen.truth.hd_map import HdLane, HdMap
 from tests.world_gen.truth.lane_model import LaneModel, ModelLane, of_hd_map
 from tests.world_gen.truth.reduced_map import reduced
+from tests.world_gen.truth.registration import Move, laid_on
 from tests.world_gen.truth.scores import map_score
 from tests.world_gen.truth.table import as_text, once_driven, rows
 from tests.world_gen.truth.tracks import beside, corner_radius_m
@@ -105,6 +106,19 @@ def test_a_track_beside_a_lane_is_as_far_from_it_as_it_was_driven() -> None:
     assert not found.turning.any()
 
 
+def test_tracks_of_a_recorder_that_is_askew_are_laid_on_the_lanes_that_they_drive() -> None:
+    lanes = of_hd_map(crossing())
+    askew = Move(np.array([3.0, 4.0]), np.array([0.8, -0.5]), 0.02)
+    true = [lane.line for lane in lanes.lanes.values()] + [c.line for c in lanes.connections[:2]]
+    true.append(true[0] + 1.5)  # one drives beside its lane
+
+    move = laid_on(lanes, [askew.of(line) for line in true])
+
+    assert move.turn_rad == pytest.approx(-0.02, abs=0.002)
+    back = move.of(askew.of(np.concatenate(true)))
+    assert np.hypot(*(back - np.concatenate(true)).T).max() < 0.12
+
+
 @pytest.mark.parametrize("radius_m", [6.0, 10.0, 15.0])
 def test_the_radius_of_a_driven_corner_is_that_of_its_arc(radius_m: float) -> None:
     angle = np.linspace(0.0, math.pi / 2.0, 40)
@@ -124,6 +138,13 @@ def test_foretwin_stands_beside_netconvert_on_every_truth(data_dir: Path, tmp_pa
 
     assert movements["karlsruhe"] == "14 of 14, 0 more"
     assert {row.truth for row in found} >= {*movements, "berlin"}
+    laid = {
+        row.generator: float(row.text.split()[2])
+        for row in found
+        if row[:2] == ("karlsruhe", "laid track, turning, m")
+    }
+    assert laid["foretwin"] < 0.8 * laid["netconvert"]
+    assert laid["foretwin"] < 0.9 * laid["netconvert, recommended"]
 
 
 @pytest.mark.real_data
