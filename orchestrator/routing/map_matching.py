@@ -24,6 +24,7 @@ from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 LOST_AFTER_M = 20.0
 _SURE = 2.0
 """What more must speak against each other road for a match to be confident."""
+_LEAST_STRETCH_M = 5.0
 
 
 class Match(NamedTuple):
@@ -68,11 +69,20 @@ class MapMatcher:
         self._direction_known = False
         self._stretches: FirstOf[OffRoadStretch] = FirstOf(MOST_LISTED)
         self._stretch: OffRoadStretch | None = None
+        self._stretch_sure = False
+        """Whether no road for cars was nearly as likely at some step of the present stretch."""
 
     @property
     def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:
-        """What has been driven where cars may not drive, the present stretch included."""
-        return (*self._stretches, *((self._stretch,) if self._stretch else ()))
+        """What has been driven where cars may not drive, the present stretch included.
+
+        A turn into the other carriageway seems for some metres to be one in the road, back along
+        the first: what is that short, or was never sure, is no stretch.
+        """
+        stretch = self._stretch
+        if stretch is None or not self._stretch_sure or stretch.length_m < _LEAST_STRETCH_M:
+            return tuple(self._stretches)
+        return (*self._stretches, stretch)
 
     def update(
         self, xy_m: Array, yaw_rad: float, yaw_valid: bool, speed_mps: float
@@ -160,11 +170,15 @@ class MapMatcher:
         now = self._stretch or OffRoadStretch(reason, edge.edge.name, (), 0.0)
         ways = now.way_ids if edge.edge.way_id in now.way_ids else (*now.way_ids, edge.edge.way_id)
         self._stretch = now._replace(way_ids=ways, length_m=now.length_m + moved_m)
+        self._stretch_sure |= all(
+            other.cost > _SURE or legality(other.near.directed_edge) != "car"
+            for other in self._hypotheses
+        )
 
     def _close_stretch(self) -> None:
-        if self._stretch is not None and self._stretch.length_m >= 5.0:
-            self._stretches.append(self._stretch)
-        self._stretch = None
+        for told in self.off_road_stretches[len(self._stretches) :]:
+            self._stretches.append(told)
+        self._stretch, self._stretch_sure = None, False
 
 
 def _adjacent(one: NearEdge, other: NearEdge) -> bool:

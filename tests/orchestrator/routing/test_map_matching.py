@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -145,6 +146,35 @@ def test_a_one_way_street_driven_the_wrong_way_is_reported() -> None:
     assert match is not None
     assert match.directed_edge.reverse
     assert [stretch.reason for stretch in matcher.off_road_stretches] == ["against_one_way"]
+
+
+@pytest.mark.parametrize("apart_m", [8.0, 12.0], ids=["long in doubt", "a step or two"])
+def test_a_turn_onto_the_other_carriageway_is_no_drive_against_the_first(apart_m: float) -> None:
+    dual = graph_of(
+        [
+            road(0, 1, 2, [(0, 0), (400, 0)], backward=False),
+            road(1, 3, 4, [(400, apart_m), (0, apart_m)], backward=False),
+            road(2, 1, 5, [(0, 0), (-100, 0)], backward=False),
+        ]
+    )
+    angle, radius_m = np.linspace(-math.pi / 2, math.pi / 2, 40), apart_m / 2.0
+    turn = [200.0, radius_m] + radius_m * np.column_stack([np.cos(angle), np.sin(angle)])
+    xy = np.vstack([drive([(-90, 0), (200, 0)]), turn, drive([(200, apart_m), (50, apart_m)])])
+    matcher, told, on = MapMatcher(dual), [], []
+    for point, yaw in zip(xy, headings(xy), strict=True):
+        on.append(matcher.update(point, yaw, True, 5.0))
+        told.append([way for one in matcher.off_road_stretches for way in one.way_ids])
+
+    assert (0, True) in roads(on)  # for a moment it seems to turn in the road
+    assert roads(on)[-1] == (1, False)
+    assert [ways for before, ways in pairwise(told) if ways != before] == [[1002]]
+
+
+def test_a_few_metres_against_a_one_way_street_are_not_told() -> None:
+    matcher = MapMatcher(graph_of([road(0, 1, 2, [(0, 0), (300, 0)], backward=False)]))
+    for x, told in ((250.0, 0), (246.0, 0), (243.0, 1)):
+        matcher.update(np.array([x, 0.0]), math.pi, True, 8.0)
+        assert len(matcher.off_road_stretches) == told
 
 
 def test_the_carriageway_that_runs_the_cars_way_wins_although_the_other_is_nearer() -> None:
