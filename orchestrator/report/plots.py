@@ -19,6 +19,8 @@ COLOURS = ("#1f5fd0", "#c2185b", "#00857a", "#b26a00", "#8a3fb0", "#6d4c41", "#4
 """Of series, told apart by who sees colours differently too, by their lightness."""
 _INK, _SOFT, _LINE = "#1c2530", "#5b6673", "#d9dee4"
 _MOST_POINTS = 2000
+_LABEL_WIDE = 0.03
+"""Of the width of a plot: what a number takes beside a line."""
 
 
 def plot(x_label: str, y_label: str, *, height: int = 260, **more: Any) -> Any:
@@ -66,11 +68,22 @@ def drive_plot(track: CarTrack, arrivals: Sequence[tuple[int, float]]) -> Any:
     drawn = plot("drive time, s", "speed, km/h", height=230)
     time_s, speed = _thinned(track.time_s, track.speed_mps * 3.6)
     drawn.line(np.round(time_s, 2), np.round(speed, 2), color=COLOURS[0], line_width=2)
-    for number, at_s in arrivals:
+    lasts_s, fastest = float(np.ptp(track.time_s)), float(np.abs(speed).max(initial=1.0))
+    level, before_s = 0, -np.inf
+    for number, at_s in sorted(arrivals, key=lambda one: one[1]):
+        # Numbers of junctions that follow each other closely stand above each other.
+        level = level + 1 if at_s - before_s < _LABEL_WIDE * lasts_s else 0
+        before_s = at_s
         drawn.add_layout(
             Span(location=at_s, dimension="height", line_color=_SOFT, line_dash="dotted")
         )
-        drawn.text(x=[at_s], y=[0], text=[f" {number}"], text_color=_SOFT, text_font_size="13px")
+        drawn.text(
+            x=[at_s],
+            y=[0.12 * fastest * level],
+            text=[f" {number}"],
+            text_color=_SOFT,
+            text_font_size="13px",
+        )
     drawn.add_tools(
         HoverTool(tooltips=[("time", "@x{0.0} s"), ("speed", "@y{0.0} km/h")], mode="vline")
     )

@@ -6,12 +6,15 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.repeat import repeat
 from foretwin.orchestrator.report.blocks import UNKNOWN
+from foretwin.orchestrator.report.driven_track import CarTrack
 from foretwin.orchestrator.report.page import html_of
+from foretwin.orchestrator.report.plots import drive_plot
 from foretwin.orchestrator.report.write_report import report_of_folders, write_report
 from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
 from tests.orchestrator.report.told_runs import (
@@ -34,7 +37,6 @@ COVERS = (
     "foretwin.orchestrator.report.provenance_part",
     "foretwin.orchestrator.report.reality_parts",
     "foretwin.orchestrator.report.replayed",
-    "foretwin.orchestrator.report.route_picture",
     "foretwin.orchestrator.report.run_report",
     "foretwin.orchestrator.report.vehicle_parts",
 )
@@ -193,3 +195,18 @@ def test_names_of_strangers_are_shown_and_do_nothing(tmp_path: Path) -> None:
     assert "<script>alert(1)" not in page
     assert "&lt;script&gt;alert(1)" in page
     assert "\x1b" not in page
+
+
+def test_numbers_of_junctions_that_follow_closely_stand_above_each_other() -> None:
+    time_s = np.linspace(0.0, 100.0, 11)
+    stamps = np.arange(11, dtype=np.int64)
+    track = CarTrack(
+        stamp_ns=stamps, time_s=time_s, lat_lon_deg=np.zeros((11, 2)), speed_mps=np.full(11, 10.0)
+    )
+
+    drawn = drive_plot(track, [(2, 51.0), (1, 50.0), (3, 80.0)])
+
+    texts = [one for one in drawn.renderers if one.glyph.__class__.__name__ == "Text"]
+    heights = {one.data_source.data["text"][0]: one.data_source.data["y"][0] for one in texts}
+    assert heights[" 1"] == heights[" 3"] == 0.0
+    assert heights[" 2"] > 3.0
