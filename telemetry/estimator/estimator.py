@@ -74,6 +74,15 @@ class StateEstimator:
         self._state_ns: int | None = None
         self._newest_ns: int | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the motion where it is computed from the samples that are kept."""
+        return self.__dict__ if self._reordering is None else self.__dict__ | {"_track": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self._reordering is not None:
+            self._track = self._reordering.track()
+
     @property
     def skipped(self) -> Counter[str]:
         """How many samples were refused, by reason."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import itertools
 from collections import Counter, deque
 from typing import Any, NamedTuple
 
@@ -59,7 +58,16 @@ class Reordering:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be computed again: from the first checkpoint all samples are."""
-        return self.__dict__ | {"_checkpoints": deque(itertools.islice(self._checkpoints, 1))}
+        if not self._checkpoints:
+            return self.__dict__
+        first = self._checkpoints[0]
+        place = self._place_after(first.stamp_ns)
+        again = {"_checkpoints": deque([first]), "_head": first.track, "_taken": place}
+        return self.__dict__ | again
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._head = self._head.copy()
 
     @property
     def waiting(self) -> int:
@@ -104,9 +112,7 @@ class Reordering:
             self._checkpoints.pop()
         checkpoint = self._checkpoints[-1]
         self._head = checkpoint.track.copy()
-        self._taken = bisect.bisect(
-            self._samples, checkpoint.stamp_ns, key=lambda sample: sample.stamp_ns
-        )
+        self._taken = self._place_after(checkpoint.stamp_ns)
 
     def track(self) -> MotionTrack:
         """Return the track with all samples taken; it stays this object's own."""
@@ -121,6 +127,10 @@ class Reordering:
             self._taken += 1
         self._forget()
         return self._head
+
+    def _place_after(self, stamp_ns: int) -> int:
+        """Return how many samples are of this stamp or before."""
+        return bisect.bisect(self._samples, stamp_ns, key=lambda sample: sample.stamp_ns)
 
     def _apart_ns(self, stamp_ns: int) -> int:
         """Return how far apart copies shall lie."""
@@ -143,7 +153,7 @@ class Reordering:
         first_ns = self._checkpoints[0].stamp_ns
         if self._samples and self._samples[0].stamp_ns > first_ns:
             return
-        gone = bisect.bisect(self._samples, first_ns, key=lambda sample: sample.stamp_ns)
+        gone = self._place_after(first_ns)
         for sample in self._samples[:gone]:
             self._seen.discard((sample.channel, sample.stamp_ns))
         del self._samples[:gone]
