@@ -22,6 +22,7 @@ from foretwin.contracts.credentials import (
 )
 from foretwin.contracts.drive import SpeedSample, VehicleState
 from foretwin.contracts.keys import CHANNELS, alive_key
+from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process_setup import Admission, BusSetup
 from foretwin.contracts.simulation import PrepareRequest, RunEnd
@@ -86,6 +87,27 @@ def test_a_worker_cannot_speak_as_the_car(house: House) -> None:
         for _ in range(5):
             worker.publish("speed", SpeedSample(stamp_ns=1, speed_mps=99.0), vehicle="ego")
         only(mailbox, car, "speed", SpeedSample(stamp_ns=2, speed_mps=3.0), vehicle="ego")
+
+
+def keys_of(subject: str, message: str) -> set[str]:
+    """Return the keys on which somebody may send such messages."""
+    access = access_control(MEMBERS, subject="usernames", run_id=RUN)
+    rules = {one["id"]: one for one in access["rules"]}
+    subjects = {one["id"] for one in access["subjects"] if subject in one.get("usernames", ())}
+    return {
+        key
+        for policy in access["policies"]
+        if subjects & set(policy["subjects"])
+        for rule in policy["rules"]
+        if message in rules[rule]["messages"] and rules[rule]["permission"] == "allow"
+        for key in rules[rule]["key_exprs"]
+    }
+
+
+def test_a_car_speaks_of_itself_alone_and_the_orchestrator_of_every_vehicle() -> None:
+    assert channel_key("gnss", vehicle="ego") in keys_of("car-vehicle", "put")
+    assert channel_key("gnss", vehicle="*") not in keys_of("car-vehicle", "put")
+    assert channel_key("state", vehicle="*") in keys_of("orchestrator", "put")
 
 
 @pytest.mark.parametrize("user", [one.name for one in MEMBERS if one.role != "orchestrator"])

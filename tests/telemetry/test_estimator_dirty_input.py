@@ -23,10 +23,7 @@ from tests.telemetry.position_track import (
     yaw,
 )
 
-COVERS = (
-    "foretwin.telemetry.estimator.measured",
-    "foretwin.telemetry.estimator.position_gate",
-)
+COVERS = ("foretwin.telemetry.estimator.position_gate",)
 
 
 def test_wild_positions_are_skipped_and_counted() -> None:

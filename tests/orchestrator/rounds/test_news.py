@@ -43,3 +43,15 @@ def test_who_is_sick_is_told_when_it_begins_and_when_it_is_over() -> None:
     assert [(one.level, one.text.split(",")[0]) for one in told] == [
         ("warning", "w0 is sick"), ("info", "w0 is given jobs again"), ("warning", "w0 is sick"),
     ]  # fmt: skip
+
+
+def test_the_first_word_of_a_slow_machine_is_a_warning_and_the_next_ones_are_news() -> None:
+    told: list[Notice] = []
+    news = RoundNews(told.append)
+    for short_of in ("48 of 64 futures", "32 of 64 futures", ""):
+        news.pace(short_of, rate_hz=2.0)
+    assert [(one.level, one.text.partition(" from")[0]) for one in told] == [
+        ("warning", "48 of 64 futures"),
+        ("info", "32 of 64 futures"),
+        ("info", "the machine keeps up: all futures in every round again"),
+    ]

@@ -25,6 +25,8 @@ from foretwin.telemetry.estimator.filter_state import (
 )
 from foretwin.telemetry.estimator.motion_noise import GNSS_CORRELATION_S
 
+COVERS = ("foretwin.telemetry.estimator.filter_state",)
+
 SILENT = (0.0,) * 6
 DENSITIES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 

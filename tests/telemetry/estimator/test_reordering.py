@@ -12,6 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleState
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import WINDOW_NS, Reordering
 from tests.telemetry.position_track import Sample, circle, fix, info
@@ -127,3 +128,16 @@ def test_who_goes_on_from_its_bytes_takes_late_samples_as_well(cut: int, late_by
         for channel, message in [samples()[cut - late_by], *order[cut - 1 :]]:
             reordering.add(channel, message)
     assert again.track().state(end_ns(4.0)) == first.track().state(end_ns(4.0)) == in_order()
+
+
+def test_an_estimator_that_goes_on_from_its_bytes_gives_the_same_states() -> None:
+    straight_on, resumed = StateEstimator(info()), StateEstimator(info())
+    for number, (channel, message) in enumerate(samples()):
+        if number % 7 == 0:
+            resumed = pickle.loads(pickle.dumps(resumed))
+        received_ns = message.stamp_ns + 3_000_000
+        first = straight_on.handle(channel, message, received_ns=received_ns)
+        assert resumed.handle(channel, message, received_ns=received_ns) == first
+    assert straight_on.skipped == resumed.skipped
+    before, after = straight_on._track, pickle.loads(pickle.dumps(straight_on))._track
+    assert after.state(end_ns(4.0)) == before.state(end_ns(4.0))

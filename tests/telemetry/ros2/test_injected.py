@@ -96,3 +96,20 @@ def injected_uuid(number: int) -> Any:
     from foretwin.telemetry.ros_messages.shapes import uuid_from
 
     return uuid_from(walker(user_id=f"w{number}")).uuid
+
+
+def test_whom_a_sensor_was_shown_is_known_within_its_outline_and_nowhere_else():
+    injected = Injected()
+    wide = walker(length_m=4.0, width_m=2.0, speed_mps=0.0)
+    injected.note_measured(5 * S, RoadUsers(stamp_ns=5 * S, users=(wide,)))
+
+    def is_left(ahead_m: float, aside_m: float) -> bool:
+        there = moved(replace(wide, yaw_rad=wide.yaw_rad + math.pi / 2), aside_m)
+        there = moved(replace(there, yaw_rad=wide.yaw_rad, user_id="7", width_m=1.1), ahead_m)
+        return bool(injected.without(RoadUsers(stamp_ns=5 * S, users=(there,))).users)
+
+    assert not is_left(0.0, 0.0)
+    assert not is_left(0.5, -0.9)
+    assert not is_left(-1.9, 0.4)
+    assert is_left(0.0, 2.0)
+    assert is_left(3.0, 0.0)

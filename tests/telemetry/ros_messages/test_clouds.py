@@ -13,8 +13,6 @@ from foretwin.telemetry.ros_messages.clouds import cloud_from, cloud_of
 from foretwin.telemetry.ros_messages.foreign import UnusableError
 from foretwin.telemetry.ros_messages.table import messages_from
 
-COVERS = ("foretwin.contracts.point_cloud",)
-
 
 def test_each_field_is_found_where_it_is_said_to_be() -> None:
     points = np.arange(18, dtype=np.float32).reshape(3, 6)
