@@ -30,6 +30,7 @@ class MirrorHandler:
     stamp_ns: int = 0
     """Of the newest sample."""
     independent: bool | None = None
+    """Whether the free twin has run by recorded commands yet: some may be late or lost."""
     compared: int = 0
     """Samples of a free twin under recorded commands, and those beyond a limit of the alarms."""
     beyond: int = 0
@@ -49,7 +50,7 @@ class MirrorHandler:
             return
         self._stamps_ns.append(sample.stamp_ns)
         self.stamp_ns = sample.stamp_ns
-        self.independent = sample.independent
+        self.independent = sample.independent or bool(self.independent)
         if sample.independent:
             self.compared += 1
             self.beyond += _is_beyond(sample)

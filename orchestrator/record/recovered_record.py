@@ -142,7 +142,8 @@ def _told_by_tables(run: Path, said: Mapping[str, Any]) -> dict[str, Any]:
         told["intersections"] = visited_junctions(results).records
     mirror = kept_rows(results, "mirror", "independent")
     if mirror and "comparisons.parquet" not in gone:
-        told["comparison"] = counts.comparisons.record(independent=mirror[-1]["independent"])
+        independent = any(row["independent"] for row in mirror)
+        told["comparison"] = counts.comparisons.record(independent=independent)
     if "rounds.parquet" in gone and said.get("futures"):
         told = {name: said.get(name) for name in told}
     times_s = [s for s in (counts.last_round_s, said.get("drive_time_s")) if s is not None]

@@ -23,8 +23,12 @@ class HumanRow(NamedTuple):
 
 def gaps_of(table: pa.Table | None) -> list[GapRow]:
     """Return the rows of a run's table of gaps by horizon and manoeuvre, each horizon first as a
-    whole; none without a table."""
+    whole; none without a table.
+
+    Runs by estimated commands count where there are no others: the rest were late or lost.
+    """
     rows = [] if table is None else table.to_pylist()
     # A run's gaps are those of its own car, which the table does not repeat.
     samples = msgspec.convert([{"vehicle_id": "", **row} for row in rows], list[GapSample])
-    return gap_table(samples, also_all=True)
+    commanded = [one for one in samples if one.independent]
+    return gap_table(commanded or samples, also_all=True)

@@ -30,10 +30,10 @@ class FindingsStanding(NamedTuple):
     latest: dict[str, ParameterEstimate]
     reported: dict[str, float]
     gaps: dict[str, RunningMeans]
+    estimated: dict[str, RunningMeans]
     alarms: int
     beyond: int
     verdicts: FirstOf[Verdict]
-    independent: bool
 
 
 @dataclass(slots=True)
@@ -48,10 +48,11 @@ class Findings:
     _latest: dict[str, ParameterEstimate] = field(default_factory=dict)
     _reported: dict[str, float] = field(default_factory=dict)
     _gaps: dict[str, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
+    _estimated: dict[str, RunningMeans] = field(default_factory=lambda: defaultdict(RunningMeans))
+    """Those of runs by commands that were estimated from the motion, by manoeuvre too."""
     _alarms: int = 0
     _beyond: int = 0
     _verdicts: FirstOf[Verdict] = field(default_factory=lambda: FirstOf(MOST_LISTED))
-    _independent: bool = True
 
     @property
     def standing(self) -> FindingsStanding:
@@ -60,19 +61,19 @@ class Findings:
             latest=self._latest,
             reported=self._reported,
             gaps=dict(self._gaps),
+            estimated=dict(self._estimated),
             alarms=self._alarms,
             beyond=self._beyond,
             verdicts=self._verdicts,
-            independent=self._independent,
         )
 
     def go_on(self, standing: FindingsStanding) -> None:
         """Begin with what was said before."""
         self._latest, self._reported = standing.latest, standing.reported
         self._gaps.update(standing.gaps)
+        self._estimated.update(standing.estimated)
         self._alarms, self._beyond = standing.alarms, standing.beyond
         self._verdicts = standing.verdicts
-        self._independent = standing.independent
 
     def take(self, found: Identification | GapSample | GapAlarm | Verdict) -> None:
         """Keep and tell one finding."""
@@ -81,11 +82,11 @@ class Findings:
                 self._identification(found)
             case GapSample():
                 self.tables.add("gaps", [row_of(found, GAP)])
-                self._independent = self._independent and found.independent
                 # The horizon of the alarms is told; the tables hold all.
                 if abs(found.horizon_s - ALARM_HORIZON_S) < 1e-9:
                     self._beyond += found.independent and found.beyond_limits
-                    self._gaps[found.manoeuvre].take(
+                    gaps = self._gaps if found.independent else self._estimated
+                    gaps[found.manoeuvre].take(
                         tuple(getattr(found, name) ** 2 for name in _SQUARES)
                     )
             case GapAlarm():
@@ -122,17 +123,24 @@ class Findings:
                 self.tell(Notice("info", found_text(found, counts)))
 
     def record(self) -> dict[str, Any]:
-        """Return the `gap`, `verdicts` and `parameters` of run.json."""
+        """Return the `gap`, `verdicts` and `parameters` of run.json.
+
+        Runs by estimated commands count where there are no others: where a command arrived late or
+        was lost, they say nothing of the rest, and stand in `without_commands` alone.
+        """
+        without = sum(rows.count for rows in self._estimated.values())
+        gaps = self._gaps or self._estimated
         return {
             "gap": {
                 "horizon_s": ALARM_HORIZON_S,
-                "independent": self._independent,
-                "samples": sum(rows.count for rows in self._gaps.values()),
+                "independent": bool(self._gaps) or not without,
+                "samples": sum(rows.count for rows in gaps.values()),
+                "without_commands": without,
                 "alarms": self._alarms,
                 "beyond_limits": self._beyond,
                 "rms": {
-                    "all": _rms(sum(self._gaps.values(), RunningMeans())),
-                    **{name: _rms(rows) for name, rows in sorted(self._gaps.items())},
+                    "all": _rms(sum(gaps.values(), RunningMeans())),
+                    **{name: _rms(rows) for name, rows in sorted(gaps.items())},
                 },
             },
             "verdicts": [

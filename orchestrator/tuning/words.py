@@ -67,6 +67,9 @@ def summary_lines(
         if gap["independent"]:
             told = f"{gap['alarms']} alarm{'s' if gap['alarms'] != 1 else ''}"
             told += f", beyond a limit {gap['beyond_limits']} of {gap['samples']} times"
+            if gap["without_commands"]:
+                count = gap["without_commands"]
+                told += f" (commands were missing {count} time{'s' if count != 1 else ''} more)"
         lines.append(
             f"  left to itself for {gap['horizon_s']:g} s, the model is off by "
             f"{rms['along_m']:.2f} m along the road, {rms['across_m']:.2f} m across, "

@@ -77,3 +77,11 @@ def test_a_free_twin_beyond_a_limit_of_the_alarms_is_counted(gap: str, size: flo
         handler.take(sample(at_s, since_reset_s=4.0, **{gap: share * size}))
     handler.take(sample(4.0, since_reset_s=4.0, independent=False, **{gap: 9.0 * size}))
     assert handler.record() == {"samples": 3, "beyond_limits": 2}
+    assert handler.independent  # a command was lost, the others were not
+
+
+def test_a_twin_that_ran_by_estimated_commands_alone_is_not_independent() -> None:
+    handler = MirrorHandler(Tables(), lambda _: None, "ego")  # type: ignore[arg-type]
+    assert handler.independent is None
+    handler.take(sample(1.0, independent=False))
+    assert handler.independent is False

@@ -108,11 +108,19 @@ def test_the_end_of_a_drive_tells_it_in_a_few_lines(tmp_path: Path) -> None:
             ["1 alarm, beyond a limit 2 of 2", "the gap was beyond its limits, and nothing shows"],
         ),
         (
+            TuneReply(gaps=(gap(0.3), gap(9.0, independent=False), gap(0.3))),
+            [
+                "0.30 m across, 5.7° and 0.00 m/s (RMS); 0 alarms, beyond a limit 0 of 2 times "
+                "(commands were missing 1 time more)",
+                "nothing shows that",
+            ],
+        ),
+        (
             TuneReply(gaps=(gap(9.0, independent=False),)),
             ["no limits hold, since commands were estimated", "no commands were recorded"],
         ),
     ],
-    ids=["within", "beyond", "estimated commands"],
+    ids=["within", "beyond", "some lost", "estimated commands"],
 )
 def test_a_summary_counts_by_the_limits_of_the_alarms(
     tmp_path: Path, reply: TuneReply, told: list[str]
