@@ -69,6 +69,8 @@ class Answer(NamedTuple):
     failure: str = ""
     worker_id: str = ""
     received_mono_ns: int = 0
+    garbled: bool = False
+    """What came was no message of its kind: `failure` says why, and another may be asked."""
 
 
 @dataclass(slots=True)
@@ -124,8 +126,8 @@ def world_task(request: WantedWorld) -> Task:
     return Task(f"World of {request.junction_id}", "build_world", request.junction_id, request)
 
 
-def _never(_: Answer) -> str:
-    return ""
+def _garbled(answer: Answer) -> str:
+    return answer.failure if answer.garbled else ""
 
 
 def answers(
@@ -133,12 +135,12 @@ def answers(
     tasks: Iterable[Task],
     *,
     ahead: int | None = None,
-    fault_in: Callable[[Answer], str] = _never,
+    fault_in: Callable[[Answer], str] = _garbled,
 ) -> Iterator[Answer]:
     """Have tasks answered by a runner that has no others, and yield the answers as they come.
 
     Tasks are taken as they are needed: the runner holds at most `ahead`; without, `AHEAD`,
-    or where that are more, twice as many as can be in work. An answer in which
+    or where that are more, twice as many as can be in work. An answer, garbled or not, in which
     `fault_in` finds a fault does not count: its task is asked again, up to `TRIES` times in all.
     """
     left, held = iter(tasks), 0
@@ -152,7 +154,8 @@ def answers(
             return
         answer = runner.take(None)
         assert answer is not None
-        if answer.message is not None and (fault := fault_in(answer)):
+        readable = answer.message is not None or answer.garbled
+        if readable and (fault := fault_in(answer)):
             wrong[answer.task.key] += 1
             if wrong[answer.task.key] < TRIES:
                 runner.submit(answer.task)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import logging
 import math
 import os
@@ -14,7 +15,7 @@ import re
 import signal
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import Future
 from typing import Any
 
@@ -49,8 +50,9 @@ class RayCluster:
         self._seats: tuple[str, ...] = ()
         self._look_again_s, self._lost_s = 0.0, -math.inf
         self._refs: dict[Future[Ended], Any] = {}
+        self._turns = itertools.count()
         # A node or process that dies costs a life, a mistake of ours none: it is an answer.
-        self._answer = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(answer_here)
+        self._answer = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(_answer_on_node)
 
     def seats(self) -> tuple[str, ...]:
         """Return a name for each processor of the nodes that live; see SeatCluster."""
@@ -79,13 +81,30 @@ class RayCluster:
         """Store bytes; see SeatCluster."""
         return self._ray.put(data)
 
-    def ask(self, question: SeatQuestion, world: Any | None) -> Future[Ended]:
+    def ask(
+        self, question: SeatQuestion, world: Any | None, *, away_from: Collection[str] = ()
+    ) -> Future[Ended]:
         """Have a question answered; see SeatCluster."""
-        ref = self._answer.remote(self._setup, question, world)
+        answer = self._answer
+        if away_from and (node := self._node_but(away_from)):
+            from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+            there = NodeAffinitySchedulingStrategy(node, soft=True)
+            answer = answer.options(scheduling_strategy=there)
+        ref = answer.remote(self._setup, question, world)
         ended: Future[Ended] = Future()
         self._refs[ended] = ref
         ref.future().add_done_callback(lambda done: self._end(ended, done))
         return ended
+
+    def _node_but(self, these: Collection[str]) -> str | None:
+        """Return the id of a node that lives and is none of these, each in its turn."""
+        others = [
+            node["NodeID"]
+            for node in self._ray.nodes()
+            if node["Alive"] and node["Resources"].get("CPU") and node["NodeID"] not in these
+        ]
+        return others[next(self._turns) % len(others)] if others else None
 
     def forget(self, asked: Future[Ended]) -> None:
         """Let a question not be begun; see SeatCluster."""
@@ -93,12 +112,14 @@ class RayCluster:
         if ref is not None:
             self._ray.cancel(ref)
 
-    def _end(self, ended: Future[Ended], done: Future[SeatAnswer]) -> None:
+    def _end(self, ended: Future[Ended], done: Future[tuple[str, SeatAnswer]]) -> None:
         self._refs.pop(ended, None)
         error = done.exception()
-        ended.set_result(
-            Ended(done.result()) if error is None else Ended(None, self._trouble(error))
-        )
+        if error is not None:
+            ended.set_result(Ended(None, self._trouble(error)))
+        else:
+            node, answer = done.result()
+            ended.set_result(Ended(answer, node=node))
 
     def _trouble(self, error: BaseException) -> str:
         """Return in one line what became of those who were to answer."""
@@ -110,6 +131,15 @@ class RayCluster:
         cause = getattr(error, "cause", None) or error
         lines = [line.strip() for line in str(cause).splitlines() if line.strip()]
         return f"{type(cause).__name__}: {lines[-1] if lines else 'no more is said'}"
+
+
+def _answer_on_node(
+    setup: bytes, question: SeatQuestion, world: bytes | None
+) -> tuple[str, SeatAnswer]:
+    """Return the id of this node, and what is answered here."""
+    import ray
+
+    return ray.get_runtime_context().get_node_id(), answer_here(setup, question, world)
 
 
 @contextlib.contextmanager

@@ -8,11 +8,10 @@ prefers nodes that hold it.
 from __future__ import annotations
 
 import contextlib
-import functools
 import itertools
 import time
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
@@ -31,6 +30,7 @@ _ON_A_WORLD = "job", "place"
 """What is asked about a World that is there."""
 _KEPT_WORLDS = 8
 """So many Worlds stay in the object store after the last question about them."""
+_REMEMBERED = 1024
 _LOOK_S = 1.0
 _AGAIN_S = 5.0
 """Of a node that is killed Ray knows by then, and plays its tasks again. Of one whose power or link
@@ -42,6 +42,8 @@ class Ended(NamedTuple):
 
     answer: SeatAnswer | None
     trouble: str = ""
+    node: str = ""
+    """Where the answer is from."""
 
 
 class SeatCluster(Protocol):
@@ -57,8 +59,11 @@ class SeatCluster(Protocol):
     def put(self, data: bytes) -> Any:
         """Store bytes for whoever is asked; gone with the last reference to what is returned."""
 
-    def ask(self, question: SeatQuestion, world: Any | None) -> Future[Ended]:
-        """Have a question answered by any seat, again where that dies."""
+    def ask(
+        self, question: SeatQuestion, world: Any | None, *, away_from: Collection[str] = ()
+    ) -> Future[Ended]:
+        """Have a question answered by any seat, on no node of these where there are others; again
+        where that dies."""
 
     def forget(self, asked: Future[Ended]) -> None:
         """Let a question that was not begun not be begun any more."""
@@ -105,6 +110,8 @@ class RayRunner:
         self._worlds: OrderedDict[str, Any] = OrderedDict()
         self._asked_of: dict[str, int] = {}
         """How many open questions there are about each World that is stored."""
+        self._answered_on: OrderedDict[str, set[str]] = OrderedDict()
+        """Which nodes have answered the last tasks: who asks again wants another's word."""
         self._count = TaskCount()
         self._heard_s = time.monotonic()
         self._next_look_s = 0.0
@@ -191,14 +198,11 @@ class RayRunner:
         """Give a task to the cluster; raises OSError where its World cannot be read."""
         task, world = asked.task, self._world_of(asked.task)
         question = SeatQuestion(task.channel, task.world_id, encode(task.question))
-        future = self._cluster.ask(question, world)
+        before = self._answered_on.get(task.key, ())
+        future = self._cluster.ask(question, world, away_from=before)
         asked.futures.append(future)
-        future.add_done_callback(functools.partial(self._note_end, asked))
-
-    def _note_end(self, asked: _AtSeats, future: Future[Ended]) -> None:
-        self._ended.put(
-            _EndOfOne(asked, future)
-        )  # By a thread of Ray's: the rest is for who takes.
+        # By a thread of Ray's: the rest is for who takes.
+        future.add_done_callback(lambda done: self._ended.put(_EndOfOne(asked, done)))
 
     def _world_of(self, task: Task) -> Any | None:
         """Return the World of a task in the object store."""
@@ -223,7 +227,7 @@ class RayRunner:
         if self._open.get(task.key) is not end.of:
             return  # It was cancelled, or its other half was sooner.
         end.of.futures.remove(end.future)
-        answer, trouble = end.future.result()
+        answer, trouble, node = end.future.result()
         if answer is None and end.of.futures:
             return  # The other half may be answered yet.
         del self._open[task.key]
@@ -232,6 +236,9 @@ class RayRunner:
             self._count.lost += 1
             self._answers.append(_given_up(task, trouble))
         else:
+            self._answered_on.setdefault(task.key, set()).add(node)
+            while len(self._answered_on) > _REMEMBERED:
+                self._answered_on.popitem(last=False)
             self._take_answer(task, answer)
         self._give_out()
 
@@ -244,7 +251,7 @@ class RayRunner:
             self._count.lost += 1
             self._answers.append(_given_up(task, answer.refusal, answer.seat))
             return
-        failure, message = answer.refusal, None
+        failure, message, garbled = answer.refusal, None, False
         if not failure:
             reply = CHANNELS[task.channel].reply
             assert reply is not None
@@ -252,10 +259,10 @@ class RayRunner:
                 where = f"{task.channel} of {answer.seat}"
                 message = opened(answer.data, reply, where=where).message
             except Refused as refused:
-                failure = one_line(refused)
+                failure, garbled = one_line(refused), True
         if message is None:
             self._count.refused += 1
-            self._answers.append(_given_up(task, failure, answer.seat))
+            self._answers.append(_given_up(task, failure, answer.seat)._replace(garbled=garbled))
             return
         self._count.results += 1
         self._answers.append(Answer(task, message, "", answer.seat, time.monotonic_ns()))

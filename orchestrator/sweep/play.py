@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 from collections.abc import Iterator
 
 from foretwin.contracts.job_identity import JobBytes, job_bytes
@@ -13,6 +14,8 @@ from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.rows import Due, Parts, fault_in
 from foretwin.orchestrator.sweep.shard import Shard
 from foretwin.sim_worker.futures.finished_part import finished_part
+
+log = logging.getLogger("orchestrator")
 
 
 def jobs_left(plan: SweepPlan, maker: JobMaker, parts: Parts, shard: Shard) -> bytearray:
@@ -34,6 +37,8 @@ def play(
 ) -> None:
     """Play jobs, and keep the parts that come back of them; raises OSError."""
     at_work: dict[str, Due] = {}
+    told: set[str] = set()
+    """Workers of whose rubbish was told."""
 
     def tasks() -> Iterator[Task]:
         for one in plan.planned(lambda number: bool(left[number])):
@@ -54,9 +59,13 @@ def play(
 
         def fault(answer: Answer) -> str:
             due = at_work[answer.task.key]
-            found = fault_in(answer.message.part, due)
-            if found:
-                say(f"job {due.number}: worker {answer.worker_id} gave no part: {found}")
+            found = answer.failure if answer.garbled else fault_in(answer.message.part, due)
+            text = f"job {due.number}: worker {answer.worker_id} gave no part: {found}"
+            if found and answer.worker_id in told:
+                log.warning("%s", text)
+            elif found:
+                told.add(answer.worker_id)
+                say(f"{text}; more of its kind are in the log")
             return found
 
         for answer in answers(runner, tasks(), fault_in=fault):

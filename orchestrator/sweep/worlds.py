@@ -151,6 +151,8 @@ def _built(
 
     def fault_in(answer: Answer) -> str:
         """Return why what came back is no World, "" where it is one or says why there is none."""
+        if answer.garbled:
+            return answer.failure
         built: BuiltWorld = answer.message
         try:
             if not built.failure:

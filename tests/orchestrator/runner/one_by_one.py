@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from concurrent.futures import Future
 from typing import Any
 
@@ -21,6 +22,8 @@ class OneByOne:
     def __init__(self, *seats: str) -> None:
         self.names = seats or ("n1-0", "n1-1")
         self.asked: list[tuple[SeatQuestion, Any, Future[Ended]]] = []
+        self.away_from: list[set[str]] = []
+        """Of each question, who was not to answer it."""
         self.stored: list[bytes] = []
         self.forgotten, self.lost_s = 0, -math.inf
 
@@ -31,7 +34,10 @@ class OneByOne:
         self.stored.append(data)
         return data
 
-    def ask(self, question: SeatQuestion, world: Any | None) -> Future[Ended]:
+    def ask(
+        self, question: SeatQuestion, world: Any | None, *, away_from: Collection[str] = ()
+    ) -> Future[Ended]:
+        self.away_from.append(set(away_from))
         ended: Future[Ended] = Future()
         self.asked.append((question, world, ended))
         return ended
@@ -39,9 +45,9 @@ class OneByOne:
     def forget(self, asked: Future[Ended]) -> None:
         self.forgotten += 1
 
-    def end(self, which: int = 0, **answer: Any) -> None:
+    def end(self, which: int = 0, *, node: str = "n1", **answer: Any) -> None:
         *_, ended = self.asked.pop(which)
-        ended.set_result(Ended(SeatAnswer("n1-0", **{"data": DONE, **answer})))
+        ended.set_result(Ended(SeatAnswer(f"{node}-0", **{"data": DONE, **answer}), node=node))
 
     def lose(self, trouble: str) -> None:
         *_, ended = self.asked.pop(0)

@@ -289,8 +289,8 @@ def test_whatever_happens_each_task_ends_once(
 
 def test_all_of_many_are_answered_by_a_cluster_that_answers_at_once() -> None:
     class AtOnce(OneByOne):
-        def ask(self, question: SeatQuestion, world: Any | None) -> Future[Ended]:
-            ended = super().ask(question, world)
+        def ask(self, question: SeatQuestion, world: Any | None, **more: Any) -> Future[Ended]:
+            ended = super().ask(question, world, **more)
             self.end()
             return ended
 
