@@ -145,9 +145,12 @@ def _file_of(table: Path, column: str, value: str) -> Path:
 def _row(path: Path, column: str, value: str, kind: type[_Row]) -> _Row:
     with opened(path) as file:
         _check_same(path, file.schema_arrow)
-        table = file.read(list(kind.__struct_fields__))
-        for row in table.filter(pc.field(column) == value).slice(0, 1).to_pylist():
-            return msgspec.convert(row, kind)
+        for group in range(file.num_row_groups):  # of all others the ids alone are read
+            ids = file.read_row_group(group, [column])[column]
+            place = pc.index(ids, pa.scalar(value, ids.type)).as_py()
+            if place >= 0:
+                table = file.read_row_group(group, list(kind.__struct_fields__))
+                return msgspec.convert(table.slice(place, 1).to_pylist()[0], kind)
     raise UserError(f"{path}: no {column} {value!r}")
 
 
