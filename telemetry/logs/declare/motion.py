@@ -16,6 +16,9 @@ _SMOOTH_S = 1.0
 """Over so long a parabola is laid through positions, or over five of them: shorter, and noise is
 taken for turning."""
 _HOLE_S = 2.5
+_SPARSEST_S = 20.0
+"""Positions farther apart than this tell no motion: so are those of a clock whose unit is not
+this one, a thousand times as long."""
 MOVES_MPS = 3.0
 """Below, a course says little."""
 FASTEST_MPS = 90.0
@@ -48,13 +51,16 @@ class GridMotion(NamedTuple):
 
 
 def motion_of(time_s: Array, xy_m: Array, *, whole: bool = False) -> GridMotion | None:
-    """Return the motion of positions (N, 2) at rising times (N,); None where there is too little.
+    """Return the motion of positions (N, 2) at rising times (N,); None where they are too few or
+    too far apart.
 
     Of long drives the stretch that turns most, unless the `whole` is wanted.
     """
     if len(time_s) < 10 or time_s[-1] - time_s[0] < 5.0:
         return None
     usual_s = float(np.median(np.diff(time_s)))
+    if usual_s > _SPARSEST_S:
+        return None
     half = max(round(0.5 * max(_SMOOTH_S, 4.0 * usual_s) / GRID_S), 2)
     grid = np.arange(time_s[0], time_s[-1], GRID_S)
     if len(grid) < 4 * half:

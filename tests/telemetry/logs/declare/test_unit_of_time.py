@@ -9,6 +9,7 @@ import pytest
 
 from foretwin.telemetry.logs.declare.choice import Chosen, OpenQuestion
 from foretwin.telemetry.logs.declare.clock import ClockColumn
+from foretwin.telemetry.logs.declare.motion import motion_of
 from foretwin.telemetry.logs.declare.proposal import propose
 from foretwin.telemetry.logs.declare.readings import Reading, unit_of_time
 from foretwin.telemetry.logs.log import LogError
@@ -35,6 +36,16 @@ def straight_table(folder: Path) -> Path:
         "".join(f"{a:.6f},{b:.3f},{c:.12f},{d:.12f}\n" for a, b, c, d in zip(*columns, strict=True))
     )
     return path
+
+
+def test_positions_of_a_clock_read_a_thousand_times_too_slowly_tell_no_motion() -> None:
+    time_s = np.arange(0.0, 30.0, 0.1)
+    xy_m = np.stack([12.0 * time_s, 0.1 * time_s**2], axis=1)
+
+    assert motion_of(time_s, xy_m) is not None
+    assert motion_of(time_s * 100.0, xy_m * 100.0) is not None
+    # Smoothing them over 400 s on a grid of 50 ms would take most of a minute.
+    assert motion_of(time_s * 1000.0, xy_m * 1000.0) is None
 
 
 def test_a_heading_is_no_latitude_by_a_clock_that_is_a_thousand_times_slower(
