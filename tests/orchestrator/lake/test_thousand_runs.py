@@ -5,10 +5,12 @@ FORETWIN_LAKE_RUN names a finished run to copy; without it one is driven.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,15 +20,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 
 from tests.orchestrator.lake.copied_runs import DAYS, MAPS, VEHICLES, copies_of
-from tests.orchestrator.lake.made_runs import contents, lake_table, rows_by_run
+from tests.orchestrator.lake.killed_collect import PHASES, Killing, Whole, phase_of
+from tests.orchestrator.lake.made_runs import contents, lake_table
 from tests.system.foretwin_command import environment, foretwin
 
 pytestmark = [pytest.mark.judge, pytest.mark.timeout(1800)]
-COUNT, KILLS, QUERY_S = 1000, 20, 3.0
+COUNT, STEPS, QUERY_S = 1000, 4, 3.0
+OF_EACH_KIND = 3
+"""So many kills of each of seven kinds; see `drawn_kills`."""
 SEED = int(os.environ.get("FORETWIN_KILL_SEED", "0")) or random.SystemRandom().randrange(1, 10**6)
 
 
@@ -35,6 +42,8 @@ class Copies(NamedTuple):
 
     folder: Path
     rows: dict[str, int]
+    size_bytes: int
+    """Of all tables."""
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +56,10 @@ def copies(tmp_path_factory: pytest.TempPathFactory) -> Copies:
     rows = {
         path.stem: pq.read_metadata(path).num_rows for path in (run / "results").glob("*.parquet")
     }
-    copies_of(run, folder / "runs", COUNT)
-    return Copies(folder / "runs", {name: count for name, count in rows.items() if count})
+    written = copies_of(run, folder / "runs", COUNT)
+    size_bytes = sum(path.stat().st_size for one in written for path in one.rglob("*.parquet"))
+    there = {name: count for name, count in rows.items() if count}
+    return Copies(folder / "runs", there, size_bytes)
 
 
 def collecting(copies: Copies, lake: Path) -> subprocess.Popen[str]:
@@ -127,30 +138,92 @@ def test_a_thousand_runs_answer_a_question_in_three_seconds(copies: Copies, sql:
     assert min(cpu_s, took_s) < QUERY_S
 
 
+class Kill(NamedTuple):
+    """When a collect is ended: before an event, or after a share of its processor time."""
+
+    before_event: int | None = None
+    after_share: float | None = None
+
+
+def drawn_kills(whole: Whole, drawn: random.Random) -> list[Kill]:
+    """Return kills over the whole of a collect's work: before events of each kind, and where its
+    processor time goes, which is at files in the middle of their writing."""
+    steps, events = whole.steps, whole.events
+    first_file = next(at for at, (_, name) in enumerate(events) if name.endswith(".parquet"))
+    of_kind = (
+        list(range(first_file)),
+        [step.manifest for step in steps],
+        [step.published[0] for step in steps],
+        [at for step in steps for at in step.published[1:]],
+        [step.published[-1] + 1 for step in steps],
+        list(range(len(events))),
+    )
+    chosen = [[Kill(before_event=at) for at in drawn.sample(of, OF_EACH_KIND)] for of in of_kind]
+    shares = [(number + drawn.random()) / OF_EACH_KIND for number in range(OF_EACH_KIND)]
+    chosen.append([Kill(after_share=share) for share in shares])
+    return [kill for turn in zip(*chosen, strict=True) for kill in turn]
+
+
+def killed(copies: Copies, lake: Path, kill: Kill, whole: Whole | None) -> Whole | None:
+    """Collect until the kill; returns what was done where it came to the end before."""
+    told = lake.with_suffix(".told")
+    told.unlink(missing_ok=True)
+    asked = Killing(
+        lake=str(lake), runs=str(copies.folder), step_bytes=copies.size_bytes // STEPS,
+        before_event=kill.before_event, told=str(told),
+        after_cpu_s=kill.after_share and whole and kill.after_share * whole.cpu_s,
+    )  # fmt: skip
+    words = ("-m", "tests.orchestrator.lake.killed_collect", msgspec.json.encode(asked).decode())
+    ended = subprocess.run(
+        [sys.executable, "-P", *words], env=environment(lake.parent / "cache"), check=False,
+        timeout=1200,
+    )  # fmt: skip
+    if told.exists():
+        return msgspec.json.decode(told.read_bytes(), type=Whole)
+    assert ended.returncode in (-signal.SIGKILL, -signal.SIGPROF)
+    return None
+
+
 def test_a_collect_that_is_killed_leaves_a_lake_of_whole_runs(
     copies: Copies, tmp_path: Path
 ) -> None:
-    drawn, lake = random.Random(SEED), tmp_path / "lake"
     print(f"\nFORETWIN_KILL_SEED={SEED}")
-    seen = []
-    for _ in range(KILLS):
-        with collecting(copies, lake) as process:
-            after_s = drawn.uniform(0.5, 12.0)
-            try:
-                process.wait(after_s)
-            except subprocess.TimeoutExpired:
-                process.send_signal(signal.SIGKILL)
-        runs = rows_by_run(lake, "runs")
-        assert all(count == 1 for count in runs.values())
+    whole = killed(copies, tmp_path / "whole", Kill(), None)
+    assert whole is not None
+    wanted = hashes(tmp_path / "whole")
+    phases: Counter[str] = Counter()
+    for number, kill in enumerate(drawn_kills(whole, random.Random(SEED))):
+        lake = tmp_path / f"lake{number}"
+        if killed(copies, lake, kill, whole) is not None:  # it took less this time
+            phases["after its end"] += 1
+            continue
+        phase = phase_of(lake, whole)
+        phases[phase] += 1
+        seen = runs_in(lake, "runs")
+        assert all(count == 1 for count in seen.values())
         for table, rows in copies.rows.items():
-            there = rows_by_run(lake, table)
+            there = runs_in(lake, table)
             assert set(there.values()) <= {rows}, table
-            assert runs.keys() <= there.keys(), table
-        seen.append(len(runs))
-    print(f"runs in the lake after each kill: {seen}")
+            assert seen.keys() <= there.keys(), table
+        print(f"{kill}: {phase}, {len(seen)} runs there")
 
-    collected(copies, lake)
+        killed(copies, lake, Kill(), None)
 
-    names = {path.name for path in copies.folder.iterdir()}
-    for table, rows in copies.rows.items():
-        assert rows_by_run(lake, table) == Counter(dict.fromkeys(names, rows)), table
+        assert hashes(lake) == wanted, kill
+        shutil.rmtree(lake)
+    print(f"{phases.total()} kills of {len(whole.events)} events: {dict(phases)}")
+    assert phases.keys() >= PHASES
+
+
+def hashes(lake: Path) -> dict[str, str]:
+    return {name: hashlib.sha256(data).hexdigest() for name, data in contents(lake).items()}
+
+
+def runs_in(lake: Path, table: str) -> Counter[str]:
+    """Count rows by run, as any user of Arrow can; no other column of so many is read."""
+    if not any((lake / table).rglob("*.parquet")):  # no file of it is published yet
+        return Counter()
+    found = ds.dataset(lake / table, partitioning="hive").to_table(columns=["run_id"])
+    return Counter(
+        {one["values"]: one["counts"] for one in found["run_id"].value_counts().to_pylist()}
+    )
