@@ -233,6 +233,21 @@ def test_over_a_socket_a_frame_is_there_at_once_and_a_frozen_page_holds_up_nobod
     connection.close()
 
 
+def test_a_frame_goes_out_with_when_it_was_made(server: CopilotServer) -> None:
+    connection = HTTPConnection(LOOPBACK, server.port, timeout=DEADLINE_S)
+    connection.request("GET", f"/{KEY}/events")
+    lines = connection.getresponse().fp
+    wait_for(server, 1)
+
+    before_s = time.monotonic()
+    server.publish(b"1")
+    now_s = next(float(line[4:]) for line in lines if line.startswith(b"id: "))
+    assert before_s - 0.001 <= now_s <= time.monotonic() + 0.001
+    server.publish(b"2", 7.5)
+    assert next(line for line in lines if line.startswith(b"id: ")) == b"id: 7.500\n"
+    connection.close()
+
+
 def test_the_last_frame_reaches_a_page_before_the_server_is_gone(server: CopilotServer) -> None:
     connection, frames = listen(server)
     wait_for(server, 1)
