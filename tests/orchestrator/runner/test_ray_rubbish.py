@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from foretwin.contracts.runner import TRIES, Answer, answers
 from tests.orchestrator.runner.one_by_one import OneByOne, counted, on, task
 
-COVERS = ("foretwin.orchestrator.runner.ray_runner", "foretwin.contracts.runner")
 RUBBISH = b"\xc1 rubbish"
 
 
