@@ -39,6 +39,8 @@ deviation. On centre it is a good part of the angle, and makes the ratio look to
 _PULL_STD_RAD_PER_MPS2 = 0.002
 """A driver corrects half a degree at the steering wheel for each m/s² without a thought."""
 _LAG_STD_S = 0.05
+_EVEN_STD, _STDS_OF_ALL = 12.0**-0.5, 1.96
+"""Of what is anything between 0 and 1, and how many of them a 95 % interval has on each side."""
 _BEND_STD_RAD, _BEND_S = 4e-4, 9.0
 """What a planar car leaves unexplained of the tyre angle in a bend, and the way to the next one:
 so little do a thousand instants of one bend tell."""
@@ -117,11 +119,11 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     play = PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(ALIKE_S / period_s * angles)
     of_bends = max(play, _BEND_STD_RAD * math.sqrt(_BEND_S / period_s * angles))
 
-    def fitted(values: Array, *, least_std: float, brief: bool) -> Fit:
+    def fitted(values: Array, *, least_std: float, brief: bool, more: Array | float = 0.0) -> Fit:
         apart, slopes = signals.unexplained(values)
         return fit_linear(
             (slopes * weights).T,
-            (apart + values @ slopes) * weights,
+            (apart + values @ slopes + more) * weights,
             record.time_s[used],
             prior=centre,
             prior_std=spread,
@@ -141,6 +143,11 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     brief = fitted(values, least_std=of_bends, brief=True)
     half_widths = brief.half_widths()
     half_widths[Theta.UNDERSTEER] = fit.half_width(Theta.UNDERSTEER)
+    # How the two wheels of the axle are steered, no file says: anything from each across the way to
+    # both alike, which bends that are equally tight take for ratio and understeer.
+    more = signals.less_if_alike(values)
+    alike = fitted(values, least_std=of_bends, brief=False, more=more).values - fit.values
+    half_widths = np.hypot(half_widths, _STDS_OF_ALL * _EVEN_STD * alike)
     # The straights tell the offset, where tyres have nothing to be unexplained.
     straight = fitted(values, least_std=play, brief=True)
     values[Theta.OFFSET], half_widths[Theta.OFFSET] = (

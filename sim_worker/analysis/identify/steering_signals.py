@@ -39,6 +39,8 @@ _MAX_TIRE_RAD = 0.25
 """Beyond it, an axle's two wheels are not one: steered alike, by 0.25 they turn a car as one would
 by 1.5 % less, by 0.58 by 8 %; how nearly each points across the way to the bend's middle no file
 says."""
+_ALIKE_PER_RAD2 = 0.24
+"""So much less of its angle do wheels that are steered alike turn a car by, times its square."""
 _LEAST_FEED = 0.2
 """Of 1 + K v²/L, which is zero at the speed where an oversteering car loses its stability."""
 _ANGLES_BELOW_MPS = 4.0
@@ -115,6 +117,14 @@ class SteeringSignals(NamedTuple):
             values[Theta.INVERSE_RATIO] * self.wheel_rad - values[Theta.LAG] * self.wheel_radps
         )
         return np.asarray(tyre - (values @ self.given - by_wheel))
+
+    def less_if_alike(self, values: Array) -> Array:
+        """Return how much less of the yaw rate (M,) parameters explain if both wheels are steered
+        alike, and not each across the way to the bend's middle."""
+        wheel_rad = self.late_wheel_rad(values)[self.used]
+        tyre_rad = values[Theta.INVERSE_RATIO] * wheel_rad + values[Theta.OFFSET]
+        slopes = self.unexplained(values).slopes[Theta.OFFSET]
+        return np.asarray(_ALIKE_PER_RAD2 * tyre_rad**3 * slopes)
 
     def late_wheel_rad(self, values: Array) -> Array:
         """Return the steering wheel (N,) as the tyres follow it, τ before."""

@@ -10,6 +10,8 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.analysis.identify.steering import fit_steering
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.analysis.road_grade import grade_from_altitude
@@ -56,6 +58,25 @@ def test_a_minute_of_city_driving_tells_the_hidden_car(
     assert found.value == pytest.approx(truth, abs=within)
     assert found.low < found.value < found.high
     assert found.high - found.low < 6.0 * within
+
+
+def test_intervals_hold_a_good_part_of_how_the_two_wheels_are_steered() -> None:
+    record, vehicle = city_minute(), load_vehicle()
+    one = fit_steering(record, vehicle)
+    values, signals = one.fit.values, one.signals
+    tyre = values[Theta.INVERSE_RATIO] * record.wheel_rad + values[Theta.OFFSET]
+    # Of wheels that are steered alike, what turns the car is so much less.
+    less = record.wheel_rad * (1.0 - 0.24 * np.square(tyre))
+    alike = fit_steering(record._replace(wheel_rad=less), vehicle)
+
+    apart = alike.signals.unexplained(values).yaw_rate_radps
+    apart -= signals.unexplained(values).yaw_rate_radps
+    told = signals.less_if_alike(values)
+    assert float(np.abs(told).max()) == pytest.approx(0.0054, abs=0.0003)
+    np.testing.assert_allclose(told, apart, atol=0.0003)
+    for index in (Theta.INVERSE_RATIO, Theta.UNDERSTEER):
+        moved = abs(alike.fit.values[index] - values[index])
+        assert 0.55 * moved < one.half_widths[index] < 1.2 * moved
 
 
 def test_the_wheelbase_is_not_told_without_a_tyre_angle() -> None:
