@@ -109,6 +109,11 @@ def test_the_command_line_starts_without_heavy_libraries() -> None:
     assert loaded_by("foretwin.__main__") & set(HEAVY) == set()
 
 
+def test_who_leads_a_drive_loads_no_engine_and_no_viewer() -> None:
+    loaded = loaded_by("foretwin.orchestrator.drive.drive")
+    assert loaded & {"mujoco", "rerun", "matplotlib", "scipy.stats"} == set()
+
+
 def test_who_holds_a_sweep_loads_nothing_that_only_its_workers_need() -> None:
     loaded = loaded_by("foretwin.orchestrator.commands.sweep")
     assert loaded & {"numba", "mujoco", "scipy.stats", "rerun", "matplotlib"} == set()

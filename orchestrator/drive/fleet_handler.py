@@ -32,7 +32,7 @@ from foretwin.orchestrator.record.machine import this_machine
 from foretwin.orchestrator.rounds.jobs import planners_of
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions
-from foretwin.sim_worker.futures.run_job import result_digest
+from foretwin.sim_worker.futures.result_digest import result_digest
 
 MOST_MEMBERS = 64
 MOST_LOADED = 8

@@ -8,7 +8,7 @@ from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.rounds.probe import probe_task
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions
-from foretwin.sim_worker.futures.run_job import result_digest
+from foretwin.sim_worker.futures.result_digest import result_digest
 
 
 class ReferenceProbe:

@@ -9,7 +9,6 @@ islands are contacts of the physics.
 from __future__ import annotations
 
 import functools
-import hashlib
 import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -18,7 +17,6 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32
-from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.futures import (
     JOB_SCHEMA_VERSION,
     Accident,
@@ -243,19 +241,6 @@ def _nothing_played(job: Job, instants: int) -> _Played:
     )
     states = np.zeros((0, instants, 8), np.float32)
     return _Played(states, tracks, outcome, dict.fromkeys(job.metrics, none))
-
-
-def result_digest(result: FuturesResult) -> str:
-    """Return the SHA-256 of everything in a result that does not depend on who computed it."""
-    parts = (result.trajectory, result.outcome, result.road_users, *result.accidents)
-    digest = hashlib.sha256(
-        f"{result.round_id} {result.job_index} {result.world_id} {result.future_indices}".encode()
-    )
-    for part in parts:
-        digest.update(content_bytes(part))
-    for name, values in sorted(result.metrics.items()):
-        digest.update(name.encode() + np.ascontiguousarray(values).tobytes())
-    return digest.hexdigest()
 
 
 def _ticks(job: Job, stage: BatchSimulation) -> tuple[int, int]:

@@ -14,7 +14,8 @@ from foretwin.contracts.runner import Runner, Task, answers, job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
 from tests.sim_worker.in_process_runner import InProcessRunner

@@ -22,7 +22,8 @@ from foretwin.contracts.world_identity import with_id
 from foretwin.sim_worker import seat as seats
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.seat import Seat, SeatAnswer, SeatQuestion, SeatSetup, answer_here, made_of
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import FuturesWorker

@@ -35,7 +35,8 @@ from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.finished_part import finished_part
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner

@@ -10,7 +10,8 @@ import pytest
 from foretwin.contracts.runner import JobRequest
 from foretwin.orchestrator.rounds.probe import probe_task
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.trip import town, town_plan, town_world
 from tests.sim_worker.places import crossroads

@@ -18,7 +18,8 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation, Controls
 from foretwin.sim_worker.batch.compiled import CELL_M, FAR, STEP_M
 from foretwin.sim_worker.batch.nearness import CarBox, NearStatics, most_drift_m
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import cog_from_base

@@ -31,7 +31,8 @@ from foretwin.contracts.world_identity import with_id
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.far.worker import serve_far
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus

@@ -23,7 +23,8 @@ from foretwin.sim_worker.futures.ego_dry_run import (
 )
 from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.playable import job_at, places
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roles import StagedCase

@@ -13,7 +13,8 @@ from foretwin.contracts.codec import content_bytes, write_message
 from foretwin.contracts.futures import Future, FuturesResult
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.future_mix import plan_futures
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.metrics.displacement import distinct_count
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -30,6 +31,7 @@ from tests.sim_worker.places import (
 COVERS = (
     "foretwin.sim_worker.futures.closed_loop",
     "foretwin.sim_worker.futures.job_accidents",
+    "foretwin.sim_worker.futures.result_digest",
     "foretwin.sim_worker.scenarios.live",
     "foretwin.sim_worker.vehicle.seeding",
 )
@@ -109,7 +111,8 @@ def test_another_process_computes_the_same_bytes(
         "import sys; from pathlib import Path; from foretwin.contracts.codec import read_message;"
         "from foretwin.contracts.world import World;"
         "from foretwin.contracts.futures import Job;"
-        "from foretwin.sim_worker.futures.run_job import run_job, result_digest;"
+        "from foretwin.sim_worker.futures.result_digest import result_digest;"
+        "from foretwin.sim_worker.futures.run_job import run_job;"
         "from foretwin.sim_worker.batch.batch_simulation import BatchSimulation;"
         "from foretwin.sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
         "s = BatchSimulation(read_message(d / 'world', World), load_vehicle(), nsim=16);"

@@ -15,7 +15,8 @@ from foretwin.contracts.futures import Future, FuturesResult, PlannerTiming
 from foretwin.contracts.planner_link import PlannerJoined
 from foretwin.contracts.setup import StackSetup
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import PlayAgain
 from foretwin.sim_worker.planners.stack import ATTEMPTS, MOST_HUNG_JOBS, StackPlanner
 from foretwin.sim_worker.planners.stack_processes import MOST_FAILED_STARTS

@@ -12,7 +12,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import decode, encode
 from foretwin.contracts.futures import Future, Job, RecordedRoadUser
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
