@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import hashlib
 import subprocess
 import sys
 from pathlib import Path
@@ -31,7 +30,6 @@ from tests.sim_worker.places import (
 COVERS = (
     "foretwin.sim_worker.futures.closed_loop",
     "foretwin.sim_worker.futures.job_accidents",
-    "foretwin.sim_worker.futures.result_digest",
     "foretwin.sim_worker.scenarios.live",
     "foretwin.sim_worker.vehicle.seeding",
 )
@@ -292,12 +290,3 @@ def test_a_job_that_cannot_be_done_says_why(
 ) -> None:
     with pytest.raises(ValueError, match=said):
         run_job(msgspec.structs.replace(job(NOMINAL), **changes), stage)
-
-
-def test_result_digest_ignores_who_computed_it(stage: BatchSimulation) -> None:
-    result = run_job(job(NOMINAL, horizon_s=1.0), stage, worker_id="a")
-    other = run_job(job(NOMINAL, horizon_s=1.0), stage, worker_id="b")
-    assert result_digest(result) == result_digest(other)
-    moved = run_job(job(NOMINAL, state=state_at(-50.0, -1.501), horizon_s=1.0), stage)
-    assert result_digest(moved) != result_digest(result)
-    assert len(result_digest(result)) == hashlib.sha256().digest_size * 2
