@@ -198,7 +198,7 @@ def measure_stored(few: Workload, many: Workload, answer_bytes: float) -> Stored
 def measure_car(folder: Path) -> Car:
     """Drive through the town, traced, and read what its rounds and samples took."""
     folder.mkdir()
-    drive = drive_live([], folder)
+    drive = drive_live(["--trace"], folder)
     (run,) = (folder / "runs").iterdir()
     events = json.loads((run / "trace.json").read_bytes())["traceEvents"]
     names = {e["pid"]: e["args"]["name"] for e in events if e["name"] == "process_name"}
