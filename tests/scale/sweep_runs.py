@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -132,10 +132,10 @@ class Taken(NamedTuple):
     machine_s: float
 
 
-def taken_so_far() -> Taken:
-    """Return what is taken now."""
+def taken_so_far(workers: Sequence[int]) -> Taken:
+    """Return what is taken now, by this process and by workers whose ids are given."""
     parent_s = time.process_time()
-    own_s = parent_s + sum(_cpu_s(pid) for pid in children(os.getpid()))
+    own_s = parent_s + sum(_cpu_s(pid) for pid in workers)
     return Taken(time.perf_counter(), parent_s, own_s, _machine_cpu_s())
 
 
@@ -146,6 +146,7 @@ class _Noting:
         self._runner = runner
         self.began: Taken | None = None
         self.answers: list[Taken] = []
+        self._workers: list[int] = []
 
     @property
     def capacity(self) -> int:
@@ -161,7 +162,7 @@ class _Noting:
 
     def submit(self, task: Task) -> None:
         if self.began is None:
-            self.began = taken_so_far()
+            self.began = taken_so_far(())
         self._runner.submit(task)
 
     def cancel(self, key: str) -> None:
@@ -170,7 +171,9 @@ class _Noting:
     def take(self, timeout_s: float | None = 0.0) -> Answer | None:
         answer = self._runner.take(timeout_s)
         if answer is not None:
-            self.answers.append(taken_so_far())
+            # To look for them among all processes takes milliseconds, as much as the answer does.
+            self._workers = self._workers or list(children(os.getpid()))
+            self.answers.append(taken_so_far(self._workers))
         return answer
 
 
