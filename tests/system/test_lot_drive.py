@@ -16,14 +16,26 @@ import pytest
 from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.starvation import kept_waiting
-from tests.system.foretwin_command import log_lines, run_folder, started, wait_for
+from tests.system.foretwin_command import (
+    FRESH,
+    environment,
+    log_lines,
+    run_folder,
+    started,
+    wait_for,
+)
 from tests.telemetry.lot_car.test_braking import ANCHOR, MAPPING
 
 DATA = os.environ.get("FORETWIN_DATA", "")
+PACES = 0.1, 0.05
+"""Whoever is halted for 150 ms of the drive's time shuts the gate, rightly. Two cores on which
+thirty others want to run halt somebody for a second, but not for three."""
 ATTEMPTS = 4
 BUSY_S = 10.0
 """More than processes wait for one another on two cores that have nothing else to do: 7 to 10 s."""
+END_S = 18.0
 LATEST_MS = 50.0
 """From a state to the objects at the driving stack, in 95 of 100 lists."""
 LOT = """
@@ -46,8 +58,8 @@ FLAGS = (
 
 
 @contextlib.contextmanager
-def on_the_lot(folder: Path, *, dialect: str, objects: str, **drives: str) -> Iterator[Any]:
-    """Yield the drive's process, its run's folder, and what the stand-in said in the end."""
+def on_the_lot(folder: Path, *, dialect: str, objects: str, pace: float) -> Iterator[Any]:
+    """Yield what the stand-in said in the end, the run's log, and how long somebody waited."""
     endpoint = free_endpoint()
     ros2, lot = folder / "car.toml", folder / "lot.toml"
     text = MAPPING.format(dialect=dialect, objects=objects, **WALKER)
@@ -57,18 +69,20 @@ def on_the_lot(folder: Path, *, dialect: str, objects: str, **drives: str) -> It
     flags = (*FLAGS, "--map", osm, "--ros2", str(ros2), "--anchor", str(lot))
     with (
         ZenohBus(BusSetup(endpoint=endpoint), router=True),
-        started(folder / "runs", *flags) as process,
+        started(folder / "runs", *flags, entry=FRESH, pace=pace) as process,
     ):
         wait_for(lambda: run_folder(folder / "runs") is not None, "the run's folder")
         run = run_folder(folder / "runs")
         assert run is not None
         wait_for(lambda: "both switches are on" in told(run), "the gateway")
-        words = ("--ros2", str(ros2), "--anchor", str(lot), "--end", drives.get("end", "25"))
-        command = [sys.executable, "-m", "foretwin", "standin", *words, "--json"]
-        car = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        words = ("--ros2", str(ros2), "--anchor", str(lot), "--end", f"{END_S:g}", "--json")
+        car = subprocess.Popen(
+            [sys.executable, "-P", "-m", "foretwin", "standin", *words],
+            stdout=subprocess.PIPE, text=True, env=environment(folder / "cache", pace=pace),
+        )  # fmt: skip
         try:
             with kept_waiting(process.pid, car.pid) as kept:
-                said, _ = car.communicate(timeout=60.0)
+                said, _ = car.communicate(timeout=DEADLINE_S + END_S / pace)
         finally:
             car.kill()
         yield json.loads(said), told(run), kept.seconds
@@ -78,33 +92,50 @@ def told(run: Path) -> str:
     return "\n".join(one["text"] for one in log_lines(run))
 
 
+DIALECTS = [("ros2dds", "PredictedObjects"), ("rmw_zenoh", "DetectedObjects")]
+
+
 @pytest.mark.judge
 @pytest.mark.real_data
-@pytest.mark.timeout(400)
-@pytest.mark.parametrize(
-    ("dialect", "objects"), [("ros2dds", "PredictedObjects"), ("rmw_zenoh", "DetectedObjects")]
-)
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(("dialect", "objects"), DIALECTS)
 def test_it_stands_before_a_pedestrian_whom_only_the_world_holds(
     tmp_path: Path, dialect: str, objects: str
 ) -> None:
-    """Anew where a busy machine halted somebody for 150 ms: that shuts the gate, rightly.
+    if not DATA:
+        pytest.skip("FORETWIN_DATA names no folder of real maps")
+    for pace in PACES:
+        folder = tmp_path / str(pace)
+        folder.mkdir()
+        with on_the_lot(folder, dialect=dialect, objects=objects, pace=pace) as (report, log, _):
+            print(dialect, pace, report)
+        # In the end it shuts in any case: the car's process ends before the drive.
+        if report["stood_before_m"] is not None or "vehicle: shut: " not in log:
+            break
+    assert report["brakes"] == ["pedestrian"], log
+    assert report["stood_before_m"] == pytest.approx(2.0, abs=1.0)
+    assert report["lists"] > 100
 
-    The latency runs from the stamp of the state that a list is of to the list's arrival.
+
+@pytest.mark.judge
+@pytest.mark.real_data
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize(("dialect", "objects"), DIALECTS)
+def test_lists_arrive_at_the_stack_within_50_ms(tmp_path: Path, dialect: str, objects: str) -> None:
+    """From the stamp of the state that a list is of to the list's arrival, by the world's time.
+
+    Anew where a busy machine kept somebody waiting.
     """
     if not DATA:
         pytest.skip("FORETWIN_DATA names no folder of real maps")
     for attempt in range(ATTEMPTS):
         folder = tmp_path / str(attempt)
         folder.mkdir()
-        with on_the_lot(folder, dialect=dialect, objects=objects) as (report, log, kept_s):
+        words: dict[str, Any] = {"dialect": dialect, "objects": objects, "pace": 1.0}
+        with on_the_lot(folder, **words) as (report, _, kept_s):
             print(dialect, report, f"kept waiting {kept_s:.2f} s")
-            # The gate shuts in the end in any case: the car's process ends before the drive.
-            shut = report["stood_before_m"] is None and "shut: " in log
-            late = report["latency_ms_p95"] is None or report["latency_ms_p95"] >= LATEST_MS
-            if (shut and kept_s > 1.0) or (late and kept_s > BUSY_S):
-                continue
-            assert report["latency_ms_p95"] < LATEST_MS
-            assert report["brakes"] == ["pedestrian"]
-            assert report["stood_before_m"] == pytest.approx(2.0, abs=1.0)
-            return
-    pytest.skip(f"in {ATTEMPTS} attempts the machine kept somebody waiting for over 150 ms")
+            late_ms = report["latency_ms_p95"]
+            if late_ms is not None and late_ms < LATEST_MS:
+                return
+            assert kept_s > BUSY_S
+    pytest.skip(f"in {ATTEMPTS} attempts the machine kept somebody waiting for {BUSY_S:g} s")
