@@ -7,7 +7,8 @@ import pytest
 from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.futures import Future
 from foretwin.sim_worker.engines.engine_stage import EngineStage
-from foretwin.sim_worker.futures.run_job import result_digest, run_alone, run_job
+from foretwin.sim_worker.futures.result_digest import result_digest
+from foretwin.sim_worker.futures.run_job import run_alone, run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, drive, seed, states
 from tests.sim_worker.hilly import hilly
