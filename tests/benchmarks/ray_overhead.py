@@ -32,7 +32,7 @@ from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
-from foretwin.sim_worker.seat import SeatSetup
+from foretwin.sim_worker.seat import SeatAnswer, SeatQuestion, SeatSetup
 from tests.benchmarks.canned_worker import ANSWER, answer_here
 from tests.benchmarks.measuring import Measurement, UnavailableError
 from tests.orchestrator.sweeps import alone, places_of, small_sweep
@@ -122,6 +122,13 @@ class _CannedWorkers:
         return self._launch(module="canned_worker", setup=setup)
 
 
+def _answer_of_nobody(
+    setup: bytes, question: SeatQuestion, world: bytes | None
+) -> tuple[str, SeatAnswer]:
+    """Answer as a seat does, with no node's id."""
+    return "", answer_here(setup, question, world)
+
+
 @contextlib.contextmanager
 def on_ray(folder: Path, setup: WorkerSetup) -> Iterator[Runner]:
     """Give a runner on a Ray of its own, with one seat that is canned."""
@@ -130,7 +137,7 @@ def on_ray(folder: Path, setup: WorkerSetup) -> Iterator[Runner]:
     with ray_cluster(seat, address=None, processors=1) as cluster:
         import ray
 
-        cluster._answer = ray.remote(num_cpus=1)(answer_here)
+        cluster._answer = ray.remote(num_cpus=1)(_answer_of_nobody)
         cluster._setup = ray.put(str(folder).encode())
         yield RayRunner(cluster, world_file=lambda _: world.read_bytes(), task_timeout_s=TIMEOUT_S)
 
