@@ -6,8 +6,6 @@ exponentially, as fast as between the two nearest to it.
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 import numpy as np
 
@@ -34,12 +32,6 @@ class ProgressForecast(msgspec.Struct, frozen=True, kw_only=True):
 
     def at(self, level: float) -> Array:
         """Return (T,) the distance that is not exceeded with this probability."""
-        if self.levels[0] <= level < self.levels[-1]:
-            # All instants at once, by the very formula of np.interp.
-            place = int(np.searchsorted(self.levels, level, side="right"))
-            low, high = self.levels[place - 1 : place + 1]
-            below, above = self.distance_m[:, place - 1], self.distance_m[:, place]
-            return np.asarray((above - below) / (high - low) * (level - low) + below)
         shares = np.full((len(self.time_s), 1), level)
         return value_at(self.levels, self.distance_m, shares)[:, 0]
 
@@ -98,17 +90,25 @@ def share_below(levels: Array, quantiles: Array, values: Array) -> Array:
 def value_at(levels: Array, quantiles: Array, shares: Array) -> Array:
     """Return the value below which `shares` (T, V) of each of T distributions lie.
 
-    Undoes `share_below`; shares lie between 0 and 1, exclusively.
+    Undoes `share_below`; shares lie between 0 and 1, exclusively. Between two levels it is
+    np.interp's formula, over all distributions at once.
     """
     levels = np.broadcast_to(levels, quantiles.shape)
-    found = np.empty(shares.shape)
-    for row, (level, quantile, share) in enumerate(zip(levels, quantiles, shares, strict=True)):
-        upper = _tail(1.0 - level[::-1], -quantile[::-1])
-        low, high = share < level[0], share > level[-1]
-        found[row] = np.interp(share, level, quantile)
-        found[row][low] = quantile[0] + _tail(level, quantile) * np.log(share[low] / level[0])
-        found[row][high] = quantile[-1] - upper * np.log((1.0 - share[high]) / (1.0 - level[-1]))
-    return found
+    last = levels.shape[1] - 1
+    place = (levels[:, None] <= shares[..., None]).sum(axis=2)
+    right = np.clip(place, 1, last)
+    low, high = (np.take_along_axis(levels, at, 1) for at in (right - 1, right))
+    below, above = (np.take_along_axis(quantiles, at, 1) for at in (right - 1, right))
+    found = (above - below) / (high - low) * (shares - low) + below
+    first, end = levels[:, :1], levels[:, -1:]
+    lower = _tail(levels, quantiles)[:, None] * np.log(shares / first)
+    upper = _tail(1.0 - levels[:, ::-1], -quantiles[:, ::-1])[:, None]
+    upper = upper * np.log((1.0 - shares) / (1.0 - end))
+    return np.select(
+        [shares < first, shares > end, place > last],
+        [quantiles[:, :1] + lower, quantiles[:, -1:] - upper, quantiles[:, -1:]],
+        found,
+    )
 
 
 def pinball(levels: Array, quantiles: Array, values: Array) -> Array:
@@ -120,6 +120,7 @@ def pinball(levels: Array, quantiles: Array, values: Array) -> Array:
     return np.asarray(np.where(over >= 0.0, levels * over, (levels - 1.0) * over))
 
 
-def _tail(level: Any, quantile: Any) -> float:
+def _tail(level: Array, quantile: Array) -> Array:
     """Return after how much of the value the share below falls by e, at the low end."""
-    return float((quantile[1] - quantile[0]) / np.log(level[1] / level[0]))
+    rise = quantile[..., 1] - quantile[..., 0]
+    return np.asarray(rise / np.log(level[..., 1] / level[..., 0]))

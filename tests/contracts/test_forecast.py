@@ -47,6 +47,9 @@ def test_a_level_is_the_same_to_the_last_bit_as_among_many_shares(level: float, 
 
     alone = value_at(LEVELS, distance_m, np.full((8, 1), level))[:, 0]
     assert forecast.at(level).tolist() == alone.tolist()
+    if LEVELS[0] <= level <= LEVELS[-1]:
+        between = [float(np.interp(level, LEVELS, row)) for row in distance_m]
+        assert alone.tolist() == between
 
 
 @given(share=st.floats(1e-6, 1.0 - 1e-6), width_m=st.floats(0.5, 80.0))
