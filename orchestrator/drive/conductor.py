@@ -262,7 +262,8 @@ class Conductor:
         if self.fleet.takes(process_id):
             self.fleet.alive(process_id, up=item.up)
         elif process_id != ORCHESTRATOR and not self.strangers.refuse(process_id, up=item.up):
-            self.alive |= {process_id: item.received_mono_ns * 1e-9} if item.up else {}
+            if item.up:
+                self.alive[process_id] = item.received_mono_ns * 1e-9
             (self._process_up if item.up else self.process_down)(process_id)
 
     def _process_up(self, process_id: str) -> None:

@@ -74,15 +74,18 @@ class MapMatcher:
 
     @property
     def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:
-        """What has been driven where cars may not drive, the present stretch included.
+        """What has been driven where cars may not drive, the present stretch included."""
+        present = self._present_stretch()
+        return (*self._stretches, *((present,) if present else ()))
+
+    def _present_stretch(self) -> OffRoadStretch | None:
+        """Return the stretch that is being driven.
 
         A turn into the other carriageway seems for some metres to be one in the road, back along
-        the first: what is that short, or was never sure, is no stretch.
+        the first: what is that short, or was never sure, is none.
         """
-        stretch = self._stretch
-        if stretch is None or not self._stretch_sure or stretch.length_m < _LEAST_STRETCH_M:
-            return tuple(self._stretches)
-        return (*self._stretches, stretch)
+        long = self._stretch is not None and self._stretch.length_m >= _LEAST_STRETCH_M
+        return self._stretch if long and self._stretch_sure else None
 
     def update(
         self, xy_m: Array, yaw_rad: float, yaw_valid: bool, speed_mps: float
@@ -176,8 +179,8 @@ class MapMatcher:
         )
 
     def _close_stretch(self) -> None:
-        for told in self.off_road_stretches[len(self._stretches) :]:
-            self._stretches.append(told)
+        if (ended := self._present_stretch()) is not None:
+            self._stretches.append(ended)
         self._stretch, self._stretch_sure = None, False
 
 

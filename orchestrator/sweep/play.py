@@ -60,12 +60,13 @@ def play(
         def fault(answer: Answer) -> str:
             due = at_work[answer.task.key]
             found = answer.failure if answer.garbled else fault_in(answer.message.part, due)
-            text = f"job {due.number}: worker {answer.worker_id} gave no part: {found}"
-            if found and answer.worker_id in told:
-                log.warning("%s", text)
-            elif found:
-                told.add(answer.worker_id)
-                say(f"{text}; more of its kind are in the log")
+            if found:
+                text = f"job {due.number}: worker {answer.worker_id} gave no part: {found}"
+                if answer.worker_id in told:
+                    log.warning("%s", text)
+                else:
+                    told.add(answer.worker_id)
+                    say(f"{text}; more of its kind are in the log")
             return found
 
         for answer in answers(runner, tasks(), fault_in=fault):

@@ -17,6 +17,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.tuning import SteeringMapBin
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.analysis.identify.acceptance import HALF_OF_95
 from foretwin.sim_worker.analysis.identify.regression import Fit, fit_linear
 from foretwin.sim_worker.analysis.identify.steering_signals import (
     ALIKE_S,
@@ -39,8 +40,8 @@ deviation. On centre it is a good part of the angle, and makes the ratio look to
 _PULL_STD_RAD_PER_MPS2 = 0.002
 """A driver corrects half a degree at the steering wheel for each m/s² without a thought."""
 _LAG_STD_S = 0.05
-_EVEN_STD, _STDS_OF_ALL = 12.0**-0.5, 1.96
-"""Of what is anything between 0 and 1, and how many of them a 95 % interval has on each side."""
+_EVEN_STD = 12.0**-0.5
+"""Standard deviation of what is anything between 0 and 1."""
 _BEND_STD_RAD, _BEND_S = 4e-4, 9.0
 """What a planar car leaves unexplained of the tyre angle in a bend, and the way to the next one:
 so little do a thousand instants of one bend tell."""
@@ -147,7 +148,7 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     # both alike, which bends that are equally tight take for ratio and understeer.
     more = signals.less_if_alike(values)
     alike = fitted(values, least_std=of_bends, brief=False, more=more).values - fit.values
-    half_widths = np.hypot(half_widths, _STDS_OF_ALL * _EVEN_STD * alike)
+    half_widths = np.hypot(half_widths, HALF_OF_95 * _EVEN_STD * alike)
     # The straights tell the offset, where tyres have nothing to be unexplained.
     straight = fitted(values, least_std=play, brief=True)
     values[Theta.OFFSET], half_widths[Theta.OFFSET] = (
