@@ -20,6 +20,7 @@ from foretwin.contracts.page_address import FRAMES_FILE, page_address, page_key
 from foretwin.contracts.ports import LOOPBACK, free_endpoint, free_port
 from foretwin.contracts.setup import BusSetup, CopilotSetup, write_setup
 from foretwin.viewer.copilot.frame import PageFrame
+from foretwin.viewer.copilot.server import CopilotServer, PageActions, page_app
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 
@@ -120,3 +121,22 @@ class DisplayRun:
             self.process.kill()
             self.process.wait()
         self.bus.close()
+
+
+@contextlib.contextmanager
+def served_page(
+    frame: Callable[[], bytes], *, plan: bytes | None = None
+) -> Generator[tuple[CopilotServer, str]]:
+    """Serve a page without a display's process: who sends its frames, and its address."""
+    actions = PageActions(frame_at=lambda _: frame(), plan_of=lambda _: plan, mark=lambda _: None)
+    port = free_port()
+    server = CopilotServer(
+        lambda feed: page_app("key", feed, actions, about={"attribution": "", "run": ""}),
+        host=LOOPBACK,
+        port=port,
+    )
+    server.start()
+    try:
+        yield server, page_address("key", port=port)
+    finally:
+        server.close(DEADLINE_S)

@@ -14,14 +14,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from foretwin.contracts.page_address import page_address
-from foretwin.contracts.ports import LOOPBACK, free_port
 from foretwin.contracts.simulation import ActiveWorld
 from foretwin.viewer.copilot.junction_plan import junction_plan
-from foretwin.viewer.copilot.server import CopilotServer, PageActions, page_app
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.copilot.chromium import Browser
+from tests.viewer.copilot.display import served_page
 from tests.viewer.copilot.test_now import Drive, a_round
 
 FRAME_S = 0.2
@@ -57,44 +55,36 @@ def measured(browser: Browser, *, count: int, rate_hz: float, looks: int) -> Ite
     """Show `count` frames, and look at the heap so many times in equal parts of them."""
     plan = msgspec.json.encode(junction_plan(scene.junction(), scene.DRIVE_FRAME))
     made, newest = frames(), [b"{}"]
-    actions = PageActions(frame_at=lambda _: newest[0], plan_of=lambda _: plan, mark=lambda _: None)
-    port = free_port()
-    server = CopilotServer(
-        lambda feed: page_app("key", feed, actions, about={"attribution": "", "run": ""}),
-        host=LOOPBACK,
-        port=port,
-    )
-    server.start()
     go, stop = threading.Event(), threading.Event()
+    with served_page(lambda: newest[0], plan=plan) as (server, address):
 
-    def feed() -> None:
-        go.wait()
-        for frame in made:
-            newest[0] = frame
-            server.publish(frame)
-            if stop.wait(1.0 / rate_hz):
-                return
+        def feed() -> None:
+            go.wait()
+            for frame in made:
+                newest[0] = frame
+                server.publish(frame)
+                if stop.wait(1.0 / rate_hz):
+                    return
 
-    feeding = threading.Thread(target=feed)
-    feeding.start()
-    server.publish(next(made))
-    try:
-        browser.do("open", url=page_address("key", port=port), size=(1024, 600))
-        browser.do("count_changes", selector="#marks")
-        begun_s = time.monotonic()
-        go.set()
-        for look in range(1, looks + 1):
-            deadline_s = time.monotonic() + DEADLINE_S + 3.0 * count / looks / rate_hz
-            while (shown := browser.do("changes")) < count * look // looks:
-                assert time.monotonic() < deadline_s, shown
-                time.sleep(0.2)
-            yield HeapSeen(shown, time.monotonic() - begun_s, browser.do("heap_mb"))
-        browser.do("close")
-    finally:
-        go.set()
-        stop.set()
-        feeding.join()
-        server.close(DEADLINE_S)
+        feeding = threading.Thread(target=feed)
+        feeding.start()
+        server.publish(next(made))
+        try:
+            browser.do("open", url=address, size=(1024, 600))
+            browser.do("count_changes", selector="#marks")
+            begun_s = time.monotonic()
+            go.set()
+            for look in range(1, looks + 1):
+                deadline_s = time.monotonic() + DEADLINE_S + 3.0 * count / looks / rate_hz
+                while (shown := browser.do("changes")) < count * look // looks:
+                    assert time.monotonic() < deadline_s, shown
+                    time.sleep(0.2)
+                yield HeapSeen(shown, time.monotonic() - begun_s, browser.do("heap_mb"))
+            browser.do("close")
+        finally:
+            go.set()
+            stop.set()
+            feeding.join()
 
 
 def main() -> None:

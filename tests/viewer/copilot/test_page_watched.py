@@ -19,17 +19,15 @@ from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
-from foretwin.contracts.page_address import page_address
-from foretwin.contracts.ports import LOOPBACK, free_endpoint, free_port
+from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import Event, RunEnd
 from foretwin.contracts.tuning import SetReply, SetRequest
 from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S
-from foretwin.viewer.copilot.server import CopilotServer, PageActions, page_app
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.copilot.chromium import Browser, judges_python
-from tests.viewer.copilot.display import RUN, DisplayRun
+from tests.viewer.copilot.display import RUN, DisplayRun, served_page
 from tests.viewer.copilot.page_heap import FRAMES_OF_AN_HOUR, measured
 from tests.viewer.copilot.test_alerts import gap, injection, worker
 from tests.viewer.copilot.test_now import AHEAD_OF_X1, Drive, a_round
@@ -129,41 +127,33 @@ def test_a_frame_that_waited_on_its_way_is_not_shown_as_current(browser: Browser
     drive.goes_on(4.0)
     drive.take("round", a_round())
     frame = msgspec.json.encode(drive.frame())
-    actions = PageActions(frame_at=lambda _: frame, plan_of=lambda _: None, mark=lambda _: None)
-    port = free_port()
-    server = CopilotServer(
-        lambda feed: page_app("key", feed, actions, about={"attribution": "", "run": ""}),
-        host=LOOPBACK,
-        port=port,
-    )
-    server.start()
     stop = threading.Event()
     late_s = 0.0
+    with served_page(lambda: frame) as (server, address):
 
-    def go_on() -> None:
-        while not stop.wait(0.1):
-            server.publish(frame, time.monotonic() - late_s)
+        def go_on() -> None:
+            while not stop.wait(0.1):
+                server.publish(frame, time.monotonic() - late_s)
 
-    feeding = threading.Thread(target=go_on)
-    feeding.start()
-    try:
-        browser.do("open", url=page_address("key", port=port), size=(1024, 600))
-        browser.do("wait", selector="body[data-level=danger][data-current=yes]")
-        late_s = 20.0
-        browser.do("wait", selector="body[data-level=none][data-current=no]")
-        browser.do("wait", selector="#alert:not([hidden])")
-        assert browser.do("text", selector="#danger") == "do not rely on this"
-        assert browser.do("text", selector="#alert-text") == "this display is 20 s behind"
-        late_s = 0.0
-        browser.do("wait", selector="body[data-level=danger][data-current=yes]")
-        assert browser.do("text", selector="#danger").startswith("car ")
-        stop.set()
-        browser.do("wait", selector="body[data-level=none][data-current=no]")
-        browser.do("close")
-    finally:
-        stop.set()
-        feeding.join()
-        server.close(DEADLINE_S)
+        feeding = threading.Thread(target=go_on)
+        feeding.start()
+        try:
+            browser.do("open", url=address, size=(1024, 600))
+            browser.do("wait", selector="body[data-level=danger][data-current=yes]")
+            late_s = 20.0
+            browser.do("wait", selector="body[data-level=none][data-current=no]")
+            browser.do("wait", selector="#alert:not([hidden])")
+            assert browser.do("text", selector="#danger") == "do not rely on this"
+            assert browser.do("text", selector="#alert-text") == "this display is 20 s behind"
+            late_s = 0.0
+            browser.do("wait", selector="body[data-level=danger][data-current=yes]")
+            assert browser.do("text", selector="#danger").startswith("car ")
+            stop.set()
+            browser.do("wait", selector="body[data-level=none][data-current=no]")
+            browser.do("close")
+        finally:
+            stop.set()
+            feeding.join()
 
 
 @pytest.mark.parametrize("operator", [True, False], ids=["operator", "another seat"])
