@@ -1,0 +1,47 @@
+"""The roads between two lanes, as a check of paths needs them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.drawn_maps import drawn_map, world_of
+from tests.world_gen.measure_turns import ALLOWED_RAD, turns_of
+from tests.world_gen.roads_driven import RoadsDriven
+
+ROAD = {"highway": "residential", "lanes": "2"}
+ASIDE = drawn_map(
+    {
+        1: (-80.0, -3.0), 7: (-5.0, -3.0), 2: (0.0, 0.0), 3: (0.0, 14.0), 4: (80.0, 14.0),
+        5: (0.0, -80.0), 6: (0.0, 90.0),
+    },
+    [(10, (1, 7, 2), ROAD), (20, (5, 2, 3, 6), ROAD), (30, (3, 4), ROAD)],
+)  # fmt: skip
+"""A crossing whose eastern arm lies 14 m north of its western one, which bends at the end."""
+
+
+def bearings_deg(start_way: int, end_way: int) -> list[float]:
+    world, roads = world_of(ASIDE), RoadsDriven(build_road_graph(ASIDE).edges)
+    lanes = {lane.id: lane for lane in world.lanes}
+    (one,) = (
+        c
+        for c in world.connections
+        if c.from_lane_id.startswith(f"w{start_way}.") and c.to_lane_id.startswith(f"w{end_way}.")
+    )
+    found = roads.directions(lanes[one.from_lane_id], lanes[one.to_lane_id])
+    return [round(math.degrees(math.atan2(north, east))) % 360 for east, north in found]
+
+
+def test_who_crosses_where_arms_lie_aside_drives_along_the_road_between() -> None:
+    assert bearings_deg(10, 30) == [0, 31, 90, 0]
+    assert bearings_deg(30, 10) == [180, 270, 211, 180]
+
+
+def test_such_a_turn_leaves_the_angle_of_its_lanes_and_not_that_of_its_roads() -> None:
+    turns = turns_of(world_of(ASIDE), RoadsDriven(build_road_graph(ASIDE).edges))
+    across = [t for t in turns if t.name.startswith("w10.") and ">w30." in t.name]
+
+    assert across[0].left_rad > ALLOWED_RAD
+    assert across[0].left_roads_rad == pytest.approx(0.0, abs=0.02)
