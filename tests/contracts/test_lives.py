@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,6 +20,15 @@ def test_a_process_comes_and_goes_under_its_own_key() -> None:
     assert lives.take(A0, up=True) == Word(W0, True)
     assert lives.take(A0, up=False) == Word(W0, False)
     assert lives.take(A0, up=False) is None
+
+
+def test_of_processes_that_are_gone_nothing_is_kept() -> None:
+    lives = Lives()
+    for number in range(10):
+        for up in (True, False):
+            lives.take(alive_key(run="r1", process=f"w{number}"), up=up)
+
+    assert pickle.dumps(lives) == pickle.dumps(Lives())
 
 
 def test_the_late_end_of_an_earlier_life_is_not_that_of_its_successor() -> None:

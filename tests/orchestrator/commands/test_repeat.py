@@ -173,6 +173,14 @@ def test_a_table_that_does_not_say_what_it_was_played_with_is_refused(
     assert f"{copied}/rows/job-0" in _said(capsys)
 
 
+def test_a_future_is_found_in_any_group_of_rows(copied: Path) -> None:
+    future = _rows(copied)[-1]["future_id"]
+    part = sorted((copied / "rows").glob("*.parquet"))[-1]
+    pq.write_table(pq.read_table(part), part, row_group_size=1)
+    assert pq.ParquetFile(part).num_row_groups > 1
+    assert run(["repeat", str(copied), future]) == 0
+
+
 def test_parts_of_other_jobs_stop_no_repeat(
     copied: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

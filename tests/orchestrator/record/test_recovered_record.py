@@ -184,3 +184,16 @@ def test_siblings_are_counted_from_their_table(tmp_path: Path) -> None:
     recover(run)
     told = record_of(run)["siblings"]
     assert (told["rounds"], told["with_reality"]) == (3, {"count": 3, "rank_correlation": -1.0})
+
+
+@pytest.mark.parametrize(("ran", "independent"), [((True, False), True), ((False, False), False)])
+def test_one_command_that_was_lost_does_not_make_a_twin_dependent(
+    tmp_path: Path, ran: tuple[bool, ...], independent: bool
+) -> None:
+    run = killed_run(tmp_path / "run")
+    streams = RunStreams(run / "results", {"mirror": TABLES["mirror"]})
+    streams.take("mirror", [{"independent": one} for one in ran])
+    streams.write(sync=True)
+    streams.close()
+    recover(run)
+    assert record_of(run)["comparison"]["independent"] is independent

@@ -204,9 +204,10 @@ def test_numbers_of_junctions_that_follow_closely_stand_above_each_other() -> No
         stamp_ns=stamps, time_s=time_s, lat_lon_deg=np.zeros((11, 2)), speed_mps=np.full(11, 10.0)
     )
 
-    drawn = drive_plot(track, [(2, 51.0), (1, 50.0), (3, 80.0)])
+    drawn = drive_plot(track, [(2, 51.0), (1, 50.0), (3, 80.0), (4, 52.0)])
 
     texts = [one for one in drawn.renderers if one.glyph.__class__.__name__ == "Text"]
     heights = {one.data_source.data["text"][0]: one.data_source.data["y"][0] for one in texts}
     assert heights[" 1"] == heights[" 3"] == 0.0
     assert heights[" 2"] > 3.0
+    assert heights[" 4"] == 2.0 * heights[" 2"]

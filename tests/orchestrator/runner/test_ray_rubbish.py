@@ -55,3 +55,17 @@ def test_a_refusal_in_words_is_an_answer() -> None:
 
     assert answer is not None
     assert not answer.garbled
+
+
+def test_of_a_thousand_tasks_it_is_known_who_answered_and_of_older_ones_not() -> None:
+    cluster = OneByOne()
+    runner = on(cluster)
+    for key in ("older", "old", *(f"{number}" for number in range(1023))):
+        runner.submit(task(key))
+        cluster.end()
+        assert runner.take() is not None
+
+    for key in ("older", "old"):
+        runner.submit(task(key))
+
+    assert cluster.away_from[-2:] == [set(), {"n1"}]

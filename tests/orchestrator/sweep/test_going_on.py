@@ -129,9 +129,19 @@ class Garbage(InProcessRunner):
         if answer.task.key in self._given and not self.always:
             return answer
         self._given.add(answer.task.key)
+        return self._garbage(answer)
+
+    def _garbage(self, answer: Answer) -> Answer:
         cut = {name: data[:-9] for name, data in answer.message.part.tables.items()}
         part = msgspec.structs.replace(answer.message.part, tables=cut)
         return answer._replace(message=JobAnswer(part=part))
+
+
+class NoMessages(Garbage):
+    """Gives bytes at first that are no answer at all."""
+
+    def _garbage(self, answer: Answer) -> Answer:
+        return answer._replace(message=None, failure="Refused: job of w0: no", garbled=True)
 
 
 def test_garbage_of_a_seat_is_told_and_played_again(
@@ -152,6 +162,16 @@ def test_garbage_of_a_seat_is_told_and_played_again(
     lost = run_sweep(loaded, tmp_path / "lost", Garbage(worker_setup(loaded, out)))
     assert lost["failed"] == lost["rows"] == summary["rows"]
     assert played(loaded, tmp_path / "lost")["rows_sha256"] == summary["rows_sha256"]
+
+
+def test_bytes_that_are_no_answer_are_told_and_the_job_is_played_again(
+    two_worlds: tuple[Loaded, Path, dict[str, Any]], tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    loaded, _, summary = two_worlds
+    again = run_sweep(loaded, tmp_path / "out", NoMessages(worker_setup(loaded, tmp_path / "out")))
+    assert (again["failed"], again["rows_sha256"]) == (0, summary["rows_sha256"])
+    assert "job 0: worker w0 gave no part: Refused: job of w0: no" in capsys.readouterr().err
 
 
 def test_a_full_disk_loses_nothing_that_is_done(

@@ -130,6 +130,17 @@ def test_a_summary_counts_by_the_limits_of_the_alarms(
         assert part in line
 
 
+def test_runs_by_estimated_commands_are_counted_one_by_one(tmp_path: Path) -> None:
+    estimated = gap(9.0, independent=False)
+    told = Kept(tmp_path, TuneReply(gaps=(gap(0.3), estimated, estimated))).record["gap"]
+    assert (told["samples"], told["without_commands"], told["independent"]) == (1, 2, True)
+
+
+def test_a_drive_without_any_run_had_none_by_estimated_commands(tmp_path: Path) -> None:
+    told = Kept(tmp_path).record["gap"]
+    assert (told["samples"], told["without_commands"], told["independent"]) == (0, 0, True)
+
+
 def test_a_value_that_the_vehicle_file_leaves_open_is_no_other_car(tmp_path: Path) -> None:
     """The bundled stand-in as it is identified: nothing in it contradicts the twin's own file."""
     standin = {

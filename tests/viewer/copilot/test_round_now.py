@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import msgspec
+import numpy as np
 import pytest
 
+from foretwin.contracts.simulation import ActiveWorld
 from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S
 from tests.viewer.copilot.test_now import Drive, a_round
-from tests.viewer.scene import state_at
+from tests.viewer.scene import WORLD_ID, state_at
 
 
 def test_a_round_ages_and_is_gone_when_none_follows() -> None:
@@ -58,3 +61,25 @@ def test_a_cars_clock_that_leaps_back_does_not_make_a_round_young_again() -> Non
     drive.now_s = 6.0
     drive.take("state", state_at(1.0))
     assert drive.frame().round_age_s == pytest.approx(2.0)
+
+
+def test_a_round_without_dangers_is_calm_and_an_old_one_says_so() -> None:
+    drive = Drive()
+    drive.goes_on(6.0)
+    harmless = np.zeros(3, dtype=np.float32)
+    drive.take("round", msgspec.structs.replace(a_round(5.0), criticality=harmless))
+    assert drive.frame().level == "calm"
+    assert "no danger found · " in drive.frame().sentence
+    drive.take("round", msgspec.structs.replace(a_round(4.0), criticality=harmless))
+    assert drive.frame().level == "calm"
+    assert "no danger found 2 s ago · " in drive.frame().sentence
+
+
+def test_where_no_world_counts_any_more_no_round_is_shown() -> None:
+    drive = Drive()
+    drive.goes_on(4.0)
+    drive.take("round", a_round())
+    drive.take("active_world", ActiveWorld(stamp_ns=1, world_id=WORLD_ID))
+    assert drive.frame().level == "danger"
+    drive.take("active_world", ActiveWorld(stamp_ns=2, world_id=None))
+    assert (drive.frame().danger, drive.frame().level) == (None, "none")

@@ -44,6 +44,7 @@ def test_positions_of_a_clock_read_a_thousand_times_too_slowly_tell_no_motion() 
 
     assert motion_of(time_s, xy_m) is not None
     assert motion_of(time_s * 100.0, xy_m * 100.0) is not None
+    assert motion_of(time_s * 250.0, xy_m * 250.0) is None  # 25 s apart
     # Smoothing them over 400 s on a grid of 50 ms would take most of a minute.
     assert motion_of(time_s * 1000.0, xy_m * 1000.0) is None
 
