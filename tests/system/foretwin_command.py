@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import pyarrow.parquet as pq
 
+from foretwin.orchestrator.record.table_stream import StreamReader
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.log_lines import read_log
 from tests.system.warm_command import WarmCommand
@@ -117,6 +118,12 @@ def log_lines(run: Path) -> list[dict[str, Any]]:
     """Return the lines of the run's log that are there so far."""
     file = run / "log.jsonl"
     return read_log(file).lines if file.exists() else []
+
+
+def rows_so_far(run: Path, table: str) -> int:
+    """Return how many rows a table of a drive that goes on has; its file is there before them."""
+    stream = run / "results" / f"{table}.arrows"
+    return sum(part.num_rows for part in StreamReader(stream).records()) if stream.exists() else 0
 
 
 def child_pids(run: Path) -> dict[str, int]:

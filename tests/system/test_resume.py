@@ -26,6 +26,7 @@ from tests.system.foretwin_command import (
     is_running,
     log_lines,
     orchestrator_pid,
+    rows_so_far,
     run_folder,
     started,
     wait_for,
@@ -161,7 +162,7 @@ def test_in_lock_step_a_kill_changes_no_bit(tmp_path: Path) -> None:
     with started(out, *SMALL) as process:
         run = begun(out)
         wait_for(lambda: says(run, "loaded by w0"), "the first world")
-        wait_for(lambda: (run / "results" / "rounds.arrows").exists(), "the first rows")
+        wait_for(lambda: rows_so_far(run, "rounds") > 0, "the first rows")
         os.kill(orchestrator_pid(run), signal.SIGKILL)
         screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
     killed = Finished(process.returncode, screen, run)
