@@ -89,7 +89,8 @@ def _tuning() -> CheckResult:
     from foretwin.orchestrator.config import DriveConfig
 
     choice = DriveConfig().tuning_choice
-    return CheckResult("tuning", "note" if choice.mode == "off" else "ok", choice.text)
+    text = f"{choice.mode}; {choice.why}"
+    return CheckResult("tuning", "note" if choice.mode == "off" else "ok", text)
 
 
 def _packages() -> CheckResult:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -28,6 +29,9 @@ from foretwin.world_gen.report.values import SubjectReport, Value, subject_repor
 CROSSING_REACH_M = 40.0
 """A crossing counts for the nearest junction within this."""
 _FROM_LEFT: tuple[Turn, ...] = ("u_turn", "left", "straight", "right")
+_WINDS = (
+    "east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east",
+)  # fmt: skip
 _MPS_TO_KMPH = 3.6
 _RULES: Mapping[YieldRule, str] = {
     "stop": "stop sign",
@@ -76,6 +80,12 @@ class Neighbourhood:
         """Return what to call the road of a lane."""
         lane = self.lanes[lane_id]
         return _called(lane.name, lane.osm_way, self.roads.get(lane.road_id))
+
+    def comes_from(self, lane_id: str) -> str:
+        """Return the wind from which a lane comes to its end: "west" of one that goes east."""
+        (x_m, y_m), (end_x_m, end_y_m) = np.asarray(self.lanes[lane_id].centerline)[-2:, :2]
+        turns = math.atan2(y_m - end_y_m, x_m - end_x_m) / math.tau
+        return _WINDS[round(turns * len(_WINDS)) % len(_WINDS)]
 
 
 def _called(name: str, osm_way: int, road: Road | None) -> str:
@@ -207,9 +217,15 @@ def _signals(at: Neighbourhood, junction: WorldJunction, heads: Iterable[Signal]
 
 
 def _right_of_way(at: Neighbourhood, conflict: Conflict) -> Value:
-    waits, goes = at.connections[conflict.yields_id], at.connections[conflict.goes_id]
-    words = f"waits for {at.road_name(goes.from_lane_id)} ({_RULES[conflict.rule]})"
-    return Value(at.road_name(waits.from_lane_id), words, conflict.source)
+    waits, goes = (
+        at.connections[one].from_lane_id for one in (conflict.yields_id, conflict.goes_id)
+    )
+    who, whom = at.road_name(waits), at.road_name(goes)
+    if who == whom:
+        who, whom = (f"{who} from the {at.comes_from(one)}" for one in (waits, goes))
+    if who == whom:
+        whom = "the lane beside"
+    return Value(who, f"waits for {whom} ({_RULES[conflict.rule]})", conflict.source)
 
 
 def _crossings(crossings: Iterable[Crossing]) -> list[Value]:

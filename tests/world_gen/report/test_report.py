@@ -10,7 +10,15 @@ import pytest
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.report.report import JunctionReport, note_kind, report_of
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
-from tests.world_gen.drawn_maps import crossing, roundabout, world_of
+from tests.world_gen.drawn_maps import (
+    AVENUE,
+    CROSS,
+    STREET,
+    crossing,
+    drawn_map,
+    roundabout,
+    world_of,
+)
 
 COVERS = (
     "foretwin.world_gen.report.subjects",
@@ -74,6 +82,28 @@ def test_who_waits_for_whom_is_told(junction):
     assert any(
         words.startswith(("Street: waits for", "Avenue: waits for")) for words in rules.guessed
     )
+
+
+def _who_waits(world: World) -> str:
+    return "\n".join(_subject(report_of(world).junctions[0], "right of way").guessed)
+
+
+def test_roads_of_one_name_are_told_apart_by_where_they_come_from():
+    rules = _who_waits(world_of(crossing(street=STREET, avenue=STREET)))
+    assert "Street from the east: waits for Street from the north (who comes from the" in rules
+    assert "Street from the north: waits for Street from the west (who comes from the" in rules
+    assert "Street from the south: waits for Street from the north (turns across" in rules
+    assert "waits for Street (" not in rules
+
+
+def test_lanes_of_one_road_that_merge_wait_for_the_lane_beside():
+    ways = [
+        (11, [3, 0], {**STREET, "oneway": "yes", "lanes": "2", "turn:lanes": "through|through"}),
+        (12, [0, 1], {**STREET, "oneway": "yes", "lanes": "1"}),
+        (13, [0, 2], {**AVENUE, "oneway": "yes"}),
+    ]
+    words = "Street from the west: waits for the lane beside (merging lanes)"
+    assert words in _who_waits(world_of(drawn_map(CROSS, ways)))
 
 
 def test_confidence_is_the_stated_formula(world, junction):
