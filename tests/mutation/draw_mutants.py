@@ -125,7 +125,8 @@ def _named_numbers(tree: ast.Module) -> dict[tuple[int, int], Any]:
     found = {}
     for node in tree.body:
         targets = [node.target] if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [])
-        if targets and all(isinstance(one, ast.Name) and one.id.isupper() for one in targets):
+        names = [name for one in targets for name in getattr(one, "elts", [one])]  # A, B = 1, 2
+        if names and all(isinstance(one, ast.Name) and one.id.isupper() for one in names):
             for one in ast.walk(node):
                 if isinstance(one, ast.Constant) and type(one.value) in (int, float):
                     found[(one.lineno, one.col_offset)] = one
