@@ -59,8 +59,8 @@ def fields_of(kind: type[msgspec.Struct]) -> tuple[FieldWords, ...]:
     words = []
     for field in found.fields:
         default = field.default
-        if field.default_factory is not msgspec.NODEFAULT and field.default_factory is not None:
-            default = field.default_factory() if callable(field.default_factory) else None
+        if callable(field.default_factory):  # else there is none
+            default = field.default_factory()
         words.append(
             FieldWords(
                 name=field.encode_name,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
-from foretwin.contracts.frames import LocalFrame, local_pose
+from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.telemetry.ros2.virtual_objects import moved
 from foretwin.telemetry.ros_messages.shapes import uuid_from
 
@@ -91,7 +91,7 @@ class Injected:
 
 def _is_within(seen: RoadUser, shown: RoadUser) -> bool:
     """Whether the middle of what is seen lies in the outline of what was shown, or nearly."""
-    x_m, y_m, _ = local_pose(LocalFrame(shown.position), seen.position, 0.0)
+    x_m, y_m = _place(seen, shown)
     cos, sin = math.cos(shown.yaw_rad), math.sin(shown.yaw_rad)
     ahead_m, aside_m = abs(cos * x_m + sin * y_m), abs(cos * y_m - sin * x_m)
     return (
@@ -104,8 +104,14 @@ def _is_same(seen: RoadUser, shown: RoadUser) -> bool:
     sizes_m = (seen.length_m - shown.length_m, seen.width_m - shown.width_m)
     if max(map(abs, sizes_m)) > _SAME_SIZE_M:
         return False
-    x_m, y_m, _ = local_pose(LocalFrame(shown.position), seen.position, 0.0)
+    x_m, y_m = _place(seen, shown)
     return (
         abs(seen.speed_mps - shown.speed_mps) <= _SAME_SPEED_MPS
         and x_m * x_m + y_m * y_m <= _SAME_PLACE_M**2
     )
+
+
+def _place(seen: RoadUser, shown: RoadUser) -> tuple[float, float]:
+    at = seen.position
+    x_m, y_m = local_from_geo(LocalFrame(shown.position), at.lat_deg, at.lon_deg).tolist()
+    return x_m, y_m

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.anchor import Anchor, AnchorPose
+from foretwin.contracts.anchor import Anchor, AnchorLine, AnchorPose
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_pose
 
 LOT = AnchorPose(lat_deg=48.19, lon_deg=16.37, alt_m=170.0, yaw_deg=25.0)
@@ -82,3 +82,36 @@ def test_left_stays_left_unless_it_is_mirrored(mirrored, left_m):
 def test_a_scale_of_no_vehicle_is_refused(scale):
     with pytest.raises(ValueError, match="scale"):
         Anchor(lot=LOT, world=WORLD, scale=scale).validate()
+
+
+@given(anchor=anchors, places=st.lists(st.tuples(metres, metres, angles), min_size=1, max_size=4))
+def test_a_line_goes_where_each_of_its_points_goes(anchor: Anchor, places):
+    points = [on_lot(x_m, y_m) for x_m, y_m, _ in places]
+    line = AnchorLine(
+        np.array([one.lat_deg for one in points]),
+        np.array([one.lon_deg for one in points]),
+        np.array([yaw_rad for *_, yaw_rad in places]),
+    )
+    there = anchor.world_from_lot_line(line)
+    for number, (point, yaw_rad) in enumerate(zip(points, line.yaw_rad.tolist(), strict=True)):
+        position, yaw = anchor.world_from_lot(point, yaw_rad)
+        assert there.lat_deg[number] == pytest.approx(position.lat_deg, abs=1e-9)
+        assert there.lon_deg[number] == pytest.approx(position.lon_deg, abs=1e-9)
+        assert math.cos(there.yaw_rad[number] - yaw) == pytest.approx(1.0, abs=1e-9)
+    back = anchor.lot_from_world_line(there)
+    assert back.lat_deg == pytest.approx(line.lat_deg, abs=1e-9)
+    assert np.cos(back.yaw_rad - line.yaw_rad) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("lat_deg", "lon_deg"),
+    [(90.0, 0.0), (-90.0, 0.0), (0.0, 180.5), (0.0, -180.5), (math.nan, 0.0)],
+)
+def test_a_point_that_is_none_of_the_earth_is_refused(lat_deg, lon_deg):
+    with pytest.raises(ValueError, match="lat_deg, lon_deg"):
+        AnchorPose(lat_deg=lat_deg, lon_deg=lon_deg, yaw_deg=0.0).validate()
+
+
+def test_the_edges_of_the_map_are_points():
+    for lon_deg in (-180.0, 180.0):
+        AnchorPose(lat_deg=89.9, lon_deg=lon_deg, yaw_deg=0.0).validate()

@@ -49,6 +49,7 @@ def test_fields_are_said_as_their_file_calls_them() -> None:
     assert by_name["spokes"].kind == "table of number"
     assert by_name["wide"].shown_default == "true"
     assert by_name["hub"].shown_default == ""
+    assert by_name["spokes"].shown_default == "{}"
 
 
 def test_a_type_names_the_tables_in_it() -> None:

@@ -14,6 +14,12 @@ from foretwin.contracts.local_bus import make_local_bus, member_of, private_file
 MEMBERS = (member_of("worker", "w0"), member_of("orchestrator", "orchestrator"))
 
 
+def open_below(folder: Path) -> list[Path]:
+    """Return the files below a folder that this process has open, removed ones too."""
+    files = [Path(os.path.realpath(one)) for one in Path("/proc/self/fd").iterdir()]
+    return [file for file in files if file.is_relative_to(folder)]
+
+
 def test_members_meet_on_a_socket_that_nobody_else_can_open(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -29,8 +35,10 @@ def test_members_meet_on_a_socket_that_nobody_else_can_open(
         for one in MEMBERS:
             with ZenohBus(local.setup_of(one.name)) as bus:
                 assert bus.connected
+    assert open_below(local.folder)
     local.remove()
     assert not local.folder.exists()
+    assert not open_below(local.folder)
 
 
 def test_where_there_can_be_no_socket_it_says_why_and_is_on_the_loopback(

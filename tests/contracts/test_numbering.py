@@ -53,6 +53,13 @@ def test_the_first_two_may_come_in_the_other_order() -> None:
     assert (numbers.missing["imu"], numbers.published["imu"], numbers.doubled) == (0, 10, 0)
 
 
+def test_a_first_message_that_comes_twice_leaves_no_hole() -> None:
+    first, *rest = numbered(10, start=5_000, sender=7)
+    numbers = heard([first, first, *rest])
+    (stream,) = numbers.streams.values()
+    assert (numbers.doubled, stream.holes) == (1, [])
+
+
 @pytest.mark.parametrize("senders", [(0, 0), (7, 8)])
 def test_a_sender_that_begins_anew_costs_nothing_and_its_first_ones_are_missed(
     senders: tuple[int, int],

@@ -10,7 +10,9 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.ports import (
     LOOPBACK,
     free_endpoint,
+    free_or,
     free_port,
+    listen_place,
     metrics_place,
     tcp_place,
     tls_place,
@@ -32,10 +34,22 @@ def test_a_free_port_can_be_listened_on_and_is_none_that_connections_are_given()
     assert free_endpoint().startswith("tcp/127.0.0.1:")
 
 
+def test_a_port_is_free_again_as_soon_as_nobody_listens_there() -> None:
+    with socket.create_server((LOOPBACK, 0)) as listener:
+        port = listener.getsockname()[1]
+        assert free_or(port) != port
+        with socket.create_connection((LOOPBACK, port)) as client:
+            served, _ = listener.accept()
+            served.close()  # the first to close: the port stays in TIME_WAIT
+            assert client.recv(1) == b""
+    assert free_or(port) == port
+
+
 @pytest.mark.parametrize(
     "endpoint",
     [
         "tcp/127.0.0.1:7447",
+        "tcp/127.0.0.1:65535",
         "tcp/[::1]:7447",
         "quic/car.local:1?rel=1#a=b",
         "unixsock-stream/a.sock",
@@ -50,6 +64,7 @@ def test_endpoints_of_zenoh_are_taken(endpoint: str) -> None:
     [
         ("foo", "PROTOCOL/ADDRESS, such as tcp/127.0.0.1:7447"),
         ("tcp/127.0.0.1:99999", "tcp/HOST:PORT with a port of 1 to 65535"),
+        ("tcp/127.0.0.1:65536", "tcp/HOST:PORT with a port of 1 to 65535"),
         ("tcp/127.0.0.1:0", "tcp/HOST:PORT with a port of 1 to 65535"),
         ("udp/car", "udp/HOST:PORT with a port of 1 to 65535"),
     ],
@@ -115,3 +130,14 @@ def test_metrics_are_told_on_the_loopback_interface_unless_a_host_is_named() -> 
 def test_what_is_no_place_for_metrics_is_told(text: str) -> None:
     with pytest.raises(UserError, match="must be a port from 1 to 65535, or HOST:PORT"):
         metrics_place(text)
+
+
+def test_whoever_lets_others_join_names_host_and_port() -> None:
+    assert listen_place("car.local:1") == ("car.local", 1)
+    assert listen_place("[::1]:65535") == ("::1", 65535)
+
+
+@pytest.mark.parametrize("text", ["", "7447", "car.local:0", "car.local:65536", "car.local:99999"])
+def test_what_is_no_place_to_listen_at_is_told(text: str) -> None:
+    with pytest.raises(UserError, match="must be HOST:PORT with a port of 1 to 65535"):
+        listen_place(text)

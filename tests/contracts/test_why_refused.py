@@ -80,6 +80,13 @@ def test_a_host_that_the_router_does_not_stand_for(campaigns: Path, endpoint: st
     )
 
 
+def test_a_certificate_that_is_gone(campaigns: Path, endpoint: str, tmp_path: Path) -> None:
+    shutil.copytree(campaigns / "ours", tmp_path / "gone")
+    tls = role_files(tmp_path / "gone", "car")
+    Path(tls.key).unlink()
+    assert cause(endpoint, tls) == f"[Errno 2] No such file or directory: '{tls.key}'"
+
+
 def test_nobody_there_and_somebody_who_speaks_no_tls(campaigns: Path) -> None:
     tls, port = role_files(campaigns / "ours", "car"), free_port()
     assert f"nobody listens at localhost:{port}" in cause(f"tls/localhost:{port}", tls)

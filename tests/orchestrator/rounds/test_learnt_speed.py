@@ -37,6 +37,14 @@ def test_a_forecast_of_the_same_changes_nothing() -> None:
 
 
 @given(accel=st.floats(-1.0, 1.0))
+def test_a_forecast_of_the_same_acceleration_changes_nothing(accel: float) -> None:
+    braking_or_not = 9.0 + accel * 0.5 * np.arange(17)
+    learnt = forecast(9.0 * TIMES_S + 0.5 * accel * TIMES_S**2)
+
+    np.testing.assert_allclose(partly_learnt(braking_or_not, learnt), braking_or_not, atol=1e-9)
+
+
+@given(accel=st.floats(-1.0, 1.0))
 def test_half_of_a_learnt_acceleration_counts(accel: float) -> None:
     learnt = forecast(9.0 * TIMES_S + 0.5 * accel * TIMES_S**2)
     found = partly_learnt(STEADY, learnt)

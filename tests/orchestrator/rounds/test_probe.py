@@ -42,3 +42,10 @@ def test_a_probe_holds_faults_scenarios_and_road_users(tmp_path: Path, which: in
 def test_where_nothing_can_be_driven_there_is_none(tmp_path: Path) -> None:
     bare = msgspec.structs.replace(crossroads(), connections=())
     assert probe_task(town_plan(tmp_path).config, bare, CAR, 0) is None
+
+
+def test_a_way_that_leads_out_of_the_world_is_none(tmp_path: Path) -> None:
+    config, world = town_plan(tmp_path).config, crossroads()
+    cut = tuple(lane for lane in world.lanes if lane.id.startswith("from_"))
+    assert probe_task(config, world, CAR, 0) is not None
+    assert probe_task(config, msgspec.structs.replace(world, lanes=cut), CAR, 0) is None

@@ -231,3 +231,15 @@ def test_a_way_on_the_lanes_is_not_counted_as_off_them(tmp_path: Path) -> None:
     house.work()
     house.end()
     assert house.conductor.rounds.futures.off_lanes_rounds == 0
+
+
+def test_forecasts_are_held_against_how_far_the_car_got(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.work()
+    house.drive(60)
+    house.end()
+    rows = pq.read_table(house.plan.folder / "results" / "forecasts.parquet").to_pylist()
+    assert {row["round_id"] for row in rows} == {0}
+    assert len(rows) == house.conductor.rounds.forecast_count.rows.count

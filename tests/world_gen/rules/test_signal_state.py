@@ -17,6 +17,7 @@ from foretwin.world_gen.rules.signal_state import (
 )
 from tests.world_gen.drawn_maps import crossing, world_of
 
+COVERS = ("foretwin.contracts.signals",)
 PLAN = SignalPlan(
     groups=(
         SignalGroup(id="w", connection_ids=("1",)),
