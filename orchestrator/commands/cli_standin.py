@@ -14,7 +14,10 @@ from foretwin.orchestrator.commands.told import CommandResult, told
 @told
 def anchor(
     map_file: MapArgument,
-    at: Annotated[str, typer.Option(help="LAT,LON: on the lane, near a junction")],
+    at: Annotated[str | None, typer.Option(help="LAT,LON: on the lane, near a junction")] = None,
+    lane: Annotated[
+        str | None, typer.Option(help="the lane's id, which --at tells, as w10012.41.44.f0")
+    ] = None,
     before_m: Annotated[
         float, typer.Option("--before", help="metres before the lane's end")
     ] = 60.0,
@@ -22,10 +25,11 @@ def anchor(
     """Print where a lot can be anchored: poses on lanes, as the [world] of an anchor file.
 
     Example: foretwin anchor MAP.osm --at 52.5127,13.3914
+    Example: foretwin anchor MAP.osm --lane w10012.41.44.f0 --before 30
     """
     from foretwin.orchestrator.commands.anchor import show_anchors
 
-    return show_anchors(map_file, at=at, before_m=before_m)
+    return show_anchors(map_file, at=at, lane_id=lane, before_m=before_m)
 
 
 @told
