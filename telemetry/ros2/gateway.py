@@ -28,6 +28,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.ros2.cadence import Cadence
 from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.gated_sender import GatedSender
+from foretwin.telemetry.ros2.injected import how_shown
 from foretwin.telemetry.ros2.injection import InjectionWord
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
@@ -107,8 +108,7 @@ class Gateway:
         named, alt_m = mapping.mirrored, self._out.ground_alt_m
         self._mirrored = MirroredObjects(named, car=car, drive_frame=drive_frame, alt_m=alt_m)
         self._diagnostics, self._due = DiagnosticLevels(), Cadence(mono_ns).due
-        self._merged = MergedObjects(mapping.merged, frame=drive_frame)
-        self._inbox = Mailbox(2048)
+        self._merged, self._inbox = MergedObjects(mapping.merged, frame=drive_frame), Mailbox(2048)
         self._views, self._clouds = (Mailbox(n, nudges=self._inbox) for n in (256, _CLOUDS))
         self._orders: Orders | None = None
         self._logged_gate = self.gate.state
@@ -270,7 +270,7 @@ class Gateway:
         def payload(row: OutRow) -> bytes:
             meant = without_own_twin(known) if row.towards_vehicle else known
             if row.towards_vehicle:
-                self.inwards.injected.note(self._out.on_lot(meant))
+                self.inwards.injected.note(self._out.on_lot(meant), how=how_shown(row.type))
             return self._out.objects(meant, row.type)
 
         self._send(self._out.rows("virtual_objects"), payload)
@@ -287,7 +287,7 @@ class Gateway:
         def payload(row: OutRow) -> bytes:
             virtual = without_own_twin(self._virtual.at(real.stamp_ns, now_ns=self._mono_ns()))
             one = self._merged.merged(real, virtual, self.inwards.objects)
-            self.inwards.injected.note(self._out.on_lot(one.virtual))
+            self.inwards.injected.note(self._out.on_lot(one.virtual), how=how_shown(row.type))
             return self._out.merged(one, row.type)
 
         self._send(self._out.rows("merged_objects"), payload)

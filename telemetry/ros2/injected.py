@@ -4,28 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from msgspec.structs import replace
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.telemetry.ros2.virtual_objects import moved
+from foretwin.telemetry.ros_messages.parts import DETECTED_OBJECTS
 from foretwin.telemetry.ros_messages.shapes import uuid_from
 
 _MOST = 4096
 """So many are remembered, the newest."""
 _REMEMBERED_NS = 2_000_000_000
-"""So long one is looked for by its place, where a list says no ids: perception holds a track of
-what it does not see any more about as long."""
+"""So long one is looked for by its place: perception holds a track of what it does not see any more
+about as long."""
 _SAME_PLACE_M, _SAME_SIZE_M, _SAME_SPEED_MPS = 0.5, 0.01, 0.1
 _MOST_CLOUDS = 64
+
+How = Literal["named", "nameless", "measured"]
+"""In a list with ids, in one without, or by what a sensor would have measured."""
+_VAGUER: tuple[How, ...] = ("named", "nameless", "measured")
+
+
+def how_shown(list_type: str) -> How:
+    """Return how road users are shown in a list of that ROS type."""
+    return "nameless" if list_type == DETECTED_OBJECTS else "named"
 
 
 class _Shown(NamedTuple):
     stamp_ns: int
     user: RoadUser
-    measured: bool
+    how: How
 
 
 class Injected:
@@ -38,7 +48,7 @@ class Injected:
 
     def note_measured(self, sent_stamp_ns: int, within: RoadUsers) -> None:
         """Take a cloud or a radar's list that goes out, and who is in it."""
-        self.note(within, measured=True)
+        self.note(within, how="measured")
         self._clouds[sent_stamp_ns] = None
         if len(self._clouds) > _MOST_CLOUDS:
             del self._clouds[next(iter(self._clouds))]
@@ -47,8 +57,8 @@ class Injected:
         """Whether a cloud comes back: stacks keep the stamp, whatever they do with the points."""
         return stamp_ns in self._clouds
 
-    def note(self, sent: RoadUsers, *, measured: bool = False) -> None:
-        """Take what goes out."""
+    def note(self, sent: RoadUsers, *, how: How = "named") -> None:
+        """Take what goes out; who went out in several ways is looked for as in the vaguest."""
         for user in sent.users:
             if not user.virtual:
                 continue
@@ -56,8 +66,8 @@ class Injected:
                 uuid = bytes(uuid_from(user).uuid).hex()
                 self._uuids[user.user_id] = uuid
             before = self._shown.pop(uuid, None)
-            measured = measured or (before is not None and before.measured)
-            self._shown[uuid] = _Shown(sent.stamp_ns, user, measured)
+            vaguest = how if before is None else max(how, before.how, key=_VAGUER.index)
+            self._shown[uuid] = _Shown(sent.stamp_ns, user, vaguest)
             if len(self._shown) > _MOST:
                 gone = self._shown.pop(next(iter(self._shown)))
                 self._uuids.pop(gone.user.user_id, None)
@@ -65,9 +75,10 @@ class Injected:
     def without(self, seen: RoadUsers) -> RoadUsers:
         """Return what the car sees that was not shown to it.
 
-        It is known by its UUID; in a list without ids, whose own are numbers, by its place at that
-        time, size and speed. Whoever was shown as points gets its id and size from the stack's own
-        perception: it is known by where it is, and so is what is real within its outline.
+        It is known by its UUID; where either list has none, by its place at that time, size and
+        speed: in lists without ids they are numbers, and who was shown in such a list gets an id
+        from the stack's own tracking. Whoever was shown as points gets its size from there too: it
+        is known by where it is, and so is what is real within its outline.
         """
         if not self._shown:
             return seen
@@ -79,14 +90,15 @@ class Injected:
             return True
         numbered = user.user_id.isdecimal()
         return any(
-            (numbered and _is_same(user, one)) or (measured and _is_within(user, one))
-            for one, measured in self._around(stamp_ns)
+            ((numbered or how == "nameless") and _is_same(user, one))
+            or (how == "measured" and _is_within(user, one))
+            for one, how in self._around(stamp_ns)
         )
 
-    def _around(self, stamp_ns: int) -> Iterator[tuple[RoadUser, bool]]:
-        for shown_ns, user, measured in self._shown.values():
+    def _around(self, stamp_ns: int) -> Iterator[tuple[RoadUser, How]]:
+        for shown_ns, user, how in self._shown.values():
             if abs(stamp_ns - shown_ns) <= _REMEMBERED_NS:
-                yield moved(user, user.speed_mps * (stamp_ns - shown_ns) * 1e-9), measured
+                yield moved(user, user.speed_mps * (stamp_ns - shown_ns) * 1e-9), how
 
 
 def _is_within(seen: RoadUser, shown: RoadUser) -> bool:

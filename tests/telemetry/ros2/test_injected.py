@@ -69,6 +69,24 @@ def test_in_a_list_without_ids_it_is_known_by_place_size_and_speed():
     assert injected.without(long_gone) is long_gone
 
 
+def test_whom_tracking_gives_an_id_of_its_own_is_known_as_well():
+    """Lists of detected objects go out without ids, and come back tracked."""
+
+    def seen(user: RoadUser) -> RoadUsers:
+        return RoadUsers(stamp_ns=5 * S, users=(user,))
+
+    tracked = replace(walker(), user_id="0123456789abcdef0123456789abcdef", virtual=False)
+    nameless = Injected()
+    nameless.note(RoadUsers(stamp_ns=5 * S, users=(walker(),)), how="nameless")
+    assert nameless.without(seen(tracked)).users == ()
+    beside = seen(moved(replace(tracked, yaw_rad=0.0), 0.6))
+    assert nameless.without(beside) is beside
+    # Later shown with its id as well, which one perception keeps, and another not.
+    nameless.note(RoadUsers(stamp_ns=5 * S, users=(walker(),)))
+    assert nameless.without(seen(tracked)).users == ()
+    assert shown(walker()).without(seen(tracked)).users == (tracked,)
+
+
 def test_a_real_one_that_is_merged_into_the_list_stays_real():
     real = walker(virtual=False, user_id="0123456789abcdef0123456789abcdef")
     seen = RoadUsers(stamp_ns=5 * S, users=(real,))
