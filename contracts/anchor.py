@@ -97,6 +97,13 @@ class Anchor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         """What a length to the left, a yaw rate or a steering angle is multiplied by."""
         return -1.0 if self.mirrored else 1.0
 
+    @property
+    def turned_round(self) -> Anchor:
+        """The anchor of who lives in the World, and says all as on the lot."""
+        return Anchor(
+            lot=self.world, world=self.lot, scale=1.0 / self.scale, mirrored=self.mirrored
+        )
+
     def world_from_lot(self, position: GeoPoint, yaw_rad: float) -> GeoPose:
         """Return in the World what is a position and a yaw (true east) on the lot."""
         return _moved(self.lot, self.world, self.scale, self.side, position, yaw_rad)

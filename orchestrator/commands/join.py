@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import secrets
 import tempfile
 import time
@@ -13,14 +12,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
-import numpy as np
 
 from foretwin.contracts.anchor_file import AnchorFile, read_anchor
 from foretwin.contracts.bus import Bus, BusUnreachable, ask
 from foretwin.contracts.certificates import read_certificate
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.exit_codes import USER
-from foretwin.contracts.frames import LocalFrame, geo_from_local
+from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import is_identifier
 from foretwin.contracts.joining import newest_running, running_drive
 from foretwin.contracts.local_bus import CAR_OF
@@ -31,12 +29,13 @@ from foretwin.contracts.roles import JoinReply, JoinRequest
 from foretwin.contracts.setup import ReplaySetup, Ros2Setup, StandinSetup
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.campaign.joining import own_certificate
+from foretwin.orchestrator.commands.standin import way_in_world
 from foretwin.orchestrator.commands.worker import drive_at
 from foretwin.orchestrator.drive.exit_words import EXIT_DONE, EXIT_PARTLY
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.record.which_run import run_folder
 from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, WhenDead
-from foretwin.telemetry.logs import open_log, read_line
+from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
 from foretwin.telemetry.ros2.mapping import read_mapping
 
@@ -194,22 +193,11 @@ def _process(
         )
         return _Row("telemetry.ros2"), setup
     path_file = folder / "path.json"
-    path_file.write_text(json.dumps(_path_in_world(asked, anchor)), encoding="utf-8")
+    way = way_in_world(anchor, route=asked.route, way_m=asked.way_m, speed_mps=asked.speed_mps)
+    line = {name: column.tolist() for name, column in way._asdict().items()}
+    path_file.write_text(json.dumps(line), encoding="utf-8")
     standin = StandinSetup(**given, path_file=str(path_file), beside=True)
     return _Row(STANDIN), standin
-
-
-def _path_in_world(asked: JoinAsked, anchor: AnchorFile) -> dict[str, list[float]]:
-    """Return the stand-in's path: a line of the World, or straight on from the anchor's point."""
-    if asked.route is not None:
-        lat_deg, lon_deg = read_line(asked.route).lat_lon_deg.T
-    else:
-        yaw_rad = anchor.world.yaw_rad
-        ends_m = np.outer([0.0, anchor.scale * asked.way_m], [math.cos(yaw_rad), math.sin(yaw_rad)])
-        lat_deg, lon_deg = geo_from_local(anchor.world.frame, ends_m).T
-    speed_mps = np.full(len(lat_deg), anchor.scale * asked.speed_mps)
-    names = "lat_deg", "lon_deg", "speed_mps"
-    return {k: v.tolist() for k, v in zip(names, (lat_deg, lon_deg, speed_mps), strict=True)}
 
 
 class _AskedSeat:

@@ -16,9 +16,11 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts import drive
+from foretwin.contracts.anchor import Anchor
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.foreign_bus import ForeignBus
 from foretwin.contracts.mailbox import Mailbox
+from foretwin.telemetry.anchored import world_from_lot_message
 from foretwin.telemetry.lot_car.ros_voice import RosVoice
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.mapping import Mapping
@@ -33,7 +35,8 @@ log = logging.getLogger("lot_car")
 
 
 class LotReport(msgspec.Struct, frozen=True, kw_only=True):
-    """What a drive on the lot came to; times from the stamp of a list to its arrival here."""
+    """What a drive on the lot came to, in metres of the lot; times from the stamp of a list to its
+    arrival here."""
 
     lists: int
     """Lists of objects that were heard."""
@@ -67,11 +70,19 @@ class LotCar:
         *,
         foreign: ForeignBus,
         steering_ratio: float,
+        anchor: Anchor | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """Stand at the path's beginning until the first list of objects has come."""
+        """Stand at the path's beginning until the first list of objects has come.
+
+        With an `anchor` the source lives in the World: what it says is moved to its lot, and made
+        smaller there, as it would be measured on a car of that scale.
+        """
         self._source, self._mono_ns = source, mono_ns
+        self._anchor = anchor
+        self._lot_anchor = None if anchor is None else anchor.turned_round
+        self._scale = 1.0 if anchor is None else anchor.scale
         self._voice = RosVoice(mapping, steering_ratio=steering_ratio)
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         heard = msgspec.structs.replace(mapping, inwards=(heard_objects(mapping),), outwards=())
@@ -106,8 +117,9 @@ class LotCar:
             self._source.see((), stamp_ns=self._source.first_stamp_ns)
         for channel, sample in self._source.advance(self._stamp_ns(now_ns)):
             stamp_ns = sample.stamp_ns + self._later_ns
+            on_lot = world_from_lot_message(self._lot_anchor, sample)
             for row, payload in self._voice.say(
-                channel, msgspec.structs.replace(sample, stamp_ns=stamp_ns)
+                channel, msgspec.structs.replace(on_lot, stamp_ns=stamp_ns)
             ):
                 self._sender.put(OutRow(topic=row.topic, type=row.type, source="state"), payload)
         self._watch()
@@ -126,7 +138,7 @@ class LotCar:
             brakes=tuple(self._brakes.values()),
             braked_at_m=self._braked_at_m,
             stood_before_m=self._stood_before_m,
-            driven_m=round(self._source.s_m, 2),
+            driven_m=round(self._source.s_m / self._scale, 2),
         )
 
     def _hear(self, message: Any, received_ns: int) -> None:
@@ -136,17 +148,18 @@ class LotCar:
         self._source.hold(False)
         self._latencies_ms.append((received_ns - message.stamp_ns) * 1e-6)
         self._heard_mono_ns = self._mono_ns()
-        self._source.see(message.users, stamp_ns=message.stamp_ns - self._later_ns)
+        there = world_from_lot_message(self._anchor, message)
+        self._source.see(there.users, stamp_ns=message.stamp_ns - self._later_ns)
 
     def _watch(self) -> None:
-        ahead, speed_mps = self._source.ahead, self._source.speed_mps
+        ahead, speed_mps = self._source.ahead, self._source.speed_mps / self._scale
         if ahead is None or not (self._source.brakes or self._brakes):
             return
-        kind, left_m = ahead.user.kind, round(ahead.gap_m(self._source.s_m), 2)
+        kind, left_m = ahead.user.kind, round(ahead.gap_m(self._source.s_m) / self._scale, 2)
         if self._source.brakes and ahead.user.user_id not in self._brakes:
-            log.info("brakes for a %s %.1f m ahead, at %.1f m/s", kind, left_m, speed_mps)
+            log.info("brakes for a %s %.2f m ahead, at %.2f m/s", kind, left_m, speed_mps)
             self._brakes[ahead.user.user_id] = kind
             self._braked_at_m = left_m if self._braked_at_m is None else self._braked_at_m
-        if speed_mps < _STANDS_MPS and left_m < (self._stood_before_m or math.inf):
+        if self._source.speed_mps < _STANDS_MPS and left_m < (self._stood_before_m or math.inf):
             log.info("stands %.2f m before a %s", left_m, kind)
             self._stood_before_m = left_m

@@ -11,7 +11,7 @@ from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.redialled_bus import RedialledBus
 from foretwin.contracts.setup import BusSetup, Ros2Setup
 from foretwin.telemetry.ros2.gateway import Gateway
-from foretwin.telemetry.ros2.lot_guard import LotGuard
+from foretwin.telemetry.ros2.lot_guard import APART_M, LotGuard
 from foretwin.telemetry.ros2.mapping import listening_only, parse_mapping
 from foretwin.telemetry.ros_messages.parts import typestore
 
@@ -22,10 +22,15 @@ def lot_guard(setup: Ros2Setup) -> LotGuard | None:
     """Return who watches the fence of the car's lot, None where it has none."""
     if setup.anchor is None or not setup.fence:
         return None
-    car = setup.vehicle
+    car, scale = setup.vehicle, setup.anchor.scale
     ahead_m = 0.0 if car is None else car.length_m.value - car.rear_overhang_m.value
     aside_m = 0.0 if car is None else 0.5 * car.width_m.value
-    return LotGuard(setup.fence, frame=setup.anchor.lot.frame, reach_m=math.hypot(ahead_m, aside_m))
+    return LotGuard(
+        setup.fence,
+        frame=setup.anchor.lot.frame,
+        reach_m=math.hypot(ahead_m, aside_m) / scale,  # its file is in the World's size
+        apart_m=APART_M / scale,
+    )
 
 
 def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:

@@ -47,14 +47,20 @@ class LotGuard:
     """Knows the fence and the newest state of the car, and says what is wrong."""
 
     def __init__(
-        self, fence_deg: Sequence[tuple[float, float]], *, frame: LocalFrame, reach_m: float
+        self,
+        fence_deg: Sequence[tuple[float, float]],
+        *,
+        frame: LocalFrame,
+        reach_m: float,
+        apart_m: float = APART_M,
     ) -> None:
         """`fence_deg` are corners, latitude and longitude; `reach_m` is how far the car's body goes
-        from base_link."""
+        from base_link, `apart_m` how far a position may lie from the state besides; of a small car
+        both are small."""
         lat_deg, lon_deg = np.array(fence_deg).T
         self._fence = shapely.Polygon(local_from_geo(frame, lat_deg, lon_deg))
         self._edge = self._fence.exterior
-        self._frame, self._reach_m = frame, reach_m
+        self._frame, self._reach_m, self._apart_m = frame, reach_m, apart_m
         self._state: VehicleState | None = None
         self._state_ns = 0
 
@@ -84,7 +90,7 @@ class LotGuard:
         if not self._fence.contains(place):
             return GateTrouble("outside the fence", "the car is outside its fence")
         if fix is not None and not (apart_m := place.distance(self._place(fix))) <= (
-            APART_M + self._reach_m
+            self._apart_m + self._reach_m
         ):
             why = f"the car's position is {apart_m:.1f} m apart from its estimated state"
             return GateTrouble("position apart", why)

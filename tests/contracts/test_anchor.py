@@ -115,3 +115,14 @@ def test_a_point_that_is_none_of_the_earth_is_refused(lat_deg, lon_deg):
 def test_the_edges_of_the_map_are_points():
     for lon_deg in (-180.0, 180.0):
         AnchorPose(lat_deg=89.9, lon_deg=lon_deg, yaw_deg=0.0).validate()
+
+
+@given(anchor=anchors, x_m=metres, y_m=metres, yaw_rad=angles)
+def test_turned_round_it_leads_back(anchor: Anchor, x_m: float, y_m: float, yaw_rad: float) -> None:
+    there = anchor.world_from_lot(on_lot(x_m, y_m), yaw_rad)
+    back = anchor.turned_round.world_from_lot(there.position, there.yaw_rad)
+    expected = anchor.lot_from_world(there.position, there.yaw_rad)
+    assert (back.position.lat_deg, back.position.lon_deg, back.yaw_rad) == pytest.approx(
+        (expected.position.lat_deg, expected.position.lon_deg, expected.yaw_rad), abs=1e-9
+    )
+    assert anchor.turned_round.scale * anchor.scale == pytest.approx(1.0)

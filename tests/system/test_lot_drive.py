@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -57,16 +57,32 @@ FLAGS = (
 )  # fmt: skip
 
 
+class LotSide(NamedTuple):
+    """What a car on its lot and its drive are given: two files, and further words of both."""
+
+    mapping: str
+    anchor: str
+    drive: tuple[str, ...]
+    car: tuple[str, ...] = ()
+
+
+def in_berlin(dialect: str, objects: str) -> LotSide:
+    """Return Tempelhofer Feld, anchored on Charlottenstraße."""
+    return LotSide(
+        MAPPING.format(dialect=dialect, objects=objects, **WALKER),
+        LOT.format(lot=ANCHOR.lot, world=ANCHOR.world),
+        ("--map", f"{DATA}/osm-berlin-mitte/berlin-mitte.osm"),
+    )
+
+
 @contextlib.contextmanager
-def on_the_lot(folder: Path, *, dialect: str, objects: str, pace: float) -> Iterator[Any]:
+def on_the_lot(folder: Path, side: LotSide, *, pace: float) -> Iterator[Any]:
     """Yield what the stand-in said in the end, the run's log, and how long somebody waited."""
     endpoint = free_endpoint()
     ros2, lot = folder / "car.toml", folder / "lot.toml"
-    text = MAPPING.format(dialect=dialect, objects=objects, **WALKER)
-    ros2.write_text(f'endpoint = "{endpoint}"\n{text}', encoding="utf-8")
-    lot.write_text(LOT.format(lot=ANCHOR.lot, world=ANCHOR.world), encoding="utf-8")
-    osm = f"{DATA}/osm-berlin-mitte/berlin-mitte.osm"
-    flags = (*FLAGS, "--map", osm, "--ros2", str(ros2), "--anchor", str(lot))
+    ros2.write_text(f'endpoint = "{endpoint}"\n{side.mapping}', encoding="utf-8")
+    lot.write_text(side.anchor, encoding="utf-8")
+    flags = (*FLAGS, *side.drive, "--ros2", str(ros2), "--anchor", str(lot))
     with (
         ZenohBus(BusSetup(endpoint=endpoint), router=True),
         started(folder / "runs", *flags, entry=FRESH, pace=pace) as process,
@@ -75,7 +91,8 @@ def on_the_lot(folder: Path, *, dialect: str, objects: str, pace: float) -> Iter
         run = run_folder(folder / "runs")
         assert run is not None
         wait_for(lambda: "both switches are on" in told(run), "the gateway")
-        words = ("--ros2", str(ros2), "--anchor", str(lot), "--end", f"{END_S:g}", "--json")
+        files = ("--ros2", str(ros2), "--anchor", str(lot))
+        words = (*files, "--end", f"{END_S:g}", "--json", *side.car)
         car = subprocess.Popen(
             [sys.executable, "-P", "-m", "foretwin", "standin", *words],
             stdout=subprocess.PIPE, text=True, env=environment(folder / "cache", pace=pace),
@@ -107,7 +124,7 @@ def test_it_stands_before_a_pedestrian_whom_only_the_world_holds(
     for pace in PACES:
         folder = tmp_path / str(pace)
         folder.mkdir()
-        with on_the_lot(folder, dialect=dialect, objects=objects, pace=pace) as (report, log, _):
+        with on_the_lot(folder, in_berlin(dialect, objects), pace=pace) as (report, log, _):
             print(dialect, pace, report)
         # In the end it shuts in any case: the car's process ends before the drive.
         if report["stood_before_m"] is not None or "vehicle: shut: " not in log:
@@ -131,8 +148,8 @@ def test_lists_arrive_at_the_stack_within_50_ms(tmp_path: Path, dialect: str, ob
     for attempt in range(ATTEMPTS):
         folder = tmp_path / str(attempt)
         folder.mkdir()
-        words: dict[str, Any] = {"dialect": dialect, "objects": objects, "pace": 1.0}
-        with on_the_lot(folder, **words) as (report, _, kept_s):
+        side = in_berlin(dialect, objects)
+        with on_the_lot(folder, side, pace=1.0) as (report, _, kept_s):
             print(dialect, report, f"kept waiting {kept_s:.2f} s")
             late_ms = report["latency_ms_p95"]
             if late_ms is not None and late_ms < LATEST_MS:

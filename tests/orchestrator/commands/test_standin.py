@@ -9,11 +9,14 @@ import pytest
 
 from foretwin.contracts import anchor_file
 from foretwin.contracts.anchor_file import read_anchor
-from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.contracts.bus import BusUnreachable
+from foretwin.contracts.frames import geo_from_local
+from foretwin.orchestrator.commands import standin
 from foretwin.orchestrator.commands.cli import run
-from foretwin.orchestrator.commands.standin import LotDrive, path_on_lot, told
+from foretwin.orchestrator.commands.standin import told, way_in_world
 from foretwin.telemetry.lot_car.lot_car import LotReport
 from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
 from tests.telemetry.lot_car.test_braking import MAPPING
 
 COVERS = ("foretwin.orchestrator.commands.cli_standin",)
@@ -54,27 +57,41 @@ def test_a_mapping_without_the_cars_router_is_refused(
     assert "endpoint must be named" in capsys.readouterr().err
 
 
-def test_the_way_goes_straight_on_or_along_a_line_of_the_world(
-    files: tuple[Path, Path], tmp_path: Path
+def test_a_router_that_is_not_there_is_told_in_a_line(
+    files: tuple[Path, Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
+    def nobody(_: object) -> None:
+        raise BusUnreachable("no router")
+
+    monkeypatch.setattr(standin, "ZenohForeignBus", nobody)
+    assert run(["standin", "--ros2", str(files[0]), "--anchor", str(files[1])]) == 2
+    said = capsys.readouterr().err
+    assert said.endswith("car.toml: endpoint tcp/127.0.0.1:1: nobody listens there\n")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("scale", [1.0, 10.0])
+def test_the_way_goes_straight_on_or_along_a_line_of_the_world(
+    files: tuple[Path, Path], tmp_path: Path, scale: float
+):
+    """What is asked for is of the lot, where a car of 1:10 drives a tenth as far and as fast."""
+    files[1].write_text(EXAMPLE.replace("scale = 1.0", f"scale = {scale}"), encoding="utf-8")
     anchor, driver = read_anchor(files[1]), read_parameters().driver
-    asked = LotDrive(files[0], files[1], None, 80.0, 8.0, 10.0)
-    path = path_on_lot(anchor, asked, driver=driver)
-    assert path.length_m == pytest.approx(80.0, abs=0.1)
-    assert path.at(0.0).yaw_rad == pytest.approx(anchor.lot.yaw_rad, abs=1e-3)
+    way = way_in_world(anchor, route=None, way_m=80.0, speed_mps=2.0)
+    path = DrivenPath(*way, driver=driver)
+    assert path.length_m == pytest.approx(80.0 * scale, abs=0.1)
+    assert way.speed_mps.tolist() == [2.0 * scale] * 2
+    assert path.at(0.0).yaw_rad == pytest.approx(anchor.world.yaw_rad, abs=1e-3)
     assert (path.frame.origin.lat_deg, path.frame.origin.lon_deg) == pytest.approx(
-        (anchor.lot.lat_deg, anchor.lot.lon_deg)
+        (anchor.world.lat_deg, anchor.world.lon_deg)
     )
     line = geo_from_local(anchor.world.frame, np.array([[0.0, 0.0], [0.0, 50.0]]))
     points = "".join(f'<trkpt lat="{lat:.9f}" lon="{lon:.9f}"/>' for lat, lon in line)
     route = tmp_path / "route.gpx"
     route.write_text(f'<gpx version="1.1"><trk><trkseg>{points}</trkseg></trk></gpx>')
-    there = path_on_lot(anchor, asked._replace(route=route), driver=driver)
-    assert there.length_m == pytest.approx(50.0, abs=0.1)
-    begins = local_from_geo(
-        anchor.lot.frame, there.frame.origin.lat_deg, there.frame.origin.lon_deg
-    )
-    assert begins == pytest.approx([0.0, 0.0], abs=0.01)
+    there = way_in_world(anchor, route=route, way_m=80.0, speed_mps=2.0)
+    assert DrivenPath(*there, driver=driver).length_m == pytest.approx(50.0, abs=0.1)
+    assert np.stack(there[:2], axis=1) == pytest.approx(line, abs=1e-8)
 
 
 def test_what_came_of_it_is_said_in_a_sentence():

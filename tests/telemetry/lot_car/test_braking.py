@@ -125,28 +125,36 @@ class Wire:
 
 
 class Meeting:
-    """The stand-in on its lot, the gateway, and who knows the car's state in the World."""
+    """The stand-in on its lot, the gateway, and who knows the car's state in the World.
 
-    def __init__(self, dialect: str, objects: str, *, ahead_m: float) -> None:
+    `ahead_m` is of the World, where a lot of `scale` 10 is ten times as large.
+    """
+
+    def __init__(self, dialect: str, objects: str, *, ahead_m: float, scale: float = 1.0) -> None:
+        anchor = replace(ANCHOR, scale=scale)
         self.wire, self.bus, self.orders = Wire(), MemoryBus(), OrderSide("r")
         cos, sin = math.cos(ANCHOR.world.yaw_rad), math.sin(ANCHOR.world.yaw_rad)
         at = geo_pose(ANCHOR.world.frame, ahead_m * cos, ahead_m * sin, 0.0).position
         text = MAPPING.format(dialect=dialect, objects=objects, lat=at.lat_deg, lon=at.lon_deg)
         mapping = parse_mapping(text, name="m.toml")
-        fence = [geo_pose(ANCHOR.lot.frame, *one, 0.0).position for one in FENCE_M]
+        mapping = replace(mapping, antenna_m=tuple(one / scale for one in mapping.antenna_m or ()))
+        corners_m = np.array(FENCE_M) / scale
+        fence = [geo_pose(ANCHOR.lot.frame, x, y, 0.0).position for x, y in corners_m.tolist()]
         self.gateway = Gateway(
             mapping, bus=self.bus, foreign=self.wire, run_id="r", vehicle_id="ego",
             drive_frame=ANCHOR.world.frame, flag_on=True, order_keys=self.orders.keys,
-            anchor=ANCHOR, mono_ns=lambda: self.wire.now_ns,
+            anchor=anchor, mono_ns=lambda: self.wire.now_ns,
             wall_ns=lambda: WALL_NS + self.wire.now_ns,
             guard=LotGuard(
-                [(one.lat_deg, one.lon_deg) for one in fence], frame=ANCHOR.lot.frame, reach_m=4.0
+                [(one.lat_deg, one.lon_deg) for one in fence], frame=ANCHOR.lot.frame,
+                reach_m=4.0 / scale,
             ),
         )  # fmt: skip
         parameters = read_parameters()
         self.car = LotCar(
-            mapping, StandinSource(straight(100.0), parameters, vehicle_id="ego"),
-            foreign=self.wire, steering_ratio=parameters.car.steering_ratio,
+            mapping,
+            StandinSource(straight(100.0, at=ANCHOR.world), parameters, vehicle_id="ego"),
+            foreign=self.wire, anchor=anchor, steering_ratio=parameters.car.steering_ratio,
             mono_ns=lambda: self.wire.now_ns, wall_ns=lambda: WALL_NS + self.wire.now_ns,
         )  # fmt: skip
         self.heard = Mailbox(10_000)
@@ -179,9 +187,9 @@ class Meeting:
         )  # fmt: skip
 
 
-def straight(way_m: float) -> DrivenPath:
-    cos, sin = math.cos(ANCHOR.lot.yaw_rad), math.sin(ANCHOR.lot.yaw_rad)
-    ends = [geo_pose(ANCHOR.lot.frame, s * cos, s * sin, 0.0).position for s in (0.0, way_m)]
+def straight(way_m: float, *, at: AnchorPose = ANCHOR.lot) -> DrivenPath:
+    cos, sin = math.cos(at.yaw_rad), math.sin(at.yaw_rad)
+    ends = [geo_pose(at.frame, s * cos, s * sin, 0.0).position for s in (0.0, way_m)]
     return DrivenPath(
         np.array([one.lat_deg for one in ends]), np.array([one.lon_deg for one in ends]),
         np.array([8.0, 8.0]), driver=read_parameters().driver,
@@ -206,6 +214,23 @@ def test_on_an_empty_lot_it_stands_before_a_pedestrian_of_the_world(dialect: str
     counts = meeting.gateway.report()["in"]
     assert {"gnss", "imu", "speed", "steering", "status", "control", "plan"} <= counts.keys()
     assert meeting.gateway.report()["unused"] == {}
+
+
+def test_a_car_of_1_10_stands_a_tenth_as_far_before_whom_it_hears_of() -> None:
+    large, small = (
+        Meeting("ros2dds", "PredictedObjects", ahead_m=25.0, scale=one) for one in (1.0, 10.0)
+    )
+    for one in (large, small):
+        one.go_on(10.0)
+        assert one.gateway.gate.state == "open", one.gateway.gate.why
+    reports = [one.car.report() for one in (large, small)]
+    assert [one.brakes for one in reports] == [("pedestrian",)] * 2
+    for name in ("stood_before_m", "braked_at_m", "driven_m"):
+        in_world, on_lot = (getattr(one, name) for one in reports)
+        assert 10.0 * on_lot == pytest.approx(in_world, abs=0.3), name
+    assert large.fix is not None
+    assert small.fix is not None
+    assert small.fix.std_m == pytest.approx(large.fix.std_m)
 
 
 def test_when_injection_ends_it_goes_on_by_what_it_sees_itself():

@@ -10,8 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.contracts.anchor import Anchor, AnchorPose
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_pose
+from foretwin.contracts.setup import BusSetup, Ros2Setup
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.ros2.__main__ import lot_guard
 from foretwin.telemetry.ros2.lot_guard import BRAKING_MPS2, REACTION_S, LotGuard, margin_m
 
 S, MS = 10**9, 10**6
@@ -98,3 +102,28 @@ def test_a_state_that_is_said_again_and_again_says_nothing_new():
     for after_ms in range(0, 200, 20):
         one.take_state(state(0.0), now_ns=S + after_ms * MS)
     assert one.trouble(S + 180 * MS, heard_ns=S + 180 * MS) is not None
+
+
+@pytest.mark.parametrize(("scale", "reason"), [(10.0, None), (1.0, "near the fence")])
+def test_a_small_car_is_small_on_its_lot(scale: float, reason: str | None) -> None:
+    """Its parameters are those of the World, where a lot of 20 m by 8 m is ten times as large."""
+    pose = AnchorPose(lat_deg=FRAME.origin.lat_deg, lon_deg=FRAME.origin.lon_deg, yaw_deg=0.0)
+    corners = ((-10.0, -4.0), (10.0, -4.0), (10.0, 4.0), (-10.0, 4.0))
+    setup = Ros2Setup(
+        run_id="r", process_id="ros2", bus=BusSetup(endpoint="tcp/127.0.0.1:1"), log_file="l",
+        vehicle_id="ego", mapping="", mapping_name="m", drive_frame=FRAME,
+        anchor=Anchor(lot=pose, world=pose, scale=scale),
+        fence=tuple(degrees(*one) for one in corners), vehicle=load_vehicle("f1tenth"),
+    )  # fmt: skip
+    watch = lot_guard(setup)
+    assert watch is not None
+    watch.take_state(state(0.0, speed_mps=0.5), now_ns=S)
+    found = watch.trouble(S, heard_ns=S)
+    assert (found and found.reason) == reason
+    if scale == 10.0:  # half a metre there is five in the World
+        near, far = (
+            watch.trouble(S, heard_ns=S, fix=GeoPoint(*degrees(x, 0.0))) for x in (0.8, 1.2)
+        )
+        assert near is None
+        assert far is not None
+        assert far.reason == "position apart"
