@@ -102,10 +102,10 @@ class Breach(msgspec.Struct, frozen=True, kw_only=True):
         return _ahead(WIDE_M) if fence is None else fence(self.amount)
 
     @property
-    def fence_deg(self) -> list[list[float]]:
+    def fence_deg(self) -> tuple[tuple[float, float], ...]:
         """The same by latitude and longitude."""
         places = [lot_place(*one) for one in self.corners]
-        return [[one.lat_deg, one.lon_deg] for one in places]
+        return tuple((one.lat_deg, one.lon_deg) for one in places)
 
     def __str__(self) -> str:
         return (

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import msgspec
 
 from foretwin.contracts.anchor import Anchor, AnchorPose
+from foretwin.contracts.anchor_file import AnchorFile, anchor_text
 from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.ports import free_endpoint
@@ -144,11 +145,8 @@ def played(folder: Path, breach: Breach, *, pace: float) -> Outcome:
         dialect=breach.dialect, objects=breach.lists, lat=there.lat_deg, lon=there.lon_deg
     ).replace("\n[[out]]", PERCEIVED, 1)
     ros2.write_text(f'endpoint = "{endpoint}"\n{text}', encoding="utf-8")
-    tables = "".join(
-        f"[{name}]\nlat_deg = {one.lat_deg}\nlon_deg = {one.lon_deg}\nyaw_deg = {one.yaw_deg}\n"
-        for name, one in (("lot", TOWN.lot), ("world", TOWN.world))
-    )
-    lot.write_text(f"fence = {breach.fence_deg}\n{tables}", encoding="utf-8")
+    file = AnchorFile(lot=TOWN.lot, world=TOWN.world, fence=breach.fence_deg)
+    lot.write_text(anchor_text(file), encoding="utf-8")
     case.write_bytes(msgspec.json.encode(breach))
     flags = (*FLAGS, "--ros2", str(ros2), "--anchor", str(lot))
     with (

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.anchor import Anchor, AnchorPose
+from foretwin.contracts.anchor_file import AnchorFile, anchor_text
 from foretwin.contracts.frames import GeoPoint, geo_pose
 from tests.system.test_lot_drive import PACES, LotSide, on_the_lot
 from tests.telemetry.lot_car.test_braking import MAPPING
@@ -43,13 +44,12 @@ def small_lot() -> LotSide:
     ):
         assert there in mapping
         mapping = mapping.replace(there, here)
-    fence = [[one.lat_deg, one.lon_deg] for one in (place(*xy_m) for xy_m in CORNERS_M)]
-    tables = "".join(
-        f"[{name}]\nlat_deg = {one.lat_deg}\nlon_deg = {one.lon_deg}\nyaw_deg = {one.yaw_deg}\n"
-        for name, one in (("lot", SMALL.lot), ("world", SMALL.world))
+    places = [place(*xy_m) for xy_m in CORNERS_M]
+    fence = tuple((one.lat_deg, one.lon_deg) for one in places)
+    file = AnchorFile(lot=SMALL.lot, world=SMALL.world, scale=SCALE, fence=fence)
+    return LotSide(
+        mapping, anchor_text(file), ("--vehicle", "f1tenth"), ("--way", "12", "--speed", "0.8")
     )
-    anchor = f"scale = {SCALE}\nfence = {fence}\n{tables}"
-    return LotSide(mapping, anchor, ("--vehicle", "f1tenth"), ("--way", "12", "--speed", "0.8"))
 
 
 @pytest.mark.judge
