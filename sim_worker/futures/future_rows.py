@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.future_numbers import numbers_of
 from foretwin.contracts.futures import (
     COLLISION_WITH,
@@ -74,15 +75,13 @@ def future_rows(job: Job, result: FuturesResult | None, *, job_sha256: str) -> l
     places = {} if result is None else {i: p for p, i in enumerate(result.future_indices)}
     unplaced = {} if result is None else dict(result.unplaced)
     rows = []
-    risk = None if result is None else risks(job, result)
+    numbers = {} if result is None else _measured_numbers(job, result)
     for future in job.futures:
         row = _job_columns(job, future, job_sha256)
         if result is not None and future.index in places:
             place = places[future.index]
             row |= _result_columns(job, future, result, place)
-            assert risk is not None
-            row["likelihood"] = float(risk.likelihood[place])
-            row["criticality"] = float(risk.criticality[place])
+            row |= {name: values[place] for name, values in numbers.items()}
         elif result is not None:
             row["left_out"] = unplaced[future.index]
         rows.append(row)
@@ -124,6 +123,29 @@ def _job_columns(job: Job, future: Future, job_sha256: str) -> Row:
     }
 
 
+def _measured_numbers(job: Job, result: FuturesResult) -> dict[str, list[float | None]]:
+    """Return the numbers of a result's futures, by column, in its order."""
+    outcome, planned, risk = result.outcome, result.planned, risks(job, result)
+    columns = {f"metric_{name}": values for name, values in result.metrics.items()}
+    columns |= {
+        name: getattr(outcome, name)
+        for name in ("collision_time_s", "min_clearance_m", "progress_m")
+    }
+    columns |= {"likelihood": risk.likelihood, "criticality": risk.criticality}
+    if planned is not None:
+        columns["planned_impact_time_s"] = planned.time_s
+        columns["planned_impact_off_m"] = planned.off_m
+    return {name: _numbers(values) for name, values in columns.items()}
+
+
+def _numbers(values: Array) -> list[float | None]:
+    """Return numbers as tables have them: None for one that there is not."""
+    numbers: list[float | None] = np.asarray(values, dtype=np.float64).tolist()
+    for place in np.flatnonzero(~np.isfinite(values)).tolist():
+        numbers[place] = None
+    return numbers
+
+
 def _result_columns(job: Job, future: Future, result: FuturesResult, place: int) -> Row:
     outcome, planned = result.outcome, result.planned
     states = np.ascontiguousarray(result.trajectory.states[place])
@@ -141,13 +163,8 @@ def _result_columns(job: Job, future: Future, result: FuturesResult, place: int)
         "worker_id": result.worker_id,
     }
     row |= _place("end", x, y) | {"end_yaw_rad": float(yaw)}
-    for name in ("collision_time_s", "min_clearance_m", "progress_m"):
-        row[name] = _number(getattr(outcome, name)[place])
-    row |= {f"metric_{name}": _number(values[place]) for name, values in result.metrics.items()}
     if planned is not None:
         row["planned_impact_with"] = planned.met[place]
-        row["planned_impact_time_s"] = _number(planned.time_s[place])
-        row["planned_impact_off_m"] = _number(planned.off_m[place])
     for accident in result.accidents:
         if accident.future == place:
             kind = result.road_users.kinds[place, accident.road_user]
@@ -160,7 +177,3 @@ def _result_columns(job: Job, future: Future, result: FuturesResult, place: int)
 
 def _place(what: str, x_m: float, y_m: float) -> Row:
     return {f"{what}_x_m": float(x_m), f"{what}_y_m": float(y_m)}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
