@@ -17,7 +17,7 @@ from foretwin.contracts.keys import alive_key, key
 from foretwin.contracts.mailbox import Received
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife, hold, is_held
-from foretwin.contracts.process_setup import STARTED_BY
+from foretwin.contracts.process_setup import STARTED_BY, setup_given
 from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, take
@@ -213,3 +213,20 @@ def test_bytes_that_are_no_end_of_a_run_end_nothing(tmp_path: Path) -> None:
     bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
     assert life.over
     assert life.run_ended
+
+
+@pytest.mark.parametrize(
+    ("text", "why"), [(None, "No such file or directory"), ("{", "truncated"), ("{}", "missing")]
+)
+def test_a_setup_that_cannot_be_read_is_told_in_one_line(
+    text: str | None, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "p0.json"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    with pytest.raises(SystemExit) as left:
+        setup_given(ProcessSetup, ["--setup", str(file)])
+    assert left.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{file}: ")
+    assert why in line

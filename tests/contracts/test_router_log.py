@@ -219,6 +219,7 @@ def test_a_long_key_that_was_cut_is_looked_ahead_too() -> None:
 
 def test_after_a_gap_nothing_is_counted_that_may_be_a_look_ahead() -> None:
     log = RouterLog()
+    assert log.counted().counted_all
     log.gap()
     for one in looks_ahead(SPEED, may="")[3:]:
         log.take(one)

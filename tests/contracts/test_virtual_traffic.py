@@ -26,3 +26,8 @@ from foretwin.contracts.virtual_traffic import MOST_COUNT, VirtualTraffic
 def test_what_cannot_be_is_said(changes: dict[str, int | str], said: str | None) -> None:
     chosen = msgspec.convert({"source": "model"} | changes, VirtualTraffic)
     assert chosen.trouble() == said
+
+
+def test_a_word_that_it_does_not_know_is_none_that_it_passes_over() -> None:
+    with pytest.raises(msgspec.ValidationError, match="contains unknown field `cuont`"):
+        msgspec.convert({"source": "model", "cuont": 5}, VirtualTraffic)

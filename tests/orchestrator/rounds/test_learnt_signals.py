@@ -121,6 +121,15 @@ def test_a_cycle_in_which_a_change_was_missed_counts_for_nothing(
     assert found.cycles == 3
 
 
+def test_cycles_alike_that_are_out_of_step_are_of_no_one_plan() -> None:
+    learner = SignalLearner()
+    hear(learner, fixed(60.0, 20.0), -5.0, 65.0)
+    hear(learner, fixed(60.0, 20.0, 30.0), 85.0, 155.0)
+    assert learnt(learner, 155.0) is None
+    hear(learner, fixed(60.0, 20.0, 30.0), 155.0, 215.0)
+    assert learnt(learner, 215.0) is None, "the first does not fit the others yet"
+
+
 def test_a_dark_or_unknown_spell_breaks_a_cycle_too() -> None:
     light, learner = fixed(60.0, 20.0), SignalLearner()
     for word in ("dark", "unknown"):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
+import msgspec
 import pytest
 
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.rounds.news import RoundNews
+from foretwin.orchestrator.runner.open_rounds import RoundDone
 from tests.orchestrator.futures_rounds import round_done, straight
 
 ORDER = round_done(straight()).order
@@ -43,6 +46,24 @@ def test_who_is_sick_is_told_when_it_begins_and_when_it_is_over() -> None:
     assert [(one.level, one.text.split(",")[0]) for one in told] == [
         ("warning", "w0 is sick"), ("info", "w0 is given jobs again"), ("warning", "w0 is sick"),
     ]  # fmt: skip
+
+
+def test_that_somebody_acts_for_a_planner_is_told_once_for_each() -> None:
+    told: list[Notice] = []
+    news = RoundNews(told.append)
+    done = round_done(straight())
+    planner = done.order.futures[0].planner
+    count = len(done.results[0].future_indices)
+
+    def said(**words: tuple[str, ...]) -> RoundDone:
+        outcome = msgspec.structs.replace(done.results[0].outcome, **words)
+        return replace(done, results=(msgspec.structs.replace(done.results[0], outcome=outcome),))
+
+    news.planners(done)
+    assert told == []
+    for words in (said(remarks=("slow",) * count), said(failures=("gone",) * count)):
+        news.planners(words)
+    assert [one.text for one in told] == [f"a future driven by {planner}: slow"]
 
 
 def test_the_first_word_of_a_slow_machine_is_a_warning_and_the_next_ones_are_news() -> None:
