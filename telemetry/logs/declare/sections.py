@@ -20,7 +20,7 @@ from foretwin.telemetry.logs.declare.motion import MOVES_MPS
 from foretwin.telemetry.logs.declare.places import Place
 from foretwin.telemetry.logs.declare.repeats import new_when
 from foretwin.telemetry.logs.declare.roles import HeadingFit, RoleFit
-from foretwin.telemetry.logs.declare.sensors import FoundSensors
+from foretwin.telemetry.logs.declare.sensors import FoundSensors, measured_first
 
 _TOGETHER = 0.95
 _STRAIGHT_DEG = 1.5
@@ -115,7 +115,7 @@ class Sections:
     def _steering(self, sensors: FoundSensors) -> dict[str, RoleFit]:
         found = [(name, sensors.fits[f"steering.{name}"]) for name in ("wheel", "tire")
                  if f"steering.{name}" in sensors.fits]  # fmt: skip
-        return dict([min(found, key=lambda row: row[1].like.left)]) if found else {}
+        return dict([min(found, key=lambda row: measured_first(row[1]))]) if found else {}
 
     def _upright(
         self, sensors: FoundSensors, given: dict[str, Any], said: list[str]

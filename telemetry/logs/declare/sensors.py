@@ -15,6 +15,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.declare.likeness import Lateness, lateness
 from foretwin.telemetry.logs.declare.motion import GRID_S, MOVES_MPS, GridMotion, changes, on_grid
+from foretwin.telemetry.logs.declare.names import COMMANDED
 from foretwin.telemetry.logs.declare.places import Place
 from foretwin.telemetry.logs.declare.roles import (
     ROLES,
@@ -57,6 +58,11 @@ class FoundSensors(NamedTuple):
     others: dict[str, list[str]]
     doubts: dict[str, str]
     notes: list[str]
+
+
+def measured_first(fit: RoleFit) -> tuple[bool, float]:
+    """Return what to sort fits of one role by: what was measured, then what fits better."""
+    return bool(COMMANDED.search(fit.column)), fit.like.left
 
 
 def columns_beside(
@@ -108,7 +114,11 @@ def sensors_of(place: Place, beside: dict[str, ChangingColumn]) -> FoundSensors:
         for name, column in _less(beside, fits).items():
             odd = odd_speed(motion, on_grid(motion, column.time_s, column.values))
             doubts |= {} if odd is None else {name: odd}
-    notes = _never_backwards(beside, speed, heading)
+    notes = _never_backwards(beside, speed, heading) + [
+        f"{fit.column}: by its name this is what was wanted, not what then was"
+        for fit in fits.values()
+        if COMMANDED.search(fit.column)
+    ]
     return FoundSensors(fits, heading, late, _gravity(beside, fits), others, doubts, notes)
 
 
@@ -160,7 +170,7 @@ def _taken(
         by_role.setdefault(key, []).append(best)
     others = {}
     for key, rows in by_role.items():
-        rows.sort(key=lambda fit: fit.like.left)
+        rows.sort(key=measured_first)
         others[key] = [fit.column for fit in rows[1:]]
     return {key: rows[0] for key, rows in by_role.items()}, others, doubts
 

@@ -29,7 +29,6 @@ COVERS = (
     "foretwin.telemetry.logs.declare.proposal",
     "foretwin.telemetry.logs.declare.roles",
     "foretwin.telemetry.logs.declare.sections",
-    "foretwin.telemetry.logs.declare.sensors",
 )
 DECLARATIONS = Path(__file__).parents[3] / "data" / "declarations"
 

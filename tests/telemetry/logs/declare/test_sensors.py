@@ -1,0 +1,30 @@
+"""What was measured, and what a controller wanted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foretwin.telemetry.logs.declare import propose
+from tests.telemetry.logs.declare.test_propose import drawn_drive, one_table
+
+
+@pytest.mark.parametrize("wanted", ["steering_cmd", "target_steering", "Lenkwinkel_soll"])
+def test_what_was_measured_is_taken_before_what_was_wanted(tmp_path: Path, wanted: str) -> None:
+    drive = drawn_drive()
+    wheel = drive["steering"].columns["wheel"]
+    at_fixes = np.interp(drive["gnss"].stamps_ns, drive["steering"].stamps_ns, wheel)
+    noise = np.random.default_rng(3).normal(0.0, 0.02 * np.std(wheel), len(at_fixes))
+    path = one_table(tmp_path, **{wanted: at_fixes, "steering": at_fixes + noise})
+    proposed = propose(path)
+    assert proposed.declaration is not None
+    assert proposed.declaration.steering is not None
+    taken = proposed.declaration.steering.wheel or proposed.declaration.steering.tire
+    assert taken is not None
+    assert taken.column == "steering"
+    assert "not what then was" not in "\n".join(proposed.unknown)
+
+    alone = propose(one_table(tmp_path, **{wanted: at_fixes}))
+    assert f"{wanted}: by its name this is what was wanted" in "\n".join(alone.unknown)
