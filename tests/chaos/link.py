@@ -160,7 +160,7 @@ def link_for(seed: int, *, packets: bool) -> Iterator[Link]:
 def own_network() -> Iterator[int]:
     """Give a process in a network of its own; raises OSError where this user may have none."""
     holder = subprocess.Popen(
-        ["unshare", "-n", "sh", "-c", "echo there; exec sleep 900"], stdout=subprocess.PIPE
+        ["unshare", "-n", "sh", "-c", "echo there; exec sleep 7200"], stdout=subprocess.PIPE
     )
     try:
         assert holder.stdout is not None

@@ -32,6 +32,8 @@ from foretwin.telemetry.standin.path import DrivenPath, read_path
 from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 
 FROM, AHEAD_S, TRUTH = "MEETS_FROM", "MEETS_AHEAD_S", "MEETS_TRUTH"
+THERE = ".there"
+"""The end of the name of a file beside its truth, which it makes once it is on the bus."""
 PATH = "MEETS_PATH"
 """What it drives; its setup's path is passed over."""
 
@@ -97,6 +99,7 @@ def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
         anchor=setup.anchor,
         file=Path(os.environ[FROM]),
     )
+    (Path(os.environ[TRUTH]) / f"{setup.vehicle_id}{THERE}").touch()
     process.serve()
     _write_truth(setup, source)
 

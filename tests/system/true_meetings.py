@@ -27,7 +27,7 @@ from tests.orchestrator.other_vehicles.two_cars import TRUTH_S
 CAR = load_vehicle(None)
 WORLD = LocalFrame(GeoPoint(45.0015, -30.002))
 """Where they meet: beside the streets of the drawn town."""
-RADIUS_M, LAP_S, LAPS = 16.0, 22.0, 11
+RADIUS_M, LAP_S = 16.0, 22.0
 APART_M = math.sqrt(2.0) * RADIUS_M
 """Between the middles of two circles that cross at right angles."""
 LATE_S = 0.8, 2.2
@@ -38,10 +38,10 @@ FIRST_TURN = {"second": 170.0 / 360.0, "third": 350.0 / 360.0}
 """Turns until the first meeting."""
 
 
-def path_of(name: str, random: np.random.Generator) -> dict[str, list[float]]:
+def path_of(name: str, random: np.random.Generator, *, laps: int) -> dict[str, list[float]]:
     """A circle, again and again; who meets the car comes to the crossing somewhat late or early."""
     length_m = 2.0 * math.pi * RADIUS_M
-    along_m = np.arange(0.0, (LAPS + 1.0) * length_m, 0.5)
+    along_m = np.arange(0.0, (laps + 1.0) * length_m, 0.5)
     turns = along_m / length_m
     begins_rad = math.radians(235.0 if name == "ego" else 325.0)
     angle = begins_rad + math.tau * turns
@@ -49,7 +49,7 @@ def path_of(name: str, random: np.random.Generator) -> dict[str, list[float]]:
     lat, lon = geo_from_local(WORLD, xy_m + np.array([MIDDLES_M[name], 0.0])).T
     speed = np.full(len(turns), length_m / LAP_S)
     if name != "ego":
-        late_s = random.choice((-1.0, 1.0), LAPS + 3) * random.uniform(*LATE_S, LAPS + 3)
+        late_s = random.choice((-1.0, 1.0), laps + 3) * random.uniform(*LATE_S, laps + 3)
         lap = np.maximum(np.ceil(turns - FIRST_TURN[name]), 0).astype(int)
         first_s = LAP_S * FIRST_TURN[name]
         stretched = np.where(
