@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, get_args
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.exit_codes import DONE, PARTLY
 from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.orchestrator.commands.progress_bar import progress_bar
@@ -30,6 +31,8 @@ class ReportWritten(msgspec.Struct, frozen=True, kw_only=True):
     file: str
     size_bytes: int
     verdict: str
+    unread: tuple[str, ...] = ()
+    """What there should be of the folders and could not be read."""
     indicators: msgspec.Struct | None = None
 
 
@@ -62,10 +65,13 @@ def report(
         file=str(out),
         size_bytes=out.stat().st_size,
         verdict=told.verdict,
+        unread=told.unread,
         indicators=told.counted,
     )
     size = f"{written.size_bytes / 1e6:.1f} MB"
-    return CommandResult(written, f"{written.verdict}\nwrote {written.file} ({size})")
+    words = [written.verdict, f"wrote {written.file} ({size})"]
+    words += [f"left out: {one}" for one in written.unread]
+    return CommandResult(written, "\n".join(words), PARTLY if written.unread else DONE)
 
 
 def _redaction(word: str | None) -> Redaction | None:

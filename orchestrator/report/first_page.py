@@ -43,7 +43,7 @@ def verdict_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[str,
             f"{scenario_of(worst.worst[0])} at {worst.name}"
         )
         tone = _graver(tone, tone_of(grave))
-    elif passed:
+    elif passed and not run.futures_unread:
         said.append("nothing critical was foreseen")
     said, tone = _about_reality(run, said, tone)
     late = rounds_in_time(run)
@@ -52,6 +52,9 @@ def verdict_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[str,
         tone = _graver(tone, "watch")
     if troubles := [*(record.get("troubles") or []), *(part_of(record, "recovered", "lost") or [])]:
         said.append(f"something is missing: {str(troubles[0]).rstrip('.')}")
+        tone = "bad"
+    if run.unread:
+        said += run.unread
         tone = "bad"
     return " ".join(f"{one[0].upper()}{one[1:]}." for one in said), tone
 
@@ -112,7 +115,7 @@ def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[KeyF
             f"{plural(futures, 'future')} in {plural(len(run.rounds), 'round')}",
         ),
         KeyFigure(
-            "none" if not gravest else power(gravest, 0),
+            UNKNOWN if run.futures_unread else "none" if not gravest else power(gravest, 0),
             "gravest foreseen",
             f"criticality; amber from {power(AMBER_FROM, 0)}, red from {power(RED_FROM, 0)}",
             tone_of(gravest),

@@ -254,7 +254,7 @@ def _picture(run: RunMaterial, one: JunctionPassed, world: World) -> Drawn:
 
 def _play(run: RunMaterial, round_id: int) -> ReplayedRound:
     if run.futures is None:
-        return ReplayedRound((), "the table of futures is missing", None)
+        return ReplayedRound((), "; ".join(run.unread) or "no future was played", None)
     return replayed(run.folder, run.futures.filter(pc.field("round_id") == round_id).to_pylist())
 
 

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.errors import one_line
 from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.recorded_messages import CarRecorded, car_recorded
@@ -101,6 +102,8 @@ class RunMaterial:
         self.record: dict[str, Any] = read_record(folder)
         self._tables: dict[str, pa.Table | None] = {}
         self._worlds = KeptWorlds(folder)
+        self.damaged: dict[str, str] = {}
+        """Why a table that was asked for cannot be read, by its name, though its file is there."""
 
     def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table | None:
         """Return a table of the run, None where it is missing, empty or cannot be read."""
@@ -111,7 +114,10 @@ class RunMaterial:
     def _read(self, name: str, columns: Sequence[str] | None) -> pa.Table | None:
         try:
             found = read_parts(table_at(self.folder, name), columns=columns)
-        except (OSError, pa.ArrowException):
+        except FileNotFoundError:
+            return None
+        except (OSError, pa.ArrowException) as error:
+            self.damaged[name] = one_line(error)
             return None
         return found if found.num_rows else None
 
@@ -129,6 +135,19 @@ class RunMaterial:
     def futures(self) -> pa.Table | None:
         """Return what a report reads of the table of futures."""
         return self.table("futures", FUTURE_COLUMNS)
+
+    @property
+    def futures_unread(self) -> bool:
+        """Whether futures were played that no table tells of: nothing is known of them then."""
+        return self.futures is None and bool(part_of(self.record, "futures", "count"))
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """Return in words what there should be of the tables and could not be read so far."""
+        said = [f"the table of {name} is damaged" for name in sorted(self.damaged)]
+        if self.futures_unread and "futures" not in self.damaged:
+            said.append("the table of futures is missing")
+        return tuple(said)
 
     @property
     def start_stamp_ns(self) -> int:

@@ -79,6 +79,7 @@ def run_report(
         front=tuple(_front(run, passed, pictures=pictures)),
         parts=tuple(parts),
         attribution=(run.attribution,) if run.attribution else (),
+        unread=run.unread,
     )
 
 

@@ -61,6 +61,7 @@ def several_runs_report(
         for one in seen:
             of_each.append(_one(one, pictures=pictures))
             advance(one.name)
+    unread = [f"{one.name}: {word}" for one in seen for word in one.run.unread]
     ids = [str(one.run.record.get("run_id") or one.run.folder.name) for one in seen]
     attribution = dict.fromkeys(one.run.attribution for one in seen if one.run.attribution)
     return Report(
@@ -69,7 +70,7 @@ def several_runs_report(
         verdict=_verdict(seen),
         tone="watch" if any(_tone(one) in ("watch", "bad") for one in seen) else "good",
         figures=tuple(_figure(one) for one in seen[:5]),
-        front=(_key_figures(seen), *_left(runs)),
+        front=(*(Prose(f"{one}.", "bad") for one in unread), _key_figures(seen), *_left(runs)),
         parts=(
             Chapter("settings", "What was set otherwise", (_settings(seen, places=places),)),
             Chapter("junctions", "Junction by junction", (_junctions(seen),)),
@@ -89,6 +90,7 @@ def several_runs_report(
         ),
         attribution=tuple(attribution),
         counted=indicators,
+        unread=tuple(unread),
     )
 
 

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.errors import UserError
+from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
 from foretwin.orchestrator.report.material import KeptWorlds, TableRow, most_critical
@@ -61,13 +61,17 @@ class SweepMaterial:
 
     @cached_property
     def futures(self) -> pa.Table:
-        """Return all rows with the columns that a report reads; none where none can be read."""
+        """Return all rows with the columns that a report reads, none where none was written;
+        UserError where their file is damaged."""
         columns = [*_COLUMNS, *(f"metric_{name}" for name in ROW_METRICS)]
-        empty = JOB_TABLES["futures"].empty_table().select(columns)
         try:
-            return pq.read_table(table_at(self.folder, "futures"), columns=columns)
-        except (OSError, pa.ArrowException):
-            return empty
+            file = table_at(self.folder, "futures")
+        except FileNotFoundError:
+            return JOB_TABLES["futures"].empty_table().select(columns)
+        try:
+            return pq.read_table(file, columns=columns)
+        except (OSError, pa.ArrowException) as error:
+            raise UserError(f"{file}: cannot be read: {one_line(error)}") from error
 
     @cached_property
     def played(self) -> pa.Table:

@@ -45,6 +45,16 @@ def test_json_holds_the_indicators_over_several_runs_and_nothing_else_is_printed
     assert [(one["events"], one["exposure"], one["low"]) for one in lost] == [(0, 80.0, 0.0)]
 
 
+def test_what_could_not_be_read_is_said_last_and_by_the_exit_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = told_run(tmp_path, futures={"count": 9})
+    (folder / "results" / "futures.parquet").unlink()
+
+    assert run(["report", str(folder), "--out", str(tmp_path / "one.html")]) == 3
+    assert capsys.readouterr().out.endswith("left out: the table of futures is missing\n")
+
+
 @pytest.mark.parametrize("of", ["a run", "two runs", "a sweep"])
 def test_how_far_it_is_is_counted_section_by_section_to_the_last(
     of: str,

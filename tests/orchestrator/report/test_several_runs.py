@@ -37,6 +37,16 @@ def test_the_same_run_twice_changes_nothing(tmp_path: Path) -> None:
     assert page.count("same</td>") > 3
 
 
+def test_what_cannot_be_read_of_one_of_them_stands_first(tmp_path: Path) -> None:
+    one, other = told_run(tmp_path / "one"), told_run(tmp_path / "other", futures={"count": 9})
+    (other / "results" / "futures.parquet").unlink()
+
+    report = report_of_folders([one, other])
+
+    assert report.unread == ("B: the table of futures is missing",)
+    assert "B: the table of futures is missing." in html_of(report)
+
+
 def test_runs_and_sweeps_do_not_go_together(tmp_path: Path) -> None:
     one = told_run(tmp_path)
     (tmp_path / "sweep").mkdir()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.repeat import repeat
 from foretwin.orchestrator.report.page import html_of
@@ -61,3 +62,12 @@ def test_a_sweep_that_played_nothing_says_so(tmp_path: Path) -> None:
 
     assert "The sweep holds no rows: nothing was played." in page
     assert "not complete" in page
+
+
+def test_a_sweep_whose_rows_are_damaged_is_refused(swept: Path, tmp_path: Path) -> None:
+    (tmp_path / "sweep.json").write_bytes((swept / "sweep.json").read_bytes())
+    (tmp_path / "rows").mkdir()
+    (tmp_path / "rows" / "job-0.parquet").write_bytes(b"PAR1")
+
+    with pytest.raises(UserError, match=r"rows: cannot be read"):
+        report_of_folders([tmp_path])

@@ -174,6 +174,27 @@ def test_what_is_missing_of_a_recovered_run_makes_the_verdict(tmp_path: Path) ->
     assert "what the car did is not recorded" in page
 
 
+@pytest.mark.parametrize("how", ["damaged", "missing"])
+def test_where_the_futures_cannot_be_read_nothing_is_said_of_what_was_foreseen(
+    tmp_path: Path, how: str
+) -> None:
+    run = told_run(tmp_path, futures={"count": 9})
+    assert "he gravest of what was foreseen" in report_of_folders([run]).verdict
+    table = run / "results" / "futures.parquet"
+    if how == "damaged":
+        table.write_bytes(table.read_bytes()[:200])
+    else:
+        table.unlink()
+
+    report = report_of_folders([run])
+
+    assert (report.tone, report.unread) == ("bad", (f"the table of futures is {how}",))
+    assert "foreseen" not in report.verdict
+    assert report.verdict.endswith(f"The table of futures is {how}.")
+    (gravest,) = [one for one in report.figures if one.name == "gravest foreseen"]
+    assert gravest.value == UNKNOWN
+
+
 def test_a_run_that_goes_on_or_was_killed_is_refused(tmp_path: Path) -> None:
     killed = told_run(tmp_path, exit="running")
 
