@@ -64,8 +64,10 @@ _MORE = {
     "boulder-no-std": _Public("boulder-rtk/boulder_no_std.csv", "tuning"),
     "kitti-00": _Public("kitti-00/kitti00.csv", "tuning"),
     "kitti-05": _Public("kitti-05/kitti05.csv", "tuning"),
-    "kitti-02": _Public("kitti-02/kitti02.csv", "held_out"),
-    "kitti-08": _Public("kitti-08/kitti08.csv", "held_out"),
+    **{
+        f"kitti-{number}": _Public(f"kitti-{number}/kitti{number}.csv", "held_out")
+        for number in ("02", "06", "07", "08", "09", "10")
+    },
     "main-tower": _Public("frankfurt-main-tower/Frankfurt_Main_Tower_GT.txt", "held_out"),
     "boreas-september": _Public(
         "boreas-2021-09-02/lidar_poses.csv", "held_out", 0.01, true_heading=True

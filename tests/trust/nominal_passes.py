@@ -65,6 +65,14 @@ SOURCES = (
     ),
     Source("chemnitz", "tuned_on", "FORETWIN_DRIVES", "chemnitz-city/Chemnitz_GT.txt"),
     Source("boulder", "tuned_on", "FORETWIN_DRIVES", "boulder-rtk/boulder.csv"),
+    *(
+        Source(f"kitti-{number}", group, "FORETWIN_DRIVES", f"kitti-{number}/kitti{number}.csv")
+        for group, numbers in (
+            ("tuned_on", ("00", "05")),
+            ("held_out", ("02", "06", "07", "08", "09", "10")),
+        )
+        for number in numbers
+    ),
     Source(
         "main-tower",
         "held_out",
