@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from foretwin.contracts.codec import SchemaMismatch
-from foretwin.contracts.errors import one_line
+from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.segments import DRIVE_FILE
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.recorded_messages import CarRecorded, car_recorded
@@ -99,7 +99,7 @@ class RunMaterial:
         self.called = called or str(folder)
         """What commands in the report name it."""
         check_finished(folder)
-        self.record: dict[str, Any] = read_record(folder)
+        self.record = _known(folder, read_record(folder))
         self._tables: dict[str, pa.Table | None] = {}
         self._worlds = KeptWorlds(folder)
         self.damaged: dict[str, str] = {}
@@ -143,10 +143,13 @@ class RunMaterial:
 
     @property
     def unread(self) -> tuple[str, ...]:
-        """Return in words what there should be of the tables and could not be read so far."""
-        said = [f"the table of {name} is damaged" for name in sorted(self.damaged)]
+        """Return in words what there should be of the run and could not be read so far."""
+        said = [] if self.record else ["its run.json holds no record of a drive"]
+        said += [f"the table of {name} is damaged" for name in sorted(self.damaged)]
         if self.futures_unread and "futures" not in self.damaged:
             said.append("the table of futures is missing")
+        if part_of(self.record, "ledger", "telemetry", "recorded") and not self.recorded.states:
+            said.append(f"{DRIVE_FILE} holds nothing of the car that can be read")
         return tuple(said)
 
     @property
@@ -181,6 +184,17 @@ class RunMaterial:
         """Return whose map it is."""
         told = self.record.get("map") or {}
         return str(told.get("attribution") or "")
+
+
+def _known(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
+    """Return a record; UserError where it is none that a drive of this foretwin writes."""
+    for key in ("map", "config", "futures", "ledger", "comparison", "agreement", "tuning"):
+        if not isinstance(record.get(key) or {}, dict):
+            raise UserError(f"{folder}/run.json: {key}: a table is asked for, as a drive writes it")
+    for key in ("intersections", "troubles", "off_road"):
+        if not isinstance(record.get(key) or [], list):
+            raise UserError(f"{folder}/run.json: {key}: a list is asked for, as a drive writes it")
+    return record
 
 
 def in_lock_step(record: Mapping[str, Any]) -> bool:

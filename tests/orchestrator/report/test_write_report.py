@@ -195,6 +195,37 @@ def test_where_the_futures_cannot_be_read_nothing_is_said_of_what_was_foreseen(
     assert gravest.value == UNKNOWN
 
 
+def test_a_drive_whose_recording_is_empty_is_not_told_as_whole(tmp_path: Path) -> None:
+    recorded = {"rounds": None, "telemetry": {"published": 9, "recorded": 9, "lost": 0}}
+    run = told_run(tmp_path, ledger=recorded)
+    assert report_of_folders([run]).unread == ()
+    (run / "drive.mcap").write_bytes(b"")
+
+    report = report_of_folders([run])
+
+    assert report.unread == ("drive.mcap holds nothing of the car that can be read",)
+    assert report.tone == "bad"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"intersections": "no"}', "run.json: intersections: a list is asked for"),
+        ('{"futures": [1]}', "run.json: futures: a table is asked for"),
+    ],
+)
+def test_a_record_that_no_drive_wrote_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(UserError, match=re.escape(said)):
+        report_of_folders([tmp_path])
+
+
+def test_a_torn_record_is_said_to_be_none(tmp_path: Path) -> None:
+    run = told_run(tmp_path)
+    (run / "run.json").write_text('{"run_id": "x", "inter')
+    assert report_of_folders([run]).unread == ("its run.json holds no record of a drive",)
+
+
 def test_a_run_that_goes_on_or_was_killed_is_refused(tmp_path: Path) -> None:
     killed = told_run(tmp_path, exit="running")
 
