@@ -102,7 +102,7 @@ def rounds_in_time(run: RunMaterial) -> tuple[int, int] | None:
 
 def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[KeyFigure, ...]:
     """Return the five numbers of the first page."""
-    futures = sum(one.futures for one in passed)
+    rounds, futures = plural(len(run.rounds), "round"), sum(one.futures for one in passed)
     reached = sum(one.arrived_s is not None for one in passed)
     gravest = max((one.gravest or 0.0 for one in passed), default=0.0)
     error = part_of(run.record, "comparison", "ade_m", "4")
@@ -112,7 +112,7 @@ def figures_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[KeyF
         KeyFigure(
             str(reached),
             "junctions passed",
-            f"{plural(futures, 'future')} in {plural(len(run.rounds), 'round')}",
+            rounds if run.futures_unread else f"{plural(futures, 'future')} in {rounds}",
         ),
         KeyFigure(
             UNKNOWN if run.futures_unread else "none" if not gravest else power(gravest, 0),

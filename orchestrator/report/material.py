@@ -149,7 +149,7 @@ class RunMaterial:
         if self.futures_unread and "futures" not in self.damaged:
             said.append("the table of futures is missing")
         if part_of(self.record, "ledger", "telemetry", "recorded") and not self.recorded.states:
-            said.append(f"{DRIVE_FILE} holds nothing of the car that can be read")
+            said.append(f"the recording of the car, {DRIVE_FILE}, cannot be read")
         return tuple(said)
 
     @property

@@ -193,6 +193,7 @@ def test_where_the_futures_cannot_be_read_nothing_is_said_of_what_was_foreseen(
     assert report.verdict.endswith(f"The table of futures is {how}.")
     (gravest,) = [one for one in report.figures if one.name == "gravest foreseen"]
     assert gravest.value == UNKNOWN
+    assert report.figures[0].note == "1 round"
 
 
 def test_a_drive_whose_recording_is_empty_is_not_told_as_whole(tmp_path: Path) -> None:
@@ -203,7 +204,7 @@ def test_a_drive_whose_recording_is_empty_is_not_told_as_whole(tmp_path: Path) -
 
     report = report_of_folders([run])
 
-    assert report.unread == ("drive.mcap holds nothing of the car that can be read",)
+    assert report.unread == ("the recording of the car, drive.mcap, cannot be read",)
     assert report.tone == "bad"
 
 
