@@ -25,7 +25,6 @@ def anchor(
     """Print where a lot can be anchored: poses on lanes, as the [world] of an anchor file.
 
     Example: foretwin anchor MAP.osm --at 52.5127,13.3914
-    Example: foretwin anchor MAP.osm --lane w10012.41.44.f0 --before 30
     """
     from foretwin.orchestrator.commands.anchor import show_anchors
 
