@@ -29,8 +29,9 @@ from foretwin.sim_worker.virtual_traffic.source import STEP_S, TrafficSource, Vi
 from foretwin.world_gen.rules.signal_state import LiveColour, colours_at
 
 STEP_NS = round(STEP_S * 1e9)
-_MOST_STEPS = 4
-"""At once. Who has missed more than 0.2 s of the car goes on from where it is, and says so."""
+_MOST_STEPS = 24
+"""At once: receivers that say once a second where the car is are the slowest, and say it a little
+late. Who has missed more of the car than that goes on from where it is, and says so."""
 
 
 class ToldCourse(msgspec.Struct, frozen=True):

@@ -130,6 +130,16 @@ def test_after_a_silence_it_goes_on_and_counts_what_it_left_out() -> None:
     assert traffic.missed == 60
 
 
+@pytest.mark.parametrize("every_s", [0.1, 0.2, 1.0])
+def test_a_car_that_seldom_says_where_it_is_has_traffic_at_20_hz_as_well(every_s: float) -> None:
+    traffic, _ = going()
+    traffic.take_course(course(0.0), WORLD)
+    jitter_s = np.random.default_rng(1).uniform(-1e-4, 1e-4, round(20.0 / every_s) + 1)
+    said = at(traffic, *(np.arange(len(jitter_s)) * every_s + 1.0 + jitter_s))
+    assert traffic.missed == 0
+    assert len(said) == pytest.approx(400, abs=2)
+
+
 def test_where_the_clock_steps_back_it_goes_on_from_there() -> None:
     traffic, _ = going()
     traffic.take_course(course(0.0), WORLD)
