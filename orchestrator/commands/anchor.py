@@ -11,8 +11,11 @@ import numpy as np
 from foretwin.contracts.did_you_mean import meant
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPose, geo_pose, local_from_geo
+from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
+from foretwin.contracts.partial_file import partial_file
 from foretwin.contracts.world import Lane, World
 from foretwin.geometry.polyline import arc_lengths, interpolated
+from foretwin.orchestrator.commands.anchor_page import anchor_page
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.choice import (
     FARTHEST_M,
@@ -64,15 +67,20 @@ class LanePose(NamedTuple):
 
 
 def show_anchors(
-    map_file: Path, *, at: str | None, lane_id: str | None, before_m: float
+    map_file: Path, *, at: str | None, lane_id: str | None, before_m: float, page: Path | None
 ) -> CommandResult:
     """Return the poses on the lanes that lead to the junction nearest to a place, best first, or
     that on one lane.
 
     In words the first is a table of an anchor file as it stands, the others are comments of one.
+    `page` is where a page is written that takes a click instead.
     """
     if not 0.0 <= before_m <= 1000.0:
         raise UserError(f"--before {before_m}: 0 to 1000 m")
+    if page is not None and page.suffix.lower() not in (".html", ".htm"):
+        raise UserError(f"--page {page}: an HTML file, such as {page.stem}.html")
+    if page is not None and (trouble := trouble_with_folder(page.parent)) is not None:
+        raise UserError(f"--page {page}: {trouble}")
     if at is not None and lane_id is None:
         opened, (junction, *_) = choose_junctions(map_file, at=at, radius_m=_RADIUS_M)
         asked = _AnchorPlace(opened, junction, parse_place(at))
@@ -90,6 +98,11 @@ def show_anchors(
     if not found:
         raise UserError(f"--at {at}: no lane leads to {summary.id}")
     lines = []
+    if page is not None:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        with named_in_errors(f"--page {page}"), partial_file(page) as partial:
+            partial.write_text(anchor_page(world, radius_m=_RADIUS_M), encoding="utf-8")
+        lines.append(f"# wrote {page}: a click on it tells the pose there")
     for number, one in enumerate(found):
         name = one.lane.name or "a road without a name"
         lines.append(
@@ -102,6 +115,7 @@ def show_anchors(
         "junction_id": summary.id,
         "junction": summary.name,
         "poses": [one.as_object() for one in found],
+        "page": None if page is None else str(page),
         "attribution": world.attribution,
     }
     return CommandResult(body, "\n".join(lines))

@@ -21,6 +21,9 @@ def anchor(
     before_m: Annotated[
         float, typer.Option("--before", help="metres before the lane's end")
     ] = 60.0,
+    page: Annotated[
+        Path | None, typer.Option(help="FILE.html: a picture on which a click takes a place")
+    ] = None,
 ) -> CommandResult:
     """Print where a lot can be anchored: poses on lanes, as the [world] of an anchor file.
 
@@ -28,7 +31,7 @@ def anchor(
     """
     from foretwin.orchestrator.commands.anchor import show_anchors
 
-    return show_anchors(map_file, at=at, lane_id=lane, before_m=before_m)
+    return show_anchors(map_file, at=at, lane_id=lane, before_m=before_m, page=page)
 
 
 @told

@@ -32,7 +32,7 @@ def junction_svg(
     `seconds_m` (K, 2) where it was after each whole second.
     """
     canvas = _canvas(world, futures, driven_m)
-    _ground(canvas, world)
+    draw_ground(canvas, world)
     _futures(canvas, futures)
     wide = _stroke(canvas, 0.0055)
     if len(driven_m) > 1:
@@ -77,7 +77,8 @@ def _canvas(world: World, futures: Sequence[SeenFuture], driven_m: Array) -> Can
     return Canvas(x - half * _ASPECT, y - half, x + half * _ASPECT, y + half)
 
 
-def _ground(canvas: Canvas, world: World) -> None:
+def draw_ground(canvas: Canvas, world: World) -> None:
+    """Draw roads, lanes, kerbs, crossings, stop lines and buildings, in the World's frame."""
     for areas, colour in ((world.sidewalks, style.SIDEWALK), (world.road_surface, style.ROAD)):
         for area in areas:
             canvas.area((area.outline, *area.holes), f'fill="{colour}"')
