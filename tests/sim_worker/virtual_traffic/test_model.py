@@ -123,7 +123,11 @@ def test_at_red_they_wait() -> None:
     row[:2] = 20.0
     for k in range(600):
         scene = traffic.step(row, time_s=k * STEP_S, colours={"all": "red"})
-    assert any(user.speed_mps < 0.1 for user in scene)
+    waiting = {user.user_id for user in scene if user.speed_mps < 0.1}
+    assert len(waiting) > 3
+    for k in range(600, 800):
+        later = {u.user_id: u for u in traffic.step(row, time_s=k * STEP_S, colours={"all": "red"})}
+        assert all(later[one].speed_mps == 0.0 for one in waiting & set(later))
     inside = [u for u in scene if max(abs(u.x_m), abs(u.y_m)) < 6.0]
     assert not inside
 
