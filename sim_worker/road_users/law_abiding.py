@@ -104,7 +104,7 @@ class LawAbiding:
             speed, self._desired, wanted / np.maximum(gap, 0.1), most, decel
         )
         accel = np.minimum(accel, self._for_bends(arc, speed))
-        # Who stands sets off for a way that is worth it, and does not creep up to what it waits for.
+        # Who stands sets off for a way that is worth it, and does not creep up to what it awaits.
         stays = (speed < driver.HOLD_SPEED_MPS) & (gap < least + driver.WORTH_M)
         accel = np.where(stays, np.minimum(accel, driver.HOLD_MPS2), accel)
         return np.asarray(np.clip(accel, -driver.EMERGENCY_DECEL_MPS2, most))
