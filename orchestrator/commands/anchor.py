@@ -11,11 +11,12 @@ import numpy as np
 from foretwin.contracts.did_you_mean import meant
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPose, geo_pose, local_from_geo
-from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
+from foretwin.contracts.new_folder import named_in_errors
 from foretwin.contracts.partial_file import partial_file
 from foretwin.contracts.world import Lane, World
 from foretwin.geometry.polyline import arc_lengths, interpolated
 from foretwin.orchestrator.commands.anchor_page import anchor_page
+from foretwin.orchestrator.commands.output import check_html_file
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.choice import (
     FARTHEST_M,
@@ -77,10 +78,8 @@ def show_anchors(
     """
     if not 0.0 <= before_m <= 1000.0:
         raise UserError(f"--before {before_m}: 0 to 1000 m")
-    if page is not None and page.suffix.lower() not in (".html", ".htm"):
-        raise UserError(f"--page {page}: an HTML file, such as {page.stem}.html")
-    if page is not None and (trouble := trouble_with_folder(page.parent)) is not None:
-        raise UserError(f"--page {page}: {trouble}")
+    if page is not None:
+        check_html_file(page, "--page", "the page")
     if at is not None and lane_id is None:
         opened, (junction, *_) = choose_junctions(map_file, at=at, radius_m=_RADIUS_M)
         asked = _AnchorPlace(opened, junction, parse_place(at))

@@ -1,4 +1,4 @@
-"""How commands print what they found: as JSON, or as a table."""
+"""How commands say what they found: as JSON, as a table, or in a file that is a page."""
 
 from __future__ import annotations
 
@@ -6,14 +6,28 @@ import csv
 import io
 import os
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.terminal import console, say, words
 
 if TYPE_CHECKING:
     from rich.table import Column
+
+
+def check_html_file(path: Path, option: str, what: str) -> None:
+    """Refuse, before what takes long is begun, a file to write that is no HTML file or cannot be
+    one; `what` is what will stand in it. Raises UserError."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise UserError(f"{option} {path}: {what} is an HTML file, such as {path.stem}.html")
+    if path.is_dir():
+        raise UserError(f"{option} {path}: is a folder")
+    if (trouble := trouble_with_folder(path.parent)) is not None:
+        raise UserError(f"{option} {path}: {trouble}")
 
 
 def print_json(body: object) -> None:

@@ -10,8 +10,9 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.exit_codes import DONE, PARTLY
-from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
+from foretwin.contracts.new_folder import named_in_errors
 from foretwin.contracts.segments import DRIVE_FILE
+from foretwin.orchestrator.commands.output import check_html_file
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.report.gap_rows import HumanRow
@@ -20,8 +21,6 @@ from foretwin.orchestrator.report.write_report import write_report
 
 if TYPE_CHECKING:
     from foretwin.sim_worker.analysis.two_drives.differences import Spread
-
-_SUFFIXES = (".html", ".htm")
 
 
 class ReportWritten(msgspec.Struct, frozen=True, kw_only=True):
@@ -49,12 +48,7 @@ def report(
     Raises UserError or what errors of paths raise, before anything is written.
     """
     redaction = _redaction(redact)
-    if out.suffix.lower() not in _SUFFIXES:
-        raise UserError(f"--out {out}: a report is an HTML file, such as {out.stem}.html")
-    if out.is_dir():
-        raise UserError(f"--out {out}: is a folder")
-    if (trouble := trouble_with_folder(out.parent)) is not None:
-        raise UserError(f"--out {out}: {trouble}")
+    check_html_file(out, "--out", "a report")
     if against is not None and len(folders) != 1:
         raise UserError("--against goes with one run")
     people = [] if against is None else _people(folders[0], against)

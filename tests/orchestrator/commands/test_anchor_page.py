@@ -63,8 +63,8 @@ def test_points_lie_on_their_lane_and_look_along_it(world: World) -> None:
         )
         step = line[1] - line[0]
         yaw_rad = local_from_geo_yaw(world.frame, np.radians(found["yaw_deg"][0]), lat[0], lon[0])
-        looks = np.array([np.cos(yaw_rad), np.sin(yaw_rad)]).ravel()
-        assert float(looks @ step) == pytest.approx(float(np.hypot(*step)), abs=1e-4)
+        off_rad = float(yaw_rad) - float(np.arctan2(step[1], step[0]))
+        assert abs(np.angle(np.exp(1j * off_rad))) < 1e-5
 
 
 def test_the_page_asks_for_nothing_and_strangers_names_do_nothing(world: World) -> None:
@@ -85,8 +85,16 @@ def test_the_command_writes_it_beside_the_table(
     assert f"# wrote {page}" in said
     assert set(tomllib.loads(said)) == {"world"}
     assert lanes_in(page.read_text())
-    assert run(["anchor", str(MAP_FILE), "--at", PLACE, "--page", str(tmp_path / "a.png")]) == 2
-    assert "place.html" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "said"), [("a.png", "a.html"), ("a.html", "is a folder")])
+def test_what_can_be_no_page_is_refused_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, said: str
+) -> None:
+    (tmp_path / "a.html").mkdir()
+    page = str(tmp_path / name)
+    assert run(["anchor", "no-map.osm", "--at", PLACE, "--page", page]) == 2
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.judge
