@@ -121,13 +121,15 @@ def test_at_red_they_wait() -> None:
     traffic.use_world(lit)
     row = np.zeros(8)
     row[:2] = 20.0
-    for k in range(600):
+    stands: dict[str, tuple[float, float]] = {}
+    for k in range(800):
         scene = traffic.step(row, time_s=k * STEP_S, colours={"all": "red"})
-    waiting = {user.user_id for user in scene if user.speed_mps < 0.1}
-    assert len(waiting) > 3
-    for k in range(600, 800):
-        later = {u.user_id: u for u in traffic.step(row, time_s=k * STEP_S, colours={"all": "red"})}
-        assert all(later[one].speed_mps == 0.0 for one in waiting & set(later))
+        for user in scene:
+            if user.speed_mps < 0.01:
+                stands.setdefault(user.user_id, (user.x_m, user.y_m))
+            if user.user_id in stands:
+                assert (user.x_m, user.y_m) == pytest.approx(stands[user.user_id], abs=0.01)
+    assert len(stands) > 3
     inside = [u for u in scene if max(abs(u.x_m), abs(u.y_m)) < 6.0]
     assert not inside
 

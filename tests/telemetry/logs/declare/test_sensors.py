@@ -26,5 +26,13 @@ def test_what_was_measured_is_taken_before_what_was_wanted(tmp_path: Path, wante
     assert taken.column == "steering"
     assert "not what then was" not in "\n".join(proposed.unknown)
 
+    tyre = at_fixes / 15.0 * (1.0 + noise / np.std(wheel))
+    both = propose(one_table(tmp_path, **{wanted: at_fixes, "tyre": tyre})).declaration
+    assert both is not None
+    assert both.steering is not None
+    assert both.steering.wheel is None
+    assert both.steering.tire is not None
+    assert both.steering.tire.column == "tyre"
+
     alone = propose(one_table(tmp_path, **{wanted: at_fixes}))
     assert f"{wanted}: by its name this is what was wanted" in "\n".join(alone.unknown)
