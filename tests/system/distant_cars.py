@@ -36,7 +36,13 @@ from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.chaos.link import PacketLink, own_network
 from tests.orchestrator.campaign.campaigns import campaign, now
 from tests.system.encounter_car import AHEAD_S, FROM, PATH, THERE, TRUTH
-from tests.system.foretwin_command import environment, run_folder, slow_s, wait_for
+from tests.system.foretwin_command import (
+    end_process,
+    environment,
+    run_folder,
+    slow_s,
+    wait_for,
+)
 from tests.system.true_meetings import (
     LAP_S,
     SETTLED_S,
@@ -165,7 +171,7 @@ class Meeting:
                 env=environment(self.folder / "cache", pace=self._pace) | mine,
                 stdout=screen, stderr=screen, stdin=subprocess.DEVNULL,
             )  # fmt: skip
-        self._stack.callback(_ended, process)
+        self._stack.callback(end_process, process)
         return process
 
 
@@ -181,16 +187,6 @@ def anchor_of(name: str) -> Anchor:
 def lot_file(name: str) -> str:
     anchor = anchor_of(name)
     return anchor_text(AnchorFile(lot=anchor.lot, world=anchor.world))
-
-
-def _ended(process: subprocess.Popen[bytes]) -> None:
-    if process.poll() is None:
-        process.send_signal(signal.SIGTERM)
-        try:
-            process.wait(timeout=60.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
 
 
 class Told(NamedTuple):

@@ -104,6 +104,17 @@ def started(
                 os.kill(pid, signal.SIGKILL)
 
 
+def end_process(process: subprocess.Popen[Any], *, within_s: float = 60.0) -> None:
+    """End a process, by force where it takes longer; what it still says is read away."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.communicate(timeout=within_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+    process.communicate()
+
+
 def run_folder(out: Path) -> Path | None:
     """Return the folder of the only run below `out`, None where there is none."""
     try:

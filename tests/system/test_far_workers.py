@@ -27,6 +27,7 @@ from tests.chaos.outsiders import Outsider, live_car
 from tests.orchestrator.campaign.campaigns import campaign, now
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
+    end_process,
     environment,
     log_lines,
     run_folder,
@@ -97,7 +98,7 @@ class Fleet:
             cwd=self.folder, env=environment(self.folder / "cache") | (env or {}), text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
         )  # fmt: skip
-        self._stack.callback(_ended, process)
+        self._stack.callback(end_process, process, within_s=40.0)
         return process
 
     def rounds(self) -> list[dict[str, Any]]:
@@ -148,16 +149,6 @@ class Fleet:
 
 def _listed(run: Path) -> bool:
     return (run / "run.json").exists()
-
-
-def _ended(process: subprocess.Popen[str]) -> None:
-    if process.poll() is None:
-        process.send_signal(signal.SIGTERM)
-        try:
-            process.communicate(timeout=40.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-    process.communicate()
 
 
 @pytest.fixture
