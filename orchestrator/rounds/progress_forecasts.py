@@ -217,7 +217,7 @@ def _spread_of_futures(done: RoundDone, forecast: ProgressForecast, instants: li
         travelled_m(result.trajectory.states[np.asarray(result.outcome.valid, dtype=bool)])
         for result in done.results
     ]
-    at = np.concatenate([way[:, places] for way in ways])
+    at = np.concatenate([np.zeros((0, len(places))), *(way[:, places] for way in ways)])
     if len(at):
         found[instants] = np.quantile(at, forecast.levels, axis=0).T
     return found

@@ -161,15 +161,15 @@ class LockStep:
             start_stamp_ns=self._start_ns, count=1, progress=self._forecasts,
         )  # fmt: skip
         self.rounds.append(Round(number, world, intent, state, trend, job))
-        if not self._futures:
-            return
         order = RoundOrder(
             round_id=number, stamp_ns=state.stamp_ns, junction_id=intent.junction_id,
             world_id=world.id, receipt_mono_ns=0, started_mono_ns=0, jobs=(job,),
         )  # fmt: skip
-        result = self.played(job)
-        if result.outcome.valid[0]:
-            done = RoundDone(order=order, results=(result,), latency_ms=0.0, seconds=0.0)
+        results = (self.played(job),) if self._futures else ()
+        done = RoundDone(order=order, results=results, latency_ms=0.0, seconds=0.0)
+        if self._forecasts is not None:
+            self._forecasts.take_round(done)
+        if results and results[0].outcome.valid[0]:
             self._desk.take_round(done, world.frame, state)
 
     def played(self, job: Job) -> FuturesResult:

@@ -4,10 +4,8 @@
 
 prints for each pass, of arrivals before which the car did not stand, how far what is shown 10 and
 5 s before was off (median, 95th percentile, mean in seconds), and how far the countdown departs
-from counting down within 0.2 s (95th percentile). Then, of all arrivals, those after a stop too,
-between when and when the car is said to come while about 10 and 5 s are shown: how many of a
-hundred came between, before and after; how often no end is told; how long it is where one is. The
-last row has all of them.
+from counting down within 0.2 s (95th percentile). The last row has all of them. What can be known
+of places ahead, and between when and when they are said to be reached, is in `knowable.py`.
 """
 
 from __future__ import annotations
@@ -28,7 +26,6 @@ from tests.orchestrator.in_process_drive import LockStep
 from tests.trust.nominal_passes import passes
 
 BEFORE_S = (10.0, 5.0)
-ABOUT_S = 1.0
 _WITHIN_S = 0.25
 _LAST_M = 3.0
 
@@ -41,8 +38,6 @@ class Shown(NamedTuple):
     junction_id: str
     distance_m: float
     in_s: float | None
-    early_s: float | None = None
-    late_s: float | None = None
 
 
 class Watched(LockStep):
@@ -57,13 +52,7 @@ class Watched(LockStep):
             return
         first, time_s = way.junctions[0], state.stamp_ns * 1e-9
         name = first.junction.summary.id
-        at = Shown(time_s, state.speed_mps, name, first.distance_m, way.countdown_s)
-        assert self._forecasts is not None
-        band = self._forecasts.arrival_band(first.distance_m, usual_mps=way.usual_speed_mps)
-        if band is not None and at.in_s is not None:
-            band = band.around(at.in_s)
-            at = at._replace(early_s=band.early_s, late_s=band.late_s)
-        self.shown.append(at)
+        self.shown.append(Shown(time_s, state.speed_mps, name, first.distance_m, way.countdown_s))
 
 
 def arrivals(shown: list[Shown]) -> Iterator[list[Shown]]:
@@ -76,7 +65,8 @@ def arrivals(shown: list[Shown]) -> Iterator[list[Shown]]:
 
 def off_s(one: list[Shown], before_s: float) -> float | None:
     """Return how far the countdown was off so long before an arrival, None where the car stood."""
-    reached_s = _reached_s(one)
+    last = one[-1]
+    reached_s = last.time_s + last.distance_m / max(last.speed_mps, STANDING_MPS)
     left = [(reached_s - at.time_s, at) for at in one]
     rest = [at for left_s, at in left if left_s <= before_s + _WITHIN_S]
     nearest_s, at = min(left, key=lambda pair: abs(pair[0] - before_s))
@@ -84,44 +74,6 @@ def off_s(one: list[Shown], before_s: float) -> float | None:
     if abs(nearest_s - before_s) > _WITHIN_S or not moving or at.in_s is None:
         return None
     return at.in_s - nearest_s
-
-
-def _reached_s(one: list[Shown]) -> float:
-    last = one[-1]
-    return last.time_s + last.distance_m / max(last.speed_mps, STANDING_MPS)
-
-
-class Bands(NamedTuple):
-    """What came of N bands, in parts of them, and how long those are that have an end."""
-
-    count: int
-    held: float
-    before: float
-    after: float
-    endless: float
-    median_s: float
-
-
-def bands(groups: list[list[Shown]], before_s: float) -> Bands | None:
-    """Return what came of the bands that were told while about `before_s` was shown."""
-    told = [
-        (_reached_s(one) - at.time_s, at.early_s, np.inf if at.late_s is None else at.late_s)
-        for one in groups
-        for at in one
-        if at.in_s is not None and abs(at.in_s - before_s) < ABOUT_S and at.early_s is not None
-    ]
-    if not told:
-        return None
-    came, early, late = np.array(told).T
-    long_s = (late - early)[np.isfinite(late)]
-    return Bands(
-        len(told),
-        float(np.mean((came >= early) & (came <= late))),
-        float(np.mean(came < early)),
-        float(np.mean(came > late)),
-        float(np.mean(np.isinf(late))),
-        float(np.median(long_s)) if len(long_s) else np.nan,
-    )
 
 
 def departures_s(one: list[Shown]) -> list[float]:
@@ -145,15 +97,6 @@ def row(name: str, groups: list[list[Shown]]) -> str:
             cells.append("-")
     steps = [step for one in groups for step in departures_s(one)]
     cells.append(f"{np.percentile(steps, 95.0):.2f}" if steps else "-")
-    for before_s in BEFORE_S:
-        told = bands(groups, before_s)
-        if told is None:
-            cells.append("-")
-        else:
-            parts = " / ".join(f"{100.0 * part:.0f}" for part in told[1:4])
-            cells.append(
-                f"{parts} ({told.count}), {100.0 * told.endless:.0f}, {told.median_s:.1f} s"
-            )
     return "| " + " | ".join(cells) + " |"
 
 
@@ -163,8 +106,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--group", action="append", default=[])
     given = parser.parse_args(arguments)
-    print("| drive | arrivals | 10 s before | 5 s before | departs s | between, 10 s | 5 s |")
-    print("|" + " --- |" * 7)
+    print("| drive | arrivals | 10 s before | 5 s before | departs s |")
+    print("|" + " --- |" * 5)
     found: dict[str, list[list[Shown]]] = {}
     with tempfile.TemporaryDirectory() as folder:
         groups = given.group or ["given"]

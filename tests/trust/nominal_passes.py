@@ -88,6 +88,7 @@ class Pass(NamedTuple):
     """A pass: its rounds with a known truth over the whole horizon, and what played them."""
 
     name: str
+    group: Group
     drive: LockStep
     truth: Truth
     rounds: list[Round]
@@ -121,7 +122,7 @@ def _passes_of(
     if source.map is not None:
         driven = _driven(driver, str(base / source.map), log)
         for number, window in enumerate(source.windows_s, 1):
-            yield _cut(f"{source.name} {number}", driven, truth, window)
+            yield _cut(f"{source.name} {number}", source.group, driven, truth, window)
         return
     since_s = (truth.track.stamp_ns - truth.track.stamp_ns[0]) * 1e-9
     for number in range(int(since_s[-1] // WINDOW_S) + 1):
@@ -134,7 +135,7 @@ def _passes_of(
             speed_limit_kmh=source.speed_limit_kmh,
         )  # fmt: skip
         driven = _driven(driver, str(map_file), log)
-        yield _cut(f"{source.name} {number + 1}, drawn", driven, truth, window)
+        yield _cut(f"{source.name} {number + 1}, drawn", source.group, driven, truth, window)
 
 
 def _driven(driver: type[LockStep], map_file: str, log: str) -> LockStep:
@@ -145,7 +146,9 @@ def _driven(driver: type[LockStep], map_file: str, log: str) -> LockStep:
     return driver(config, futures=False).run()
 
 
-def _cut(name: str, drive: LockStep, truth: Truth, window_s: tuple[float, float]) -> Pass:
+def _cut(
+    name: str, group: Group, drive: LockStep, truth: Truth, window_s: tuple[float, float]
+) -> Pass:
     """Keep the rounds of a window whose truth reaches to the horizon without a gap."""
     stamps = truth.track.stamp_ns
     long = np.flatnonzero(np.diff(stamps) > _LONGEST_GAP_S * 1e9)
@@ -156,4 +159,4 @@ def _cut(name: str, drive: LockStep, truth: Truth, window_s: tuple[float, float]
         whole = at_s >= window_s[0] and at_s + HORIZON_S < window_s[1] and end < stamps[-1]
         if whole and not np.any((stamps[long + 1] > begin) & (stamps[long] < end)):
             kept.append(one)
-    return Pass(name, drive, truth, kept, *window_s)
+    return Pass(name, group, drive, truth, kept, *window_s)

@@ -49,11 +49,10 @@ class DriveForecasts(NamedTuple):
 
 def true_distances(drive: RealDrive, examples: Examples) -> Array:
     """Return (N, T) how far the car really went after each example."""
-    track = truth_of(drive).track
-    since_s = (track.stamp_ns - track.stamp_ns[0]) * 1e-9
-    speed = track.speed_mps
-    way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(since_s) * (speed[1:] + speed[:-1]))])
-    start_s = (examples.stamp_ns - track.stamp_ns[0]) * 1e-9
+    truth = truth_of(drive)
+    stamp_ns, way = truth.track.stamp_ns, truth.way_m
+    since_s = (stamp_ns - stamp_ns[0]) * 1e-9
+    start_s = (examples.stamp_ns - stamp_ns[0]) * 1e-9
     until_s = start_s[:, None] + np.array(PROGRESS_TIMES_S)
     return np.asarray(np.interp(until_s, since_s, way) - np.interp(start_s, since_s, way)[:, None])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.trust.arrivals import Shown, arrivals, bands, departures_s, off_s, row
+from tests.trust.arrivals import Shown, arrivals, departures_s, off_s, row
 
 
 def approach(junction_id: str, *, off_s: float = 0.0, stood_at_s: float = -1.0) -> list[Shown]:
@@ -38,43 +38,3 @@ def test_an_arrival_after_a_stop_does_not_count() -> None:
 
     assert off_s(one, 10.0) is None
     assert off_s(one, 5.0) == pytest.approx(0.0)
-
-
-def told(junction_id: str, early_s: float, late_s: float | None) -> list[Shown]:
-    """An approach that is told to end so many seconds before and after what is shown."""
-    return [
-        at._replace(early_s=at.in_s - early_s, late_s=None if late_s is None else at.in_s + late_s)
-        for at in approach(junction_id)
-        if at.in_s is not None
-    ]
-
-
-def test_between_before_and_after_are_told_apart() -> None:
-    found = bands([told("a", 1.0, 1.0), told("b", -1.0, 3.0), told("c", 3.0, -1.0)], 10.0)
-
-    assert found is not None
-    assert (found.held, found.before, found.after) == pytest.approx((1 / 3, 1 / 3, 1 / 3))
-    assert (found.endless, found.median_s) == pytest.approx((0.0, 2.0))
-    assert found.count == 3 * 19
-
-
-def test_a_band_without_an_end_holds_whoever_comes_late() -> None:
-    found = bands([told("a", 1.0, None)], 10.0)
-
-    assert found is not None
-    assert found.held == found.endless == 1.0
-    assert "100 / 0 / 0 (19), 100, nan s" in row("x", [told("a", 1.0, None)])
-
-
-def test_an_arrival_after_a_stop_counts_for_bands() -> None:
-    late = [
-        at._replace(time_s=at.time_s + 30.0) if at.time_s > 115.0 else at for at in told("a", 1, 1)
-    ]
-    found = bands([late], 10.0)
-
-    assert found is not None
-    assert (found.held, found.after) == (0.0, 1.0)
-
-
-def test_without_a_band_nothing_is_said() -> None:
-    assert bands([approach("a")], 10.0) is None

@@ -47,6 +47,13 @@ class Truth(NamedTuple):
     slip_m: Array
     torn: npt.NDArray[np.int64]
 
+    @property
+    def way_m(self) -> Array:
+        """(N,) how far the car had come."""
+        speed, since_s = self.track.speed_mps, (self.track.stamp_ns - self.track.stamp_ns[0]) * 1e-9
+        steps_m = 0.5 * np.diff(since_s) * (speed[1:] + speed[:-1])
+        return np.concatenate([[0.0], np.cumsum(steps_m)])
+
     def at(self, stamp_ns: npt.NDArray[np.int64], name: str) -> Array:
         """Return a field of the track, interpolated at (M,) stamps; positions are (M, 2)."""
         base = self.track.stamp_ns
