@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.world import World
@@ -113,6 +114,7 @@ class LockStep:
         self._latest: VehicleState | None = None
         self.rounds: list[Round] = []
         self.comparisons: list[Comparison] = []
+        self.outcomes: list[ForecastOutcome] = []
 
     def run(self) -> LockStep:
         if self._inputs.routes:
@@ -134,7 +136,7 @@ class LockStep:
             return
         self._latest = state
         if self._forecasts is not None:
-            self._forecasts.take_state(state, self._start_ns)
+            self.outcomes += self._forecasts.take_state(state, self._start_ns)
         self.comparisons += self._desk.take_state(state)
         self._wanted += self.mission.on_state(state, mono_s=0.0)
         if self.mission.road_line is not None:

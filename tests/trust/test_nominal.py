@@ -32,6 +32,10 @@ def test_the_nominal_future_is_best_at_every_horizon(tmp_path: Path) -> None:
     assert ours[1] < 1.25 * known[1]
     assert ours[3] < 1.1 * known[3]
 
+    shares = np.array([one.share for one in first.drive.outcomes])
+    assert len(shares) > 3000
+    assert np.mean((shares >= 0.1) & (shares <= 0.9)) == pytest.approx(0.8, abs=0.1)
+
 
 def test_a_drawn_road_lies_about_where_it_was_driven_and_has_junctions(tmp_path: Path) -> None:
     turn = np.linspace(0.0, np.pi / 2.0, 20)
