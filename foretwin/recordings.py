@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from foretwin.checks import path_of
@@ -22,6 +21,7 @@ from foretwin.orchestrator.record.folders_of_runs import table_files
 from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
 from foretwin.orchestrator.record.run_state import RECORD, check_finished
 from foretwin.orchestrator.record.table_parts import read_parts
+from foretwin.sim_worker.futures.checked_parquet import read_parquet
 from foretwin.simulation import Futures
 
 
@@ -62,7 +62,7 @@ class Recording:
         """
         try:
             table = table_at(self.folder, name)
-            return pq.read_table(table) if table.is_dir() else read_parts(table)
+            return read_parquet(table) if table.is_dir() else read_parts(table)
         except (OSError, pa.ArrowException) as error:
             raise UserError(f"{self.folder}: no table {name!r} to be read: {error}") from error
 

@@ -28,14 +28,17 @@ from foretwin.orchestrator.across.run_rows import (
 from foretwin.orchestrator.across.table_heads import TableHeads
 from foretwin.orchestrator.record.folders_of_runs import table_files
 from foretwin.orchestrator.record.run_state import RUNNING
+from foretwin.sim_worker.futures.checked_parquet import VERIFIED
 from foretwin.sim_worker.futures.columns import columns_of, schema
 
 RUN, RUN_ID, RUNS = "run", "run_id", "runs"
 """The column that says whose a row is, here and in lakes; and the table with a row for each run."""
-_ON_DISK = ds.ParquetFragmentScanOptions(pre_buffer=False)
+_ON_DISK = ds.ParquetFragmentScanOptions(pre_buffer=False, **VERIFIED)
 """What is read ahead for object stores costs a fifth more here."""
 _PARQUET = ds.ParquetFileFormat(default_fragment_scan_options=_ON_DISK)
-_IN_LAKE = ds.ParquetFileFormat()
+_IN_LAKE = ds.ParquetFileFormat(
+    default_fragment_scan_options=ds.ParquetFragmentScanOptions(**VERIFIED)
+)
 
 
 class TableSource(NamedTuple):

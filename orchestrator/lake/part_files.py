@@ -15,6 +15,7 @@ from foretwin.orchestrator.lake.manifest import LakeFile, LakeManifest, part_nam
 from foretwin.orchestrator.lake.sources import RUN_ID, RUNS_SCHEMA, SourceTables
 from foretwin.orchestrator.lake.store import HashedSink, LakeStore
 from foretwin.orchestrator.record.results import TABLES
+from foretwin.sim_worker.futures.checked_parquet import parquet_file, parquet_writer
 
 PART_BYTES = 64 << 20
 """A file takes no more rows once it is so long; the last one of a partition is written anew with
@@ -126,7 +127,7 @@ def _credited(schema: pa.Schema, named: set[str]) -> pa.Schema:
 @contextmanager
 def _opened(store: LakeStore, name: str) -> Iterator[pq.ParquetFile]:
     try:
-        with store.system.open_input_file(name) as source, pq.ParquetFile(source) as file:
+        with store.system.open_input_file(name) as source, parquet_file(source) as file:
             yield file
     except (OSError, pa.ArrowException) as error:
         why = " ".join(str(error).split())
@@ -194,7 +195,7 @@ class _OpenPart:
     def __enter__(self) -> _OpenPart:
         self._store.renew()
         self._sink: HashedSink = self._held.enter_context(self._store.staging(self._name))
-        self._writer = pq.ParquetWriter(self._sink, self._schema, compression="zstd")
+        self._writer = parquet_writer(self._sink, self._schema)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *what: object) -> None:

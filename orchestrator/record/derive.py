@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.orchestrator.record.durable import whole_file
 from foretwin.orchestrator.record.table_stream import SUFFIX, StreamReader
+from foretwin.sim_worker.futures.checked_parquet import parquet_writer
 
 GROUP_ROWS, GROUP_JOBS = 2000, 128
 """Rows of a group of a Parquet file; those of jobs are large."""
@@ -44,7 +44,7 @@ def derive(stream: Path, *, each_group: Callable[[], None] = lambda: None) -> De
     rows = 0
     with (
         whole_file(stream.with_suffix(".parquet")) as partial,
-        pq.ParquetWriter(partial, reader.schema, compression="zstd") as writer,
+        parquet_writer(partial, reader.schema) as writer,
     ):
         for group in _groups(reader, GROUP_JOBS if stream.stem == "jobs" else GROUP_ROWS):
             writer.write_table(group)

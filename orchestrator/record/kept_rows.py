@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.record.table_stream import SUFFIX, StreamReader
+from foretwin.sim_worker.futures.checked_parquet import read_parquet
 
 
 def kept_rows(results: Path, table: str, *columns: str) -> list[dict[str, Any]]:
@@ -35,6 +35,6 @@ def _rows(part: Path, columns: list[str]) -> Iterator[dict[str, Any]]:
             for record in StreamReader(part).records():
                 yield from (record.select(columns) if columns else record).to_pylist()
         else:
-            yield from pq.read_table(part, columns=columns or None).to_pylist()
+            yield from read_parquet(part, columns or None).to_pylist()
     except (OSError, pa.ArrowException):
         return

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from foretwin.contracts.errors import UserError
+from foretwin.sim_worker.futures.checked_parquet import parquet_file
 from foretwin.sim_worker.futures.columns import RESULT_SCHEMA_VERSION
 
 
@@ -20,7 +21,7 @@ def opened(path: Path) -> Iterator[pq.ParquetFile]:
     Raises FileNotFoundError where there is none.
     """
     try:
-        with pq.ParquetFile(path) as file:
+        with parquet_file(path) as file:
             yield file
     except (UserError, FileNotFoundError):
         raise

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
+
+from foretwin.sim_worker.futures.checked_parquet import read_parquet
 
 _PUT_AWAY = re.compile(r"(.+)-(\d{3,})")
 
@@ -46,6 +47,5 @@ def next_part(last: Path) -> Path:
 
 def read_parts(last: Path, *, columns: Sequence[str] | None = None) -> pa.Table:
     """Return the rows of all parts of a table; raises OSError or pa.ArrowException."""
-    wanted = None if columns is None else list(columns)
     parts = parts_of_table(last) or [last]
-    return pa.concat_tables([pq.read_table(part, columns=wanted) for part in parts])
+    return pa.concat_tables([read_parquet(part, columns) for part in parts])

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
 from foretwin.orchestrator.report.material import KeptWorlds, TableRow, most_critical
+from foretwin.sim_worker.futures.checked_parquet import read_parquet
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 
@@ -69,7 +69,7 @@ class SweepMaterial:
         except FileNotFoundError:
             return JOB_TABLES["futures"].empty_table().select(columns)
         try:
-            return pq.read_table(file, columns=columns)
+            return read_parquet(file, columns)
         except (OSError, pa.ArrowException) as error:
             raise UserError(f"{file}: cannot be read: {one_line(error)}") from error
 
@@ -85,7 +85,7 @@ class SweepMaterial:
     def metric_means(self) -> dict[str, tuple[str, str]]:
         """Return unit and better direction of the metrics that the sweep measured."""
         try:
-            told = pq.read_table(table_at(self.folder, "metrics")).to_pylist()
+            told = read_parquet(table_at(self.folder, "metrics")).to_pylist()
         except (OSError, pa.ArrowException):
             return {}
         measured = {

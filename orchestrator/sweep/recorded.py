@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUsers, VehicleState
@@ -21,6 +20,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import kept_apart, length
 from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
+from foretwin.sim_worker.futures.checked_parquet import read_parquet
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
@@ -115,7 +115,7 @@ def _starts(run: Path, states: list[VehicleState], *, every_s: float) -> tuple[R
 
 def _rounds(file: Path) -> list[dict[str, Any]]:
     try:
-        rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
+        rows: list[dict[str, Any]] = read_parquet(file).to_pylist()
     except (OSError, pa.ArrowException) as error:
         raise UserError(f"recorded.run: {file} cannot be read: {error}") from error
     return sorted(rows, key=lambda row: (row["stamp_ns"], row["round_id"]))

@@ -8,11 +8,11 @@ from collections.abc import Iterable
 
 import msgspec
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.job_identity import JobBytes
 from foretwin.contracts.parts import CaseCount, FinishedPart, JobCells
+from foretwin.sim_worker.futures.checked_parquet import parquet_writer
 from foretwin.sim_worker.futures.future_rows import Row, future_rows
 from foretwin.sim_worker.futures.job_tables import as_table, job_row, played_with, road_user_rows
 from foretwin.sim_worker.scenarios.reading import numbers
@@ -60,7 +60,8 @@ def finished_part(
 def parquet_bytes(table: pa.Table) -> bytes:
     """Return a table as the bytes of a file."""
     file = pa.BufferOutputStream()
-    pq.write_table(table, file, compression="zstd")
+    with parquet_writer(file, table.schema) as writer:
+        writer.write_table(table)
     data: bytes = file.getvalue().to_pybytes()
     return data
 

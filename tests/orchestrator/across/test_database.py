@@ -117,11 +117,22 @@ def damage_pages(file: Path) -> None:
     file.write_bytes(data)
 
 
+def flip_a_byte(file: Path) -> None:
+    """In the last page of `future_id`: other text, which could be read."""
+    group = pq.read_metadata(file).row_group(0)
+    columns = [group.column(n) for n in range(group.num_columns)]
+    (column,) = (one for one in columns if one.path_in_schema == "future_id")
+    begin = column.dictionary_page_offset or column.data_page_offset
+    data = bytearray(file.read_bytes())
+    data[begin + column.total_compressed_size - 1] ^= 0x01
+    file.write_bytes(data)
+
+
 def cut_short(file: Path) -> None:
     file.write_bytes(file.read_bytes()[:-1])
 
 
-@pytest.mark.parametrize("spoil", [damage_pages, cut_short])
+@pytest.mark.parametrize("spoil", [damage_pages, flip_a_byte, cut_short])
 def test_a_damaged_file_is_left_out_and_told(tmp_path: Path, spoil: object) -> None:
     runs = three(tmp_path)
     file = runs[1] / "results" / "futures.parquet"

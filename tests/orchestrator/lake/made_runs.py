@@ -9,11 +9,11 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset as ds
-import pyarrow.parquet as pq
 
 from foretwin.orchestrator.lake.manifest import MANIFEST
 from foretwin.orchestrator.record.results import TABLES
 from foretwin.orchestrator.record.run_folder import METRICS_FILE, SWEPT_TABLES
+from foretwin.sim_worker.futures.checked_parquet import parquet_writer
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 
 CREDIT = "© OpenStreetMap contributors"
@@ -72,7 +72,9 @@ def future_row(number: int, index: int) -> dict[str, Any]:
 
 
 def write(path: Path, rows: list[dict[str, Any]], schema: pa.Schema, told: dict[str, str]) -> None:
-    pq.write_table(pa.Table.from_pylist(rows, schema=schema.with_metadata(told)), path)
+    table = pa.Table.from_pylist(rows, schema=schema.with_metadata(told))
+    with parquet_writer(path, table.schema) as writer:
+        writer.write_table(table)
 
 
 def lake_table(lake: Path, table: str) -> pa.Table:

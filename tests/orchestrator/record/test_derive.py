@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.orchestrator.record.derive import GROUP_JOBS, GROUP_ROWS, derive, streams_in
+from foretwin.sim_worker.futures.checked_parquet import parquet_writer
 from tests.orchestrator.record.tables_for_streams import SCHEMA, rows, write
 
 
@@ -26,7 +27,7 @@ def test_the_bytes_are_those_of_a_table_written_at_once(sizes: list[int], folder
     stream.unlink(missing_ok=True)
     write(stream, sizes)
     at_once = pa.Table.from_pylist(rows(0, sum(sizes)), schema=SCHEMA)
-    with pq.ParquetWriter(folder / "at_once", SCHEMA, compression="zstd") as writer:
+    with parquet_writer(folder / "at_once", SCHEMA) as writer:
         if sum(sizes):
             writer.write_table(at_once)
 
