@@ -78,10 +78,12 @@ def test_left_stays_left_unless_it_is_mirrored(mirrored, left_m):
     )
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0, 1000.0, math.nan])
+@pytest.mark.parametrize("scale", [0.0, -1.0, 0.0099, 100.1, 1000.0, math.nan])
 def test_a_scale_of_no_vehicle_is_refused(scale):
     with pytest.raises(ValueError, match="scale"):
         Anchor(lot=LOT, world=WORLD, scale=scale).validate()
+    for whole in (0.01, 1.0, 100.0):
+        Anchor(lot=LOT, world=WORLD, scale=whole).validate()
 
 
 @given(anchor=anchors, places=st.lists(st.tuples(metres, metres, angles), min_size=1, max_size=4))

@@ -40,7 +40,8 @@ def test_without_scale_and_fence_it_is_the_same_size_and_has_no_end(tmp_path: Pa
 @pytest.mark.parametrize(
     ("fence", "says"),
     [
-        ("[[52.47, 13.38], [52.48, 13.40]]", "2 corners"),
+        ("[[52.47, 13.38], [52.48, 13.40]]", "2 corners; 3 to 1000 are needed"),
+        (str([[52.47, 13.38]] * 1001), "1001 corners; 3 to 1000 are needed"),
         ("[[152.47, 13.38], [52.48, 13.40], [52.47, 13.41]]", "degrees"),
         ("[[52.47, 13.38], [52.48, 13.41], [52.48, 13.38], [52.47, 13.41]]", "sides cross"),
         ("[[52.47, 13.38], [52.47, 13.41], [52.47, 13.39]]", "sides cross"),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.forecast import (
     LEAST_APART_M,
     PROGRESS_LEVELS,
+    PROGRESS_TIMES_S,
     ProgressForecast,
     pinball,
     rising,
@@ -27,6 +28,12 @@ def even(low_m: float, high_m: float) -> ProgressForecast:
         levels=LEVELS,
         distance_m=np.linspace(low_m, high_m, len(LEVELS))[None],
     )
+
+
+def test_a_forecast_is_told_each_second_up_to_eight_by_every_twentieth() -> None:
+    assert PROGRESS_TIMES_S == tuple(range(1, 9))
+    assert pytest.approx(np.linspace(0.05, 0.95, 19)) == LEVELS
+    assert LEAST_APART_M == 0.01, "no car is known to a centimetre"
 
 
 def test_a_median_lies_in_the_middle_and_other_levels_where_they_are() -> None:

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.frames import (
+    METRES_PER_DEG,
     GeoPoint,
     LocalFrame,
     base_from_sensor,
@@ -90,6 +91,14 @@ def test_distances_are_those_of_the_ellipsoid() -> None:
     _, _, distance_m = geod.inv(lon[0], lat[0], lon[1], lat[1])
 
     assert distance_m == pytest.approx(500.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("lat_deg", [-80.0, -45.0, 0.0, 52.5, 80.0])
+def test_a_degree_of_latitude_is_nearly_as_long_everywhere(lat_deg: float) -> None:
+    frame = LocalFrame(GeoPoint(lat_deg - 0.5, 13.4))
+    assert local_from_geo(frame, lat_deg + 0.5, 13.4) == pytest.approx(
+        (0.0, METRES_PER_DEG), rel=0.006, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(

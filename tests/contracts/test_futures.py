@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from foretwin.contracts.futures import STATE_COLUMNS
+from foretwin.contracts.futures import (
+    PATH_BEHIND_M,
+    RESULT_STEP_S,
+    SPEED_AHEAD_STEP_S,
+    STATE_COLUMNS,
+)
+
+
+def test_a_future_is_told_ten_times_a_second_and_aims_at_a_speed_twice() -> None:
+    assert (RESULT_STEP_S, SPEED_AHEAD_STEP_S, PATH_BEHIND_M) == (0.1, 0.5, 10.0)
 
 
 def test_the_columns_of_a_state() -> None:

@@ -7,7 +7,6 @@ import pytest
 from foretwin.contracts.gap import (
     ALARM_HORIZON_S,
     ALARM_LIMITS_PER_S,
-    STATE_STDS,
     GapSample,
     limits_after,
 )
@@ -51,7 +50,9 @@ def test_a_gap_is_beyond_its_limits_on_either_side() -> None:
 
 
 def test_what_states_leave_open_widens_the_limits() -> None:
-    unsure = sample(across_m=1.3, across_std_m=0.2)
-    assert unsure.limits["across_m"] == pytest.approx(1.0 + STATE_STDS * 0.2)
+    """By two standard deviations."""
+    unsure = sample(across_m=1.39, across_std_m=0.2)
+    assert unsure.limits["across_m"] == pytest.approx(1.0 + 2.0 * 0.2)
+    assert sample(across_m=1.41, across_std_m=0.2).beyond_limits
     assert unsure.limits["yaw_rad"] == limits_after(2.0)["yaw_rad"]
     assert not unsure.beyond_limits

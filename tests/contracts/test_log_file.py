@@ -116,6 +116,15 @@ def test_no_process_fills_a_log_and_the_worst_has_room_longest(
     assert [line["text"] for line in lines[:-3]] == [str(n) for n in range(len(lines) - 3)]
 
 
+def test_a_process_leaves_at_most_eight_megabytes_and_of_warnings_sixteen(
+    file: Path, log: logging.Logger
+) -> None:
+    for level, most in ((logging.INFO, 8e6), (logging.WARNING, 16e6)):
+        for _ in range(20):
+            log.log(level, "x" * 999_000)
+        assert most - 1e6 < file.stat().st_size <= most
+
+
 def test_a_file_that_cannot_be_opened_ends_nothing(tmp_path: Path) -> None:
     handler = LogFile(tmp_path / "missing" / "log.jsonl")
     handler.emit(logging.LogRecord("here", 20, "", 0, "a", (), None))

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts import numbering as module
-from foretwin.contracts.numbering import MOST_GAP, MOST_STREAMS, Numbering, Numberings
+from foretwin.contracts.numbering import MOST_GAP, Numbering, Numberings
 
 
 class Sent(NamedTuple):
@@ -176,27 +175,40 @@ def test_a_number_whose_sender_is_not_told_is_of_who_was_heard_last() -> None:
     assert numbers.missing == {"imu": 2, "gnss": 2}
 
 
-def test_more_holes_than_are_kept_still_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_HOLES", 10)
+def test_more_holes_than_are_kept_still_count() -> None:
     numbering = Numbering("imu", 0, 0)
-    for seq in range(0, 100, 2):
+    for seq in range(0, 1000, 2):
         numbering.go_on(seq, 0)
-    assert (len(numbering.holes), numbering.missing) == (10, 49)
-    assert not numbering.fill(1, 0), "given up"
-    assert numbering.fill(97, 0)
+    assert (len(numbering.holes), numbering.missing) == (256, 499)
+    assert not numbering.fill(997 - 2 * 256, 0), "given up"
+    assert numbering.fill(999 - 2 * 256, 0)
+
+
+@pytest.mark.parametrize(("seq", "missing"), [(30_001, 30_000), (30_002, 0)])
+def test_who_is_more_than_five_minutes_ahead_goes_on_with_another_numbering(
+    seq: int, missing: int
+) -> None:
+    """At a hundred a second."""
+    assert lost([Sent(0, 1_000, 7), Sent(seq, 2_000, 7)]) == missing
+
+
+@pytest.mark.parametrize(("first", "missing"), [(64, 64), (65, 0)])
+def test_another_sender_of_a_channel_that_is_heard_early_began_at_nothing(
+    first: int, missing: int
+) -> None:
+    assert lost([*numbered(9, sender=7), *numbered(9, start=first, sender=8)]) == missing
 
 
 def test_more_senders_than_are_kept_still_count_and_fill_no_memory() -> None:
     numbers = Numberings()
-    for sender in range(1, 3 * MOST_STREAMS):
+    for sender in range(1, 768):
         for seq in (0, 2):
             numbers.take("imu", seq, sender=sender)
         numbers.take("imu", sender - 1, sender=9_999)  # who is heard stays
-    assert len(numbers.streams) == MOST_STREAMS
+    assert len(numbers.streams) == 256
     assert numbers.take("imu", 0, sender=9_999) is None
-    senders = 3 * MOST_STREAMS - 1
-    assert numbers.published["imu"] == 4 * senders
-    assert numbers.missing["imu"] == senders
+    assert numbers.published["imu"] == 4 * 767
+    assert numbers.missing["imu"] == 767
 
 
 def test_many_lives_of_one_that_tells_no_id_fill_no_memory() -> None:

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.running import (
-    ACCURACY,
     EXACT,
     FirstOf,
     RunningMeans,
@@ -39,7 +38,7 @@ def test_quantiles_of_many_are_nearly_so_and_know_no_order(seed: int, q: float) 
     nearest = np.percentile(values, q, method="lower")
     found = quantiles(values.tolist()).percentile(q)
 
-    assert found == pytest.approx(nearest, rel=1.01 * ACCURACY, abs=1e-9)
+    assert found == pytest.approx(nearest, rel=0.0101, abs=1e-9)
     assert found == quantiles(random.permutation(values).tolist()).percentile(q)
 
 
@@ -49,6 +48,13 @@ def test_quantiles_of_a_day_take_little_memory() -> None:
     assert len(found._bins) < 3000
     assert found._values is None
     assert sys.getsizeof(found._bins) < 200_000
+
+
+def test_of_many_none_is_kept_and_small_and_great_ones_are_told_apart() -> None:
+    assert quantiles([1.0] * 5_000)._values is None
+    for value in (1e-9, 2e-9, 5e11, 1e12):
+        assert quantiles([value] * 5_000).percentile(50) == pytest.approx(value, rel=0.0101)
+    assert quantiles([0.9e-9] * 5_000).percentile(50) == 0.0
 
 
 @pytest.mark.parametrize("odd", [-1.0, float("nan")])

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.forecast import PROGRESS_LEVELS, PROGRESS_TIMES_S, ProgressForecast
-from foretwin.orchestrator.rounds.arrival_band import LATEST_S, ArrivalBand, arrival_band
+from foretwin.orchestrator.rounds.arrival_band import ArrivalBand, arrival_band
 
 TIMES_S = np.array(PROGRESS_TIMES_S)
 LEVELS = np.array(PROGRESS_LEVELS)
@@ -73,8 +73,38 @@ def test_who_still_slows_down_as_the_forecast_ends_goes_on_to() -> None:
     assert band.late_s is None or band.late_s > 8.0 + 12.0 / 2.0  # 2 m/s are left at 8 s
 
 
-def test_what_is_too_far_is_not_told() -> None:
-    assert arrival_band(steady(8.0, 12.0), 1.1 * LATEST_S * 12.0, usual_mps=12.0) is None
+@pytest.mark.parametrize("usual_mps", [14.0, 6.0])
+def test_beyond_the_forecast_speeds_go_from_the_last_to_another_and_a_trend_fades(
+    usual_mps: float,
+) -> None:
+    """p90 drives at 10 m/s and comes back to the usual speed within 24 s; p10 loses 0.4 m/s each
+    second, which fades within 3 s."""
+    early_m, late_m = 10.0 * TIMES_S, 10.0 * TIMES_S - 0.2 * TIMES_S**2
+    share = np.interp(LEVELS, (0.1, 0.9), (0.0, 1.0))
+    forecast = of_courses(late_m[:, None] + share * (early_m - late_m)[:, None])
+
+    def way_m(
+        after_s: float, from_m: float, last_mps: float, to_mps: float, within_s: float
+    ) -> float:
+        fading_s = within_s * (1.0 - np.exp(-after_s / within_s))
+        return from_m + to_mps * after_s + (last_mps - to_mps) * float(fading_s)
+
+    early = arrival_band(forecast, way_m(16.0, 80.0, 10.0, usual_mps, 24.0), usual_mps=usual_mps)
+    assert early is not None
+    assert early.early_s == pytest.approx(24.0, abs=0.003)
+    # In the last second 7 m: so the last speed is told, and the trend by quarters of the time.
+    late = arrival_band(forecast, way_m(6.1, 67.2, 7.0, 7.0 - 3.0 * 0.4, 3.0), usual_mps=usual_mps)
+    assert late is not None
+    assert late.late_s == pytest.approx(14.1, abs=0.003)
+
+
+@pytest.mark.parametrize(("in_s", "told"), [(59.9, True), (60.3, False)])
+def test_what_is_more_than_a_minute_ahead_is_not_told(in_s: float, told: bool) -> None:
+    crawls = steady(1.0, 1.0)
+    assert (arrival_band(crawls, in_s, usual_mps=1.0) is not None) == told
+    late = arrival_band(steady(1.0, 2.0), in_s, usual_mps=2.0)
+    assert late is not None
+    assert (late.late_s is not None) == told
 
 
 def test_a_car_that_is_there_is_there() -> None:

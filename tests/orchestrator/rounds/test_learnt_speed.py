@@ -13,7 +13,7 @@ from foretwin.contracts.forecast import PROGRESS_LEVELS, PROGRESS_TIMES_S, Progr
 from foretwin.orchestrator.forecast.progress_model import progress_model
 from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
-from foretwin.orchestrator.rounds.learnt_speed import LEARNT_SHARE, partly_learnt
+from foretwin.orchestrator.rounds.learnt_speed import partly_learnt
 from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import town_world
@@ -44,12 +44,14 @@ def test_a_forecast_of_the_same_acceleration_changes_nothing(accel: float) -> No
     np.testing.assert_allclose(partly_learnt(braking_or_not, learnt), braking_or_not, atol=1e-9)
 
 
-@given(accel=st.floats(-1.0, 1.0))
-def test_half_of_a_learnt_acceleration_counts(accel: float) -> None:
-    learnt = forecast(9.0 * TIMES_S + 0.5 * accel * TIMES_S**2)
+@given(power=st.sampled_from([2, 3, 4]), at_most=st.floats(-8.0, 8.0))
+def test_half_of_a_learnt_acceleration_or_jerk_counts(power: int, at_most: float) -> None:
+    """What grows with a power of time by so many metres within 8 s."""
+    learnt = forecast(9.0 * TIMES_S + at_most * (TIMES_S / 8.0) ** power)
     found = partly_learnt(STEADY, learnt)
 
-    np.testing.assert_allclose(found, 9.0 + LEARNT_SHARE * accel * 0.5 * np.arange(17), atol=1e-6)
+    change = at_most * power * (0.5 * np.arange(17)) ** (power - 1) / 8.0**power
+    np.testing.assert_allclose(found, 9.0 + 0.5 * change, atol=1e-6)
 
 
 def test_uneven_quantiles_give_even_speeds() -> None:

@@ -67,6 +67,36 @@ def test_a_part_of_what_the_car_lies_aside_fades() -> None:
     assert moved[-1] == pytest.approx(-1.5 * ASIDE_SHARE, abs=0.02)
 
 
+@given(
+    aside_m=st.floats(-5.0, 5.0),
+    turned_rad=st.floats(-1.5, 1.5),
+    speed_mps=st.floats(-2.0, 30.0),
+    way_rad=st.floats(-math.pi, math.pi),
+)
+def test_both_lead_so_far_aside(
+    aside_m: float, turned_rad: float, speed_mps: float, way_rad: float
+) -> None:
+    """The heading, of up to 0.5 rad, over 2.6 s and 2 m; a third of up to 3 m aside over 5 s and
+    1 m, ahead of the car alone."""
+    ahead_m, speed = EAST[:, 0] - 0.2, max(speed_mps, 0.0)
+    tangent = math.tan(max(-0.5, min(turned_rad, 0.5)))
+    heading = tangent * ahead_m * np.exp(-np.abs(ahead_m) / (2.6 * speed + 2.0))
+    fades = 1.0 - np.exp(-np.maximum(ahead_m, 0.0) / (5.0 * speed + 1.0))
+    wanted = heading - 0.33 * max(-3.0, min(aside_m, 3.0)) * fades
+
+    moved = led(aside_m=aside_m, turned_rad=turned_rad, speed_mps=speed_mps, way_rad=way_rad)
+    np.testing.assert_allclose(moved, wanted, atol=1e-9)
+
+
+def test_on_a_way_that_comes_back_the_car_is_where_it_begins() -> None:
+    """It is looked for on the first 60 m."""
+    there = np.column_stack([np.arange(0.0, 80.0), np.zeros(80)])
+    path = np.concatenate([there, there[::-1] + (0.0, 2.0)])
+    car_xy_m = np.array([58.0, 1.9])
+    found = led_from_car(path, car_xy_m=car_xy_m, car_yaw_rad=0.1, speed_mps=10.0)
+    assert found[58 + 15, 1] > 0.5
+
+
 def test_a_car_that_crosses_the_road_is_not_followed_across() -> None:
     assert np.abs(led(turned_rad=3.0)).max() < 6.0
     np.testing.assert_allclose(led(turned_rad=0.6), led(turned_rad=1.4), atol=1e-12)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
-from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from foretwin.orchestrator.rounds.seen_users import MOST_SEEN, WITHIN_M, near_car
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_pose
+from foretwin.orchestrator.rounds.seen_users import WITHIN_M, near_car
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 CAR = VehicleState(
@@ -39,7 +40,22 @@ def test_those_near_the_car_at_about_its_time_are_met() -> None:
     assert WITHIN_M == 120.0
     assert names(seen(near, user("edge", WITHIN_M - 1.0), far)) == ["near", "edge"]
     assert names(seen()) == names(None) == []
-    assert names(seen(near, stamp_ns=1_000 + 600_000_000)) == []
+    for stamp_ns, heard in ((500_001_000, ["near"]), (-499_999_000, ["near"]), (500_001_001, [])):
+        assert names(seen(near, stamp_ns=stamp_ns)) == heard
+
+
+def test_who_is_met_is_as_it_was_seen_but_in_the_worlds_frame() -> None:
+    world = LocalFrame(GeoPoint(52.51, 13.45))
+    walker = RoadUser(
+        user_id="7", kind="pedestrian", position=GeoPoint(52.5001, 13.4002), yaw_rad=0.7,
+        speed_mps=1.5, length_m=0.5, width_m=0.6,
+    )  # fmt: skip
+    (found,) = near_car(seen(walker), CAR, world)
+    at = local_pose(world, walker.position, 0.7)
+
+    assert (found.x_m, found.y_m, found.yaw_rad) == pytest.approx(at)
+    assert (found.user_id, found.kind) == ("7", "pedestrian")
+    assert (found.speed_mps, found.length_m, found.width_m) == (1.5, 0.5, 0.6)
 
 
 def test_nobody_is_there_twice() -> None:
@@ -56,7 +72,7 @@ def test_of_a_crowd_the_nearest_are_met_in_their_order(
     found = near_car(seen(*users), CAR, FRAME)
     away_m = {str(number): float(np.hypot(*place)) for number, place in enumerate(places)}
 
-    assert len(found) == min(len(places), MOST_SEEN)
+    assert len(found) == min(len(places), 16)
     kept = [one.user_id for one in found]
     assert kept == sorted(kept, key=int)
     left_m = [away_m[name] for name in away_m.keys() - set(kept)]
