@@ -31,7 +31,7 @@ def even(low_m: float, high_m: float) -> ProgressForecast:
 
 
 def test_a_forecast_is_told_each_second_up_to_eight_by_every_twentieth() -> None:
-    assert PROGRESS_TIMES_S == tuple(range(1, 9))
+    assert tuple(range(1, 9)) == PROGRESS_TIMES_S
     assert pytest.approx(np.linspace(0.05, 0.95, 19)) == LEVELS
     assert LEAST_APART_M == 0.01, "no car is known to a centimetre"
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 
+from foretwin.contracts.own_log import _BURST, _LET_GO_S, _PER_S
+from tests.pages import page
+
 WRITES = """
 import os, sys, time
 from foretwin.contracts.own_log import OwnLog
@@ -24,6 +27,12 @@ def said(write: str, *, take: str = "heard.append", prepare: str = "") -> list[s
     assert done.stdout == ""
     assert done.returncode == 0, done.stderr
     return done.stderr.splitlines()
+
+
+def test_the_page_tells_what_a_flood_is() -> None:
+    flood = f"more than {_BURST:,} records at a stretch, or {_PER_S:,} a second"
+    assert f"{flood}) they are let go for half a second" in page("bus.md")
+    assert _LET_GO_S == 0.5
 
 
 def test_each_write_is_a_record_whatever_stands_in_it() -> None:

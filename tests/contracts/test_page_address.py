@@ -9,9 +9,10 @@ import pytest
 
 from foretwin.contracts.campaign import TlsFiles
 from foretwin.contracts.credentials import credentials_file, make_credentials
-from foretwin.contracts.page_address import page_address, page_key
+from foretwin.contracts.page_address import USUAL_PORT, page_address, page_key
 from foretwin.contracts.ports import LOOPBACK
 from foretwin.contracts.process_setup import BusSetup
+from tests.pages import page
 
 
 def joins(folder: Path, user: str) -> BusSetup:
@@ -37,6 +38,10 @@ def test_over_a_network_it_follows_from_the_certificates_key(tmp_path: Path) -> 
     file.write_bytes(b"another")
     assert page_key(setup, "run1") != first
     assert page_key(BusSetup(endpoint="tcp/x:1"), "run1") != first
+
+
+def test_the_page_tells_where_it_is_usually_opened() -> None:
+    assert page_address("1d9c09c621f3f08a", port=USUAL_PORT) in page("copilot.md")
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.running import (
+    ACCURACY,
     EXACT,
+    MOST_LISTED,
     FirstOf,
     RunningMeans,
     RunningQuantiles,
 )
+from tests.pages import page
 
 VALUES = st.floats(0.0, 1e11)
 
@@ -24,6 +27,12 @@ def quantiles(values: list[float]) -> RunningQuantiles:
     for value in values:
         found.take(value)
     return found
+
+
+def test_the_page_tells_what_is_exact_and_how_much_is_listed() -> None:
+    told = f"quantiles exactly up to {EXACT:,} values, within {100 * ACCURACY:g} % beyond"
+    assert told in page("results.md")
+    assert f"hold their first {MOST_LISTED:,} entries" in page("results.md")
 
 
 @given(st.lists(VALUES, min_size=1, max_size=50), st.sampled_from([0, 5, 50, 95, 100]))

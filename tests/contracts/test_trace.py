@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from foretwin.contracts import trace
+from tests.pages import page
 
 ANOTHER = """
 import sys
@@ -192,6 +193,10 @@ for _ in range(3000):
 trace.end()
 """
 """In a process of its own: threads that other tests left add spans to a trace of this one."""
+
+
+def test_the_page_tells_how_much_a_process_writes() -> None:
+    assert f"A process writes {trace.MOST_BYTES / 1e6:g} MB at most" in page("trace.md")
 
 
 def test_a_process_writes_no_more_than_it_may(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from foretwin.world_gen.buildings.roofs import roof_over, roof_tags
 from tests.world_gen.buildings.test_footprints import SQUARE, footprints
 from tests.world_gen.drawn_maps import crossing, drawn_map, world_of
 
-COVERS = ("foretwin.contracts.beside_road",)
 HOUSE = np.array([[0.0, 0.0], [12.0, 0.0], [12.0, 8.0], [0.0, 8.0]])
 
 
