@@ -33,7 +33,6 @@ from foretwin.contracts import (
     vehicle,
     world,
 )
-from foretwin.contracts.ports import WEB_PORT
 
 COVERS = (
     "foretwin.contracts.drive",
@@ -91,7 +90,7 @@ LISTED: dict[str, dict[str, Any]] = {
     "VehicleState": {"yaw_valid": True},
     "VehicleStatus": {"control_mode": "unknown", "gear": "unknown", "indicator": "unknown"},
     "ViewerSetup": {
-        "live": "none", "page_port": WEB_PORT, "title": "foretwin", "attribution": OSM,
+        "live": "none", "page_port": 9090, "title": "foretwin", "attribution": OSM,
     },
     "VirtualTraffic": {"source": "off", "scenario": "cpta", "count": 20},
     "Where": {"setting": "junction"},

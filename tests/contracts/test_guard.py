@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.contracts.bounds import MOST_IDENTIFIER, MOST_USERS, SHAPES
+from foretwin.contracts.bounds import SHAPES
 from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import (
     GnssFix,
@@ -175,7 +175,26 @@ def test_what_may_be_unknown_may_be_nan_and_nothing_else_may() -> None:
 
 
 def test_too_many_road_users_are_no_message() -> None:
-    assert why(RoadUsers(stamp_ns=1, users=(user(),) * (MOST_USERS + 1))) == "too many road users"
+    assert why(RoadUsers(stamp_ns=1, users=(user(),) * 5_001)) == "too many road users"
+    assert (
+        len(admit(RoadUsers(stamp_ns=1, users=(user(),) * 5_000), where=KEY).message.users) == 5_000
+    )
+
+
+def test_a_text_may_be_twenty_thousand_characters_long() -> None:
+    notice = WorldNotice(world_id="w", intersection_id="n4", file="f" * 20_000)
+    assert admit(notice, where=KEY).message == notice
+    longer = msgspec.structs.replace(notice, file="f" * 20_001)
+    assert why(longer) == "WorldNotice: file too long"
+
+
+def test_a_stamp_may_be_any_until_the_year_2116() -> None:
+    last_ns = 2**62
+    for stamp_ns in (last_ns, -last_ns):
+        assert admit(SpeedSample(stamp_ns=stamp_ns, speed_mps=1.0), where=KEY)
+    for stamp_ns in (last_ns + 1, -last_ns - 1):
+        sample = SpeedSample(stamp_ns=stamp_ns, speed_mps=1.0)
+        assert why(sample) == "SpeedSample: stamp_ns out of bounds"
 
 
 @pytest.mark.parametrize(
@@ -188,7 +207,10 @@ def test_what_names_a_file_or_a_process_is_a_plain_name(name: str) -> None:
 
 def test_a_plain_name_may_be_long() -> None:
     assert is_identifier("w0")
-    assert is_identifier("x" * MOST_IDENTIFIER)
+    assert is_identifier("x" * 200)
+    assert not is_identifier("x" * 201)
+    assert is_road_user(user(user_id="x" * 200))
+    assert not is_road_user(user(user_id="x" * 201))
 
 
 def test_bytes_that_are_no_message_are_refused_with_why() -> None:

@@ -20,6 +20,7 @@ from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, ROUTER, python, take, take_until
 from tests.contracts.memory_bus import MemoryBus
+from tests.pages import page
 
 W0 = {"run": "r1", "process": "w-x-0"}
 TOKEN = alive_key(**W0)
@@ -93,6 +94,10 @@ def wait_until(condition: Callable[[], bool]) -> None:
     deadline_s = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < deadline_s
+
+
+def test_the_page_tells_how_often_it_knocks() -> None:
+    assert f"knocks at the router's port every {1e3 * KNOCK_EVERY_S:.0f} ms" in page("bus.md")
 
 
 def test_all_that_was_declared_holds_on_the_new_session(far: Far) -> None:

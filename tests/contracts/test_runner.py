@@ -13,8 +13,6 @@ from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.parts import JobCells
 from foretwin.contracts.placement import PlaceRequest
 from foretwin.contracts.runner import (
-    AHEAD,
-    TRIES,
     Answer,
     JobRequest,
     Task,
@@ -52,16 +50,14 @@ def task(number: int) -> Task:
 
 def test_a_large_cluster_is_given_twice_as_many_as_it_can_work_at() -> None:
     class Large(Newest):
-        capacity = AHEAD
+        capacity = 256
 
     runner = Large()
-    assert sum(1 for _ in answers(runner, map(task, range(3 * AHEAD)))) == 3 * AHEAD
-    assert runner.most == 2 * AHEAD
+    assert sum(1 for _ in answers(runner, map(task, range(768)))) == 768
+    assert runner.most == 512
 
 
-@pytest.mark.parametrize(
-    ("count", "ahead"), [(0, 3), (1, 3), (3, 3), (50, 3), (50, 1), (300, AHEAD)]
-)
+@pytest.mark.parametrize(("count", "ahead"), [(0, 3), (1, 3), (3, 3), (50, 3), (50, 1), (300, 256)])
 def test_tasks_are_made_as_they_are_needed_and_each_is_answered(count: int, ahead: int) -> None:
     runner, made = Newest(), []
 
@@ -97,15 +93,15 @@ def test_a_wrong_answer_does_not_count_and_its_task_is_asked_again() -> None:
     runner = Odd()
 
     def fault_in(answer: Answer) -> str:
-        never, soon = answer.task.key == "1", answer.task.key == "2" and answer.message < TRIES
+        never, soon = answer.task.key == "1", answer.task.key == "2" and answer.message < 3
         return "garbage" if never or soon else ""
 
     said = {
         answer.task.key: (answer.message, answer.failure)
         for answer in answers(runner, map(task, range(4)), ahead=2, fault_in=fault_in)
     }
-    assert said == {"0": (1, ""), "1": (None, "garbage"), "2": (TRIES, ""), "3": (1, "")}
-    assert runner.asked == {"0": 1, "1": TRIES, "2": TRIES, "3": 1}
+    assert said == {"0": (1, ""), "1": (None, "garbage"), "2": (3, ""), "3": (1, "")}
+    assert runner.asked == {"0": 1, "1": 3, "2": 3, "3": 1}
     assert runner.most == 2
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from foretwin.contracts.tally import RESERVED_BYTES, Tally, read_tally, tally_file, write_tally
+from foretwin.contracts.tally import Tally, read_tally, tally_file, write_tally
 
 
 def test_who_goes_on_takes_what_waited_and_nothing_twice() -> None:
@@ -31,7 +31,7 @@ def test_a_tally_survives_and_takes_the_room_that_it_has(tmp_path: Path) -> None
     tally.settle("unwritten", "imu")
     write_tally(tally, path)
     assert path.name == "drive.tally.json"
-    assert path.stat().st_size == RESERVED_BYTES
+    assert path.stat().st_size == 16_384
     assert read_tally(path) == tally
     write_tally(Tally(), path)
     assert read_tally(path) == Tally()

@@ -11,8 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.orchestrator.rounds.pace import (
-    CALM_PERIODS,
-    LATE_ROUNDS,
     MEASURED_ROUNDS,
     Pace,
     RoundPace,
@@ -145,8 +143,8 @@ def test_with_room_to_spare_all_are_run_again_and_every_fall_makes_it_wait_longe
         THREE_QUARTERS,
         ALL,
     ]
-    assert changes[2] - 60 >= 3 * CALM_PERIODS // FOURTH.one_of - LATE_ROUNDS
-    assert changes[5] - changes[4] == 3 * CALM_PERIODS
+    assert changes[2] - 60 >= 3 * 10 // 4 - 2
+    assert changes[5] - changes[4] == 3 * 10
 
 
 def test_a_round_that_was_given_up_counts_as_endless() -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
@@ -69,6 +72,57 @@ def test_in_a_list_without_ids_it_is_known_by_place_size_and_speed():
     assert injected.without(long_gone) is long_gone
 
 
+@pytest.mark.parametrize(
+    ("field", "least", "most"),
+    [("length_m", 0.491, 0.509), ("width_m", 0.591, 0.609), ("speed_mps", 1.31, 1.49)],
+)
+def test_sizes_and_speeds_are_the_same_within_a_centimetre_and_a_tenth(
+    field: str, least: float, most: float
+):
+    def is_left(value: float) -> bool:
+        user = replace(walker(), user_id="7", **{field: value})
+        return bool(shown(walker()).without(RoadUsers(stamp_ns=5 * S, users=(user,))).users)
+
+    assert not is_left(least)
+    assert not is_left(most)
+    assert is_left(2.0 * least - getattr(walker(), field))
+    assert is_left(2.0 * most - getattr(walker(), field))
+
+
+@given(way_rad=st.floats(-math.pi, math.pi), away_m=st.floats(0.0, 1.5), after_s=st.floats(-3, 3))
+def test_places_are_the_same_within_half_a_metre_and_two_seconds(
+    way_rad: float, away_m: float, after_s: float
+):
+    """Of where it would be by then."""
+    assume(abs(away_m - 0.5) > 1e-3)
+    assume(abs(abs(after_s) - 2.0) > 1e-3)
+    then = moved(walker(), 1.4 * after_s)
+    there = replace(moved(replace(then, yaw_rad=way_rad), away_m), yaw_rad=0.0, user_id="7")
+    seen = RoadUsers(stamp_ns=5 * S + round(after_s * S), users=(there,))
+    is_it = away_m < 0.5 and abs(after_s) < 2.0
+    assert shown(walker()).without(seen).users == (() if is_it else (there,))
+
+
+@given(
+    yaw_rad=st.floats(-math.pi, math.pi),
+    ahead_m=st.floats(-4.0, 4.0),
+    aside_m=st.floats(-4.0, 4.0),
+)
+def test_a_sensor_sees_it_within_half_a_metre_of_its_outline(
+    yaw_rad: float, ahead_m: float, aside_m: float
+):
+    assume(abs(abs(ahead_m) - 2.5) > 1e-3)
+    assume(abs(abs(aside_m) - 1.5) > 1e-3)
+    wide = walker(length_m=4.0, width_m=2.0, speed_mps=0.0, yaw_rad=yaw_rad)
+    injected = Injected()
+    injected.note_measured(5 * S, RoadUsers(stamp_ns=5 * S, users=(wide,)))
+    aside = moved(replace(wide, yaw_rad=yaw_rad + math.pi / 2), aside_m)
+    there = moved(replace(aside, yaw_rad=yaw_rad, user_id="7", width_m=1.1), ahead_m)
+    is_it = abs(ahead_m) < 2.5 and abs(aside_m) < 1.5
+    seen = RoadUsers(stamp_ns=5 * S, users=(there,))
+    assert injected.without(seen).users == (() if is_it else (there,))
+
+
 def test_whom_tracking_gives_an_id_of_its_own_is_known_as_well():
     """Lists of detected objects go out without ids, and come back tracked."""
 
@@ -95,10 +149,17 @@ def test_a_real_one_that_is_merged_into_the_list_stays_real():
 
 def test_the_newest_thousands_are_remembered():
     injected = shown(*(walker(user_id=f"w{number}") for number in range(5000)))
-    ids = [bytes(injected_uuid(number)).hex() for number in (0, 4999)]
-    first, last = (RoadUsers(stamp_ns=9 * S, users=(walker(user_id=one),)) for one in ids)
-    assert injected.without(first) is first
-    assert injected.without(last).users == ()
+    ids = [bytes(injected_uuid(number)).hex() for number in (0, 903, 904, 4999)]
+    seen = [RoadUsers(stamp_ns=9 * S, users=(walker(user_id=one),)) for one in ids]
+    left = [len(injected.without(one).users) for one in seen]
+    assert left == [1, 1, 0, 0], "4,096 of them"
+
+
+def test_the_newest_clouds_are_remembered():
+    injected = Injected()
+    for stamp_ns in range(1, 101):
+        injected.note_measured(stamp_ns, RoadUsers(stamp_ns=stamp_ns, users=()))
+    assert [injected.is_shown_cloud(n) for n in (36, 37, 100, 101)] == [False, True, True, False]
 
 
 def test_one_that_is_shown_again_and_again_is_not_forgotten_for_new_ones():
@@ -114,20 +175,3 @@ def injected_uuid(number: int) -> Any:
     from foretwin.telemetry.ros_messages.shapes import uuid_from
 
     return uuid_from(walker(user_id=f"w{number}")).uuid
-
-
-def test_whom_a_sensor_was_shown_is_known_within_its_outline_and_nowhere_else():
-    injected = Injected()
-    wide = walker(length_m=4.0, width_m=2.0, speed_mps=0.0)
-    injected.note_measured(5 * S, RoadUsers(stamp_ns=5 * S, users=(wide,)))
-
-    def is_left(ahead_m: float, aside_m: float) -> bool:
-        there = moved(replace(wide, yaw_rad=wide.yaw_rad + math.pi / 2), aside_m)
-        there = moved(replace(there, yaw_rad=wide.yaw_rad, user_id="7", width_m=1.1), ahead_m)
-        return bool(injected.without(RoadUsers(stamp_ns=5 * S, users=(there,))).users)
-
-    assert not is_left(0.0, 0.0)
-    assert not is_left(0.5, -0.9)
-    assert not is_left(-1.9, 0.4)
-    assert is_left(0.0, 2.0)
-    assert is_left(3.0, 0.0)

@@ -16,7 +16,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_pose
 from foretwin.contracts.setup import BusSetup, Ros2Setup
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.ros2.__main__ import lot_guard
-from foretwin.telemetry.ros2.lot_guard import BRAKING_MPS2, REACTION_S, LotGuard, margin_m
+from foretwin.telemetry.ros2.lot_guard import LotGuard, margin_m
 
 S, MS = 10**9, 10**6
 FRAME = LocalFrame(GeoPoint(52.4739, 13.395))
@@ -51,7 +51,7 @@ def trouble(told: VehicleState, *, after_ns: int = 0, silent_ns: int = 0) -> str
 
 def test_the_margin_is_the_way_of_reacting_and_of_braking():
     assert margin_m(0.0) == 0.0
-    assert margin_m(8.0) == pytest.approx(8.0 * REACTION_S + 64.0 / (2.0 * BRAKING_MPS2))
+    assert margin_m(8.0) == margin_m(-8.0) == pytest.approx(8.0 * 2.5 + 64.0 / (2.0 * 3.4))
     assert margin_m(-8.0) == margin_m(8.0)
 
 
