@@ -87,11 +87,11 @@ class CpuMeter:
         """Write what was taken until now; a disk that is full must not end a process."""
         now_s, cpu_s = time.monotonic(), self._taken_s()
         self._next_s = now_s + _EVERY_S
-        ready, starting_cpu_s = self._starting_cpu_s is not None, self._starting_cpu_s or 0.0
+        starting_cpu_s = self._starting_cpu_s
         life = _Life(
             cpu_s=cpu_s,
-            starting_cpu_s=starting_cpu_s if ready else cpu_s,
-            ready_s=now_s - self._ready_s if ready else 0.0,
+            starting_cpu_s=cpu_s if starting_cpu_s is None else starting_cpu_s,
+            ready_s=0.0 if starting_cpu_s is None else now_s - self._ready_s,
         )
         with contextlib.suppress(OSError):
             # One write of the same length each time: who reads meanwhile sees no half of it.

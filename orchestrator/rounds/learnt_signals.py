@@ -91,8 +91,6 @@ def _as_foretold(signal: SignalState, learnt: LearntSignal) -> bool:
     if signal.colour in _NO_CYCLE:
         return True
     cycle = heard_cycle(learnt, signal.stamp_ns)
-    if signal.colour == cycle.colour_at(0.0):
-        return True
     most_s = learnt.spread_s + AGREE_S
     return any(signal.colour == cycle.colour_at(most_s * k / 8.0) for k in range(-8, 9))
 

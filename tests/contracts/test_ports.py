@@ -9,6 +9,7 @@ import pytest
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.ports import (
     LOOPBACK,
+    WEB_PORT,
     free_endpoint,
     free_or,
     free_port,
@@ -71,6 +72,10 @@ def test_endpoints_of_zenoh_are_taken(endpoint: str) -> None:
 )
 def test_an_endpoint_that_is_none_is_told_what_it_lacks(endpoint: str, right: str) -> None:
     assert trouble_with_endpoint(endpoint) == right
+
+
+def test_the_viewer_for_browsers_is_where_links_of_before_lead() -> None:
+    assert WEB_PORT == 9090
 
 
 TLS = "tls/localhost:7447"
