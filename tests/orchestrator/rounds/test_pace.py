@@ -147,6 +147,50 @@ def test_with_room_to_spare_all_are_run_again_and_every_fall_makes_it_wait_longe
     assert changes[5] - changes[4] == 3 * 10
 
 
+@pytest.mark.parametrize(("falls", "calm_rounds"), [(1, 20), (4, 50), (5, 60), (9, 60)])
+def test_each_fall_makes_it_wait_ten_periods_longer_up_to_sixty(
+    falls: int, calm_rounds: int
+) -> None:
+    """Until it rises again, though there is room to spare."""
+    before = [RoundTime(pace, 0.3) for pace in (ALL, HALF)] * falls
+    waits, rises = (
+        [*before[:-1], *[RoundTime(HALF, 0.1)] * count] for count in (calm_rounds - 1, calm_rounds)
+    )
+    assert next_pace(waits, PACES, period_s=PERIOD_S) == HALF
+    assert next_pace(rises, PACES, period_s=PERIOD_S) == THREE_QUARTERS
+
+
+def test_of_rare_rounds_four_are_enough() -> None:
+    def after(count: int) -> Pace:
+        return next_pace([RoundTime(FOURTH, 0.1)] * count, PACES, period_s=PERIOD_S)
+
+    assert (after(3), after(4)) == (FOURTH, SECOND)
+
+
+@pytest.mark.parametrize(("slow", "rises"), [(2, True), (3, False)])
+def test_a_tenth_of_calm_rounds_may_have_been_slow(slow: int, rises: bool) -> None:
+    """Of twenty, after one fall."""
+    calm = [RoundTime(HALF, 0.1)] * (20 - slow) + [RoundTime(HALF, 0.4)] * slow
+    found = next_pace([RoundTime(ALL, 0.6), *calm], PACES, period_s=PERIOD_S)
+    assert found == (THREE_QUARTERS if rises else HALF)
+
+
+def test_what_a_pace_remembers_of_a_long_drive_has_an_end() -> None:
+    pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
+    for number in range(600):
+        pace.take(ALL, 0.1, [("w0", f"world {number // 2}")])
+    assert (len(pace._history), len(pace._met)) == (240, 64)
+
+
+def test_what_is_run_of_what_was_asked_for_is_told() -> None:
+    pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
+    assert (pace.slowed, pace.short_of) == (False, "")
+    pace.now = HALF
+    assert (pace.slowed, pace.short_of) == (True, "32 of 64 futures")
+    pace.now = FOURTH
+    assert pace.short_of == "16 of 64 futures in 1 of 4 rounds"
+
+
 def test_a_round_that_was_given_up_counts_as_endless() -> None:
     pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -50,6 +51,35 @@ def test_a_plan_shifted_by_a_metre_is_a_metre_off(house: House) -> None:
     assert compared.difference.lateral_m == pytest.approx(1.0, abs=0.1)
     assert compared.difference.ade_m == pytest.approx(1.0, abs=0.1)
     assert house.conductor.rounds.plans.record()["count"] == 1
+
+
+@pytest.mark.parametrize(("older_s", "counts"), [(0.0, True), (0.9, True), (1.1, False)])
+def test_a_plan_that_is_a_second_old_is_neither_compared_nor_followed(
+    house: House, older_s: float, counts: bool
+) -> None:
+    house.drive(49)
+    plan = car_plan(house, 49, left_m=1.0)
+    age_ns = round(older_s * 1e9)
+    house.bus.publish(
+        "plan", msgspec.structs.replace(plan, stamp_ns=plan.stamp_ns - age_ns), vehicle="ego"
+    )
+    house.drive(50)
+    assert house.conductor.start_round()
+    house.settle()
+    asked = [one for worker in house.workers for one in worker.take()]
+    jobs = [one.message().decoded() for one in asked]
+    state = house.states[49]
+    assert len(jobs) >= 2
+    for job in jobs:
+        assert (job.car_plan is not None) == counts
+        if job.car_plan is not None:
+            apart_s = job.state.stamp_ns / 1e9 - state.stamp_ns / 1e9 + older_s
+            assert job.car_plan.time_s == pytest.approx(plan.time_from_stamp_s - apart_s, abs=1e-6)
+            assert job.car_plan.speed_mps.tolist() == plan.speed_mps.tolist()
+    for one in asked:
+        house.workers[0].answer_one(one)
+    house.settle()
+    assert (house.watched("plan_comparison") != []) == counts
 
 
 def test_a_nominal_future_that_diverged_is_compared_with_nothing(house: House) -> None:

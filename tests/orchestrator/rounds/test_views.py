@@ -122,6 +122,25 @@ def test_a_round_is_at_the_streets_that_meet_there() -> None:
     assert view.place == "Mill Lane"
 
 
+def test_of_many_futures_the_sixteen_worst_show_whom_they_meet() -> None:
+    count = 20
+    states = np.concatenate([straight((0.0, float(y))) for y in range(count)])
+    near_m = np.linspace(0.1, 1.5, count)[::-1]
+    done = round_done(states, scenario_id="scp", outcome={"min_clearance_m": near_m})
+    poses = np.zeros((count, len(TIME_S), 1, 3), dtype=np.float32)
+    tracks = RoadUserTracks(
+        poses=poses,
+        speed_mps=poses[..., 0],
+        size_m=np.ones((count, 1, 2), dtype=np.float32),
+        kinds=np.zeros((count, 1)),
+        kind_names=("bicycle",),
+    )
+    result = msgspec.structs.replace(done.results[0], road_users=tracks)
+    done = RoundDone(order=done.order, results=(result,), latency_ms=100.0, seconds=0.1)
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert [one.future for one in view.met] == list(range(4, 20)), "the nearest are last"
+
+
 def test_it_tells_who_is_met_when_and_what_is_hit() -> None:
     done = meeting((40.0, 2.0), (30.0, 60.0))
     view = round_view(done, round_futures(done).futures, FRAME, FRAME)
