@@ -6,7 +6,7 @@ Nothing here knows of files: values may be those of a TOML file or of flags.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import msgspec
@@ -25,6 +25,12 @@ _WORDS = {
     "object": "a table",
     "null": "nothing",
 }
+_OF_VALUES = {
+    "int": int, "float": float, "str": str, "bool": bool, "array": list, "object": dict,
+    "null": type(None),
+}  # fmt: skip
+_ANY_KEY = "..."
+"""What msgspec says for a key of a table whose keys are free."""
 
 
 class Wrong(NamedTuple):
@@ -44,20 +50,25 @@ def in_words(error: msgspec.ValidationError, kind: type[msgspec.Struct], values:
         found = [one for before in found for one in _inside(before, name)]
     quoted = re.search(r"`(.*)`$", what)
     if what.startswith("Object contains unknown field ") and quoted:
+        place = _named(values, place, lambda given: quoted[1] in given)
         known = [field.encode_name for field in _fields(found)]
         around = f" in {dotted(place)}" if place else ""
         text = f"unknown key {quoted[1]!r}{around}; {one_of(quoted[1], known)}"
         return Wrong((*place, quoted[1]), text)
     if what.startswith("Object missing required field ") and quoted:
+        place = _named(values, place, lambda given: quoted[1] not in given)
         around = f"{dotted(place)}: " if place else ""
         instead = _meant_for(quoted[1], found, _given(values, place))
         return Wrong(place, f"{around}the key {quoted[1]!r} is missing{instead}")
     if what.startswith("Invalid enum value "):
         given = what.removeprefix("Invalid enum value ").strip("'\"")
+        place = _named(values, place, lambda one: str(one) == given)
         return Wrong(place, f"{dotted(place)} {given!r}: {one_of(given, _choices(found))}")
     if wrong := re.fullmatch(r"Expected `(.+)`, got `(\w+)`", what):
+        place = _named(values, place, lambda one: type(one) is _OF_VALUES.get(wrong[2]))
         right = " or ".join(dict.fromkeys(_WORDS.get(one, one) for one in wrong[1].split(" | ")))
-        return Wrong(place, f"{dotted(place)} {_shown(_given(values, place))}: must be {right}")
+        given = f"{dotted(place)} {_shown(_given(values, place))}".lstrip()
+        return Wrong(place, f"{given}: must be {right}")
     return Wrong(place, f"{dotted(place)}: {what[:1].lower()}{what[1:]}".removeprefix(": "))
 
 
@@ -65,7 +76,7 @@ def dotted(place: Iterable[str | int]) -> str:
     """Return a place as it is written in errors, such as `vehicles[0].role`."""
     text = ""
     for step in place:
-        text += f"[{step}]" if isinstance(step, int) or step == "..." else f".{step}"
+        text += f"[{step}]" if isinstance(step, int) or step == _ANY_KEY else f".{step}"
     return text.removeprefix(".")
 
 
@@ -79,7 +90,7 @@ def inside(kind: type[msgspec.Struct], place: Iterable[str | int]) -> list[msgsp
     """Return the types that a place of a struct may have."""
     found = [msgspec.inspect.type_info(kind)]
     for step in place:
-        name = step if isinstance(step, str) and step != "..." else ""
+        name = step if isinstance(step, str) and step != _ANY_KEY else ""
         found = [one for before in found for one in _inside(before, name)]
     return found
 
@@ -126,6 +137,26 @@ def _given(values: Any, place: Iterable[str | int]) -> Any:
         except (KeyError, IndexError, TypeError):
             return None
     return values
+
+
+def _named(
+    values: Any, place: tuple[str | int, ...], is_wrong: Callable[[Any], bool]
+) -> tuple[str | int, ...]:
+    """Return a place with the keys of free tables that lead to the first value that is wrong."""
+    return next((at for at in _places(values, place) if is_wrong(_given(values, at))), place)
+
+
+def _places(
+    values: Any, place: tuple[str | int, ...], begin: int = 0
+) -> Iterator[tuple[str | int, ...]]:
+    """Yield every place that one with free keys may be."""
+    if _ANY_KEY not in place[begin:]:
+        yield place
+        return
+    at = place.index(_ANY_KEY, begin)
+    around = _given(values, place[:at])
+    for key in around if isinstance(around, dict) else ():
+        yield from _places(values, (*place[:at], key, *place[at + 1 :]), at + 1)
 
 
 def _shown(value: object) -> str:

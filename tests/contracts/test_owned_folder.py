@@ -121,6 +121,14 @@ def test_who_comes_second_does_not_own_it(tmp_path: Path) -> None:
     first.remove()
     first.remove()
     assert own(folder) is None  # it is gone
+    assert not owned_folder._remove_left(folder)
+
+
+def test_a_folder_that_is_removed_twice_is_kept_over_nothing(tmp_path: Path) -> None:
+    folder = own(tmp_path)
+    assert folder is not None
+    folder.remove()
+    folder.keep_over_exec()
 
 
 def test_a_folder_that_another_removes_as_it_is_made_is_made_again(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import pytest
@@ -27,6 +27,8 @@ class Waggon(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     load: dict[str, float] = {}
     spare: Wheel | float | None = None
     axle: Axle | None = None
+    brakes: dict[str, Wheel] = {}
+    weight_kg: Annotated[int, msgspec.Meta(ge=0)] = 0
 
 
 @pytest.mark.parametrize(
@@ -42,7 +44,7 @@ class Waggon(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             {"name": "x", "seat": 3},
             ("seat",),
             "unknown key 'seat'; did you mean seats? "
-            "one of name, seats, open, wheels, load, spare, axle",
+            "one of name, seats, open, wheels, load, spare, axle, brakes, weight_kg",
         ),
         ({"name": 3}, ("name",), "name 3: must be a text in quotes"),
         ({"name": "x", "seats": 2.5}, ("seats",), "seats 2.5: must be a whole number"),
@@ -69,6 +71,38 @@ class Waggon(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "spare 'y': must be a number or a table or nothing",
         ),
         ({"name": "x", "wheels": 3}, ("wheels",), "wheels 3: must be a list"),
+        (
+            {"name": "x", "load": {"coal": 1.0, "...": 2.0, "iron": "y"}},
+            ("load", "iron"),
+            "load.iron 'y': must be a number",
+        ),
+        (
+            {"name": "x", "brakes": {"air": {"radius_m": 1.0}, "hand": {"side": "left"}}},
+            ("brakes", "hand"),
+            "brakes.hand: the key 'radius_m' is missing",
+        ),
+        (
+            {"name": "x", "brakes": {"air": {"radius_m": 1.0}, "hand": {"radius_m": True}}},
+            ("brakes", "hand", "radius_m"),
+            "brakes.hand.radius_m true: must be a number",
+        ),
+        (
+            {"name": "x", "brakes": {"a": {"radius_m": 1.0}, "b": {"radius_m": 1.0, "rad": 1}}},
+            ("brakes", "b", "rad"),
+            "unknown key 'rad' in brakes.b; did you mean radius_m? one of radius_m, side",
+        ),
+        (
+            {"name": "x", "brakes": {"a": {"radius_m": 1.0, "side": "up"}}},
+            ("brakes", "a", "side"),
+            "brakes.a.side 'up': one of left, right",
+        ),
+        ({"name": "x", "weight_kg": -1}, ("weight_kg",), "weight_kg: expected `int` >= 0"),
+        (7, (), "7: must be a table"),
+        (
+            {"name": "x" * 5, "open": "y" * 39},
+            ("open",),
+            f"open '{'y' * 38}…: must be true or false",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_by_key(values: Any, place: tuple[str | int, ...], text: str) -> None:

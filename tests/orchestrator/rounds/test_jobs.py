@@ -18,7 +18,6 @@ from foretwin.orchestrator.rounds.jobs import _signals, planners_of, scenarios_o
 from foretwin.orchestrator.rounds.pace import Pace
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.scenarios.reading import catalogue
-from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 from tests.orchestrator.house import House
 
 
@@ -102,15 +101,17 @@ def light(stamp_ns: int) -> SignalState:
     return SignalState(stamp_ns=stamp_ns, group_id="g", colour="red")
 
 
-@pytest.mark.parametrize(("age_s", "fresh"), [(0.0, True), (-0.1, True), (0.1, False)])
-def test_signals_count_as_long_as_they_are_fresh(age_s: float, fresh: bool) -> None:
-    now_ns = round(1e9 * (100.0 + LIVE_FOR_S + age_s))
+@pytest.mark.parametrize(
+    ("age_ns", "fresh"),
+    [(0, True), (2 * 10**9, True), (2 * 10**9 + 1, False), (-2 * 10**9, True), (-3 * 10**9, False)],
+)
+def test_signals_count_for_two_seconds(age_ns: int, fresh: bool) -> None:
+    now_ns = 100 * 10**9
     state = VehicleState(
         vehicle_id="ego", stamp_ns=now_ns, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
         speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0,
     )  # fmt: skip
-    of_now = light(now_ns)
-    old = light(round(100e9) if age_s else now_ns)
+    of_now, old = light(now_ns), light(now_ns - age_ns)
     assert _signals((of_now, old), state) == ((of_now, old) if fresh else (of_now,))
 
 

@@ -199,6 +199,21 @@ def test_what_two_cycles_have_in_common_is_the_mean_of_both() -> None:
     assert found.from_s == pytest.approx((0.0, 20.2, 23.2, 59.2), abs=0.02)
     assert (found.begins_ns - START_NS) / 1e9 == pytest.approx(60.1, abs=0.02)
     assert found.spread_s == pytest.approx(0.2, abs=0.02)
+    said = learner.record(ns(122.0), START_NS)["g"]
+    assert said["lasts_s"] == {"green": 20.2, "amber": 3.0, "red": 36.0, "red_amber": 1.0}
+
+
+def test_of_cycles_with_another_between_them_the_newest_that_are_alike_count() -> None:
+    learner = SignalLearner()
+    for number, green_s in enumerate((20.0, 30.0, 20.0, 20.0)):
+        begin_s = 60.0 * number
+        hear(learner, fixed(60.0, green_s, begin_s), begin_s - 5.0 * (not number), begin_s + 60.0)
+        if number == 2:
+            assert learnt(learner, begin_s + 60.0) is None
+    hear(learner, fixed(60.0, 20.0, 240.0), 240.0, 245.0)
+    found = learnt(learner, 245.0)
+    assert found is not None
+    assert found.cycles == 2
 
 
 def test_of_a_long_drive_the_newest_six_cycles_count() -> None:

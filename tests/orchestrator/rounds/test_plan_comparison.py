@@ -12,8 +12,11 @@ import pytest
 from foretwin.contracts.drive import PlannedTrajectory
 from foretwin.contracts.frames import geo_from_local, geo_from_local_yaw, local_from_geo
 from foretwin.contracts.frames import local_from_geo_yaw as to_local_yaw
+from foretwin.orchestrator.rounds.comparisons import plan_compared
+from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
+from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.house import House
-from tests.orchestrator.trip import town
+from tests.orchestrator.trip import town, town_world
 
 
 @pytest.fixture
@@ -57,6 +60,7 @@ def test_a_plan_shifted_by_a_metre_is_a_metre_off(house: House) -> None:
 def test_a_plan_that_is_a_second_old_is_neither_compared_nor_followed(
     house: House, older_s: float, counts: bool
 ) -> None:
+    assert PLAN_FRESH_NS == 10**9
     house.drive(49)
     plan = car_plan(house, 49, left_m=1.0)
     age_ns = round(older_s * 1e9)
@@ -120,3 +124,9 @@ def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
     house.work()
 
     assert house.watched("plan_comparison") == []
+
+
+def test_without_a_plan_there_is_nothing_to_compare(house: House) -> None:
+    done, world = round_done(straight()), town_world("n4")
+    path = done.order.jobs[0].path
+    assert plan_compared(done, None, house.states[0], path, world) is None

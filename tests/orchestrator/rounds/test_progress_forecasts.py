@@ -224,6 +224,8 @@ def test_an_arrival_is_told_from_where_the_car_is_now() -> None:
 def test_without_a_round_of_late_no_arrival_is_told() -> None:
     forecasts = fresh()
     assert forecasts.arrival_band(60.0, usual_mps=10.0) is None
+    drive(forecasts, until_s=1.0, rounds=False)
+    assert forecasts.arrival_band(60.0, usual_mps=10.0) is None
     drive(forecasts, until_s=5.0)
     drive(forecasts, from_s=5.1, until_s=8.0, rounds=False)
     assert forecasts.arrival_band(60.0, usual_mps=10.0) is None

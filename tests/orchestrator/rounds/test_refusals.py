@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.orchestrator.drive.progress import ProgressLine, worker_statuses
+from foretwin.orchestrator.rounds.runner import RoundRunner
 from tests.orchestrator.house import House, Worker
 
 
@@ -36,7 +37,7 @@ def test_a_job_that_every_worker_refuses_ends_its_round_and_not_the_drive(house:
     # The second job is wanted no more once the first is refused by both.
     assert refuse_all(house, *house.workers, reason="path has no length") in (3, 4)
 
-    rounds = house.conductor.rounds
+    rounds: RoundRunner = house.conductor.rounds
     assert not rounds.open
     assert rounds.tally.failed == 1
     count = rounds.dispatcher.dispatch.count

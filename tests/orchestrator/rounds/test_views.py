@@ -155,6 +155,15 @@ def test_it_tells_who_is_met_when_and_what_is_hit() -> None:
     assert hit.time_s == 4.0
 
 
+def test_who_is_near_as_a_wall_is_hit_is_met_and_not_touched() -> None:
+    done = meeting((40.0, 2.0), (30.0, 60.0))
+    done.results[0].outcome.collision_with[2] = 2
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
+    assert view.hits == (FutureHit(future=2, time_s=4.0, what="static"),)
+    assert (view.touch_xy_m.shape, view.touch_names) == ((0, 2), ())
+    assert [one.future for one in view.met] == [1, 2]
+
+
 def test_a_wall_that_is_hit_is_told_where_nobody_is_about() -> None:
     done = meeting()
     done.results[0].outcome.collision_with[2] = 2

@@ -20,6 +20,8 @@ from tests.telemetry.ros2.gateway_ground import FRAME, mapping_text
 from tests.telemetry.ros2.passing_ground import PERCEPTION, PassingGround, S
 from tests.telemetry.ros2.test_merged_objects import VAN, user
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+
 MORE = f"""{PERCEPTION}
 [[in]]
 topic = "/lidar/raw"

@@ -28,6 +28,8 @@ from tests.contracts.mirror_samples import mirror_sample
 from tests.telemetry.ros2.gateway_ground import FIX_KEY, STEERING_KEY, fix, steering
 from tests.telemetry.ros2.test_gateway import Ground, S, state
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+
 ANCHOR = Anchor(
     lot=AnchorPose(lat_deg=52.5, lon_deg=13.4, yaw_deg=0.0),
     world=AnchorPose(lat_deg=48.1, lon_deg=11.5, yaw_deg=90.0),

@@ -18,6 +18,8 @@ from tests.telemetry.autoware_messages import ros_from_signals
 from tests.telemetry.ros2.gateway_ground import cdr, mapping_text
 from tests.telemetry.ros2.test_gateway import Ground, S
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+
 RECOGNISED, BY_V2X = "/perception/lights", "/v2x/spat_in"
 TABLE = """
 [[light]]

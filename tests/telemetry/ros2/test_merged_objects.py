@@ -18,6 +18,8 @@ from foretwin.telemetry.ros_messages.parts import typestore
 from tests.telemetry.ros2.gateway_ground import FRAME
 from tests.telemetry.ros2.test_gateway import Ground, state
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+
 S = 10**9
 KINDS = (parts.PREDICTED_OBJECTS, parts.TRACKED_OBJECTS, parts.DETECTED_OBJECTS)
 MORE = """

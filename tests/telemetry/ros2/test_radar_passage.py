@@ -18,7 +18,11 @@ from tests.telemetry.ros2.gateway_ground import mapping_text
 from tests.telemetry.ros2.passing_ground import PERCEPTION, PassingGround, S
 from tests.telemetry.ros2.test_merged_objects import user
 
-COVERS = ("foretwin.telemetry.ros2.outwards", "foretwin.telemetry.ros2.rows")
+COVERS = (
+    "foretwin.telemetry.ros2.inwards",
+    "foretwin.telemetry.ros2.outwards",
+    "foretwin.telemetry.ros2.rows",
+)
 MORE = f"""{PERCEPTION}
 [[out]]
 topic = "/sensing/radar/front/objects_raw"

@@ -20,6 +20,8 @@ from foretwin.telemetry.ros_messages.parts import (
 from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import FRAME, RecordingForeign, cdr
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+
 S = 10**9
 KEY = "0/planning/route/autoware_planning_msgs::msg::dds_::LaneletRoute_/RIHS01_x"
 MAP = """[map]

@@ -9,6 +9,8 @@ from foretwin.telemetry.ros_messages.objects import predicted_from_users
 from foretwin.telemetry.ros_messages.parts import PREDICTED_OBJECTS, typestore
 from tests.telemetry.ros2.test_gateway_on_a_lot import PLAIN, WALKER, Lot, replaced
 
+COVERS = ("foretwin.telemetry.ros2.inwards",)
+
 DETECTED = """
 [[out]]
 topic = "/perception/detected"
