@@ -179,3 +179,7 @@ def test_closing_wakes_reader_and_writer() -> None:
 def test_a_mailbox_without_room_is_refused() -> None:
     with pytest.raises(ValueError, match="depth 0"):
         Mailbox(0)
+
+
+def test_what_was_too_large_to_be_kept_is_of_nobodys_numbering() -> None:
+    assert Received("speed", "a/b", None, SpeedSample).sender == 0

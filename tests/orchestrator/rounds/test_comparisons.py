@@ -159,6 +159,21 @@ def test_after_the_clock_has_stepped_back_comparisons_go_on() -> None:
     assert {comparison.horizon_s for comparison in found} == {1.0, 2.0, 4.0, 8.0}
 
 
+@pytest.mark.parametrize(("back_s", "goes_on"), [(0.9, True), (1.1, False)])
+def test_a_stamp_that_is_more_than_a_second_old_is_a_clock_set_anew(
+    back_s: float, goes_on: bool
+) -> None:
+    handler, found = OpenComparisons(DRIVE, 8.0), []
+    for state in car(DRIVE):
+        found += handler.take_state(state)
+        if state.stamp_ns == START_NS:
+            handler.take_round(round_done(straight()), DRIVE, state)
+        if state.stamp_ns == START_NS + 2_000_000_000:
+            old_ns = state.stamp_ns - round(back_s * 1e9)
+            assert handler.take_state(msgspec.structs.replace(state, stamp_ns=old_ns)) == []
+    assert len(found) == (4 if goes_on else 0)
+
+
 def test_the_mean_future_is_weighed_by_how_likely_futures_are() -> None:
     """One stays on the way, one lies 4 m to the left and is a third as likely, one is lost."""
     lost = straight((0.0, 0.0))

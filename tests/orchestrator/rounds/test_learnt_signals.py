@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.drive import SignalColour, SignalState
 from foretwin.contracts.signals import LearntSignal
-from foretwin.orchestrator.rounds import learnt_signals
 from foretwin.orchestrator.rounds.learnt_signals import SignalLearner
 from foretwin.world_gen.rules.signal_state import heard_cycle
 from tests.orchestrator.house import House
@@ -262,14 +261,23 @@ def test_two_lights_of_one_cycle_tell_the_offset_of_their_green_wave() -> None:
     }
 
 
-def test_of_too_many_groups_the_one_silent_for_longest_goes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(learnt_signals, "MOST_SIGNALS", 2)
+def test_of_more_than_a_thousand_groups_the_one_silent_for_longest_goes() -> None:
     learner = SignalLearner()
-    for i in range(3):
+    for i in range(1000):
         learner.take(SignalState(stamp_ns=ns(i), group_id=f"g{i}", colour="red"))
-    assert [signal.group_id for signal in learner.newest] == ["g1", "g2"]
+    learner.take(SignalState(stamp_ns=ns(2000), group_id="g0", colour="red"))
+    learner.take(SignalState(stamp_ns=ns(2001), group_id="new", colour="red"))
+    heard = {signal.group_id for signal in learner.newest}
+    assert heard == {f"g{i}" for i in range(1000) if i != 1} | {"new"}
+
+
+def test_of_a_light_without_a_cycle_little_is_kept() -> None:
+    learner = SignalLearner()
+    for number in range(200):
+        colour: SignalColour = "red" if number % 2 else "amber"
+        learner.take(SignalState(stamp_ns=ns(number), group_id="g", colour=colour))
+    (group,) = learner._groups.values()
+    assert len(group._changes) == 48
 
 
 def test_futures_of_a_drive_are_told_what_was_learnt(tmp_path: Path) -> None:

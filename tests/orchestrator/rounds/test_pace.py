@@ -56,6 +56,9 @@ def test_paces_fall_from_all_futures_to_fewer_and_then_to_fewer_rounds() -> None
     )  # fmt: skip
     assert paces_between(64, 40) == (Pace(64), Pace(48), Pace(40), Pace(40, 2), Pace(40, 4))
     assert paces_between(3, 1) == (Pace(3), Pace(2), Pace(1), Pace(1, 2), Pace(1, 4))
+    assert paces_between(64, 8) == (
+        Pace(64), Pace(48), Pace(32), Pace(16), Pace(8), Pace(8, 2), Pace(8, 4),
+    )  # fmt: skip
     assert paces_between(64, 64) == (Pace(64),)
 
 
