@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from foretwin.contracts import trace
 from foretwin.contracts.errors import UserError, one_line
@@ -37,6 +36,7 @@ from foretwin.orchestrator.record.so_far import forget_so_far
 from foretwin.orchestrator.record.table_parts import parts_of_table
 from foretwin.orchestrator.record.table_stream import SUFFIX, TableStream, record_bytes
 from foretwin.orchestrator.runner.supervisor import fold_stderr
+from foretwin.sim_worker.futures.checked_parquet import parquet_file
 from foretwin.telemetry.logs.mend_mcap import look_through, mend
 
 RECOVERED = "recovered"
@@ -158,7 +158,9 @@ def _in_parquet(results: Path, *, but: Container[str] = ()) -> Iterator[Part]:
     parts = [part for name in TABLES for part in parts_of_table(results / f"{name}.parquet")]
     for file in (part for part in parts if part.stem not in but):
         try:
-            yield Part(f"{file.stem}: {pq.read_metadata(file).num_rows} rows, as they were")
+            with parquet_file(file) as table:
+                rows = sum(batch.num_rows for batch in table.iter_batches())
+            yield Part(f"{file.stem}: {rows} rows, as they were")
         except (OSError, pa.ArrowException) as error:
             yield Part(f"{file.stem}: lost: {one_line(error)}", lost=True)
 

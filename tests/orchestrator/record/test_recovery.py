@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow as pa
@@ -193,10 +194,24 @@ def test_the_recorder_may_first_end_its_file(
     assert recover(run).exit_word == "recovered"
 
 
-def test_a_table_whose_parquet_is_damaged_is_said(tmp_path: Path) -> None:
+def cut(data: bytes) -> bytes:
+    return data[:4]
+
+
+def flip_a_byte(data: bytes) -> bytes:
+    """In the end of the last page: the file's end, which tells of all columns, stays whole."""
+    end = len(data) - 8 - int.from_bytes(data[-8:-4], "little")
+    return data[: end - 1] + bytes([data[end - 1] ^ 0x01]) + data[end:]
+
+
+@pytest.mark.parametrize("spoil", [cut, flip_a_byte])
+def test_a_table_whose_parquet_is_damaged_is_said(
+    tmp_path: Path, spoil: Callable[[bytes], bytes]
+) -> None:
     run = killed_run(tmp_path / "run")
     recover(run)
-    (run / "results" / "events.parquet").write_bytes(b"PAR1")
+    events = run / "results" / "events.parquet"
+    events.write_bytes(spoil(events.read_bytes()))
     done = recover(run)
 
     assert not done.healthy
