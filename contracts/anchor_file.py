@@ -74,7 +74,7 @@ class AnchorFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         if not all(abs(lat) < 90.0 and abs(lon) <= 180.0 for lat, lon in self.fence):
             raise ValueError("fence: corners are [latitude, longitude] in degrees")
         ring = shapely.Polygon(self.fence)
-        if not ring.is_valid or ring.area == 0.0:
+        if not ring.is_valid:  # nor is one without an area
             raise ValueError("fence: its sides cross; name the corners in order")
         if self.lot is None:
             return

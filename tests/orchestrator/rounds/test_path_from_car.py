@@ -93,8 +93,8 @@ def test_on_a_way_that_comes_back_the_car_is_where_it_begins() -> None:
     there = np.column_stack([np.arange(0.0, 80.0), np.zeros(80)])
     path = np.concatenate([there, there[::-1] + np.array([0.0, 2.0])])
     car_xy_m = np.array([58.0, 1.9])
-    found = led_from_car(path, car_xy_m=car_xy_m, car_yaw_rad=0.1, speed_mps=10.0)
-    assert found[58 + 15, 1] > 0.5
+    found = led_from_car(path, car_xy_m=car_xy_m, car_yaw_rad=0.0, speed_mps=10.0)
+    assert found[58 + 15, 1] == pytest.approx(-0.33 * 1.9 * (1.0 - math.exp(-15.0 / 51.0)))
 
 
 def test_a_car_that_crosses_the_road_is_not_followed_across() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
@@ -10,6 +11,7 @@ from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import SignalColour, SignalState
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
 from foretwin.contracts.towards_vehicle import Authority
+from foretwin.telemetry.ros2.lights import LightIds
 from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping
 from foretwin.telemetry.ros2.spat import V2xMovement, colours_from_spat, spat_json
 from foretwin.telemetry.ros_messages.parts import STRING, TRAFFIC_LIGHTS, TRAFFIC_SIGNALS, typestore
@@ -203,3 +205,27 @@ def test_a_table_that_cannot_be_used_is_refused(rows: Sequence[str], text: str) 
     out = ROWS[ROWS.index("[[out]]") :]
     with pytest.raises(MappingError, match=text):
         parse_mapping(mapping_text(enabled=True, more=out + "".join(rows)), name="m.toml")
+
+
+@pytest.mark.parametrize(
+    ("named", "wrong"),
+    [
+        ({"ids": (1, 2**63 - 1)}, ""), ({"ids": (2**63,)}, "ids"), ({"ids": (7, 0)}, "ids"),
+        ({"ways": (1, 2**31 - 1)}, ""), ({"ways": (2**31,)}, "ways"),
+        ({"signals": (1, 2**31 - 1)}, ""), ({"signals": (0,)}, "signals"),
+        ({"intersection": 0, "signal_group": 1}, ""),
+        ({"intersection": 65535, "signal_group": 254}, ""),
+        ({"intersection": -1, "signal_group": 1}, "intersection -1: 0 to 65535"),
+        ({"intersection": 65536, "signal_group": 1}, "intersection 65536: 0 to 65535"),
+        ({"intersection": 1, "signal_group": 0}, "signal_group 0: 1 to 254"),
+        ({"intersection": 1, "signal_group": 255}, "signal_group 255: 1 to 254"),
+        ({"signal_group": 1}, "both or none"),
+    ],
+)  # fmt: skip
+def test_numbers_are_those_of_their_standards(named: dict[str, Any], wrong: str) -> None:
+    light = LightIds(group="g", **named)
+    if not wrong:
+        light.validate()
+        return
+    with pytest.raises(ValueError, match=wrong):
+        light.validate()

@@ -110,3 +110,49 @@ def test_events_of_others_are_read_and_what_has_no_colour_is_left_out() -> None:
 def test_another_text_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="no SPAT"):
         colours_from_spat(text)
+
+
+def test_a_message_is_as_large_as_the_standard_lets_it_be() -> None:
+    """255 groups of each of 32 intersections, names of 63 letters."""
+    movements = {f"{n:03}{'x' * 80}": V2xMovement(n // 300, n % 300) for n in range(40 * 300)}
+    lights = [ShownLight(group_id=name, colour="red", why="plan") for name in movements]
+    text = spat_json(lights, movements, wall_ns=WALL_NS, revision=127)
+    assert text is not None
+    found = msgspec.json.decode(text)["intersections"]
+    assert [one["id"]["id"] for one in found] == list(range(32))
+    assert {len(one["states"]) for one in found} == {255}
+    assert {one["revision"] for one in found} == {127}
+    assert found[0]["states"][7]["movementName"] == "007" + "x" * 60
+    assert len(colours_from_spat(text)) == 32 * 255
+
+
+def test_of_what_others_say_no_more_is_read() -> None:
+    states = [{"signalGroup": n, "state-time-speed": [{"eventState": "dark"}]} for n in range(256)]
+    crossings = [{"id": {"id": n}, "states": states} for n in range(33)]
+    found = colours_from_spat(msgspec.json.encode({"intersections": crossings}).decode())
+    assert found.keys() == {V2xMovement(n, group) for n in range(32) for group in range(255)}
+
+
+def test_of_events_the_first_is_that_of_now_and_without_one_nothing_is_known() -> None:
+    events = [{"eventState": "dark"}, {"eventState": "stop-And-Remain"}]
+    states = [{"signalGroup": 1, "state-time-speed": events},
+              {"signalGroup": 2, "state-time-speed": []}]  # fmt: skip
+    text = msgspec.json.encode({"intersections": [{"id": {"id": 5}, "states": states}]}).decode()
+    assert colours_from_spat(text) == {V2xMovement(5, 1): "dark"}
+
+
+@pytest.mark.parametrize(
+    ("wall_ns", "in_s", "tenths"),
+    [(0, 0.0, 0), (0, 3599.94, 35_999), (0, 3599.96, 0), (199_999_999, 0.04, 1), (10**9, 7.36, 84)],
+)
+def test_a_change_is_told_in_tenths_of_a_second_of_the_hour(
+    wall_ns: int, in_s: float, tenths: int
+) -> None:
+    light = ShownLight(group_id="n4:g0", colour="red", why="plan", changes_in_s=in_s)
+    text = spat_json((light,), MOVEMENTS, wall_ns=wall_ns, revision=0)
+    assert text is not None
+    message = msgspec.json.decode(text)
+    (event,) = message["intersections"][0]["states"][0]["state-time-speed"]
+    assert event["timing"] == {"minEndTime": tenths, "maxEndTime": tenths}
+    assert message["intersections"][0]["timeStamp"] == wall_ns // 10**6
+    assert message["timeStamp"] == 0, "the first minute of 1970"
