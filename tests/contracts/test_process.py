@@ -10,9 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from foretwin.contracts import trace
 from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
+from foretwin.contracts.cpu_use import cpu_uses
 from foretwin.contracts.keys import alive_key, key
 from foretwin.contracts.mailbox import Received
 from foretwin.contracts.ports import free_endpoint
@@ -132,6 +135,57 @@ def test_an_error_ends_it_with_code_1_and_stands_in_the_log(run: Run) -> None:
     assert line["process"] == "p0"
     assert line["level"] == "error"
     assert "the wheels came off" in str(line["traceback"])
+
+
+def test_what_is_wrong_outside_ends_it_with_code_2_in_one_line(run: Run) -> None:
+    wrong = FAILER.replace("RuntimeError", "FileNotFoundError")
+    command = [sys.executable, "-c", wrong, "--setup", str(run._file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
+    assert (done.returncode, done.stderr) == (2, "p0: the wheels came off\n")
+    assert run.log()[-1]["text"] == "the wheels came off"
+
+
+def test_it_leaves_what_it_took_and_what_it_did(run: Run, tmp_path: Path) -> None:
+    run.setup = msgspec.structs.replace(run.setup, trace_dir=str(tmp_path / "parts"))
+    write_setup(run.setup, run._file)
+    with run.process(WAITER) as process:
+        take(run.alive)
+        assert is_held(run._file)
+        process.terminate()
+        assert process.wait(DEADLINE_S) == 0
+    (use,) = cpu_uses(tmp_path).values()
+    assert 0.0 < use.starting_cpu_s <= use.cpu_s
+    assert use.share_of_core is not None
+    trace.joined(tmp_path / "parts", tmp_path / "trace.json")
+    assert b'"p0"' in (tmp_path / "trace.json").read_bytes()
+    assert not is_held(run._file)
+
+
+class Noted:
+    """A meter, or a file of refusals, that notes what it is asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def ready(self) -> None:
+        self.asked.append("ready")
+
+    def look(self, *_: object) -> None:
+        self.asked.append("look")
+
+
+def test_what_it_takes_and_refuses_is_looked_at_whenever_it_asks_for_its_run() -> None:
+    setup = ProcessSetup(
+        run_id="r1", process_id="p0", vehicle_id="ego", bus=BusSetup(endpoint=""), log_file=""
+    )
+    meter, refusals = Noted(), Noted()
+    life = ProcessLife(setup, MemoryBus(), meter=meter, refusal_file=refusals)  # type: ignore[arg-type]
+    life.ready()
+    assert not life.over
+    assert not life.begun
+    assert meter.asked == ["ready", "look", "look"]
+    assert refusals.asked == ["look", "look"]
+    ProcessLife(setup, MemoryBus()).ready()
 
 
 def test_it_waits_out_the_grace_once_the_orchestrator_is_gone() -> None:
