@@ -6,6 +6,7 @@ import logging
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from foretwin.orchestrator.instructions import Notice
@@ -35,7 +36,7 @@ def test_reasons_that_are_always_new_are_not_told_for_ever() -> None:
     news = RoundNews(told.append)
     for number in range(1000):
         news.given_up(ORDER, f"at 0x{number:x}")
-    assert len(told) < 20
+    assert len(told) == 16
 
 
 def test_who_is_sick_is_told_when_it_begins_and_when_it_is_over() -> None:
@@ -76,3 +77,31 @@ def test_the_first_word_of_a_slow_machine_is_a_warning_and_the_next_ones_are_new
         ("info", "32 of 64 futures"),
         ("info", "the machine keeps up: all futures in every round again"),
     ]
+
+
+def test_of_each_planner_it_is_its_own_word_that_is_told() -> None:
+    """Futures are counted on from one job to the next; a failure says more than a remark."""
+    done = round_done(np.concatenate([straight()] * 2), np.concatenate([straight()] * 3))
+    names = iter("abcde")
+    jobs = tuple(
+        msgspec.structs.replace(
+            job,
+            futures=tuple(msgspec.structs.replace(f, planner=next(names)) for f in job.futures),
+        )
+        for job in done.order.jobs
+    )
+    words = (
+        {"remarks": ("", "b is slow")},
+        {"failures": ("c is gone", "", ""), "remarks": ("c is slow", "", "e is slow")},
+    )
+    results = tuple(
+        msgspec.structs.replace(result, outcome=msgspec.structs.replace(result.outcome, **said))
+        for result, said in zip(done.results, words, strict=True)
+    )
+    told: list[Notice] = []
+    RoundNews(told.append).planners(
+        replace(done, order=replace(done.order, jobs=jobs), results=results)
+    )
+    assert [one.text.removeprefix("a future driven by ") for one in told] == [
+        "b: b is slow", "c: c is gone", "e: e is slow",
+    ]  # fmt: skip
