@@ -81,7 +81,7 @@ def structs_in(kind: types.Type) -> list[type[msgspec.Struct]]:
             return [kind.cls]
         case types.UnionType():
             return [one for part in kind.types for one in structs_in(part)]
-        case types.VarTupleType() | types.ListType() | types.SetType():
+        case types.VarTupleType():
             return structs_in(kind.item_type)
         case types.TupleType():
             return [one for part in kind.item_types for one in structs_in(part)]
@@ -123,7 +123,7 @@ def as_toml(value: object) -> str:
             return f"{{ {text} }}" if text else "{}"
         case Mapping():
             return "{" + ", ".join(f"{key} = {as_toml(one)}" for key, one in value.items()) + "}"
-        case tuple() | list() | set() | frozenset():
+        case tuple():
             return f"[{', '.join(map(as_toml, value))}]"
     return str(value)
 
@@ -140,7 +140,7 @@ def _kind(kind: types.Type) -> str:
         case types.UnionType():
             parts = [part for part in kind.types if not isinstance(part, types.NoneType)]
             return " or ".join(dict.fromkeys(map(_kind, parts)))
-        case types.VarTupleType() | types.ListType() | types.SetType():
+        case types.VarTupleType():
             return f"list of {_kind(kind.item_type)}"
         case types.TupleType():
             return f"list of {len(kind.item_types)}: {', '.join(map(_kind, kind.item_types))}"

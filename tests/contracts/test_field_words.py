@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import datetime
+from typing import Any, Literal
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts.field_words import as_toml, fields_of, summary_of, tables_of
 
@@ -61,3 +63,49 @@ def test_defaults_are_written_as_toml() -> None:
     assert as_toml(Hub()) == "{ bolts = 5 }"
     assert as_toml(("a", 1.5, False)) == '["a", 1.5, false]'
     assert as_toml({"a": 1}) == "{a = 1}"
+
+
+class Tools(msgspec.Struct, frozen=True):
+    """In a box."""
+
+    pair: tuple[Hub, float]
+    by_name: dict[str, Hub | None]
+    either: float | str | None = None
+    blob: bytes = b""
+    rows: tuple[int, ...] = ()
+    any: Any = None
+    array: np.ndarray[Any, Any] | None = None
+    when: datetime.date | None = None
+
+
+def test_every_type_has_its_words() -> None:
+    assert {field.name: field.kind for field in fields_of(Tools)} == {
+        "pair": "list of 2: table Hub, number",
+        "by_name": "table of table Hub",
+        "either": "number or text",
+        "blob": "bytes",
+        "rows": "list of whole number",
+        "any": "anything",
+        "array": "ndarray",
+        "when": "date",
+    }
+    by_name = {field.name: field for field in fields_of(Tools)}
+    assert by_name["pair"].inner == by_name["by_name"].inner == (Hub,)
+    assert (by_name["rows"].inner, by_name["rows"].shown_default) == ((), "[]")
+    assert (by_name["pair"].required, by_name["pair"].shown_default) == (True, "")
+    assert tables_of(Tools) == [Tools, Hub]
+
+
+def test_a_type_that_is_written_nowhere_has_no_words() -> None:
+    made = msgspec.defstruct("Made", [("friction_factor", float), ("more", float)])
+    texts = {field.name: field.text for field in fields_of(made)}
+    assert texts == {"friction_factor": "Of the ground's friction.", "more": ""}
+
+
+def test_other_defaults_are_written_too() -> None:
+    assert as_toml(7) == "7"
+    assert as_toml(True) == "true"
+    assert as_toml(datetime.date(2026, 1, 2)) == "2026-01-02"
+    assert as_toml(Tools(pair=(Hub(), 1.0), by_name={})) == (
+        "{ pair = [{ bolts = 5 }, 1.0], by_name = {}, blob = b'', rows = [] }"
+    )

@@ -12,7 +12,12 @@ import pytest
 from foretwin.contracts import planner_serving
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.planner_link import LINK_VERSION, PlannedMotions, PlannerScene
+from foretwin.contracts.planner_link import (
+    LINK_VERSION,
+    PlannedMotions,
+    PlannerJoined,
+    PlannerScene,
+)
 from foretwin.contracts.planner_serving import LINK_GIVEN, Answering, serve_planner
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.planners.a_stack import straight_on
@@ -101,3 +106,25 @@ def test_a_link_that_cannot_be_read_is_one_line(
     monkeypatch.setenv(LINK_GIVEN, given)
     assert serve_planner(straight_on, name="mine", version="1") == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_to_a_sweep_it_says_who_it_is_until_it_is_asked_and_leaves_with_the_worker() -> None:
+    class Sweep(MemoryBus):
+        """Asks once it has heard twice who is there, answers nothing, and is gone."""
+
+        looks = 0
+
+        @property
+        def connected(self) -> bool:
+            self.looks += 1
+            if self.looks in (3, 4):
+                self.publish("planner_scene", scene(self.looks - 2), **IDS)
+            return self.looks < 6
+
+    bus, joined, answers = Sweep(), Mailbox(8), Mailbox(8)
+    bus.subscribe("planner_joined", joined, **IDS)
+    bus.subscribe("planned_motions", answers, **IDS)
+    who = PlannerJoined(name="mine", version="1", link=LINK_VERSION)
+    Answering(bus, straight_on, None, **IDS).serve_sweep(who)
+    assert [joined.take().message() for _ in range(len(joined))] == [who] * 3
+    assert [answers.take().message().question for _ in range(len(answers))] == [1, 2]

@@ -146,3 +146,19 @@ def test_whoever_lets_others_join_names_host_and_port() -> None:
 def test_what_is_no_place_to_listen_at_is_told(text: str) -> None:
     with pytest.raises(UserError, match="must be HOST:PORT with a port of 1 to 65535"):
         listen_place(text)
+
+
+def test_where_every_port_is_taken_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+
+    class Taken(socket.socket):
+        def bind(self, address: tuple[str, int]) -> None:  # type: ignore[override]
+            tried.append(address)
+            raise OSError("in use")
+
+    monkeypatch.setattr(socket, "socket", Taken)
+    with pytest.raises(OSError, match=r"no free port on 127\.0\.0\.1 from 20000 to 31999"):
+        free_port()
+    assert len(tried) == 200
+    assert {host for host, _ in tried} == {LOOPBACK}
+    assert all(20_000 <= port < 32_000 for _, port in tried)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 
 import numpy as np
@@ -88,3 +89,16 @@ def test_the_first_are_kept_and_the_rest_counted() -> None:
     kept.append(0)
     kept.extend(range(1, 10))
     assert (kept, kept.left_out) == ([0, 1, 2], 7)
+
+
+def test_what_was_kept_goes_on_alike_in_another_process() -> None:
+    """As it is handed to an orchestrator that goes on with a run."""
+    kept: FirstOf[int] = FirstOf(3)
+    kept.extend(range(5))
+    again = pickle.loads(pickle.dumps(kept))
+    for one in (kept, again):
+        one.append(7)
+        assert (one, one.left_out) == ([0, 1, 2], 3)
+    room: FirstOf[int] = pickle.loads(pickle.dumps(FirstOf[int](2)))
+    room.extend((8, 9, 10))
+    assert (room, room.left_out) == ([8, 9], 1)

@@ -234,3 +234,12 @@ def test_threads_that_ended_leave_nothing_open(tmp_path: Path) -> None:
         thread.start()
         thread.join()
     assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def test_a_whole_run_is_recorded_and_joined_at_its_end(tmp_path: Path) -> None:
+    with trace.whole_run(tmp_path / trace.TRACE_PARTS, "orchestrator"), trace.span("round"):
+        pass
+    assert {event["name"] for event in read(tmp_path / trace.TRACE)} == {"process_name", "round"}
+    with trace.whole_run(None, "orchestrator"), trace.span("round"):
+        pass
+    assert [file.name for file in tmp_path.iterdir()] == [trace.TRACE]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 import pytest
 
-from foretwin.contracts.type_words import Wrong, dotted, in_words, undotted
+from foretwin.contracts.type_words import Wrong, dotted, in_words, inside, undotted
 
 
 class Wheel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -115,3 +115,19 @@ def test_what_is_wrong_is_said_by_key(values: Any, place: tuple[str | int, ...],
 def test_a_place_reads_as_it_was_written() -> None:
     assert dotted(("vehicles", 0, "role")) == "vehicles[0].role"
     assert undotted("vehicles[0].role") == ("vehicles", 0, "role")
+
+
+def test_a_place_has_the_types_that_it_may_have() -> None:
+    def names(*place: str | int) -> list[str]:
+        return [type(one).__name__ for one in inside(Waggon, place)]
+
+    assert names() == ["StructType"]
+    assert names("seats") == ["IntType"]
+    assert names("wheels") == ["VarTupleType"]
+    assert names("wheels", 0) == names("wheels", "...") == ["StructType"]
+    assert names("wheels", 3, "radius_m") == ["FloatType"]
+    assert names("load", "coal") == names("load", "...") == ["FloatType"]
+    assert set(names("spare")) == {"StructType", "FloatType", "NoneType"}
+    assert names("spare", "side") == ["LiteralType"]
+    assert names("seats", "x") == names("nothing") == names(0) == []
+    assert dotted(("load", "...", "x")) == "load[...].x"

@@ -13,12 +13,14 @@ from foretwin.contracts.drive import SignalState, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint
 from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.instructions import RoundIntent
 from foretwin.orchestrator.rounds import runner
-from foretwin.orchestrator.rounds.jobs import _signals, planners_of, scenarios_of
+from foretwin.orchestrator.rounds.jobs import RoundPlanner, _signals, planners_of, scenarios_of
 from foretwin.orchestrator.rounds.pace import Pace
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.scenarios.reading import catalogue
 from tests.orchestrator.house import House
+from tests.orchestrator.trip import town_world
 
 
 @pytest.mark.parametrize(("futures", "size"), [(6, 3), (7, 3), (1, 32), (64, 32)])
@@ -152,3 +154,26 @@ def test_where_a_round_runs_fewer_those_found_worst_are_among_them(
     assert [future.index for future in played] == list(range(64))
     assert all({0, 33, 41, 50} <= set(turn) for turn in turns)
     assert not all(60 in turn for turn in turns)
+
+
+def test_of_eight_worlds_it_is_known_what_can_happen_in_them(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    planner = RoundPlanner(house.plan.config, house.plan.vehicle)
+    intent = house.mission.plan_round()
+    house.tables.close()
+    assert isinstance(intent, RoundIntent)
+    world = town_world(intent.junction_id)
+    for number in range(10):
+        planner._fitting(msgspec.structs.replace(world, id=f"w{number}"), intent.path)
+    assert list(planner._known) == [f"w{number}" for number in range(2, 10)]
+
+
+def test_without_scenarios_nothing_happens_in_a_future(tmp_path: Path) -> None:
+    house = House(tmp_path, scenarios=())
+    house.drive(20)
+    assert house.conductor.start_round()
+    asked = [one.message().decoded() for worker in house.workers for one in worker.take()]
+    house.tables.close()
+    assert asked
+    assert {future.scenario_id for job in asked for future in job.futures} == {""}

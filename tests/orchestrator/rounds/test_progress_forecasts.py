@@ -13,9 +13,10 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.forecast.features import CONTROLS
 from foretwin.orchestrator.forecast.progress_model import progress_model
 from foretwin.orchestrator.instructions import RoundIntent
-from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
+from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts, _ahead
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS
 
@@ -236,3 +237,13 @@ def test_a_forecast_from_before_a_hole_tells_no_arrival() -> None:
     drive(forecasts, until_s=5.0)
     forecasts.take_state(state(4.0), START_NS)  # the clock stepped back
     assert forecasts.arrival_band(60.0, usual_mps=10.0) is None
+
+
+def test_where_no_junction_is_ahead_none_is_forecast_for() -> None:
+    forecasts = fresh()
+    drive(forecasts, until_s=3.0, rounds=False)
+    here = state(3.0)
+    nowhere = replace(INTENT, next_junction=None)
+    facts = [_ahead(intent, here, (), FRAME) for intent in (INTENT, nowhere)]
+    assert facts[0] == facts[1]._replace(junction_m=80, control=float(CONTROLS.index("signals")))
+    assert forecasts.forecast(1, nowhere, here, (), FRAME) is not None

@@ -243,3 +243,32 @@ def test_forecasts_are_held_against_how_far_the_car_got(tmp_path: Path) -> None:
     rows = pq.read_table(house.plan.folder / "results" / "forecasts.parquet").to_pylist()
     assert {row["round_id"] for row in rows} == {0}
     assert len(rows) == house.conductor.rounds.forecast_count.rows.count
+
+
+def test_a_round_that_is_open_at_the_drives_end_is_cut_off(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    rounds = house.conductor.rounds
+    rounds.close()
+    house.tables.close()
+    assert not rounds.open
+    assert (rounds.tally.cut_off, rounds.tally.run, rounds.tally.failed) == (1, 0, 0)
+
+
+def test_a_worker_that_nobody_started_here_is_counted_with(tmp_path: Path) -> None:
+    """One round waits for it: both of ours refuse."""
+    house = House(tmp_path)
+    house.drive(20)
+    rounds = house.conductor.rounds
+    rounds.enroll("w-far-0")
+    assert house.conductor.start_round()
+    while asked := [one for worker in house.workers for one in worker.take()]:
+        for one in asked:
+            one.refuse("no disk")
+        house.settle()
+    assert rounds.open
+    rounds.never_again("w-far-0")
+    house.tables.close()
+    assert not rounds.open
+    assert rounds.tally.failed == 1

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from foretwin.contracts.drive import ImuSample, SpeedSample, SteeringSample
+from foretwin.contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
+from foretwin.contracts.foreign_bus import Arrived
 from foretwin.telemetry.ros2.inwards import _in_our_units
 from foretwin.telemetry.ros2.mapping import InRow
 from tests.telemetry.ros2.gateway_ground import FIX_KEY, fix
@@ -46,6 +47,21 @@ def test_angles_become_radians_to_the_left(said: dict[str, object], angle_rad: f
     sample = SteeringSample(stamp_ns=1, tire_angle_rad=0.2)
     found = _in_our_units(sample, row("steering", **said))
     assert found.tire_angle_rad == pytest.approx(angle_rad)  # type: ignore[attr-defined]
+
+
+def test_who_measures_no_angle_has_none_in_any_unit() -> None:
+    sample = ControlCommand(stamp_ns=1, tire_angle_rad=None, accel_mps2=1.0)
+    assert _in_our_units(sample, row("control", angle_unit="deg")) is sample
+
+
+def test_an_attachment_that_is_none_is_counted_and_its_sample_is_taken() -> None:
+    ground = Ground(enabled=False, flag=False)
+    inbox = next(iter(ground.foreign.inboxes.values()))
+    inbox.put(Arrived(FIX_KEY, fix(5 * S, 52.6, 13.5), b"short", ground.now_ns, 10**18))
+    ground.step()
+    inwards = ground.gateway.inwards
+    assert inwards.unused == {"/sensing/gnss: attachment not understood": 1}
+    assert (inwards.counts, inwards.lost) == ({"gnss": 1}, {})
 
 
 def test_speeds_become_metres_a_second() -> None:
