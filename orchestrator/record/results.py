@@ -110,7 +110,10 @@ TABLES: dict[str, pa.Schema] = {
 """Every table of `results/` with its columns."""
 
 WRITE_S, SYNC_S = 0.5, 1.0
-"""How often rows are appended, which outlives a kill, and synced, which outlives a power cut."""
+"""How often rows are appended, which outlives a kill, and synced, which outlives a power cut.
+
+Until then they lie in the queue: to wake up for each costs more than to keep it.
+"""
 LOOK_EVERY_S = 5.0
 """How often a table may be put away, and parts of the run removed."""
 QUEUE_DEPTH = 4096
@@ -137,7 +140,8 @@ class ResultTables:
         told = {**metadata, **played_with()}
         schemas = {name: schema.with_metadata(told) for name, schema in TABLES.items()}
         self._streams = RunStreams(folder, schemas)
-        self._queue: queue.Queue[tuple[str, Rows] | None] = queue.Queue(QUEUE_DEPTH)
+        self._queue: queue.Queue[tuple[str, Rows]] = queue.Queue(QUEUE_DEPTH)
+        self._over = threading.Event()
         self._lossless, self._roll = lossless, (keep or Keep()).tables
         self._kept = KeptParts(folder.parent, keep or Keep())
         self._left, self._dropped = False, 0
@@ -182,9 +186,8 @@ class ResultTables:
         """
         if timeout_s is None:
             timeout_s = LOCK_STEP_CLOSE_S if self._lossless else CLOSE_S
-        with contextlib.suppress(queue.Full):
-            self._queue.put(None, timeout=timeout_s)
         self._moved()
+        self._over.set()
         while (
             self._thread.is_alive()
             and (left_s := self._moved_s + timeout_s - time.monotonic()) > 0.0
@@ -207,9 +210,8 @@ class ResultTables:
     def leave(self, timeout_s: float = CLOSE_S) -> None:
         """Write everything, and leave the streams to who goes on with them."""
         self._left = True
-        with contextlib.suppress(queue.Full):
-            self._queue.put(None, timeout=timeout_s)
-            self._thread.join(timeout_s)
+        self._over.set()
+        self._thread.join(timeout_s)
 
     @property
     def _how(self) -> str:
@@ -230,26 +232,21 @@ class ResultTables:
     def _write_streams(self) -> None:
         """Append what comes until the end."""
         streams = self._streams
-        write_s = sync_s = time.monotonic()
+        sync_s = time.monotonic()
         over = False
         while not over:
-            with contextlib.suppress(queue.Empty):
-                item = self._queue.get(timeout=max(0.0, write_s - time.monotonic()))
-                if item is None:
-                    over = True
-                else:
-                    streams.take(*item)
-            if over or time.monotonic() >= write_s:
-                # At the end it is the Parquet files that are synced.
-                sync, before = not over and time.monotonic() >= sync_s, streams.failing
-                with span("write tables", sync=sync):
-                    streams.write(sync=sync)
-                self._tell(before, streams.failing)
-                if sync:
-                    self._write_so_far()
-                    self._keep_small(streams)
-                write_s = time.monotonic() + WRITE_S
-                sync_s = time.monotonic() + SYNC_S - WRITE_S if sync else sync_s
+            over = self._over.wait(WRITE_S)
+            for _ in range(self._queue.qsize()):
+                streams.take(*self._queue.get_nowait())
+            # At the end it is the Parquet files that are synced.
+            sync, before = not over and time.monotonic() >= sync_s, streams.failing
+            with span("write tables", sync=sync):
+                streams.write(sync=sync)
+            self._tell(before, streams.failing)
+            if sync:
+                self._write_so_far()
+                self._keep_small(streams)
+                sync_s = time.monotonic() + SYNC_S - WRITE_S / 2
         streams.close()
         self.troubles += [f"{rows} rows are lost: {why}" for why, rows in streams.lost.items()]
 

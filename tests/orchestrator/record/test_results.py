@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+from itertools import pairwise
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -11,6 +13,7 @@ import pytest
 from foretwin.orchestrator.keep import Keep
 from foretwin.orchestrator.record import results as module
 from foretwin.orchestrator.record.results import QUEUE_DEPTH, TABLES, ResultTables
+from foretwin.orchestrator.record.run_streams import RunStreams
 from foretwin.orchestrator.record.table_parts import parts_of_table, read_parts
 from foretwin.orchestrator.record.table_stream import StreamReader
 from tests.starvation import kept_waiting
@@ -45,6 +48,34 @@ def test_while_the_run_goes_on_a_row_is_in_its_file_within_a_second(tmp_path: Pa
     assert not list(tmp_path.glob("*.parquet"))
     tables.close()
     assert not list(tmp_path.glob("*.arrows"))
+
+
+def test_rows_wait_for_the_next_write_and_not_every_write_is_synced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[tuple[float, bool]] = []
+    write = RunStreams.write
+
+    def noted(streams: RunStreams, *, sync: bool) -> None:
+        written.append((time.monotonic(), sync))
+        write(streams, sync=sync)
+
+    monkeypatch.setattr(RunStreams, "write", noted)
+    monkeypatch.setattr(module, "WRITE_S", 0.05)
+    monkeypatch.setattr(module, "SYNC_S", 0.1)
+    tables = ResultTables(tmp_path, {})
+
+    def synced_thrice() -> bool:
+        tables.add("events", [event(1)])
+        return sum(sync for _, sync in written) >= 3
+
+    wait_for(synced_thrice, "three syncs")
+    tables.close()
+    *before, (_, last) = written
+    assert not last  # Parquet is
+    assert all(b - a > 0.045 for (a, _), (b, _) in pairwise(before))
+    synced = [at for at, sync in before if sync]
+    assert all(b - a > 0.07 for a, b in pairwise(synced))
 
 
 def test_a_live_drive_is_never_held_up(tmp_path: Path) -> None:
