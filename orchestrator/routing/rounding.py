@@ -91,24 +91,35 @@ def fillet(line: Array, s: Array, radius: Array) -> tuple[Array, Array]:
     total = np.maximum(np.concatenate([[0.0], wanted]) + np.concatenate([wanted, [0.0]]), 1e-9)
     fits = np.minimum(1.0, 0.98 * length / total)
     tangent = wanted * np.minimum(fits[:-1], fits[1:])
-    points, places = [line[:1]], [s[:1]]
-    for corner in range(len(turn)):
-        vertex, reach_m = line[corner + 1], tangent[corner]
-        if abs(turn[corner]) < 1e-4 or reach_m < 1e-3:
-            points.append(vertex[None])
-            places.append(s[corner + 1 : corner + 2])
-            continue
-        start = vertex - reach_m * legs[corner] / length[corner]
-        count = max(3, math.ceil(abs(turn[corner]) / 0.08))
-        angles = np.linspace(0.0, turn[corner], count)
-        arc_radius = reach_m / tangent_share[corner]
-        side = math.copysign(1.0, turn[corner])
-        normal = heading[corner] + side * math.pi / 2.0
-        centre = start + arc_radius * np.array([math.cos(normal), math.sin(normal)])
-        spokes = angles + normal + math.pi
-        points.append(centre + arc_radius * np.stack([np.cos(spokes), np.sin(spokes)], axis=-1))
-        places.append(np.linspace(s[corner + 1] - reach_m, s[corner + 1] + reach_m, count))
-    return np.concatenate([*points, line[-1:]]), np.concatenate([*places, s[-1:]])
+    round_off = (np.abs(turn) >= 1e-4) & (tangent >= 1e-3)
+    corner = np.flatnonzero(round_off)
+    turn, reach_m, at_m = turn[corner], tangent[corner], s[corner + 1]
+    start = line[corner + 1] - reach_m[:, None] * legs[corner] / length[corner, None]
+    count = np.maximum(3, np.ceil(np.abs(turn) / 0.08)).astype(int)
+    arc_radius = reach_m / tangent_share[corner]
+    normal = heading[corner] + np.copysign(1.0, turn) * math.pi / 2.0
+    aside = np.array([(math.cos(angle), math.sin(angle)) for angle in normal.tolist()])
+    centre = start + arc_radius[:, None] * aside.reshape(-1, 2)
+    # All points of all arcs: of which one each is, and its number there.
+    arc = np.repeat(np.arange(len(corner)), count)
+    number = np.arange(len(arc)) - np.repeat(np.cumsum(count) - count, count)
+
+    def evenly(begin: Array, end: Array) -> Array:
+        step = (end - begin) / (count - 1)
+        return np.where(number == count[arc] - 1, end[arc], number * step[arc] + begin[arc])
+
+    spokes = evenly(np.zeros(len(corner)), turn) + normal[arc] + math.pi
+    spread = np.stack([np.cos(spokes), np.sin(spokes)], axis=-1)
+    times = np.ones(len(round_off), dtype=int)
+    times[corner] = count
+    points, places = np.repeat(line[1:-1], times, axis=0), np.repeat(s[1:-1], times)
+    of_arcs = np.repeat(round_off, times)
+    points[of_arcs] = centre[arc] + arc_radius[arc, None] * spread
+    places[of_arcs] = evenly(at_m - reach_m, at_m + reach_m)
+    return (
+        np.concatenate([line[:1], points, line[-1:]]),
+        np.concatenate([s[:1], places, s[-1:]]),
+    )
 
 
 def smoothed(points: Array, deviation_m: float) -> Array:

@@ -18,6 +18,7 @@ from foretwin.orchestrator.routing.rounding import (
     TIGHT_M,
     curvature_pm,
     evenly_spaced,
+    fillet,
     smoothed,
     with_driven_bends,
     with_driven_turns,
@@ -62,6 +63,37 @@ def test_a_turn_as_wide_as_cars_are_driven_stays_as_it_is() -> None:
 
     assert same is xy
     assert places is s
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_corners_become_arcs_as_wide_as_their_legs_allow_and_other_nodes_stay(side: float) -> None:
+    line = np.array(
+        [[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [40.0, side * 20.0], [60.0, side * 20.0]]
+    )
+    xy, s = fillet(line, 7.0 + arc_lengths(line), np.array([10.0, 10.0, 30.0]))
+
+    assert xy[[0, 1, -1]].tolist() == line[[0, 1, -1]].tolist()
+    assert s[[0, 1, -1]].tolist() == [7.0, 27.0, 87.0]
+    # A quarter of a circle has 20 points. Both arcs share the leg between them, 10 m and 30 m.
+    both = (2, 0.98 * 5.0, [40.0 - 0.98 * 5.0, side * 0.98 * 5.0], 47.0), (
+        22, 0.98 * 15.0, [40.0 + 0.98 * 15.0, side * (20.0 - 0.98 * 15.0)], 67.0,
+    )  # fmt: skip
+    for first, radius_m, centre, at_m in both:
+        arc_xy, arc_s = xy[first : first + 20], s[first : first + 20]
+        assert np.hypot(*(arc_xy - centre).T) == pytest.approx(radius_m)
+        assert arc_s == pytest.approx(np.linspace(at_m - radius_m, at_m + radius_m, 20))
+        assert np.hypot(*np.diff(arc_xy, axis=0).T) == pytest.approx(
+            2.0 * radius_m * math.sin(math.pi / 76.0)
+        )
+    assert xy[2] == pytest.approx([40.0 - 4.9, 0.0])
+    assert xy[21] == pytest.approx([40.0, side * 4.9])
+    assert len(xy) == 43
+
+
+def test_a_line_without_corners_stays_as_it_is() -> None:
+    line = np.array([[0.0, 0.0], [20.0, 0.0], [40.0, 0.0]])
+    xy, s = fillet(line, arc_lengths(line), np.array([10.0]))
+    assert (xy.tolist(), s.tolist()) == (line.tolist(), [0.0, 20.0, 40.0])
 
 
 def test_two_turns_close_together_are_widened_as_far_as_they_leave_room() -> None:
