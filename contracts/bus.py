@@ -193,11 +193,11 @@ class ZenohBus(ZenohSession):
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; see Bus."""
         full_key = channel_key(channel, **ids)
-        with self._lock:
-            samples = self._most_kept(channel)
-            publisher = self._publisher(
-                full_key, samples=samples, **self._qos(CHANNELS[channel].qos)
-            )
+        publisher = self._publishers.get(full_key)
+        if publisher is None:
+            samples, qos = self._most_kept(channel), self._qos(CHANNELS[channel].qos)
+            with self._lock:
+                publisher = self._publisher(full_key, samples=samples, **qos)
         with span("publish " + channel):
             publisher.put(self._encoded(full_key, message))
 

@@ -77,14 +77,12 @@ def share_below(levels: Array, quantiles: Array, values: Array) -> Array:
     `levels` (Q,) or (T, Q) rise between 0 and 1, exclusively, and `quantiles` (T, Q) rise.
     """
     levels = np.broadcast_to(levels, quantiles.shape)
-    found = np.empty(values.shape)
-    for row, (level, quantile, value) in enumerate(zip(levels, quantiles, values, strict=True)):
-        short = np.minimum(value - quantile[0], 0.0) / _tail(level, quantile)
-        far = np.maximum(value - quantile[-1], 0.0) / _tail(1.0 - level[::-1], -quantile[::-1])
-        found[row] = np.interp(value, quantile, level)
-        found[row][short < 0.0] = (level[0] * np.exp(short))[short < 0.0]
-        found[row][far > 0.0] = (1.0 - (1.0 - level[-1]) * np.exp(-far))[far > 0.0]
-    return found
+    short = np.minimum(values - quantiles[:, :1], 0.0) / _tail(levels, quantiles)[:, None]
+    high_tail = _tail(1.0 - levels[:, ::-1], -quantiles[:, ::-1])[:, None]
+    far = np.maximum(values - quantiles[:, -1:], 0.0) / high_tail
+    between = np.array([*map(np.interp, values, quantiles, levels)]).reshape(values.shape)
+    low, high = levels[:, :1] * np.exp(short), 1.0 - (1.0 - levels[:, -1:]) * np.exp(-far)
+    return np.select([short < 0.0, far > 0.0], [low, high], between)
 
 
 def value_at(levels: Array, quantiles: Array, shares: Array) -> Array:

@@ -87,7 +87,7 @@ def opened(
     except Refused as refused:
         refused.header = Header(envelope.seq, envelope.sent_ns)
         raise
-    return envelope._replace(message=message, left_out=left_out)
+    return envelope._replace(message=message, left_out=left_out) if left_out else envelope
 
 
 def kept(payload: Any, most_bytes: int = MOST_BYTES) -> bytes | None:

@@ -14,6 +14,7 @@ from foretwin.contracts.frames import (
     local_from_geo,
     local_from_geo_yaw,
     target_from_source,
+    target_from_source_m,
 )
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
@@ -107,9 +108,8 @@ class OpenComparisons:
         xy = np.concatenate([result.trajectory.states[:, :, :2] for result in done.results])
         some = weights > 0.0  # what diverged is nowhere
         mean = np.average(xy[some].astype(np.float64), axis=0, weights=weights[some])
-        yaw = np.zeros(len(mean))
-        moved = target_from_source(self.frame, world_frame, mean, yaw).xy_m - _shift_m(seed)
-        return np.asarray(moved)
+        moved: Array = target_from_source_m(self.frame, world_frame, mean) - _shift_m(seed)
+        return moved
 
     def flush(self) -> list[Comparison]:
         """Return what can still be compared over the horizons that the drive has covered."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind
-from foretwin.contracts.frames import LocalFrame, target_from_source
+from foretwin.contracts.frames import LocalFrame, target_from_source_m
 from foretwin.contracts.futures import COLLISION_WITH, RoadUserTracks
 from foretwin.contracts.simulation import FutureHit, MetRoadUser, RoundView
 from foretwin.contracts.trace import traced
@@ -40,7 +40,7 @@ def round_view(
 
     def in_drive(xy_m: Array) -> Array32:
         flat = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
-        moved = target_from_source(drive_frame, world_frame, flat, np.zeros(len(flat))).xy_m
+        moved = target_from_source_m(drive_frame, world_frame, flat)
         return moved.reshape(xy_m.shape).astype(np.float32)
 
     clearance = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)

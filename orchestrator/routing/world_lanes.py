@@ -31,7 +31,8 @@ EDGE_SLACK_M = 25.0
 
 
 class Piece(NamedTuple):
-    """A lane or connection: its line (N, 2) about 0.5 m apart, and the road that it belongs to.
+    """A lane or connection: its line (N, 2) about 0.5 m apart and where that heads (N,), and the
+    road that it belongs to.
 
     `road` is the way and whether it is driven against its nodes, None of connections, whose lanes
     are `joins`. `after` and `beside` name what follows and the lanes that it may be left for.
@@ -39,6 +40,7 @@ class Piece(NamedTuple):
 
     id: str
     xy_m: Array
+    heading_rad: Array
     road: tuple[int, bool] | None
     joins: tuple[str, ...]
     after: tuple[str, ...]
@@ -69,9 +71,10 @@ class WorldLanes:
     """The lanes of a World that cars drive, in the road graph's frame."""
 
     def __init__(self, world: World, frame: LocalFrame) -> None:
-        def line(xy_m: Array) -> Array:
+        def line(xy_m: Array) -> tuple[Array, Array]:
             moved = target_from_source_m(frame, world.frame, xy_m)
-            return densified(moved, spacing_m=FINE_M)
+            fine = densified(moved, spacing_m=FINE_M)
+            return fine, headings_rad(fine)
 
         self.world_id = world.id
         self.turn_radii_m = turn_radii(world.intersection.driving_side)
@@ -84,13 +87,14 @@ class WorldLanes:
             beside = tuple(name for name in (left, right) if name is not None)
             road = (lane.osm_way, lane.reverse)
             pieces[lane.id] = Piece(
-                lane.id, line(lane.centerline), road, (), lane.successor_ids, beside
+                lane.id, *line(lane.centerline), road, (), lane.successor_ids, beside
             )
         for one in world.connections:
             if one.from_lane_id in pieces and one.to_lane_id in pieces:
-                xy = line(one.centerline)
                 joins = one.from_lane_id, one.to_lane_id
-                pieces[one.id] = Piece(one.id, xy, None, joins, (one.to_lane_id,), ())
+                pieces[one.id] = Piece(
+                    one.id, *line(one.centerline), None, joins, (one.to_lane_id,), ()
+                )
         self._pieces = tuple(pieces.values())
 
     def beside(self, route: Route, xy_m: Array, s_m: Array) -> list[Followed]:
@@ -136,7 +140,7 @@ def _followed(
     along = (nearest > 0) & (nearest < len(s_m) - 1)
     nearest = np.minimum(nearest, len(s_m) - 1)
     if spans is not None:
-        turned = headings_rad(piece.xy_m) - heading[nearest]
+        turned = piece.heading_rad - heading[nearest]
         along &= np.cos(turned) > math.cos(AHEAD_RAD)
         at = s_m[nearest]
         along &= np.any(

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.future_numbers import numbers_of
 from foretwin.contracts.futures import (
     COLLISION_WITH,
@@ -135,15 +134,11 @@ def _measured_numbers(job: Job, result: FuturesResult) -> dict[str, list[float |
     if planned is not None:
         columns["planned_impact_time_s"] = planned.time_s
         columns["planned_impact_off_m"] = planned.off_m
-    return {name: _numbers(values) for name, values in columns.items()}
-
-
-def _numbers(values: Array) -> list[float | None]:
-    """Return numbers as tables have them: None for one that there is not."""
-    numbers: list[float | None] = np.asarray(values, dtype=np.float64).tolist()
-    for place in np.flatnonzero(~np.isfinite(values)).tolist():
-        numbers[place] = None
-    return numbers
+    table = np.array(list(columns.values()), dtype=np.float64)
+    numbers: list[list[float | None]] = table.tolist()
+    for column, place in np.argwhere(~np.isfinite(table)).tolist():
+        numbers[column][place] = None  # as tables have one that there is not
+    return dict(zip(columns, numbers, strict=True))
 
 
 def _result_columns(job: Job, future: Future, result: FuturesResult, place: int) -> Row:

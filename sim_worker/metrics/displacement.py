@@ -78,12 +78,12 @@ def horizon_error(predicted: Array, actual: Array) -> HorizonError:
 
 def distinct_count(ends: Array, least_m: float = 0.1) -> int:
     """Return how many of the (S, 2) end points lie more than `least_m` from all counted before."""
-    kept = np.empty((0, 2))
-    for end in np.asarray(ends, dtype=np.float64):
-        apart = np.hypot(kept[:, 0] - end[0], kept[:, 1] - end[1])
-        if np.isfinite(end).all() and (apart > least_m).all():
-            kept = np.vstack([kept, end])
-    return len(kept)
+    known = np.asarray(ends, dtype=np.float64)[np.isfinite(ends).all(axis=1)]
+    counts = np.ones(len(known), dtype=bool)
+    for row, apart in enumerate(np.hypot(*(known[:, None] - known).T) > least_m):
+        if counts[row]:
+            counts[row + 1 :] &= apart[row + 1 :]
+    return int(np.count_nonzero(counts))
 
 
 def known(view: RolloutView) -> tuple[Array, Array]:
