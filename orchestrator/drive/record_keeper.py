@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from foretwin.contracts.errors import one_line
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.run_record import restart_troubles, run_record, samples_heard
@@ -41,11 +43,18 @@ class RecordKeeper:
         self._next_s = now_s + max(EVERY_S, took_s / SHARE)
 
     def write(self, exit_word: str) -> dict[str, Any]:
-        """Write run.json, complete; returns what it says. Raises OSError."""
+        """Write run.json, complete; returns what it says, or would say where it cannot be written:
+        then that is the last of its troubles."""
         folder = self.conductor.plan.folder
         record = self._record(exit_word)
-        write_record(record, folder / RECORD)
-        forget_so_far(folder)
+        try:
+            write_record(record, folder / RECORD)
+        except OSError as error:
+            how = f"`foretwin recover {folder}` makes it of what was written"
+            record["troubles"].append(f"{RECORD} cannot be written: {one_line(error)}; {how}")
+            return record
+        with contextlib.suppress(OSError):  # run.json says more, wherever this stays
+            forget_so_far(folder)
         return record
 
     def _record(self, exit_word: str) -> dict[str, Any]:

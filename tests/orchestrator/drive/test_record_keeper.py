@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.orchestrator.drive import record_keeper
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.record_keeper import EVERY_S, RecordKeeper
+from foretwin.orchestrator.drive.run_record import lost_lines
 from foretwin.orchestrator.drive.supervision import Life, OwnProcesses
 from foretwin.orchestrator.record.so_far import SO_FAR, read_so_far
 from foretwin.orchestrator.runner.supervisor import Supervisor
@@ -83,3 +85,34 @@ def test_what_is_told_is_the_record_of_now(kept: Kept, monkeypatch: pytest.Monke
     assert record["exit"] == "interrupted"
     assert any("balance" in text for text in record["troubles"])
     assert not (plan.folder / SO_FAR).exists()
+
+
+def no_room(*_: object) -> None:
+    raise OSError(30, "Read-only file system")
+
+
+def test_a_record_that_cannot_be_written_is_told_with_what_to_do(
+    kept: Kept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = kept.house.plan
+    kept.house.tables.close()
+    (plan.folder / SO_FAR).write_text("kept")
+    monkeypatch.setattr(record_keeper, "write_record", no_room)
+    record = kept.keeper.write("completed")
+
+    how = f"`foretwin recover {plan.folder}` makes it of what was written"
+    told = f"error: run.json cannot be written: OSError: [Errno 30] Read-only file system; {how}"
+    assert told in lost_lines(record)
+    assert (plan.folder / SO_FAR).exists()  # of which `recover` makes it
+
+
+def test_a_folder_that_loses_no_file_costs_nothing(
+    kept: Kept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept.house.tables.close()
+    monkeypatch.setattr(record_keeper, "forget_so_far", no_room)
+    record = kept.keeper.write("completed")
+
+    written = json.loads((kept.house.plan.folder / "run.json").read_text())
+    assert written == json.loads(json.dumps(record))
+    assert written["exit"] == "completed"
