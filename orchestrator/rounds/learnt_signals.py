@@ -65,7 +65,7 @@ class _Group:
         self.last = signal
         if self._learnt is not None and not _as_foretold(signal, self._learnt):
             # Another plan, or none: what was heard before says nothing of it.
-            self._learnt, self._follows = None, False
+            self._learnt = None
             self._changes.clear()
         if gap_s > LIVE_FOR_S or signal.colour in _NO_CYCLE or known.colour in _NO_CYCLE:
             self._follows = False

@@ -125,10 +125,12 @@ def test_who_comes_second_does_not_own_it(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_removed_twice_is_kept_over_nothing(tmp_path: Path) -> None:
+    open_before = len(list(Path("/proc/self/fd").iterdir()))
     folder = own(tmp_path)
     assert folder is not None
     folder.remove()
     folder.keep_over_exec()
+    assert len(list(Path("/proc/self/fd").iterdir())) == open_before
 
 
 def test_a_folder_that_another_removes_as_it_is_made_is_made_again(

@@ -157,3 +157,19 @@ def test_what_no_lidar_of_the_drive_says_is_left_out() -> None:
     ground.gateway.inwards._mounts = {}
     ground.hears()
     assert ground.gateway.inwards.unused["/lidar/raw: no sensor 'top' in the drive"] == 1
+
+
+def test_of_clouds_that_come_too_fast_the_newest_eight_go_out() -> None:
+    """Virtual ones and real ones; the car's other samples wait elsewhere."""
+    passing = Passing()
+    for number in range(20):
+        cloud = PointCloud(stamp_ns=5 * S + number, points=POINTS, sensor="top")
+        passing.bus.publish("point_cloud", cloud, run="r")
+    passing.goes_on()
+    assert passing.gateway.report()["dropped"] == {
+        "samples": 0, "words": 0, "views": 0, "clouds": 12,
+    }  # fmt: skip
+    stamps = [
+        one.header.stamp.nanosec for one in passing.heard_on("/foretwin/points", POINT_CLOUD2)
+    ]
+    assert stamps == list(range(12, 20))
