@@ -81,3 +81,11 @@ def test_the_passwords_of_a_killed_run_go_with_the_next_one(
     for one in (first, second):
         one.remove()
     assert list((tmp_path / "foretwin").iterdir()) == []
+
+
+def test_a_process_is_named_with_its_role_unless_it_is_the_only_one_of_it() -> None:
+    named = [("orchestrator", "orchestrator"), ("worker", "w0"), ("worker", "z9"), ("car", "a")]
+    assert [member_of(role, process).name for role, process in named] == [  # type: ignore[arg-type]
+        "orchestrator", "worker-w0", "worker-z9", "car-a",
+    ]  # fmt: skip
+    assert member_of("car", "a", vehicle_id="ego") == ("car-a", "car", "a", "ego", ())

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from foretwin.contracts.toml_lines import Place, line_at, lines_of
@@ -114,3 +114,33 @@ def test_whatever_the_values_hold_keys_keep_their_lines(values: list[str]) -> No
         number + 1 for number in range(len(values))
     ]
     assert set(lines) == places(tomllib.loads(text))
+
+
+PIECES = st.sampled_from(["a", '\\"', "\\\\", "\n", '"', '""', "'", "''", "#", "]", "= 1", "[t]"])
+LONG = st.tuples(st.sampled_from(['"""', "'''", '"', "'"]), st.lists(PIECES, max_size=8)).map(
+    lambda text: text[0] + "".join(text[1]) + text[0]
+)
+
+
+@given(st.lists(LONG, min_size=1, max_size=3))
+def test_after_texts_in_any_quotes_the_next_key_stands_where_it_stands(texts: list[str]) -> None:
+    rows = [f"key_{number} = {text} # end" for number, text in enumerate(texts)]
+    text = "\n".join([*rows, "[last]", "x = 1"])
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        reject()
+    assume(list(values) == [*(f"key_{number}" for number in range(len(texts))), "last"])
+    lines = lines_of(text)
+    assert set(lines) == places(values)
+    begins = [
+        1 + "\n".join(rows[:number]).count("\n") + (number > 0) for number in range(len(rows))
+    ]
+    assert [lines[f"key_{number}",] for number in range(len(rows))] == begins
+    assert lines["last", "x"] == text.count("\n") + 1
+
+
+@pytest.mark.parametrize("text", ["a = [1, 2", 'a = "b', "a = {b = 1", "[t", "a", "a = '''b"])
+def test_of_a_text_that_ends_too_early_what_was_read_is_known(text: str) -> None:
+    """It was no TOML, which others say."""
+    assert set(lines_of(text)) <= {("a",), ("a", 0), ("a", 1), ("a", "b"), ("t",)}
