@@ -67,7 +67,7 @@ class RouterSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
 def write_setup(setup: ProcessSetup, path: Path) -> None:
     """Write a setup as JSON; one that is there already stays, so that a full disk takes nothing of
     it where a process is started again. Raises OSError."""
-    data = msgspec.json.format(msgspec.json.encode(setup), indent=2)
+    data = msgspec.json.format(msgspec.json.encode(setup))
     if not path.exists() or path.read_bytes() != data:
         path.write_bytes(data)
 

@@ -2,36 +2,65 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from typing import Any
 
 import msgspec
 import pytest
 
+from foretwin import contracts
 from foretwin.contracts import (
+    anchor,
+    anchor_file,
+    beside_road,
+    camera_image,
     campaign,
     codec,
+    cpu_use,
     credentials,
     drive,
+    elevation,
+    fleet,
+    forecast,
+    frames,
     futures,
     gap,
     guard,
+    layout,
+    lights,
+    marks,
     numbering,
     parts,
     placement,
     planner_link,
+    planner_serving,
+    point_cloud,
     process_setup,
+    provenance,
+    radar_list,
+    refusal_counts,
+    roads_shown,
     roles,
     runner,
     scenario,
     segments,
+    sensed_motion,
+    sensor_drift,
+    sensor_turns,
     setup,
     siblings,
+    side_by_side,
+    signals,
     simulation,
     tally,
     towards_vehicle,
+    tracks,
     tuning,
     vehicle,
+    virtual_traffic,
     world,
+    world_building,
 )
 
 COVERS = (
@@ -50,9 +79,12 @@ LISTED: dict[str, dict[str, Any]] = {
         "impact_share": 0.5, "gap_m": 20.0, "decel_mps2": 4.0,
     },
     "Anchor": {"scale": 1.0},
+    "AnchorFile": {"scale": 1.0},
     "Area": {"source": "inferred"},
     "Connection": {"control": "none"},
+    "Drift": {"time_s": 100.0},
     "DriveEnd": {"reason": "end of source"},
+    "EnlistRequest": {"simulations": 32, "kept_worlds": 8, "control_hz": 20.0},
     "EgoPart": {"turn": "straight", "speed_mps": 8.33},
     "Mount": {"forward_m": 1.4, "up_m": 1.9},
     "FollowLimits": {
@@ -69,7 +101,10 @@ LISTED: dict[str, dict[str, Any]] = {
         "turns_source": "inferred", "direction_source": "inferred", "change": "both",
         "change_source": "default",
     },
+    "LayoutColumn": {"share": 1.0},
+    "LayoutRow": {"share": 1.0},
     "MirrorSample": {"role": "all"},
+    "OwnRefusals": {"counted_all": True},
     "Parameter": {"source": "default"},
     "PlannedMotions": {"link": 1},
     "PlannerJoined": {"link": 1},
@@ -85,6 +120,7 @@ LISTED: dict[str, dict[str, Any]] = {
     "StackSetup": {"instances": 1, "answer_within_s": 60.0, "start_within_s": 120.0},
     "StandinSetup": {"speed": 1.0},
     "Tally": {"part": 1},
+    "TrafficCourse": {"on": True},
     "VehicleFile": {"scale": 1.0},
     "VehicleInfo": {"reference_point": "unknown"},
     "VehicleState": {"yaw_valid": True},
@@ -104,9 +140,11 @@ LISTED: dict[str, dict[str, Any]] = {
 """Of faults those that are neutral are listed in the table of numbers."""
 FILES = (campaign, credentials, process_setup, roles, scenario, segments, setup, vehicle)
 MESSAGES = (
-    drive, futures, gap, numbering, parts, placement, planner_link, runner, siblings, simulation,
-    tally,
-    towards_vehicle, tuning, world,
+    anchor, anchor_file, beside_road, camera_image, cpu_use, drive, elevation, fleet, forecast,
+    frames, futures, gap, layout, lights, marks, numbering, parts, placement, planner_link,
+    planner_serving, point_cloud, provenance, radar_list, refusal_counts, roads_shown, runner,
+    sensed_motion, sensor_drift, sensor_turns, siblings, side_by_side, signals, simulation, tally,
+    towards_vehicle, tracks, tuning, virtual_traffic, world, world_building,
 )  # fmt: skip
 KINDS = sorted(
     {
@@ -142,6 +180,15 @@ def test_what_is_not_said_is_nothing_or_listed(kind: type[msgspec.Struct]) -> No
             default = field.default_factory()
         if default is not msgspec.NODEFAULT:  # else it has to be said
             assert default == listed.get(field.name, nothing(default)), field.name
+
+
+def test_no_type_of_a_message_or_file_is_left_out() -> None:
+    named = {module.__name__ for module in (*FILES, *MESSAGES)}
+    for module in pkgutil.iter_modules(contracts.__path__, f"{contracts.__name__}."):
+        kinds = vars(importlib.import_module(module.name)).values()
+        own = [kind for kind in kinds if getattr(kind, "__module__", "") == module.name]
+        if any(isinstance(one, type) and issubclass(one, msgspec.Struct) for one in own):
+            assert module.name in named
 
 
 def test_everything_listed_is_there() -> None:

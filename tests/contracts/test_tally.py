@@ -32,6 +32,7 @@ def test_a_tally_survives_and_takes_the_room_that_it_has(tmp_path: Path) -> None
     write_tally(tally, path)
     assert path.name == "drive.tally.json"
     assert path.stat().st_size == 16_384
+    assert path.stat().st_mode & 0o111 == 0
     assert read_tally(path) == tally
     write_tally(Tally(), path)
     assert read_tally(path) == Tally()
