@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import ssl
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from foretwin.contracts.bus import BusUnreachable, ZenohBus
 from foretwin.contracts.campaign import TlsFiles, role_files
 from foretwin.contracts.ports import free_port, tls_place
 from foretwin.contracts.setup import BusSetup
-from foretwin.contracts.why_refused import _answer, likely_causes
+from foretwin.contracts.why_refused import _answer, _meaning, likely_causes
 from tests.orchestrator.campaign.campaigns import campaign, expired
 
 
@@ -102,3 +103,27 @@ def test_the_error_of_a_refused_client_says_why(
         setup = BusSetup(endpoint=endpoint, tls=role_files(campaigns / "other", role))
         with pytest.raises(BusUnreachable, match=said), contextlib.closing(ZenohBus(setup)):
             pass
+
+
+@pytest.mark.parametrize(
+    ("reason", "verify", "said"),
+    [
+        ("CERTIFICATE_VERIFY_FAILED", "Hostname mismatch, no host", "does not stand for this host"),
+        ("CERTIFICATE_VERIFY_FAILED", "IP address mismatch, no ip", "does not stand for this host"),
+        ("CERTIFICATE_VERIFY_FAILED", "certificate has expired", "has expired, or this clock"),
+        ("CERTIFICATE_VERIFY_FAILED", "unable to get issuer", "the router is not of this campaign"),
+        ("SSLV3_ALERT_CERTIFICATE_EXPIRED", "", "the router says that the certificate has expired"),
+        ("TLSV1_ALERT_UNKNOWN_CA", "", "the router is of another campaign than this"),
+        ("TLSV1_ALERT_DECRYPT_ERROR", "", "the router is of another campaign than this"),
+        ("SSLV3_ALERT_BAD_CERTIFICATE", "", "the router does not take this certificate"),
+        ("TLSV13_ALERT_CERTIFICATE_REQUIRED", "", "wants a certificate and got none"),
+        ("WRONG_VERSION_NUMBER", "", "what listens there speaks no TLS"),
+        ("OF_TOMORROW", "", "TLS: OF_TOMORROW"),
+    ],
+)
+def test_every_word_of_tls_has_its_meaning(reason: str, verify: str, said: str) -> None:
+    error = ssl.SSLError(1, f"[SSL: {reason}] of some line")
+    error.reason = reason
+    if verify:
+        error.verify_message = verify  # type: ignore[attr-defined]
+    assert said in _meaning(error)

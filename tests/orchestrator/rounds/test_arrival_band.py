@@ -32,10 +32,11 @@ def stopping(speed_mps: float, decel_mps2: float, *, fastest_mps: float) -> Prog
     return of_courses(np.where(LEVELS <= 0.5, stops[:, None], goes[:, None]))
 
 
-def test_within_the_forecast_each_quantile_arrives_when_it_has_got_so_far() -> None:
-    band = arrival_band(steady(8.0, 12.0), 48.0, usual_mps=12.0)
+@pytest.mark.parametrize("way_m", [3.0, 48.0, 60.0])
+def test_within_the_forecast_each_quantile_arrives_when_it_has_got_so_far(way_m: float) -> None:
+    band = arrival_band(steady(8.0, 12.0), way_m, usual_mps=12.0)
 
-    assert band == pytest.approx((48.0 / 12.0, 48.0 / 8.0))
+    assert band == pytest.approx((way_m / 12.0, way_m / 8.0))
 
 
 def test_beyond_the_forecast_steady_quantiles_go_on() -> None:

@@ -95,6 +95,39 @@ def test_nominal_and_worst_future_are_played_a_second_time(house: SiblingHouse) 
     assert {row["engine"] for row in house.rows("jobs")} == {"mujoco"}
 
 
+@pytest.mark.parametrize(
+    ("criticality", "lost", "asked"),
+    [
+        ([0.1, 0.2, 0.3, 0.9, 0.4, 0.5], 3, [0, 5]),
+        ([0.1, 0.2, 0.3, 0.9, 0.4, 0.5], 1, [0, 3]),
+        ([0.9, 0.2, 0.3, 0.8, 0.4, 0.5], 1, [0]),
+        ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1, [0]),
+    ],
+)
+def test_the_worst_is_the_most_critical_that_is_whole(
+    house: SiblingHouse,
+    monkeypatch: pytest.MonkeyPatch,
+    criticality: list[float],
+    lost: int,
+    asked: list[int],
+) -> None:
+    taken: list[Any] = []
+    with monkeypatch.context() as patched:
+        patched.setattr(house.siblings, "take_round", lambda *round_: taken.append(round_))
+        house.round()
+    ((done, futures, rows),) = taken
+    valid = np.arange(6) != lost
+    other = futures._replace(criticality=np.array(criticality), valid=valid)
+    house.siblings.take_round(done, other, rows)
+    (question,) = house.second.take()
+    assert [one.index for one in question.message().decoded().futures] == asked
+    (kept,) = house.siblings._asked.values()
+    assert kept.future_ids == tuple(rows[place]["future_id"] for place in asked)
+    assert kept.criticality.tolist() == [criticality[place] for place in asked]
+    assert np.array_equal(kept.states, futures.states[asked].astype(np.float32))
+    house.tables.close()
+
+
 def test_what_the_drive_shows_is_laid_beside_how_far_engines_are_apart(house: SiblingHouse) -> None:
     for aside_m in (4.0, 1.0, 2.0, 3.0):
         house.aside_m = aside_m
