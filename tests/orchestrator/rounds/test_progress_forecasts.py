@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.forecast import ForecastOutcome
+from foretwin.contracts.forecast import ForecastOutcome, pinball, share_below
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.forecast.features import CONTROLS
@@ -87,6 +87,29 @@ def test_each_instant_is_told_once_its_time_has_come() -> None:
         assert one.p10_m < one.p50_m < one.p90_m
         assert 0.0 < one.share < 1.0
         assert one.stamp_ns == START_NS
+
+
+def test_what_came_is_held_against_the_quantiles_that_were_told() -> None:
+    forecasts = fresh()
+    forecasts.take_state(state(0.5), START_NS)
+    told = forecasts.forecast(3, INTENT, state(0.5), (), FRAME)
+    assert told is not None
+    forecasts.take_round(round_done(straight(), round_id=3))
+    found = drive(forecasts, from_s=0.6, until_s=9.0, rounds=False)
+
+    assert [one.horizon_s for one in found] == told.time_s.tolist()
+    for k, one in enumerate(found):
+        gone_m, quantiles_m = 10.0 * one.horizon_s, told.distance_m[k : k + 1]
+        assert one.travelled_m == pytest.approx(gone_m)
+        assert (one.p10_m, one.p50_m, one.p90_m) == pytest.approx(
+            [told.at(level)[k] for level in (0.1, 0.5, 0.9)]
+        )
+        values = np.array([[one.travelled_m]])
+        assert one.share == pytest.approx(share_below(told.levels, quantiles_m, values)[0, 0])
+        loss = pinball(told.levels, quantiles_m, values[0])
+        assert one.crps_m == pytest.approx(2.0 * loss.mean())
+        assert (one.round_id, one.intersection_id) == (3, "n4")
+        assert one.stamp_ns == START_NS + 500_000_000
 
 
 def test_the_futures_alone_are_scored_as_they_spread() -> None:
