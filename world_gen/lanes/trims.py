@@ -16,7 +16,7 @@ from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, lateral_positions
 from foretwin.world_gen.lanes.stopping import NodeTags, before_crossings_m, stop_line_m
 from foretwin.world_gen.lanes.turning_room import turning_trims
-from foretwin.world_gen.roads.road_graph import RoadEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end."""
@@ -74,7 +74,7 @@ def trims(
         mine = [cluster for cluster, _ in alike]
         legs = [leg for cluster in mine for leg in cluster.legs]
         cleared = np.minimum([values for _, values in alike], MAX_TRIM_M)
-        lines = [stop_line_m(leg, cl, node_tags) for cl in mine for leg in cl.legs]
+        lines = [_stop_m(leg, cl, sections, node_tags) for cl in mine for leg in cl.legs]
         most = np.minimum(np.reshape(lines, cleared.shape), MAX_TRIM_M)
         turning = turning_trims(mine, sections, cleared, most)
         keys = [leg.key for leg in legs]
@@ -90,6 +90,17 @@ def trims(
         wanted[key] = max(wanted[key], metres)
     _share(least, wanted, edges)
     return wanted
+
+
+def _stop_m(
+    leg: DirectedEdge,
+    cluster: Cluster,
+    sections: Mapping[int, CrossSection],
+    node_tags: NodeTags,
+) -> float:
+    """Return how far along a leg lanes must reach; nowhere where all of them lead outward."""
+    driven_in = sections[leg.edge.index].along(reverse=not leg.reverse).abreast
+    return stop_line_m(leg, cluster, node_tags) if driven_in else math.inf
 
 
 def _share(
@@ -168,7 +179,7 @@ def _tapers_m(
     rooms_m = [
         min(
             TAPER_SHARE * leg.edge.length_m,
-            stop_line_m(leg, cluster, node_tags),
+            _stop_m(leg, cluster, sections, node_tags),
             before_crossings_m(leg, node_tags),
             MAX_TRIM_M,
         )

@@ -71,6 +71,20 @@ def test_a_line_that_the_map_has_goes_before_a_wide_corner():
     assert ends[14][-1, 1] < -12.0  # no light of its own on the map
 
 
+def test_a_line_is_for_who_drives_in():
+    def begin_m(out: dict[str, str], light: dict[str, str]) -> float:
+        ways = [(11, [0, 5, 1], out), (12, [0, 2], MAIN), (13, [3, 0], MAIN), (14, [4, 0], MAIN)]
+        nodes = CROSS | {5: (9.0, 0.0)}
+        world = world_of(drawn_map(nodes, ways, node_tags={5: light}, origin=GERMANY))
+        (lane,) = (lane for lane in world.lanes if lane.id.startswith("w11") and ".f" in lane.id)
+        return float(lane.centerline[0, 0])
+
+    lights = {"highway": "traffic_signals"}
+    assert begin_m(MAIN, lights) == pytest.approx(8.7, abs=0.05)
+    outward_alone = MAIN | {"oneway": "yes", "lanes": "1"}
+    assert begin_m(outward_alone, lights) == begin_m(outward_alone, {}) > 12.0
+
+
 def test_short_roads_keep_a_lane_between_their_corners():
     nodes = CROSS | {5: (34.0, 0.0), 6: (34.0, 100.0), 7: (34.0, -100.0)}
     ways = [
