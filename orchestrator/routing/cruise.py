@@ -14,8 +14,6 @@ result and was left out.
 
 from __future__ import annotations
 
-from collections import deque
-
 LEAD_S = 2.0
 SLOPE_WINDOW_S = 1.0
 _MIN_SPAN_S = 0.3
@@ -26,7 +24,8 @@ class CruiseSpeed:
     """Learns acceleration from speeds over the last second; sees nothing of the future."""
 
     def __init__(self) -> None:
-        self._samples: deque[tuple[float, float]] = deque()
+        self._ages_s: list[float] = []
+        self._speeds_mps: list[float] = []
         self._newest_ns: int | None = None
 
     def update(self, stamp_ns: int, speed_mps: float) -> None:
@@ -36,33 +35,31 @@ class CruiseSpeed:
             if step_s == 0.0:
                 return
             if step_s > _GAP_S or step_s < 0.0:
-                self._samples.clear()
+                self._ages_s, self._speeds_mps = [], []
             else:
-                self._samples = deque(
-                    (age + step_s, speed)
-                    for age, speed in self._samples
-                    if age + step_s <= SLOPE_WINDOW_S + 1e-6
-                )
+                self._ages_s = [age + step_s for age in self._ages_s]
+                while self._ages_s and self._ages_s[0] > SLOPE_WINDOW_S + 1e-6:
+                    del self._ages_s[0], self._speeds_mps[0]
         self._newest_ns = stamp_ns
-        self._samples.append((0.0, max(0.0, speed_mps)))
+        self._ages_s.append(0.0)
+        self._speeds_mps.append(max(0.0, speed_mps))
 
     @property
     def speed_mps(self) -> float:
         """The newest speed, 0 before the first."""
-        return self._samples[-1][1] if self._samples else 0.0
+        return self._speeds_mps[-1] if self._speeds_mps else 0.0
 
     @property
     def acceleration_mps2(self) -> float:
         """The least-squares slope of the speeds of the last second, 0 while there are too few."""
-        if len(self._samples) < 3 or self._samples[0][0] < _MIN_SPAN_S:
+        count = len(self._ages_s)
+        if count < 3 or self._ages_s[0] < _MIN_SPAN_S:
             return 0.0
-        count = len(self._samples)
-        mean_age = sum(age for age, _ in self._samples) / count
-        mean_speed = sum(speed for _, speed in self._samples) / count
-        spread = sum((age - mean_age) ** 2 for age, _ in self._samples)
-        return (
-            -sum((age - mean_age) * (speed - mean_speed) for age, speed in self._samples) / spread
-        )
+        mean_age, mean_speed = sum(self._ages_s) / count, sum(self._speeds_mps) / count
+        older = [age - mean_age for age in self._ages_s]
+        faster = [speed - mean_speed for speed in self._speeds_mps]
+        spread = sum([one**2 for one in older])
+        return -sum([one * other for one, other in zip(older, faster, strict=True)]) / spread
 
     def aim_mps(self, speed_limit_mps: float | None = None) -> float:
         """Return the speed to aim at, 0 before the first sample.

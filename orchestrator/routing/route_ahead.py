@@ -103,17 +103,18 @@ class WayAhead:
             self._countdown.update(state.stamp_ns, None, waiting=False)
             return None
         self._pace.update(state.stamp_ns, state.speed_mps, self.speed_limit_mps)
+        acceleration_mps2 = self._cruise.acceleration_mps2
         upcoming: tuple[UpcomingJunction, ...] = self._follower.upcoming(FAR_AHEAD_M)
         self.junctions = predict_arrivals(
             self._follower.route,
             self._progress.s_m,
             upcoming,
             self._pace,
-            acceleration_mps2=self._cruise.acceleration_mps2,
+            acceleration_mps2=acceleration_mps2,
             bends=self._bends,
         )
         next_one = self.junctions[0] if self.junctions else None
-        waiting = stands(self._cruise.speed_mps, self._cruise.acceleration_mps2)
+        waiting = stands(self._cruise.speed_mps, acceleration_mps2)
         self._countdown.update(state.stamp_ns, next_one, waiting=waiting)
         return self._progress.passed
 
