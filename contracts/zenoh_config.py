@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,26 @@ _QUEUE_SIZES = {
     **dict.fromkeys(("control", "data_low", "background"), 2),
 }
 """Batches that may wait to be sent, by priority; docs/bus.md."""
+
+
+_THREADS, _ONE_READER = "ZENOH_RUNTIME", "(rx: (handover: app), app: (worker_threads: 1))"
+
+
+@contextlib.contextmanager
+def read_by_one_thread() -> Iterator[None]:
+    """Let the first session that this process opens have its links read by the thread that waits
+    for what comes: Zenoh wakes another one of two for each batch.
+
+    Not where a mailbox may block: nothing would be sent meanwhile. Zenoh looks into the environment
+    alone; who is started from here finds it as it was.
+    """
+    before = os.environ.get(_THREADS)
+    os.environ[_THREADS] = before or _ONE_READER
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_THREADS]
 
 
 def zenoh_config(setup: BusSetup, *, router: bool) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import re
 import shutil
@@ -13,6 +14,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.local_bus import make_local_bus
 from foretwin.contracts.router import LISTENS
 from foretwin.contracts.terminal import say
+from foretwin.contracts.zenoh_config import read_by_one_thread
 from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, ROUTER, members, row_of
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.supervisor import Supervisor
@@ -64,7 +66,8 @@ def join_bus(plan: DrivePlan) -> ZenohBus:
     deadline_s = time.monotonic() + LISTENS_WITHIN_S
     while True:
         try:
-            return ZenohBus(plan.bus)
+            with contextlib.nullcontext() if plan.bus.lossless else read_by_one_thread():
+                return ZenohBus(plan.bus)
         except BusUnreachable:  # it has died and is started again
             if time.monotonic() > deadline_s:
                 raise
