@@ -146,6 +146,8 @@ def test_of_road_users_those_that_cannot_be_are_left_out(changed: dict[str, Any]
 
     assert admitted.message == RoadUsers(stamp_ns=1, users=(good,))
     assert admitted.left_out == 1
+    arrived = opened(encode(seen, seq=7), RoadUsers, where=KEY)
+    assert (arrived.seq, arrived.message, arrived.left_out) == (7, *admitted)
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,11 @@ def test_braking_hard_aims_at_standing() -> None:
     assert after([5.0 - 0.4 * n for n in range(10)]).aim_mps() == 0.0
 
 
+def test_what_is_older_than_a_second_tells_no_acceleration() -> None:
+    assert after([0.0] * 30 + [8.0] * 11).acceleration_mps2 == 0.0
+    assert after([0.0] * 30 + [8.0] * 10).acceleration_mps2 > 1.0
+
+
 def test_a_gap_in_the_data_forgets_the_trend() -> None:
     cruise = after([2.0, 4.0, 6.0, 8.0], step_s=0.2)
     cruise.update(10_000_000_000, 8.0)

@@ -6,6 +6,7 @@ import hashlib
 
 import msgspec
 import numpy as np
+import pytest
 
 from foretwin.contracts.futures import Future, SeenRoadUser
 from foretwin.contracts.numbers import FUTURE_NUMBERS
@@ -44,6 +45,8 @@ def test_a_row_tells_what_was_asked_and_what_became_of_it() -> None:
     assert (crash["collided"], crash["collision_with"]) == (True, "road_user")
     assert (crash["accident_with"], crash["accident_kind"]) == ("seen 7", "car")
     assert crash["metric_ttc"] is not None
+    assert crossed["collision_time_s"] is None
+    assert crash["collision_time_s"] == pytest.approx(result.outcome.collision_time_s[1])
     states, poses = result.trajectory.states[1], result.road_users.poses[1]
     own = hashlib.sha256(
         np.ascontiguousarray(states).tobytes() + np.ascontiguousarray(poses).tobytes()

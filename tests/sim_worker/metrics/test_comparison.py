@@ -152,4 +152,4 @@ def test_a_plan_of_another_time_is_not_compared() -> None:
 
 def test_distinct_ends_are_counted_once() -> None:
     ends = np.array([[0.0, 0.0], [0.05, 0.0], [0.2, 0.0], [0.2, 0.01], [5.0, 5.0], [np.nan, 0.0]])
-    assert distinct_count(ends, 0.1) == 3
+    assert distinct_count(ends, 0.1) == distinct_count(ends[::-1], 0.1) == 3
