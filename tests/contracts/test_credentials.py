@@ -79,3 +79,13 @@ def test_what_is_no_password_is_named(tmp_path: Path) -> None:
     for file in (tmp_path / "a.json", tmp_path / "b.json"):
         with pytest.raises(UserError, match="no credentials for a bus"):
             read_credentials(file)
+
+
+def test_where_no_folder_can_be_it_says_why_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "file"))
+    with pytest.raises(UserError) as refused:
+        runtime_folder()
+    assert str(refused.value) == f"{tmp_path / 'file' / 'foretwin'}: not a directory"

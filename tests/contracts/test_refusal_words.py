@@ -10,7 +10,7 @@ import pytest
 
 from foretwin.contracts.drive import RoadUsers, SpeedSample
 from foretwin.contracts.guard import Refused, admit
-from foretwin.contracts.simulation import WorldNotice
+from foretwin.contracts.simulation import MetRoadUser, RoundView, WorldNotice
 from foretwin.contracts.tuning import ParameterEstimate
 from tests.contracts.test_guard import KEY, plan, user, why
 
@@ -75,3 +75,39 @@ def test_what_stands_in_a_table_is_looked_at_too() -> None:
     assert why(table({"a": 1.1e9}, [])) == "Table: sizes_m out of bounds"
     assert why(table({"a" * 20_001: 1.0}, [])) == "Table: sizes_m too long"
     assert why(table({}, ["b", "b" * 20_001])) == "Table: names too long"
+
+
+def view(**changed: object) -> RoundView:
+    """Two futures of three points, of which one meets two road users."""
+    whole = RoundView(
+        round_id=1, stamp_ns=1, intersection_id="n4", world_id="w",
+        xy_m=np.zeros((2, 3, 2), np.float32), criticality=np.zeros(2, np.float32),
+        likelihood=np.zeros(2, np.float32), nominal_index=0, names=("a", "b"), collided=0,
+        min_clearance_m=None, latency_ms=1.0, user_xy_m=np.zeros((2, 3, 2), np.float32),
+        touch_xy_m=np.zeros((1, 2), np.float32), touch_names=("c",),
+    )  # fmt: skip
+    return msgspec.structs.replace(whole, **changed)
+
+
+MET = MetRoadUser(future=0, time_s=1.0, kind="car")
+
+
+@pytest.mark.parametrize(
+    ("changed", "wrong"),
+    [
+        ({}, ""), ({"met": (MET, MET)}, ""),
+        ({"met": (MET,)}, "met"), ({"met": (MET,) * 3}, "met"),
+        ({"names": ("a",)}, "names"), ({"names": ()}, "names"),
+        ({"touch_names": ()}, "touch_names"), ({"touch_names": ("c", "d")}, "touch_names"),
+        ({"user_xy_m": np.zeros((2, 4, 2), np.float32)}, "user_xy_m"),
+        ({"touch_xy_m": np.zeros((1, 3), np.float32)}, "touch_xy_m"),
+        ({"criticality": np.zeros((2, 1), np.float32)}, "criticality"),
+    ],
+)  # fmt: skip
+def test_what_belongs_together_has_one_length_and_what_may_be_empty_may_be(
+    changed: dict[str, object], wrong: str
+) -> None:
+    if not wrong:
+        assert admit(view(**changed), where=KEY).left_out == 0
+        return
+    assert why(view(**changed)) == f"RoundView: {wrong} of another shape"

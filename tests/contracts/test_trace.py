@@ -135,7 +135,7 @@ def test_a_decorated_function_is_a_span_and_answers_as_before(tmp_path: Path) ->
     def add(one: int, *, two: int) -> int:
         return one + two
 
-    assert add(1, two=2) == 3
+    assert (add(1, two=2), add.__name__) == (3, "add")
     trace.begin(tmp_path / "parts", "orchestrator")
     assert add(2, two=3) == 5
     assert by_name(recorded(tmp_path), "add")["ph"] == "X"

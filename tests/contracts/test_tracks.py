@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import msgspec
 import numpy as np
 import pytest
@@ -65,3 +67,5 @@ def test_the_key_of_a_set_depends_on_its_tracks_alone() -> None:
     assert TrackSet.of((one, two)) == TrackSet.of((two, one))
     assert TrackSet.of((one,)).key != TrackSet.of((two,)).key
     assert len({one.id, two.id, track(STRAIGHT, name="again").id}) == 2
+    assert re.fullmatch("[0-9a-f]{12}", one.id)
+    assert re.fullmatch("[0-9a-f]{16}", TrackSet.of((one,)).key)

@@ -98,6 +98,7 @@ class Waggon(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ),
         ({"name": "x", "weight_kg": -1}, ("weight_kg",), "weight_kg: expected `int` >= 0"),
         (7, (), "7: must be a table"),
+        ({"name": "x", "open": "y" * 38}, ("open",), f"open '{'y' * 38}': must be true or false"),
         (
             {"name": "x" * 5, "open": "y" * 39},
             ("open",),

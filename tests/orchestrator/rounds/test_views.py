@@ -69,7 +69,7 @@ def test_who_moves_is_touched_where_it_is_then(time_s: float, at_m: float) -> No
 
 
 def test_the_nearest_is_so_in_both_directions_and_tracks_have_both_their_ends() -> None:
-    done = meeting((400.0, 2.0), (40.0, 12.0), (2.0, 300.0))
+    done = meeting((40.0, 300.0), (400.0, 2.0), (40.0, 12.0), (2.0, 300.0))
     view = round_view(done, round_futures(done).futures, FRAME, FRAME)
     assert view.touch_xy_m == pytest.approx(np.array([[40.0, 12.0]]), abs=1e-3)
     ends = [[[0.0, float(y)], [10.0 * TIME_S[-1], float(y)]] for y in range(3)]

@@ -123,6 +123,13 @@ def test_attachments_are_read_in_both_forms(attachment: Attachment) -> None:
     assert unpack(labelled(attachment)) == attachment
 
 
+def test_the_older_form_is_whole_or_none() -> None:
+    whole = labelled(Attachment(1, 2, bytes(range(16))))
+    for wrong in (whole[:-1], whole.replace(b"_gid", b"_git"), whole[1:]):
+        with pytest.raises(ValueError, match=f"{len(wrong)} bytes that are no attachment"):
+            unpack(wrong)
+
+
 def test_an_attachment_byte_by_byte() -> None:
     data = pack(Attachment(1, 2, bytes(range(16))))
     assert data.hex() == "0100000000000000" + "0200000000000000" + "10" + bytes(range(16)).hex()

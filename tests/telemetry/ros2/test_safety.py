@@ -69,6 +69,16 @@ def test_what_else_is_wrong_keeps_it_from_opening_and_shuts_it() -> None:
     assert (gate.state, gate.reason, gate.why) == ("shut", *outside)
 
 
+@pytest.mark.parametrize("begin_ns", [0, 10 * 10**9])
+def test_no_command_goes_out_sooner_than_its_rate_after_the_last(begin_ns: int) -> None:
+    """Fifty a second, whatever the clock says."""
+    gate = open_gate(begin_ns)
+    for after_ns, goes in ((0, True), (19_999_999, False), (20 * MS, True), (39 * MS, False)):
+        now = begin_ns + after_ns
+        assert (admit(gate, command(now), now) is not None) is goes
+    assert gate.counts["too soon after the last"] == 2
+
+
 def test_what_has_shut_stays_shut() -> None:
     gate = open_gate()
     late = DEAD_MAN_NS + 1
