@@ -12,7 +12,6 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Any, Self
 
 import msgspec
@@ -21,6 +20,7 @@ from foretwin.contracts.bus_calls import Bus, ask
 from foretwin.contracts.codec import MOST_SENDER, encode
 from foretwin.contracts.guard import Refused, kept, opened, reason_in
 from foretwin.contracts.kept import (
+    SentLately,
     ask_for_kept,
     keeping_publisher,
     most_kept,
@@ -29,7 +29,7 @@ from foretwin.contracts.kept import (
 from foretwin.contracts.keys import CHANNELS, Qos
 from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.lives import Lives, key_of_life, new_life
-from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
+from foretwin.contracts.mailbox import Alive, Mailbox, Received, Reply, Request
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.trace import span
 from foretwin.contracts.zenoh_config import zenoh_config
@@ -38,7 +38,6 @@ __all__ = [
     "Alive",
     "Bus",
     "BusUnreachable",
-    "Item",
     "Mailbox",
     "Received",
     "Reply",
@@ -46,7 +45,6 @@ __all__ = [
     "ZenohBus",
     "ZenohSession",
     "ask",
-    "zenoh_config",
 ]
 
 
@@ -77,12 +75,7 @@ class ZenohSession:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def declare_alive(self, alive_key: str) -> None:
@@ -156,8 +149,17 @@ class ZenohBus(ZenohSession):
         """The next sequence number of each key."""
         self._recovering: dict[str, Callable[[], None]] = {}
         """Asks for what is kept of a key, by key."""
+        self._lately: SentLately | None = None
         self._sender = 1 + secrets.randbelow(MOST_SENDER)
         self._lock = threading.Lock()
+
+    def go_on_as(self, other: object) -> None:
+        """Take another session's place, or be the first of several; see RedialledBus."""
+        if isinstance(other, ZenohBus) and other._lately is not None:
+            self._sender, self._sent, self._lately = other._sender, other._sent, other._lately
+            self._declared += self._lately.answers(self._session)
+        else:
+            self._lately = SentLately()
 
     def declare_alive(self, alive_key: str) -> None:
         """Hold a liveliness token; see Bus."""
@@ -199,7 +201,10 @@ class ZenohBus(ZenohSession):
             with self._lock:
                 publisher = self._publisher(full_key, samples=samples, **qos)
         with span("publish " + channel):
-            publisher.put(self._encoded(full_key, message))
+            data = self._encoded(full_key, message)
+            if self._lately is not None:
+                self._lately.add(CHANNELS[channel], full_key, data)
+            publisher.put(data)
 
     def subscribe(
         self, channel: str, mailbox: Mailbox, *, recover: bool = False, **ids: str

@@ -8,6 +8,7 @@ as any other, and such a subscriber hears plain publishers.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -68,3 +69,35 @@ def ask_for_kept(
         consolidation=zenoh.ConsolidationMode.NONE,
         accept_replies=zenoh.ReplyKeyExpr.ANY,
     )
+
+
+class SentLately:
+    """What a session sent last of the channels that are kept, for one that takes its place: the
+    publishers that keep it go with their session."""
+
+    def __init__(self) -> None:
+        self._of_key: dict[str, deque[bytes]] = {}
+
+    def add(self, channel: Channel, key: str, data: bytes) -> None:
+        """Take what is sent."""
+        samples = self._of_key.get(key)
+        if samples is None:
+            samples = self._of_key[key] = deque(maxlen=most_kept(channel))
+        samples.append(data)
+
+    def answers(self, session: Any) -> list[Any]:
+        """Return what answers in another session who asks for what was kept until now."""
+        return [
+            session.declare_queryable(f"{key}/@adv/before", _answering(key, tuple(samples)))
+            for key, samples in self._of_key.items()
+            if samples
+        ]
+
+
+def _answering(key: str, samples: tuple[bytes, ...]) -> Callable[[Any], None]:
+    def land(query: Any) -> None:
+        with query:
+            for data in samples:
+                query.reply(key, data)
+
+    return land

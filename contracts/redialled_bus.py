@@ -32,6 +32,16 @@ _LOOK_EVERY_S = 0.1
 log = logging.getLogger(__name__)
 
 
+class Session(Bus, Protocol):
+    """One of several sessions that are as one bus."""
+
+    def go_on_as(self, other: object) -> None:
+        """Take the place of another session that has lost its router; None is before the first.
+
+        Who hears it hears the same sender, with its numbers, and can ask for what that had kept.
+        """
+
+
 class Door(Protocol):
     """Where one knocks."""
 
@@ -84,11 +94,12 @@ class RedialledBus:
         self,
         setup: BusSetup,
         *,
-        dial: Callable[[BusSetup], Bus] = ZenohBus,
+        dial: Callable[[BusSetup], Session] = ZenohBus,
         door: Callable[[ListenPlace], Door] = TcpDoor,
     ) -> None:
         self._setup, self._dial = setup, dial
         self._bus = dial(setup)
+        self._bus.go_on_as(None)
         self._declared: list[Callable[[Bus], None]] = []
         """In the order in which it was: who is alive can answer."""
         self._lock = threading.Lock()
@@ -165,6 +176,7 @@ class RedialledBus:
         with self._lock:
             old, kept = self._bus, self._bus.connected
             if not kept:
+                new.go_on_as(old)
                 self._bus = new
                 for declare in self._declared:
                     declare(new)

@@ -33,6 +33,8 @@ class MemoryBus:
         self._alive: set[str] = set()
         self._watchers: list[tuple[str, Mailbox]] = []
         self._seq: dict[str, int] = {}
+        self.goes_on_as: list[object] = []
+        """Whose place it has taken."""
         self.recovered: list[str] = []
         """Keys that were asked for once more."""
 
@@ -48,6 +50,10 @@ class MemoryBus:
         data = encode(message, seq=seq, sent_ns=time.time_ns())
         for mailbox in receivers:
             mailbox.put(Received(channel, full_key, data, CHANNELS[channel].kind))
+
+    def go_on_as(self, other: object) -> None:
+        """Take another session's place; see Bus."""
+        self.goes_on_as.append(other)
 
     def subscribe(
         self, channel: str, mailbox: Mailbox, *, recover: bool = False, **ids: str

@@ -11,14 +11,22 @@ from typing import NamedTuple
 import pytest
 
 from foretwin.contracts.bus import Bus, BusUnreachable, Mailbox, ZenohBus
+from foretwin.contracts.drive import SpeedSample
 from foretwin.contracts.fleet import ClockAnswer, ClockQuestion
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.mailbox import Request
+from foretwin.contracts.mailbox import Received, Request
 from foretwin.contracts.ports import LOOPBACK, ListenPlace, free_endpoint, free_port
 from foretwin.contracts.redialled_bus import KNOCK_EVERY_S, RedialledBus, TcpDoor
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import RunEnd
-from tests.contracts.bus_sides import DEADLINE_S, ROUTER, python, take, take_until
+from tests.contracts.bus_sides import (
+    DEADLINE_S,
+    ROUTER,
+    publish_until_received,
+    python,
+    take,
+    take_until,
+)
 from tests.contracts.memory_bus import MemoryBus
 from tests.pages import page
 
@@ -73,7 +81,7 @@ def far() -> Iterator[Far]:
     lines: list[Line] = []
     door, refuses = FakeDoor(), list[str]()
 
-    def dial(setup: BusSetup) -> Bus:
+    def dial(setup: BusSetup) -> Line:
         assert setup is SETUP
         if refuses:
             raise BusUnreachable(refuses.pop())
@@ -113,6 +121,7 @@ def test_all_that_was_declared_holds_on_the_new_session(far: Far) -> None:
 
     assert take(tokens).up, "of the new session"
     new = far.lines[1]
+    assert new.goes_on_as == [far.lines[0]]
     new.publish("run_end", RunEnd(stamp_ns=3), run="r1")
     assert take(ends).message().stamp_ns == 3
     replies = Mailbox(1)
@@ -232,3 +241,40 @@ def test_over_zenoh_a_worker_answers_again_through_another_router() -> None:
         assert isinstance(question, Request)
         question.reply(ClockAnswer(utc_ns=5))
         assert take(replies).message.utc_ns == 5
+
+
+def test_over_zenoh_what_was_sent_into_a_dead_link_can_be_asked_for() -> None:
+    """By its numbers it is one sender throughout, so that who counts misses nothing."""
+    first, second = BusSetup(endpoint=free_endpoint()), BusSetup(endpoint=free_endpoint())
+    dialled = iter((first, second))
+    door = FakeDoor()
+    heard = Mailbox(1000)
+    with ExitStack() as stack:
+        before = stack.enter_context(python("-c", ROUTER, first.endpoint))
+        recorder = stack.enter_context(ZenohBus(second, router=True))
+        recorder.subscribe("speed", heard, recover=True, vehicle="car")
+        bus = RedialledBus(first, dial=lambda _: ZenohBus(next(dialled)), door=lambda _: door)
+        car = stack.enter_context(closing(bus))
+        for number in range(40):
+            car.publish("speed", SpeedSample(stamp_ns=number, speed_mps=1.0), vehicle="car")
+        before.kill()
+        wait_until(lambda: not car.connected)
+        for number in range(40, 60):
+            car.publish("speed", SpeedSample(stamp_ns=number, speed_mps=1.0), vehicle="car")
+        door.open = True
+        wait_until(lambda: car.connected)
+        publish_until_received(car, heard, vehicle="car")
+        found: dict[tuple[int, int], int] = {}
+
+        def all_came() -> bool:
+            recorder.recover("speed", vehicle="car")
+            while isinstance(item := heard.take(0.2), Received):
+                envelope = item.envelope()
+                found[item.sender, envelope.seq] = envelope.message.stamp_ns
+            return len(found) >= 60
+
+        wait_until(all_came)
+    assert len({sender for sender, _ in found}) == 1
+    assert {seq: stamp for (_, seq), stamp in found.items() if seq < 60} == {
+        number: number for number in range(60)
+    }
