@@ -141,11 +141,16 @@ def test_nobody_holds_anothers_token_or_answers_in_its_place(house: House) -> No
     assert (tokens.take_last(0.3), taken.take()) == (None, None)
 
 
-def test_what_the_car_keeps_is_given_to_who_comes_late(house: House) -> None:
+@pytest.mark.parametrize("anew", [False, True])
+def test_what_the_car_keeps_is_given_to_who_comes_late(house: House, anew: bool) -> None:
     car = house.join("car-vehicle")
+    car.go_on_as(None)
     for number in range(5):
         sample = SpeedSample(stamp_ns=number, speed_mps=1.0)
         car.publish("speed", sample, vehicle="ego")
+    if anew:
+        house.join("car-vehicle").go_on_as(car)
+        car.close()
     mailbox = Mailbox(64)
     house.join("recorder").subscribe("speed", mailbox, recover=True, vehicle="ego")
     stamps = set()
