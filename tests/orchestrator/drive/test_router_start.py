@@ -14,7 +14,8 @@ from foretwin.orchestrator.drive.router_start import cannot_listen_text
 from tests.contracts.bus_sides import ROUTER, python
 
 JOINED = """
-import json, os, sys
+import json, os, sys, time
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from foretwin.contracts.setup import BusSetup
@@ -22,7 +23,12 @@ from foretwin.orchestrator.drive.router_start import join_bus
 lossless = sys.argv[2] == "lossless"
 with join_bus(SimpleNamespace(bus=BusSetup(endpoint=sys.argv[1], lossless=lossless))):
     print("ready", flush=True)
-    names = {file.read_text().split("-")[0] for file in Path("/proc/self/task").glob("*/comm")}
+    until_s, due = time.monotonic() + 20.0, {"app", "tx"} | ({"rx"} if lossless else set())
+    names = set()
+    while not due <= names and time.monotonic() < until_s:  # a thread may begin after the session
+        for file in Path("/proc/self/task").glob("*/comm"):
+            with suppress(OSError):
+                names.add(file.read_text().split("-")[0])
     print(json.dumps([sorted(names & {"rx", "app", "tx"}), os.environ.get("ZENOH_RUNTIME")]))
     sys.stdout.flush()
     sys.stdin.read()
