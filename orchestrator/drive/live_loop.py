@@ -19,7 +19,7 @@ HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
 """So long may nothing come before it is asked whether something should have."""
 LAST_ROUND_GRACE_S = 1.0
-GATHER_S = 0.05
+GATHER_S = 0.04
 """Samples are taken in portions: waking up for each of 330 a second costs more than what most of
 them are about. Neither an answer nor a round that is due waits."""
 _BEFORE_STATE_S = 0.002
@@ -56,8 +56,7 @@ class LiveLoop:
     housekeeping: Callable[[float], None]
     stop: Callable[[], bool]
     each_turn: Callable[[], None] = lambda: None
-    """Called at least every 100 ms, and every 50 ms where something goes back to the car, unless
-    the loop itself is held up."""
+    """Called at least every 50 ms, unless the loop itself is held up."""
     before: RoundGrid | None = None
     """The grid of an orchestrator before this one: what fell due since is missed."""
     _next_due_s: float = 0.0
@@ -96,11 +95,10 @@ class LiveLoop:
             if not self._telemetry_waits():
                 until_s = min(self._gather_until(now_s), self._next_due_s, next_housekeeping_s)
                 conductor.mailbox.gather(max(0.0, until_s - now_s))
-            gathered_s = time.monotonic()
-            wake_s = min(next_housekeeping_s, self._at_the_latest_s)
-            until_s = min(wake_s, gathered_s + SILENCE_S)
+            wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
+            until_s = min(self._next_due_s, wake_s)
             seen = conductor.intake.states
-            item = conductor.mailbox.take(max(0.0, min(wake_s, now_s + SILENCE_S) - gathered_s))
+            item = conductor.mailbox.take(max(0.0, wake_s - time.monotonic()))
             if item is None:
                 now_s = time.monotonic()
                 conductor.watch_telemetry(round(now_s * 1e9))
