@@ -99,7 +99,6 @@ class RedialledBus:
     ) -> None:
         self._setup, self._dial = setup, dial
         self._bus = dial(setup)
-        self._bus.go_on_as(None)
         self._declared: list[Callable[[Bus], None]] = []
         """In the order in which it was: who is alive can answer."""
         self._lock = threading.Lock()
@@ -107,7 +106,8 @@ class RedialledBus:
         place = tcp_place(setup.endpoint)
         self._door = None if place is None else door(place)
         self._thread = threading.Thread(target=self._stand_by, name="redial", daemon=True)
-        if self._door is not None:
+        if self._door is not None:  # else no session takes the place of this one
+            self._bus.go_on_as(None)
             self._thread.start()
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:

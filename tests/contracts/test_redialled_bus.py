@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 
-from foretwin.contracts.bus import Bus, BusUnreachable, Mailbox, ZenohBus
+from foretwin.contracts.bus import BusUnreachable, Mailbox, ZenohBus
 from foretwin.contracts.drive import SpeedSample
 from foretwin.contracts.fleet import ClockAnswer, ClockQuestion
 from foretwin.contracts.keys import alive_key
@@ -121,6 +121,7 @@ def test_all_that_was_declared_holds_on_the_new_session(far: Far) -> None:
 
     assert take(tokens).up, "of the new session"
     new = far.lines[1]
+    assert far.lines[0].goes_on_as == [None]
     assert new.goes_on_as == [far.lines[0]]
     new.publish("run_end", RunEnd(stamp_ns=3), run="r1")
     assert take(ends).message().stamp_ns == 3
@@ -178,12 +179,13 @@ def test_a_bus_without_a_port_is_one_session(far: Far) -> None:
     setup = BusSetup(endpoint="unixsock-stream//tmp/x")
     lines: list[Line] = []
 
-    def dial(_: BusSetup) -> Bus:
+    def dial(_: BusSetup) -> Line:
         lines.append(Line())
         return lines[-1]
 
     with closing(RedialledBus(setup, dial=dial)):
         assert len(lines) == 1
+        assert lines[0].goes_on_as == [], "it need not keep what it sends"
     assert lines[0].closed
 
 
