@@ -13,7 +13,12 @@ from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.run_record import restart_troubles, run_record, samples_heard
 from foretwin.orchestrator.drive.supervision import DriveProcesses, Life
-from foretwin.orchestrator.record.run_state import RECORD, RUNNING, write_record
+from foretwin.orchestrator.record.run_state import (
+    RECORD,
+    RUNNING,
+    made_by_recover,
+    write_record,
+)
 from foretwin.orchestrator.record.so_far import forget_so_far, so_far_bytes
 
 EVERY_S, SHARE = 2.0, 0.01
@@ -50,8 +55,8 @@ class RecordKeeper:
         try:
             write_record(record, folder / RECORD)
         except OSError as error:
-            how = f"`foretwin recover {folder}` makes it of what was written"
-            record["troubles"].append(f"{RECORD} cannot be written: {one_line(error)}; {how}")
+            trouble = f"{RECORD} cannot be written: {one_line(error)}; {made_by_recover(folder)}"
+            record["troubles"].append(trouble)
             return record
         with contextlib.suppress(OSError):  # run.json says more, wherever this stays
             forget_so_far(folder)

@@ -35,6 +35,7 @@ from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import sync_folder
 from foretwin.orchestrator.record.kept_parts import KeptParts
 from foretwin.orchestrator.record.kept_rows import kept_rows
+from foretwin.orchestrator.record.run_state import made_by_recover
 from foretwin.orchestrator.record.run_streams import Rows, RunStreams
 from foretwin.orchestrator.record.so_far import write_so_far
 from foretwin.sim_worker.futures.columns import columns, columns_of, schema
@@ -215,7 +216,7 @@ class ResultTables:
 
     @property
     def _how(self) -> str:
-        return f"`foretwin recover {self._folder.parent}` makes it of what was written"
+        return made_by_recover(self._folder.parent)
 
     def _moved(self) -> None:
         self._moved_s = time.monotonic()

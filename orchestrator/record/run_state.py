@@ -73,6 +73,11 @@ def is_unfinished(folder: Path) -> bool:
     return bool(streams_in(folder / RESULTS))
 
 
+def made_by_recover(folder: Path) -> str:
+    """Return how what could not be written of a run is had from what was, for a trouble's end."""
+    return f"`foretwin recover {folder}` makes it of what was written"
+
+
 def check_finished(folder: Path) -> None:
     """Raise UserError, saying what to do, for a run that goes on or never came to its end."""
     if not is_unfinished(folder):
