@@ -265,7 +265,8 @@ def test_over_zenoh_what_was_sent_into_a_dead_link_can_be_asked_for() -> None:
             car.publish("speed", SpeedSample(stamp_ns=number, speed_mps=1.0), vehicle="car")
         door.open = True
         wait_until(lambda: car.connected)
-        publish_until_received(car, heard, vehicle="car")
+        new = publish_until_received(car, heard, vehicle="car")
+        assert new.envelope().seq >= 60, "it counts on"
         found: dict[tuple[int, int], int] = {}
 
         def all_came() -> bool:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow as pa
@@ -13,7 +14,7 @@ from foretwin.orchestrator.across.places import found_in
 from foretwin.orchestrator.across.tables import RunTables
 from foretwin.orchestrator.lake.collect import collect
 from foretwin.orchestrator.lake.store import FolderStore
-from tests.orchestrator.lake.made_runs import TOLD, contents, made_run, made_sweep
+from tests.orchestrator.lake.made_runs import TOLD, contents, flip_a_byte, made_run, made_sweep
 
 COVERS = ("foretwin.orchestrator.across.tables",)
 COUNTS = "SELECT run, count(*) FROM futures GROUP BY run ORDER BY run"
@@ -114,17 +115,6 @@ def test_folders_may_be_called_anything(tmp_path: Path, name: str) -> None:
 def damage_pages(file: Path) -> None:
     data = bytearray(file.read_bytes())
     data[4:2000] = bytes(1996)
-    file.write_bytes(data)
-
-
-def flip_a_byte(file: Path) -> None:
-    """In the last page of `future_id`: other text, which could be read."""
-    group = pq.read_metadata(file).row_group(0)
-    columns = [group.column(n) for n in range(group.num_columns)]
-    (column,) = (one for one in columns if one.path_in_schema == "future_id")
-    begin = column.dictionary_page_offset or column.data_page_offset
-    data = bytearray(file.read_bytes())
-    data[begin + column.total_compressed_size - 1] ^= 0x01
     file.write_bytes(data)
 
 
@@ -232,9 +222,10 @@ def test_columns_of_views_are_told_with_their_types(tmp_path: Path) -> None:
     assert columns["runs"]["futures"] == "BIGINT"
 
 
-def test_a_damaged_lake_is_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize("spoil", [damage_pages, flip_a_byte])
+def test_a_damaged_lake_is_told(tmp_path: Path, spoil: Callable[[Path], None]) -> None:
     collect(FolderStore(tmp_path / "lake"), three(tmp_path))
-    damage_pages(next(tmp_path.glob("lake/futures/*/*/*/*.parquet")))
+    spoil(next(tmp_path.glob("lake/futures/*/*/*/*.parquet")))
 
     with pytest.raises(UserError, match="the lake is damaged there"):
         Asked(tmp_path / "lake")("SELECT max(future_id) FROM futures")

@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.across import table_heads
 from foretwin.orchestrator.across.table_heads import TableHeads, footer_of, not_whole
+from foretwin.orchestrator.record.result_files import opened
+from tests.orchestrator.lake.made_runs import flip_a_byte, made_run
 
 COVERS = ("foretwin.orchestrator.record.result_files",)
 TOLD = {"result_schema": "1"}
@@ -70,3 +74,11 @@ def test_a_file_that_is_cut_short_is_told(tmp_path: Path) -> None:
         assert TableHeads().trouble(bad)
     assert not_whole([good]) == ""
     assert "No such file" in not_whole([tmp_path / "nowhere"])
+
+
+def test_a_byte_that_flipped_is_damage_that_names_its_file(tmp_path: Path) -> None:
+    file = made_run(tmp_path) / "results" / "futures.parquet"
+    flip_a_byte(file)
+
+    with pytest.raises(UserError, match=re.escape(f"{file}: cannot be read: ")), opened(file) as it:
+        it.read(["future_id"])

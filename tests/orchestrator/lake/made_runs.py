@@ -9,6 +9,7 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 
 from foretwin.orchestrator.lake.manifest import MANIFEST
 from foretwin.orchestrator.record.results import TABLES
@@ -75,6 +76,17 @@ def write(path: Path, rows: list[dict[str, Any]], schema: pa.Schema, told: dict[
     table = pa.Table.from_pylist(rows, schema=schema.with_metadata(told))
     with parquet_writer(path, table.schema) as writer:
         writer.write_table(table)
+
+
+def flip_a_byte(file: Path) -> None:
+    """In the last page of `future_id`: other text, which could be read."""
+    group = pq.read_metadata(file).row_group(0)
+    columns = [group.column(n) for n in range(group.num_columns)]
+    (column,) = (one for one in columns if one.path_in_schema == "future_id")
+    begin = column.dictionary_page_offset or column.data_page_offset
+    data = bytearray(file.read_bytes())
+    data[begin + column.total_compressed_size - 1] ^= 0x01
+    file.write_bytes(data)
 
 
 def lake_table(lake: Path, table: str) -> pa.Table:

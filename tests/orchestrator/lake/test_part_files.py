@@ -6,6 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.lake import part_files, sources
 from foretwin.orchestrator.lake.collect import collect, damaged
 from foretwin.orchestrator.lake.part_files import UncollectableError, widened
@@ -15,6 +16,7 @@ from foretwin.orchestrator.record.results import TABLES
 from tests.orchestrator.lake.made_runs import (
     CREDIT,
     TOLD,
+    flip_a_byte,
     lake_table,
     made_run,
     manifest_of,
@@ -43,6 +45,16 @@ def test_a_file_that_is_full_is_followed_by_another_and_left_as_it_is(
     assert told[first.name]["tables"]["futures"]["files"][-1] == "part-00002.parquet"
     assert told[second.name]["tables"]["futures"]["files"][0] == "part-00003.parquet"
     assert damaged(FolderStore(lake)) == []
+
+
+def test_a_byte_that_flipped_in_a_file_that_is_written_anew_is_told(tmp_path: Path) -> None:
+    lake = tmp_path / "lake"
+    collect(FolderStore(lake), [made_run(tmp_path, 1)])
+    (file,) = lake.glob("futures/*/*/*/*.parquet")
+    flip_a_byte(file)
+
+    with pytest.raises(UserError, match="the lake is damaged there"):
+        collect(FolderStore(lake), [made_run(tmp_path, 2)])
 
 
 def test_small_runs_make_large_groups_of_rows(tmp_path: Path) -> None:
