@@ -20,6 +20,7 @@ from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.contracts.trace import traced
 from foretwin.contracts.world import World
+from foretwin.geometry.recent_track import RecentTrack
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
 from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.metrics.comparison import (
@@ -45,8 +46,7 @@ class OpenComparisons:
 
     frame: LocalFrame
     horizon_s: float
-    _stamps_ns: deque[int] = field(default_factory=deque)
-    _poses: deque[tuple[float, float, float]] = field(default_factory=deque)
+    _driven: RecentTrack = field(default_factory=lambda: RecentTrack(3))
     _waiting: deque[tuple[NominalTrack, RoundOrder]] = field(default_factory=deque)
 
     @property
@@ -56,19 +56,19 @@ class OpenComparisons:
 
     def take_state(self, state: VehicleState) -> list[Comparison]:
         """Add where the car is; return the comparisons that this completes."""
-        if self._stamps_ns and state.stamp_ns < self._stamps_ns[-1] - LEAD_NS:
+        last_ns = self._driven.last_ns
+        if last_ns is not None and state.stamp_ns < last_ns - LEAD_NS:
             # The vehicle's clock has stepped back: nothing of before can be compared any more.
-            self._stamps_ns.clear()
-            self._poses.clear()
+            self._driven.clear()
             self._waiting.clear()
-        if not state.yaw_valid or (self._stamps_ns and state.stamp_ns <= self._stamps_ns[-1]):
+            last_ns = None
+        if not state.yaw_valid or (last_ns is not None and state.stamp_ns <= last_ns):
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
         # What the map moves the position by is no motion that a future could have foreseen.
         x, y = (local_from_geo(self.frame, lat, lon) - _shift_m(state)).tolist()
         yaw = float(local_from_geo_yaw(self.frame, state.yaw_rad, lat, lon))
-        self._stamps_ns.append(state.stamp_ns)
-        self._poses.append((x, y, yaw))
+        self._driven.add(state.stamp_ns, (x, y, yaw))
         due_ns = state.stamp_ns - round(max(self.horizons_s) * 1e9)
         done = []
         while self._waiting and self._waiting[0][0].stamp_ns <= due_ns:
@@ -122,12 +122,8 @@ class OpenComparisons:
     def _compare(self, nominal: NominalTrack, order: RoundOrder) -> list[Comparison]:
         # The same stretch whenever this is called: unwrapping angles from another start would
         # change their last digits, and a cut log the results before the cut.
-        first = nominal.stamp_ns - LEAD_NS
-        kept = [(s, p) for s, p in zip(self._stamps_ns, self._poses, strict=True) if s >= first]
-        track = ActualTrack(
-            stamps_ns=np.array([stamp for stamp, _ in kept], dtype=np.int64),
-            xy_yaw=np.array([pose for _, pose in kept]),
-        )
+        kept = slice(self._driven.since(nominal.stamp_ns - LEAD_NS), None)
+        track = ActualTrack(stamps_ns=self._driven.stamps_ns[kept], xy_yaw=self._driven.rows[kept])
         return compare_nominal(
             nominal,
             track,
@@ -140,9 +136,8 @@ class OpenComparisons:
         oldest = now_ns - round((self.horizon_s + KEEP_S) * 1e9)
         if self._waiting:
             oldest = min(oldest, self._waiting[0][0].stamp_ns - LEAD_NS)
-        while len(self._stamps_ns) > 2 and self._stamps_ns[1] < oldest:
-            self._stamps_ns.popleft()
-            self._poses.popleft()
+        # The one before the oldest that is wanted stays, to interpolate from.
+        self._driven.forget(min(self._driven.since(oldest) - 1, len(self._driven) - 2))
 
 
 def plan_compared(

@@ -17,6 +17,7 @@ from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStat
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.geometry.polyline import interpolated
+from foretwin.geometry.recent_track import RecentTrack
 from foretwin.sim_worker.analysis.side_by_side.departure import (
     Limits,
     departure,
@@ -69,7 +70,7 @@ class SideBySide:
         self._place = place
         self._limits = Limits()
         self._lowered = self._limits.lowered()
-        self._driven: deque[tuple[int, tuple[float, float, float, float]]] = deque()
+        self._driven = RecentTrack(4)
         self._last_plan_ns: int | None = None
         self._open: deque[Segment] = deque()
         self._ended: list[DrivenSegment] = []
@@ -151,17 +152,17 @@ class SideBySide:
         """Take where the car is; return disagreements that begin to be told of, or end."""
         if not state.yaw_valid or self._last_plan_ns is None:
             return []  # what was driven before the first plan is compared with nothing
-        if self._driven and state.stamp_ns <= self._driven[-1][0]:
-            if state.stamp_ns < self._driven[-1][0] - STEP_BACK_NS:
+        last_ns = self._driven.last_ns
+        if last_ns is not None and state.stamp_ns <= last_ns:
+            if state.stamp_ns < last_ns - STEP_BACK_NS:
                 return self._clock_stepped_back()
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
         xy = local_from_geo(self._frame, lat, lon)
         yaw = float(local_from_geo_yaw(self._frame, state.yaw_rad, lat, lon))
         x, y = xy.tolist()
-        self._driven.append((state.stamp_ns, (x, y, yaw, state.speed_mps)))
-        while self._driven[0][0] < state.stamp_ns - _KEEP_NS:
-            self._driven.popleft()
+        self._driven.add(state.stamp_ns, (x, y, yaw, state.speed_mps))
+        self._driven.forget(self._driven.since(state.stamp_ns - _KEEP_NS))
         if self._open:
             self._open[-1].last_ns = max(self._open[-1].last_ns, state.stamp_ns)
         return self._settle(state.stamp_ns)
@@ -169,10 +170,10 @@ class SideBySide:
     def finish(self) -> list[Disagreement]:
         """Compare what can still be compared at the drive's end, and end what lasts."""
         found = []
-        if self._open and self._driven:
+        if self._open and self._driven.last_ns is not None:
             last = self._open[-1]
-            last.until_ns = self._driven[-1][0]
-            found = self._settle(self._driven[-1][0])
+            last.until_ns = self._driven.last_ns
+            found = self._settle(self._driven.last_ns)
         return found + self._close_all()
 
     def _begin(self, mode: ControlMode, stamp_ns: int) -> None:
@@ -221,16 +222,16 @@ class SideBySide:
         return told
 
     def _driven_at(self, stamps_ns: Array) -> Array | None:
-        known = np.array([stamp for stamp, _ in self._driven], dtype=np.float64)
-        rows = np.array([row for _, row in self._driven])
+        known = self._driven.stamps_ns
         if len(known) < 2 or known[0] > stamps_ns[0] or known[-1] < stamps_ns[-1]:
             return None
         first = int(np.searchsorted(known, stamps_ns[0], side="right")) - 1
-        last = int(np.searchsorted(known, stamps_ns[-1]))
-        if (np.diff(known[first : last + 1]) > _LONGEST_HOLE_NS).any():
+        stretch = slice(first, int(np.searchsorted(known, stamps_ns[-1])) + 1)
+        known, rows = known[stretch], self._driven.rows[stretch].copy()
+        if (np.diff(known) > _LONGEST_HOLE_NS).any():
             return None
         rows[:, 2] = np.unwrap(rows[:, 2])
-        return interpolated(stamps_ns, known, rows)
+        return interpolated(stamps_ns, known.astype(np.float64), rows)
 
     def _clock_stepped_back(self) -> list[Disagreement]:
         """Nothing of before can be compared any more: a new segment by the new clock."""
