@@ -38,7 +38,7 @@ class LightLink:
         self._said_ns = stamp_ns = intake.now_stamp_ns
         signals = intake.signals
         shown = self.in_force.shown(
-            stamp_ns, intake.start_stamp_ns, signals.newest, signals.learnt(stamp_ns)
+            stamp_ns, intake.start_stamp_ns, signals.heard, signals.learnt(stamp_ns)
         )
         self._context.publish("lights", shown)
 

@@ -8,7 +8,7 @@ colour they show. A colour that the cycle does not say ends what was learnt.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from foretwin.contracts.drive import SignalColour, SignalState
@@ -75,6 +75,11 @@ class _Group:
             self._follows = True
             self._learnt = _learnt(signal.group_id, list(_cycles(self._changes)))
 
+    @property
+    def has_cycle(self) -> bool:
+        """Whether a cycle was learnt, though it may not hold any more."""
+        return self._learnt is not None
+
     def learnt(self, now_ns: int) -> LearntSignal | None:
         """Return the group's cycle if it is known and holds still."""
         found = self._learnt
@@ -100,25 +105,42 @@ class SignalLearner:
 
     def __init__(self) -> None:
         self._groups: dict[str, _Group] = {}
+        self._cyclic: dict[str, _Group] = {}
+        """Those of a known cycle, in the order of their names."""
+        self._heard: dict[str, SignalState] = {}
+        self._newest: tuple[SignalState, ...] | None = ()
 
     def take(self, signal: SignalState) -> None:
         """Take a report; of too many groups the one silent for longest is forgotten."""
-        group = self._groups.get(signal.group_id)
-        if group is not None:
+        name = signal.group_id
+        group = self._groups.get(name)
+        if group is None:
+            group = self._groups[name] = _Group(signal)
+        else:
             group.take(signal)
-            return
-        self._groups[signal.group_id] = _Group(signal)
+        self._heard[name], self._newest = group.last, None
+        if group.has_cycle != (name in self._cyclic):
+            self._cyclic = {n: one for n, one in sorted(self._groups.items()) if one.has_cycle}
         if len(self._groups) > MOST_SIGNALS:
-            del self._groups[min(self._groups, key=lambda i: self._groups[i].last.stamp_ns)]
+            silent = min(self._heard, key=lambda i: self._heard[i].stamp_ns)
+            del self._groups[silent], self._heard[silent]
+            self._cyclic.pop(silent, None)
+
+    @property
+    def heard(self) -> Mapping[str, SignalState]:
+        """The newest report of each group, by its name."""
+        return self._heard
 
     @property
     def newest(self) -> tuple[SignalState, ...]:
         """The newest report of each group."""
-        return tuple(group.last for group in self._groups.values())
+        if self._newest is None:
+            self._newest = tuple(self._heard.values())
+        return self._newest
 
     def learnt(self, now_ns: int) -> tuple[LearntSignal, ...]:
         """Return the cycles that hold at a time of the vehicle's clock, by group."""
-        found = (group.learnt(now_ns) for _, group in sorted(self._groups.items()))
+        found = (group.learnt(now_ns) for group in self._cyclic.values())
         return tuple(one for one in found if one is not None)
 
     def record(self, now_ns: int, start_ns: int) -> dict[str, dict[str, Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, get_args
 
@@ -76,12 +76,11 @@ class LightsInForce:
         self,
         stamp_ns: int,
         start_ns: int,
-        heard: Iterable[SignalState],
+        heard: Mapping[str, SignalState],
         learnt: Iterable[LearntSignal],
     ) -> ShownLights:
         """Return what all lights show at a stamp of the vehicle; `start_ns` is drive time 0."""
         fresh_ns = LIVE_FOR_S * 1e9
-        now = {s.group_id: s.colour for s in heard if abs(stamp_ns - s.stamp_ns) <= fresh_ns}
         cycles = {
             one.group_id: _ColourCourse(
                 (one.begins_ns - start_ns) / 1e9, one.cycle_s, one.from_s, one.colours
@@ -94,7 +93,9 @@ class LightsInForce:
             why: WhyShown = "learnt" if group in cycles else "plan"
             course = cycles.get(group) or self._courses.get(group)
             colour, following, in_s = course.at(time_s) if course else ("unknown", None, None)
-            told = self.set.get(group) or now.get(group)
+            told = self.set.get(group)
+            if told is None and (last := heard.get(group)) is not None:
+                told = last.colour if abs(stamp_ns - last.stamp_ns) <= fresh_ns else None
             if told is not None and told != "unknown":
                 why = "set" if group in self.set else "heard"
                 if told != colour or why == "set":

@@ -32,7 +32,7 @@ def lights(world: World) -> LightsInForce:
 
 
 def shown(lights: LightsInForce, time_s: float, **said: list) -> dict[str, ShownLight]:  # type: ignore[type-arg]
-    found = lights.shown(round(time_s * S), 0, said.get("heard", []), said.get("learnt", []))
+    found = lights.shown(round(time_s * S), 0, said.get("heard", {}), said.get("learnt", []))
     return {one.group_id: one for one in found.lights}
 
 
@@ -58,12 +58,12 @@ def test_by_hand_before_heard_before_learnt_before_plan(lights: LightsInForce) -
     one = shown(lights, 70.0, learnt=[learnt])[group]
     assert (one.colour, one.why, one.next_colour) == ("green", "learnt", "amber")
     assert one.changes_in_s == pytest.approx(10.0)
-    one = shown(lights, 70.0, learnt=[learnt], heard=[heard])[group]
+    one = shown(lights, 70.0, learnt=[learnt], heard={group: heard})[group]
     assert (one.colour, one.why, one.changes_in_s) == ("red_amber", "heard", None)
     # Two seconds later nobody has heard of it any more.
-    assert shown(lights, 72.1, learnt=[learnt], heard=[heard])[group].why == "learnt"
+    assert shown(lights, 72.1, learnt=[learnt], heard={group: heard})[group].why == "learnt"
     LightHandler(lights).make(group, "dark", stamp_ns=0)
-    one = shown(lights, 70.0, learnt=[learnt], heard=[heard])[group]
+    one = shown(lights, 70.0, learnt=[learnt], heard={group: heard})[group]
     assert (one.colour, one.why, one.binds_car) == ("dark", "set", True)
 
 
@@ -93,7 +93,7 @@ def test_vehicles_wait_at_the_stop_lines_of_its_lanes(lights: LightsInForce, wor
 
 def test_without_a_world_there_are_no_lights(lights: LightsInForce) -> None:
     lights.use_world(None)
-    assert lights.shown(0, 0, [], []).lights == ()
+    assert lights.shown(0, 0, {}, []).lights == ()
 
 
 def test_what_is_no_light_or_no_colour_is_refused(lights: LightsInForce) -> None:
