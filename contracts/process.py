@@ -28,7 +28,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.log_file import JsonLines, LogFile
-from foretwin.contracts.one_heap import share_one_heap
+from foretwin.contracts.one_heap import FreeMemory, share_one_heap
 from foretwin.contracts.process_setup import BusSetup, parent_pid, setup_given
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile
 from foretwin.contracts.refusals import Refusals
@@ -62,6 +62,7 @@ class ProcessLife:
         self._meter, self._refusal_file = meter, refusal_file
         self._bus = bus
         self._mono_s = mono_s
+        self._free_memory = FreeMemory(mono_s())
         self._parent = parent_pid()
         self._mailbox = Mailbox(16)
         self.refusals = Refusals()
@@ -102,6 +103,7 @@ class ProcessLife:
             self._meter.look()
         if self._refusal_file is not None:
             self._refusal_file.look(self.refusals)
+        self._free_memory.look(self._mono_s())
         while (item := self._mailbox.take()) is not None:
             if isinstance(item, Received):
                 self._take_end(item)

@@ -10,6 +10,7 @@ from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import alive_key
+from foretwin.contracts.one_heap import FreeMemory
 from foretwin.contracts.signing import OrderSigner
 from foretwin.contracts.simulation import RunEnd
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -132,9 +133,6 @@ class Orchestrator:
         """Run the drive; returns how it ended, in a word."""
         plan, before = self._plan, self._before
         conductor.join()
-        if before is None:
-            # A run that is listed can be spoken to: questions wait in the mailbox from here on.
-            reserve_record(plan, plan.folder / RECORD)
         if before is not None:
             crashed = self._life.ended_by[-1] == CRASH
             go_on(conductor, self._watch, before, plan.folder / RESULTS, crashed=crashed)
@@ -142,6 +140,8 @@ class Orchestrator:
             if before.exit_word or self._life.last:
                 return before.exit_word or "failed"
         else:
+            # A run that is listed can be spoken to: questions wait in the mailbox from here on.
+            reserve_record(plan, plan.folder / RECORD)
             line.say(f"run {plan.folder}")
             for address in addresses(plan, plan.bus_of(member(plan, COPILOT))):
                 line.say(address)
@@ -158,6 +158,8 @@ class Orchestrator:
         keeper, counts = self._keeper(conductor), DriveCounts(conductor)
         told = told_metrics(plan.metrics, counts.samples, processes=plan.processes_dir)
 
+        free_memory = FreeMemory(time.monotonic())
+
         def housekeeping(now_s: float) -> None:
             self._look_after(conductor, now_s)
             self._processes.let_give_way(conductor.alive, now_s)
@@ -166,6 +168,7 @@ class Orchestrator:
             conductor.beside.look(now_s)
             self._keep_junctions(conductor, now_s)
             self._meter.look()
+            free_memory.look(now_s)
             keeper.look(now_s)
             line.update(now_s)
             counts.look(now_s)

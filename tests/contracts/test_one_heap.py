@@ -1,4 +1,4 @@
-"""One heap for all threads, as glibc counts them."""
+"""One heap for all threads, as glibc counts them, and what of it is given back."""
 
 from __future__ import annotations
 
@@ -43,3 +43,35 @@ def heaps(*arguments: str) -> int:
 def test_threads_share_the_heap_that_there_is() -> None:
     assert heaps("one") == 1
     assert heaps() > 1, "what it is for"
+
+
+HOLES = """
+import ctypes
+from foretwin.contracts.one_heap import GIVE_BACK_EVERY_S, FreeMemory
+
+libc = ctypes.CDLL(None)
+libc.malloc.restype = ctypes.c_void_p
+libc.memset.argtypes = ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t
+libc.free.argtypes = (ctypes.c_void_p,)
+
+def held_mb():
+    return int(open("/proc/self/statm").read().split()[1]) * 4096 / 1e6
+
+parts = [libc.malloc(100_000) for _ in range(1000)]
+for part in parts:
+    libc.memset(part, 1, 100_000)
+for part in parts[::2]:
+    libc.free(part)  # between two that stay
+before_mb, free = held_mb(), FreeMemory(7.0)
+assert not free.look(7.0 + GIVE_BACK_EVERY_S - 0.1)
+assert held_mb() > before_mb - 5.0
+assert free.look(7.0 + GIVE_BACK_EVERY_S)
+print(before_mb - held_mb())
+assert not free.look(8.0 + GIVE_BACK_EVERY_S), "it is time again after the whole pause"
+"""
+
+
+def test_what_lies_free_between_what_is_used_is_given_back() -> None:
+    command = [sys.executable, "-c", HOLES]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert 40.0 < float(done.stdout) < 60.0
