@@ -17,11 +17,13 @@ from foretwin.telemetry.estimator.estimator import STATE_PERIOD_NS
 
 HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
-"""So long may nothing come before it is asked whether something should have."""
+"""So long may nothing come, beyond a portion, before it is asked whether something should have; so
+long at most is a portion worked at before anything else gets its turn."""
 LAST_ROUND_GRACE_S = 1.0
-GATHER_S = 0.04
-"""Samples are taken in portions: waking up for each of 330 a second costs more than what most of
-them are about. Neither an answer nor a round that is due waits."""
+GATHER_S = 0.1
+"""Samples are taken in portions: to wake up for each of 330 a second, with nothing in the
+processor's caches, costs more than what most of them are about. Neither an answer nor a round that
+is due waits."""
 _BEFORE_STATE_S = 0.002
 """Where something goes back to the car, so long before the next state is due nothing is gathered
 any more: what the car is shown is as old as the state that it is of."""
@@ -56,7 +58,8 @@ class LiveLoop:
     housekeeping: Callable[[float], None]
     stop: Callable[[], bool]
     each_turn: Callable[[], None] = lambda: None
-    """Called at least every 50 ms, unless the loop itself is held up."""
+    """Called at least every 100 ms, and every 50 ms where something goes back to the car, unless
+    the loop itself is held up."""
     before: RoundGrid | None = None
     """The grid of an orchestrator before this one: what fell due since is missed."""
     _next_due_s: float = 0.0
@@ -80,7 +83,6 @@ class LiveLoop:
         vehicle_id, begun = conductor.plan.config.vehicle_id, self.before is not None
         missed_end = MissedEnd(conductor.bus, conductor.mailbox, vehicle_id, begun=begun)
         next_housekeeping_s = self._next_due_s = time.monotonic()
-        fresh = False
         if self.before is not None:
             self._next_due_s = self.before.next_due_s
             self._unplaced_until_s = next_housekeeping_s + UNPLACED_S
@@ -95,10 +97,10 @@ class LiveLoop:
             if not self._telemetry_waits():
                 until_s = min(self._gather_until(now_s), self._next_due_s, next_housekeeping_s)
                 conductor.mailbox.gather(max(0.0, until_s - now_s))
+            gathered_s = time.monotonic()
             wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
-            until_s = min(self._next_due_s, wake_s)
-            seen = conductor.intake.states
-            item = conductor.mailbox.take(max(0.0, wake_s - time.monotonic()))
+            until_s = min(self._at_the_latest_s, gathered_s + SILENCE_S)
+            item = conductor.mailbox.take(max(0.0, wake_s - gathered_s))
             if item is None:
                 now_s = time.monotonic()
                 conductor.watch_telemetry(round(now_s * 1e9))
@@ -109,16 +111,13 @@ class LiveLoop:
                 # Only samples go without a turn in between: nothing that it looks at hangs on them.
                 if now_s >= until_s or not is_telemetry(item) or not self._telemetry_waits():
                     break
-                seen = conductor.intake.states
                 item = conductor.mailbox.take()
             due = now_s >= self._next_due_s and not self._is_unplaced(now_s)
-            fresh = due and (fresh or conductor.intake.states > seen)
             missed_end.look(conductor.intake, now_s)
             ended = conductor.intake.end is not None and not self._telemetry_waits()
             # Of a portion the newest state counts.
-            begins = fresh and not self._telemetry_waits()
+            begins = self._is_fresh and not self._telemetry_waits()
             if due and not ended and (begins or now_s >= self._at_the_latest_s):
-                fresh = False
                 # Where the machine is too slow, one round follows the other without a turn between.
                 conductor.make_changes()
                 # New parameters take workers a few milliseconds; no round may be half of one kind.
@@ -144,6 +143,12 @@ class LiveLoop:
     def _at_the_latest_s(self) -> float:
         """When the next round starts if no fresh state comes before."""
         return self._next_due_s + 0.5 * self._period_s
+
+    @property
+    def _is_fresh(self) -> bool:
+        """Whether the newest state came after the next round fell due, in no portion before."""
+        latest = self.conductor.intake.latest
+        return latest is not None and latest.receipt_mono_ns * 1e-9 >= self._next_due_s
 
     def _fall_due(self, now_s: float) -> bool:
         """Count the rounds due by now; returns whether one of them can be run.

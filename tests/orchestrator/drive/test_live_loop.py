@@ -46,7 +46,7 @@ def test_no_round_starts_while_workers_take_new_parameters(driven: Any) -> None:
 
 
 def test_a_round_waits_for_a_fresh_state_but_not_for_long(driven: Any) -> None:
-    often = driven(states_s=every(0.2, 6.0, start_s=0.13), end_s=6.0)
+    often = driven(states_s=every(0.2, 6.0, start_s=0.13), end_s=6.0, received=True)
     for started_s in often.started_s[1:]:
         since_state_s = (started_s - 0.13) % 0.2
         assert min(since_state_s, 0.2 - since_state_s) < 1e-3
@@ -139,10 +139,10 @@ def test_a_loop_that_is_stopped_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(kept) == pytest.approx(20, abs=2)
 
 
-def test_silence_is_looked_into_every_50_ms(driven: Any) -> None:
+def test_silence_is_looked_into_every_100_ms(driven: Any) -> None:
     conductor = driven(states_s=[0.0, 0.01, 0.02], end_s=5.0)
     gaps_s = np.diff([GATHER_S, *conductor.watched_s, 5.0])
-    assert gaps_s.max() < 0.051
+    assert gaps_s.max() < 0.101
     assert len(conductor.bus.recovered) == 1, "the car's end is asked for, and once more"
 
 
@@ -158,14 +158,20 @@ def test_a_round_starts_from_the_newest_state_of_a_portion(driven: Any) -> None:
         assert 0.0 <= started_s - state_s < 0.0071
 
 
+def test_a_state_that_came_with_a_portion_before_a_round_was_due_is_not_fresh(driven: Any) -> None:
+    conductor = driven(states_s=every(0.1, 10.0, start_s=0.04), end_s=10.0, received=True)
+    assert conductor.started_s[1:] == pytest.approx([0.54 + k / 2 for k in range(19)], abs=1e-3)
+    assert conductor.seeds_s[1:] == pytest.approx(conductor.started_s[1:], abs=1e-3)
+
+
 def test_messages_are_gathered_and_no_round_waits_for_it(driven: Any) -> None:
     conductor = driven(states_s=every(0.003, 10.0), end_s=10.0)
     gathered_s = [length_s for length_s in conductor.mailbox.gathered_s if length_s]
-    assert 200 < len(gathered_s) <= 330 and max(gathered_s) <= GATHER_S + 1e-9  # noqa: PT018
+    assert 90 < len(gathered_s) <= 130 and max(gathered_s) <= GATHER_S + 1e-9  # noqa: PT018
     assert conductor.started_s[:20] == pytest.approx([k / 2 for k in range(20)], abs=0.0031)
 
 
-@pytest.mark.parametrize(("towards_vehicle", "oldest_s"), [(True, 0.0011), (False, 0.0411)])
+@pytest.mark.parametrize(("towards_vehicle", "oldest_s"), [(True, 0.0011), (False, 0.1011)])
 def test_a_state_of_a_car_that_is_shown_things_waits_for_no_portion(
     driven: Any, towards_vehicle: bool, oldest_s: float
 ) -> None:
@@ -176,11 +182,11 @@ def test_a_state_of_a_car_that_is_shown_things_waits_for_no_portion(
         handling=lambda at_s: ages_s.append(at_s - came_s[len(ages_s)]),
     )  # fmt: skip
     assert max(ages_s) < oldest_s
-    assert towards_vehicle or max(ages_s) > 0.019
+    assert towards_vehicle or max(ages_s) > 0.079
     gathered_s = [length_s for length_s in conductor.mailbox.gathered_s if length_s]
     # What comes between two states comes in a portion all the same.
     assert sum(gathered_s) > 4.0
-    assert len(gathered_s) <= (250 if towards_vehicle else 130) + 50
+    assert len(gathered_s) <= (250 if towards_vehicle else 50) + 50
 
 
 @pytest.fixture
@@ -208,13 +214,17 @@ def turns(monkeypatch: pytest.MonkeyPatch) -> Any:
     return drive
 
 
-def test_something_is_done_each_turn_at_least_every_50_ms(turns: Any) -> None:
+@pytest.mark.parametrize(("towards_vehicle", "pause_s"), [(True, 0.05), (False, 0.1)])
+def test_something_is_done_each_turn_and_turns_are_frequent(
+    turns: Any, towards_vehicle: bool, pause_s: float
+) -> None:
+    rest: Any = {"wants_rounds": False, "towards_vehicle": towards_vehicle}
     for done in (
-        turns(states_s=[0.0, 0.3], end_s=1.0),
-        turns(states_s=every(0.003, 0.4), end_s=0.4, handling_s=0.004, wants_rounds=False),
+        turns(states_s=[0.0, 0.3], end_s=1.0, **rest),
+        turns(states_s=every(0.003, 0.4), end_s=0.4, handling_s=0.004, **rest),
     ):
         turns_s = [at_s for what, at_s in done if what == "turn"]
-        assert np.diff([*turns_s, done[-1][1]]).max() < 0.0541
+        assert np.diff([*turns_s, done[-1][1]]).max() < pause_s + 0.0041
 
 
 def test_samples_of_a_portion_need_no_turn_and_what_else_comes_gets_one(turns: Any) -> None:
@@ -226,7 +236,7 @@ def test_samples_of_a_portion_need_no_turn_and_what_else_comes_gets_one(turns: A
 
 def test_changes_asked_for_are_looked_at_every_turn(driven: Any) -> None:
     conductor = driven(states_s=[0.0, 0.3], end_s=1.0)
-    assert np.diff([*conductor.changes_made_s, 1.0]).max() < 0.051
+    assert np.diff([*conductor.changes_made_s, 1.0]).max() < 0.101
 
 
 def test_changes_are_made_between_rounds_that_follow_one_another(driven: Any) -> None:
