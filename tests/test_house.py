@@ -1,4 +1,4 @@
-"""What holds of the whole tree's names: one class, one name."""
+"""What holds of the whole tree: one class, one name; folders for a while that outlive nobody."""
 
 from __future__ import annotations
 
@@ -38,3 +38,18 @@ def test_names_that_stand_twice_stay_in_one_room(classes: dict[str, list[str]]) 
     rooms = {file.split("/")[0] for name in TWICE for file in classes[name]}
 
     assert rooms <= {"sim_worker"}
+
+
+MAKES_FOLDERS = {"contracts/owned_folder.py", "contracts/new_folder.py"}
+"""Who makes them for all others, and who tries for a moment whether one can be made."""
+
+
+def test_a_folder_for_a_while_is_gone_even_after_a_kill() -> None:
+    made_by = {
+        str(path.relative_to(ROOT))
+        for path in tracked_files()
+        if path.suffix == ".py" and path.relative_to(ROOT).parts[0] != "tests"
+        for word in ("mkdtemp", "TemporaryDirectory")
+        if f"tempfile.{word}" in path.read_text(encoding="utf-8")
+    }
+    assert made_by == MAKES_FOLDERS, "use contracts.owned_folder: the next one removes what is left"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import secrets
-import tempfile
 import time
 from contextlib import closing
 from pathlib import Path
@@ -22,6 +21,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.guard import is_identifier
 from foretwin.contracts.joining import newest_running, running_drive
 from foretwin.contracts.local_bus import CAR_OF
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.ports import trouble_with_bus
 from foretwin.contracts.process_setup import BusSetup, ProcessSetup
 from foretwin.contracts.redialled_bus import RedialledBus
@@ -95,17 +95,17 @@ def join(asked: JoinAsked) -> int:
     request = JoinRequest(instance=secrets.token_hex(8), scale=anchor.scale)
     with (
         closing(_bus(place)) as bus,
-        tempfile.TemporaryDirectory(prefix="foretwin-join-") as folder,
+        temporary_folder("foretwin-join-") as folder,
     ):
         seat = _AskedSeat(bus, place.run_id, asked.vehicle_id, request)
         frame = seat.take(ended)
         if frame is None:
             return EXIT_DONE
-        supervisor = Supervisor(FreshInterpreter(Path(folder)))
-        row, setup = _process(asked, anchor, place, frame, Path(folder))
+        supervisor = Supervisor(FreshInterpreter(folder))
+        row, setup = _process(asked, anchor, place, frame, folder)
         supervisor.start(row, setup)
         try:
-            return _look_after(supervisor, seat, ended, Path(folder))
+            return _look_after(supervisor, seat, ended, folder)
         finally:
             supervisor.stop(grace_s=0.0)
             seat.leave()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from foretwin.contracts.certificates import host_trouble
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.joining import RunningDrive, newest_running, running_drive
 from foretwin.contracts.local_bus import WATCH
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.page_address import USUAL_PORT, page_address, page_key
 from foretwin.contracts.ports import LOOPBACK, LOOPBACKS, free_or, listen_place
 from foretwin.contracts.process_setup import BusSetup
@@ -48,9 +48,9 @@ def watch(request: WatchRequest) -> int:
             raise UserError(f"{folder}: is over, and shown again on this machine alone")
         return _run("--replay", str(folder), "--port", str(free_or(USUAL_PORT)))
     drive = newest_running(request.out) if folder is None else running_drive(folder)
-    with tempfile.TemporaryDirectory(prefix="foretwin-watch-") as made:
-        setup = watch_setup(drive, request, Path(made))
-        file = Path(made) / "watch.json"
+    with temporary_folder("foretwin-watch-") as made:
+        setup = watch_setup(drive, request, made)
+        file = made / "watch.json"
         write_setup(setup, file)
         key = page_key(setup.bus, setup.run_id)
         secure = setup.page_tls is not None

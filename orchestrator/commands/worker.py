@@ -6,7 +6,6 @@ import datetime
 import os
 import re
 import socket
-import tempfile
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +18,7 @@ from foretwin.contracts.exit_codes import USER
 from foretwin.contracts.fleet import far_id
 from foretwin.contracts.keys import alive_key, run_of_alive_key
 from foretwin.contracts.new_folder import trouble_with_folder
+from foretwin.contracts.owned_folder import make_temporary
 from foretwin.contracts.ports import trouble_with_bus
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.setup import FarWorkerSetup
@@ -152,8 +152,8 @@ class _Party:
     def __init__(self, bus: BusSetup, name: str, count: int, cache: Path, run_id: str) -> None:
         self._ids = [far_id(name, number) for number in range(count)]
         self._bus, self._cache, self._run_id = bus, cache, run_id
-        self._folder = tempfile.TemporaryDirectory(prefix="foretwin-worker-")
-        self._supervisor = Supervisor(FreshInterpreter(Path(self._folder.name)))
+        self._folder = make_temporary("foretwin-worker-")
+        self._supervisor = Supervisor(FreshInterpreter(self._folder.path))
         self._read: dict[str, int] = {}
         self._said: set[str] = set()
         self._again: dict[str, float] = {}
@@ -167,7 +167,7 @@ class _Party:
     def __exit__(self, *what: object) -> None:
         self._supervisor.stop(grace_s=0.0, term_s=DRAIN_S)
         self._listen()
-        self._folder.cleanup()
+        self._folder.remove()
 
     def play(self, ended: Interruption) -> int:
         """Look after the processes until all have left, or this one is told to end."""
@@ -210,7 +210,7 @@ class _Party:
 
     def _listen(self) -> None:
         """Say once what the processes have to say."""
-        for file in sorted(Path(self._folder.name).glob("*.stderr")):
+        for file in sorted(self._folder.path.glob("*.stderr")):
             with file.open("rb") as said:
                 said.seek(self._read.get(file.name, 0))
                 data = said.read()

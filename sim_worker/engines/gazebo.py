@@ -12,13 +12,13 @@ import math
 import os
 import shutil
 import subprocess
-import tempfile
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.owned_folder import temporary_folder
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.engines.engine import Demand, Seeds
 from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
@@ -73,8 +73,8 @@ def built_runner(folder: Path | None = None) -> Path:
         text=True,
         check=True,
     ).stdout.split()
-    with tempfile.TemporaryDirectory(dir=runner.parent) as scratch:
-        new = Path(scratch) / "runner"
+    with temporary_folder("compile-", within=runner.parent) as scratch:
+        new = scratch / "runner"
         words = ["g++", "-O2", "-std=c++17", str(_SOURCE), "-o", str(new), *flags]
         done = subprocess.run(words, capture_output=True, text=True, timeout=_BUILD_S, check=False)
         if done.returncode != 0:
