@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -9,21 +11,30 @@ from foretwin.orchestrator.drive.live_loop import LiveLoop
 from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.standing import heard_of, standing_of
 
+HEARD_EVERY_S = 1.0
+"""As much is what restarting takes: an estimator that is older by it has missed the same again."""
+
 
 class HandingOver:
     """Says where a drive stands: in short as rounds and jobs begin and end, all of it at its end.
 
     What was heard changes with each sample, and takes most of the time, for the estimator is part
-    of it: between two rounds it counts as of the one that fell due last.
+    of it: it counts as of a round that fell due within the last second, or as of the last one.
     """
 
     def __init__(
-        self, conductor: Conductor, watch: ProcessWatch, *, keep: Callable[[bytes], None]
+        self,
+        conductor: Conductor,
+        watch: ProcessWatch,
+        *,
+        keep: Callable[[bytes], None],
+        mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
         """`keep` takes each standing; lock step begins anew, and keeps none."""
         self._conductor, self._watch, self._keep = conductor, watch, keep
         self._counted: object = None
-        self._heard, self._heard_by_round = b"", -1
+        self._mono_s = mono_s
+        self._heard, self._heard_by_round, self._heard_at_s = b"", -1, -math.inf
         self.loop: LiveLoop | None = None
         """What knows when the next round is due."""
 
@@ -35,8 +46,10 @@ class HandingOver:
         if counted == self._counted:
             return
         self._counted = counted
-        if self._heard_by_round != tally.due:
-            self._heard, self._heard_by_round = heard_of(self._conductor), tally.due
+        now_s = self._mono_s()
+        if self._heard_by_round != tally.due and now_s - self._heard_at_s >= HEARD_EVERY_S:
+            self._heard = heard_of(self._conductor)
+            self._heard_by_round, self._heard_at_s = tally.due, now_s
         self._hand_over("")
 
     def all(self, *, exit_word: str = "") -> None:

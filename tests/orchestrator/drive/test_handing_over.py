@@ -1,4 +1,4 @@
-"""Where a drive stands is handed over as it changes, and what was heard no oftener than rounds."""
+"""Where a drive stands is handed over as it changes, and what was heard once a second."""
 
 from __future__ import annotations
 
@@ -37,21 +37,25 @@ def test_only_what_changed_is_handed_over(tmp_path: Path) -> None:
     house.tables.close()
 
 
-def test_what_was_heard_is_as_of_the_round_that_fell_due_last(tmp_path: Path) -> None:
-    house, keeper = House(tmp_path), Keeper()
-    standing = HandingOver(house.conductor, watch(), keep=keeper)
+def test_what_was_heard_is_as_of_a_round_of_the_last_second(tmp_path: Path) -> None:
+    house, keeper, now_s = House(tmp_path), Keeper(), [50.0]
+    standing = HandingOver(house.conductor, watch(), keep=keeper, mono_s=lambda: now_s[0])
     rounds = house.conductor.rounds
-    house.drive(5)
-    rounds.tally.due += 1
-    standing.news()
-    house.send(house.states[5])
-    house.settle()
-    rounds.dispatcher.dispatch.count.given += 1
-    standing.news()
-    rounds.tally.due += 1
-    standing.news()
-    counts = [keeper.heard(at).samples.received for at in range(3)]
-    assert counts[0] == counts[1] < counts[2]
+
+    def received(at_s: float, *, due: int) -> int:
+        """Hear one state more, hand over at a time, and return how much was heard by then."""
+        house.send(house.states[len(keeper.kept)])
+        house.settle()
+        now_s[0], rounds.tally.due = at_s, due
+        rounds.dispatcher.dispatch.count.given += 1
+        standing.news()
+        return keeper.heard(-1).samples.received
+
+    first = received(50.0, due=1)
+    assert received(50.5, due=2) == first, "not for each round"
+    second = received(51.0, due=3)
+    assert second > first
+    assert received(52.5, due=3) == second, "nor between rounds"
     house.tables.close()
 
 
