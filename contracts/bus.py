@@ -17,6 +17,7 @@ from typing import Any, Self
 import msgspec
 
 from foretwin.contracts.bus_calls import Bus, ask
+from foretwin.contracts.callback_threads import keep_thread_state
 from foretwin.contracts.codec import MOST_SENDER, encode
 from foretwin.contracts.guard import Refused, kept, opened, reason_in
 from foretwin.contracts.kept import (
@@ -215,6 +216,7 @@ class ZenohBus(ZenohSession):
         samples = self._most_kept(channel) if recover else 0
 
         def land(sample: Any) -> None:
+            keep_thread_state()
             data = kept(sample.payload, most)
             mailbox.put(Received(channel, str(sample.key_expr), data, kind))
 

@@ -10,6 +10,7 @@ import time
 from typing import Any, NamedTuple, Protocol
 
 from foretwin.contracts.bus import ZenohSession
+from foretwin.contracts.callback_threads import keep_thread_state
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.setup import BusSetup
 
@@ -66,6 +67,7 @@ class ZenohForeignBus(ZenohSession):
         """Receive into `mailbox`; see ForeignBus."""
 
         def land(sample: Any) -> None:
+            keep_thread_state()
             attached = sample.attachment
             mailbox.put(
                 Arrived(

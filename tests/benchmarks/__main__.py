@@ -42,6 +42,7 @@ BENCHMARKS = (
     "metrics_64x80x10",
     "estimator_bad_network",
     "told_metrics",
+    "received_samples",
     "tuning_cost",
     "ray_overhead",
     "help_startup",
