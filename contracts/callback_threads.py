@@ -12,13 +12,13 @@ import ctypes
 import threading
 
 
-class _Known(threading.local):
+class _ThreadKnown(threading.local):
     """What is known of each thread; goes with its state."""
 
     kept = False
 
 
-_known = _Known()
+_known = _ThreadKnown()
 
 
 def keep_thread_state() -> None:
