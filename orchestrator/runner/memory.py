@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +16,8 @@ from typing import Any, NamedTuple
 LOOK_EVERY_S = 5.0
 SETTLED_AFTER_S = 300.0
 """What a process grows by later it may grow by for ever."""
+FLOOR_S = 60.0
+"""What a process holds for a moment, and gives back within a minute, is no growth."""
 GROWN_MB, MOST_MB = 256.0, 4096.0
 """Who has grown by so much since it settled, or is so large, is told of; again at each doubling."""
 _LEAST_SPAN_S = 600.0
@@ -31,28 +34,37 @@ class _Watched:
     now_mb: float = 0.0
     most_mb: float = 0.0
     settled: tuple[float, float] | None = None
-    """When it had run for long enough, and its memory then."""
+    """When it had run for long enough, and the least that it held in the minute before."""
     last_s: float = 0.0
+    _recent: deque[tuple[float, float]] = field(default_factory=deque)
     tell_at_mb: float = MOST_MB
 
     def take(self, now_s: float, now_mb: float) -> bool:
         """Take what it holds now; returns whether that is to be told."""
         self.last_s, self.now_mb = now_s, now_mb
         self.most_mb = max(self.most_mb, now_mb)
+        self._recent.append((now_s, now_mb))
+        while self._recent[0][0] <= now_s - FLOOR_S:
+            self._recent.popleft()
         if self.settled is None and now_s - self.since_s >= SETTLED_AFTER_S:
-            self.settled = now_s, now_mb
-            self.tell_at_mb = min(self.tell_at_mb, now_mb + GROWN_MB)
+            self.settled = now_s, self.floor_mb
+            self.tell_at_mb = min(self.tell_at_mb, self.floor_mb + GROWN_MB)
         if now_mb < self.tell_at_mb:
             return False
         self.tell_at_mb = 2.0 * now_mb
         return True
 
     @property
+    def floor_mb(self) -> float:
+        """The least that it held within the last minute."""
+        return min(mb for _, mb in self._recent)
+
+    @property
     def mb_per_h(self) -> float | None:
-        """How fast it has grown since it settled, None before that can be told."""
+        """How fast its floor has grown since it settled, None before that can be told."""
         if self.settled is None or self.last_s - self.settled[0] < _LEAST_SPAN_S:
             return None
-        return 3600.0 * (self.now_mb - self.settled[1]) / (self.last_s - self.settled[0])
+        return 3600.0 * (self.floor_mb - self.settled[1]) / (self.last_s - self.settled[0])
 
 
 class _Sought(NamedTuple):

@@ -67,6 +67,16 @@ def test_growth_counts_from_when_a_process_has_settled(house: House) -> None:
     assert record["orchestrator"]["per_hour"] == 0.0
 
 
+def test_what_is_held_for_a_moment_is_no_growth(house: House) -> None:
+    for second in range(0, 2400, 5):
+        # A job takes 9 MB for 20 s of each minute; what stays grows by 6 MB an hour.
+        house.holds(71, 80.0 + 6.0 * second / 3600.0 + 9.0 * (second % 60 >= 40))
+        house.look(float(second))
+    record = house.watch.record()["w0"]
+    assert record["per_hour"] == pytest.approx(6.0, abs=0.3)
+    assert record["at_end"] > record["settled"] + 9.0
+
+
 def test_who_grows_is_told_of_and_again_when_it_is_twice_as_large(house: House) -> None:
     told = []
     for minute in range(60):
