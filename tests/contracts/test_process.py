@@ -18,6 +18,7 @@ from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
 from foretwin.contracts.cpu_use import cpu_uses
 from foretwin.contracts.keys import alive_key, key
 from foretwin.contracts.mailbox import Received
+from foretwin.contracts.one_heap import FreeMemory
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife, hold, is_held
 from foretwin.contracts.process_setup import STARTED_BY, setup_given
@@ -186,6 +187,19 @@ def test_what_it_takes_and_refuses_is_looked_at_whenever_it_asks_for_its_run() -
     assert meter.asked == ["ready", "look", "look"]
     assert refusals.asked == ["look", "look"]
     ProcessLife(setup, MemoryBus()).ready()
+
+
+def test_it_gives_free_memory_back_while_it_asks_for_its_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked: list[float] = []
+    monkeypatch.setattr(FreeMemory, "look", lambda _, now_s: looked.append(now_s))
+    setup = ProcessSetup(
+        run_id="r1", process_id="p0", vehicle_id="ego", bus=BusSetup(endpoint=""), log_file=""
+    )
+    life = ProcessLife(setup, MemoryBus(), mono_s=lambda: 7.0)
+    assert not life.over
+    assert looked == [7.0]
 
 
 def test_it_waits_out_the_grace_once_the_orchestrator_is_gone() -> None:

@@ -245,7 +245,7 @@ def test_reports_out_of_order_change_nothing() -> None:
 
 def test_two_lights_of_one_cycle_tell_the_offset_of_their_green_wave() -> None:
     learner = SignalLearner()
-    for i in range(2):
+    for i in (1, 0):
         hear(learner, fixed(60.0, 20.0, 10.0 + 17.0 * i), 0.0, 260.0, group=f"g{i}")
     record = learner.record(ns(260.0), START_NS)
     assert list(record) == ["g0", "g1"]
@@ -269,6 +269,15 @@ def test_of_more_than_a_thousand_groups_the_one_silent_for_longest_goes() -> Non
     learner.take(SignalState(stamp_ns=ns(2001), group_id="new", colour="red"))
     heard = {signal.group_id for signal in learner.newest}
     assert heard == {f"g{i}" for i in range(1000) if i != 1} | {"new"}
+
+
+def test_what_was_learnt_of_a_group_goes_with_it() -> None:
+    learner = SignalLearner()
+    hear(learner, fixed(60.0, 20.0), 0.0, 260.0)
+    assert learnt(learner, 260.0) is not None
+    for i in range(1000):
+        learner.take(SignalState(stamp_ns=ns(261 + i / 1000), group_id=f"n{i}", colour="red"))
+    assert learnt(learner, 262.0) is None
 
 
 def test_of_a_light_without_a_cycle_little_is_kept() -> None:

@@ -74,10 +74,11 @@ def side_by_side(
     modes: dict[float, ControlMode] | None = None,
     until_s: float = 20.0,
     killed_s: float | None = None,
+    unseen_s: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[list[Disagreement], list[DrivenSegment]]:
     """Drive a course at 10 Hz; `planned` gives the rows of the plan made at a time.
 
-    At `killed_s` another one goes on where the first stood.
+    At `killed_s` another one goes on where the first stood. Between the `unseen_s` no state comes.
     """
     here = DrivePlace(GeoPoint(0.0, 0.0))
 
@@ -101,7 +102,8 @@ def side_by_side(
         state = state_at(at_s, driven(np.array([at_s]))[0])
         here = DrivePlace(state.position, "junction", 100.0 + at_s)
         watch.take_plan(plan_at(at_s, planned(at_s, ahead), ahead))
-        found += watch.take_state(state)
+        if not unseen_s[0] < at_s < unseen_s[1]:
+            found += watch.take_state(state)
     return [one for one in found + watch.finish() if one.over], watch.take_ended()
 
 
@@ -119,6 +121,13 @@ def test_a_plan_that_is_driven_is_no_disagreement() -> None:
     assert segment.plans > 70
     assert segment.lateral_m == pytest.approx(0.0, abs=0.01)
     assert segment.speed_mps == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_plan_is_not_compared_across_a_hole_in_what_is_known_of_the_drive() -> None:
+    _, (short,) = side_by_side(stopping, as_driven(stopping), unseen_s=(8.0, 9.4))
+    _, (long,) = side_by_side(stopping, as_driven(stopping), unseen_s=(8.0, 9.7))
+    assert short.plans - long.plans > 15
+    assert long.too_short - short.too_short == short.plans - long.plans
 
 
 def test_where_the_ads_goes_on_and_the_human_stops_is_told_with_its_place() -> None:
