@@ -14,6 +14,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
+from foretwin.contracts.codec import MOST_SENDER
 from foretwin.telemetry.logs.log import LogError
 
 BROKEN = (
@@ -33,6 +34,10 @@ MOST_RATIO = 200
 """A chunk beyond both is a bomb: recordings are packed 2 to 20 times, in chunks of some MB."""
 
 
+SENDER = "foretwin.sender"
+"""Of a channel's metadata: by whose numbering its messages are numbered."""
+
+
 class Record(NamedTuple):
     """One message as it lies in the file."""
 
@@ -42,6 +47,13 @@ class Record(NamedTuple):
     data: bytes
     sequence: int = 0
     """Its sender's number."""
+    sender: int = 0
+    """By whose numbering that is; 0 where it is not told."""
+
+
+def _sender(channel: Channel) -> int:
+    told = channel.metadata.get(SENDER, "")
+    return int(told) if told.isdecimal() and len(told) <= len(str(MOST_SENDER)) else 0
 
 
 class Contents(NamedTuple):
@@ -147,6 +159,7 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
                         message.log_time,
                         message.data,
                         message.sequence,
+                        _sender(channel),
                     )
         except (*BROKEN, OSError) as error:  # a place before the file's begin cannot be gone to
             raise LogError(f"{path}: damaged MCAP: {type(error).__name__} {error}") from None
@@ -229,9 +242,8 @@ class _Linear:
                         channel = channels[item.channel_id]
                         if channel.schema_id in by_id:
                             kind = by_id[channel.schema_id].name
-                            yield Record(
-                                channel.topic, kind, item.log_time, item.data, item.sequence
-                            )
+                            told = item.sequence, _sender(channel)
+                            yield Record(channel.topic, kind, item.log_time, item.data, *told)
             except LogError:
                 raise
             except BROKEN:

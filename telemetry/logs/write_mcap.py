@@ -20,6 +20,7 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.logs.mcap_records import SENDER
 from foretwin.telemetry.ros_messages.parts import schema_text
 from foretwin.telemetry.ros_messages.table import messages_from
 
@@ -86,7 +87,7 @@ class DriveWriter:
         self._raw = raw
         self._stream = _Whole(raw)
         self._frame: LocalFrame | None = None
-        self._ids: dict[str, int] = {}
+        self._ids: dict[tuple[str, int], int] = {}
         self._schemas: dict[str, int] = {}
         self._whole_bytes = 0
         self._finished = False
@@ -119,8 +120,15 @@ class DriveWriter:
         """How much is in the file so far."""
         return self._whole_bytes
 
-    def add(self, channel: str, message: msgspec.Struct, *, sequence: int | None = None) -> None:
-        """Write one message, numbered by its sender, else as it comes.
+    def add(
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        *,
+        sequence: int | None = None,
+        sender: int = 0,
+    ) -> None:
+        """Write one message, numbered by its `sender`, else as it comes.
 
         Raises OSError where the file cannot grow, and ValueError for what
         `foretwin.telemetry.ros_messages.table.messages_from` refuses.
@@ -131,7 +139,7 @@ class DriveWriter:
         held, size = self.held + 1, self._whole_bytes
         with self._guarded():
             for topic, kind, data in parts:
-                channel_id = self._channel_id(topic, kind)
+                channel_id = self._channel_id(topic, kind, sender)
                 before = self._stream.tell()
                 self._writer.add_message(
                     channel_id=channel_id,
@@ -201,16 +209,21 @@ class DriveWriter:
                 )
         return self._frame
 
-    def _channel_id(self, topic: str, kind: str) -> int:
-        if topic not in self._ids:
+    def _channel_id(self, topic: str, kind: str, sender: int) -> int:
+        """Return the channel of a topic and of who numbers its messages (0: not told)."""
+        key = topic, sender
+        if key not in self._ids:
             if kind not in self._schemas:
                 self._schemas[kind] = self._writer.register_schema(
                     name=kind, encoding="ros2msg", data=schema_text(kind).encode()
                 )
-            self._ids[topic] = self._writer.register_channel(
-                topic=topic, message_encoding="cdr", schema_id=self._schemas[kind]
+            self._ids[key] = self._writer.register_channel(
+                topic=topic,
+                message_encoding="cdr",
+                schema_id=self._schemas[kind],
+                metadata={SENDER: str(sender)} if sender else {},
             )
-        return self._ids[topic]
+        return self._ids[key]
 
 
 def position_of(message: msgspec.Struct) -> GeoPoint | None:

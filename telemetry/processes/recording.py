@@ -39,6 +39,7 @@ class _ToWrite(NamedTuple):
     message: msgspec.Struct
     numbering: str
     seq: int
+    sender: int
 
 
 class DriveRecording:
@@ -103,7 +104,7 @@ class DriveRecording:
         self._stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if isinstance(message, DriveEnd):
             self._take_end(message, sender)
-        self._waiting.append(_ToWrite(channel, message, numbering, seq))
+        self._waiting.append(_ToWrite(channel, message, numbering, seq, sender))
         if len(self._waiting) > MOST_WAITING:
             self._give_up(self._waiting.popleft())
         return self._go_on() if self._writer is None else self._give()
@@ -194,7 +195,7 @@ class DriveRecording:
         while self._writer is not None and self._given < len(self._waiting):
             one = self._waiting[self._given]
             try:
-                self._writer.add(one.channel, one.message, sequence=one.seq)
+                self._writer.add(one.channel, one.message, sequence=one.seq, sender=one.sender)
             except OSError as error:
                 return events + self._stopped(error)
             except ValueError as error:

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from foretwin.contracts.numbering import Numberings
 from foretwin.contracts.segments import number_of, segments_of
 from foretwin.contracts.tally import Tally, read_tally, tally_file
 from foretwin.telemetry.logs.log import LogError
@@ -26,12 +27,12 @@ def tally_left(path: Path, *, no_more_than_held: bool = False) -> Tally:
         number = number_of(path, part) or 0
         if number < tally.part:
             continue
-        found = ((channel_of(one.topic), one.sequence) for one in in_file_order(part))
+        found = ((channel_of(one.topic), one) for one in in_file_order(part))
         known = tally.in_part if number == tally.part else 0
         with contextlib.suppress(LogError, OSError):  # then what it holds is taken again
-            samples = ((channel, seq) for channel, seq in found if channel is not None)
-            for channel, seq in itertools.islice(samples, known, None):
-                if tally.numbers.take_up(channel, seq):
+            samples = ((channel, one) for channel, one in found if channel is not None)
+            for channel, one in itertools.islice(samples, known, None):
+                if _had_not_come(tally.numbers, channel, one):
                     tally.settle("recorded", channel)
     if no_more_than_held:
         held = Counter(channel_of(one.topic) for one in _records(path))
@@ -40,6 +41,12 @@ def tally_left(path: Path, *, no_more_than_held: bool = False) -> Tally:
             tally.recorded[channel] = count - missing
             tally.unwritten[channel] = tally.unwritten.get(channel, 0) + missing
     return tally
+
+
+def _had_not_come(numbers: Numberings, channel: str, one: Record) -> bool:
+    if one.sender:
+        return numbers.take(channel, one.sequence, sender=one.sender) is not None
+    return numbers.take_up(channel, one.sequence)
 
 
 def _records(path: Path) -> Iterator[Record]:

@@ -116,8 +116,7 @@ def test_a_cycle_in_which_a_change_was_missed_counts_for_nothing(
     hear(learner, light, 125.0, 245.0)
     found = learnt(learner, 245.0)
     assert found is not None
-    assert found.cycle_s == pytest.approx(60.0, abs=0.05)
-    assert found.cycles == 3
+    assert (found.cycle_s, found.cycles) == (pytest.approx(60.0, abs=0.05), 3)
 
 
 def test_cycles_alike_that_are_out_of_step_are_of_no_one_plan() -> None:
@@ -263,21 +262,13 @@ def test_two_lights_of_one_cycle_tell_the_offset_of_their_green_wave() -> None:
 
 def test_of_more_than_a_thousand_groups_the_one_silent_for_longest_goes() -> None:
     learner = SignalLearner()
+    hear(learner, fixed(60.0, 20.0, 30.0), -260.0, 0.0, group="g1")
     for i in range(1000):
         learner.take(SignalState(stamp_ns=ns(i), group_id=f"g{i}", colour="red"))
     learner.take(SignalState(stamp_ns=ns(2000), group_id="g0", colour="red"))
     learner.take(SignalState(stamp_ns=ns(2001), group_id="new", colour="red"))
-    heard = {signal.group_id for signal in learner.newest}
-    assert heard == {f"g{i}" for i in range(1000) if i != 1} | {"new"}
-
-
-def test_what_was_learnt_of_a_group_goes_with_it() -> None:
-    learner = SignalLearner()
-    hear(learner, fixed(60.0, 20.0), 0.0, 260.0)
-    assert learnt(learner, 260.0) is not None
-    for i in range(1000):
-        learner.take(SignalState(stamp_ns=ns(261 + i / 1000), group_id=f"n{i}", colour="red"))
-    assert learnt(learner, 262.0) is None
+    kept = {f"g{i}" for i in range(1000) if i != 1} | {"new"}
+    assert ({one.group_id for one in learner.newest}, learner._cyclic) == (kept, {})
 
 
 def test_of_a_light_without_a_cycle_little_is_kept() -> None:

@@ -39,6 +39,33 @@ def test_what_came_into_the_file_after_the_tally_counts(tmp_path: Path) -> None:
     assert tally_left(path).recorded == {"gnss": 4}
 
 
+def test_who_numbers_what_came_after_the_tally_is_read_from_the_file(tmp_path: Path) -> None:
+    """One who floods the bus is numbered far ahead of the car, whose samples must still come."""
+    path = tmp_path / "drive.mcap"
+    recording = DriveRecording(path)
+
+    def add(sender: int, numbers: range) -> None:
+        for seq in numbers:
+            fix = GnssFix(stamp_ns=seq, position=GeoPoint(50.0, 8.0))
+            recording.add("gnss", fix, sender=sender, seq=seq)
+
+    add(99, range(1000))
+    add(7, range(300))  # the car is heard last
+    recording.flush()
+    told = tally_file(path).read_bytes()
+    add(99, range(1000, 1400))
+    recording.finish()
+    tally_file(path).write_bytes(told)  # as a kill leaves it
+
+    again = DriveRecording(path)
+    assert again.tally.recorded == {"gnss": 1700}
+    recording = again
+    add(7, range(300, 1500))
+    again.finish()
+    assert again.tally.recorded == {"gnss": 2900}
+    assert again.missing == 0
+
+
 def test_what_never_came_to_the_disk_is_unwritten(tmp_path: Path) -> None:
     path = left(tmp_path, 4)
     write_tally(Tally(recorded={"gnss": 6, "imu": 2}, unwritten={"gnss": 1}), tally_file(path))

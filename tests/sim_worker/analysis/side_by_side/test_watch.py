@@ -15,11 +15,7 @@ from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStat
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
-from foretwin.sim_worker.analysis.side_by_side.watch import (
-    HORIZON_S,
-    SegmentsStanding,
-    SideBySide,
-)
+from foretwin.sim_worker.analysis.side_by_side.watch import HORIZON_S, SegmentsStanding, SideBySide
 
 COVERS = ("foretwin.sim_worker.analysis.side_by_side.segment",)
 
@@ -82,10 +78,7 @@ def side_by_side(
     """
     here = DrivePlace(GeoPoint(0.0, 0.0))
 
-    def place() -> DrivePlace:
-        return here
-
-    watch = SideBySide(FRAME, vehicle_id="ego", place=place)
+    watch = SideBySide(FRAME, vehicle_id="ego", place=lambda: here)
     modes = {0.0: "manual"} if modes is None else modes
     ahead = np.linspace(0.0, 5.0, 51)
     found = []
@@ -94,7 +87,7 @@ def side_by_side(
         if at_s == killed_s:
             standing: SegmentsStanding = pickle.loads(pickle.dumps(watch.standing))
             assert watch.take_ended() == []
-            watch = SideBySide(FRAME, vehicle_id="ego", place=place)
+            watch = SideBySide(FRAME, vehicle_id="ego", place=lambda: here)  # noqa: B023
             watch.go_on(standing)
         if at_s in modes:
             status = VehicleStatus(stamp_ns=START_NS + round(at_s * 1e9), control_mode=modes[at_s])
