@@ -151,13 +151,13 @@ def test_dirt_is_counted_said_and_survived(
             if index % 900 == 99:
                 writer.add("gnss", GnssFix(stamp_ns=stamp_ns + 3, position=north, std_m=0.02))
         ((topic, _, data),) = messages_from("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), None)
-        del writer._ids[topic]
+        del writer._ids[topic, 0]
         writer._writer.add_message(
             channel_id=writer._channel_id(topic, "sensor_msgs/msg/Imu"),
             log_time=stamp_ns, publish_time=stamp_ns, data=data,
         )  # fmt: skip
         early = SpeedSample(stamp_ns=drive.info.start_stamp_ns, speed_mps=3.0)
-        del writer._ids[topic]
+        del writer._ids[topic, 0]
         writer.add("speed", early)
     assert run(["gap", str(file), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
