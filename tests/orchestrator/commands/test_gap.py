@@ -153,7 +153,7 @@ def test_dirt_is_counted_said_and_survived(
         ((topic, _, data),) = messages_from("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), None)
         del writer._ids[topic, 0]
         writer._writer.add_message(
-            channel_id=writer._channel_id(topic, "sensor_msgs/msg/Imu"),
+            channel_id=writer._channel_id(topic, "sensor_msgs/msg/Imu", 0),
             log_time=stamp_ns, publish_time=stamp_ns, data=data,
         )  # fmt: skip
         early = SpeedSample(stamp_ns=drive.info.start_stamp_ns, speed_mps=3.0)
