@@ -44,6 +44,9 @@ class CountryRules(NamedTuple):
     """How long red and amber show together before green; 0 where green follows red."""
     turn_on_red: bool = False
     """Whether a turn to the near side may go on red after a stop, unless a sign forbids it."""
+    mixed_corner_m: float = 10.0
+    """Radius of the road's edge at a right angle between a main road and a lesser one: between
+    RASt 06's 12 m out of the main one and its 8 m into it, as lanes of both end at one place."""
 
     def width_m(self, road_class: str, usual_m: float) -> float:
         """Return the usual width of a lane on a road of this class."""
@@ -88,11 +91,13 @@ _GB = CountryRules(
 )
 _US = CountryRules(
     "UVC 11-801.1 (30 and 55 mph), 11-202, 11-401; 25 mph in residence districts (CVC 22352); "
-    "MUTCD 2B.07; AASHTO Green Book 2018 (12 ft, on lesser streets 10 and 11 ft)",
+    "MUTCD 2B.07; AASHTO Green Book 2018 (12 ft, on lesser streets 10 and 11 ft; corners of 20 ft "
+    "with tapers beside them)",
     *(30 * _MPH, 25 * _MPH, 55 * _MPH, 65 * _MPH, 65 * _MPH, 10 * _MPH),
     lane_width_m=_widths(3.66, 3.66, 3.35, 3.05),
     all_way_stops=True,
     turn_on_red=True,
+    mixed_corner_m=6.0,
 )
 _AU = CountryRules(
     "Australian Road Rules 20, 25, 72; Austroads AGRD part 3",

@@ -18,6 +18,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import Flags, cross, left_of, turn_rad, units
 from foretwin.geometry.polyline_batch import Polylines, points_at, without_repeats
 from foretwin.geometry.turn_curves import REACH_PER_RADIUS
+from foretwin.world_gen.countries.rules import rules_of
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import is_ring_edge
@@ -29,9 +30,7 @@ CORNER_M = np.array([18.0, 15.0, 12.0, 11.0, 9.0, 6.0, 6.0, 5.5, 4.5])
 not held against a copy of the table."""
 LEAVING_SHARE, ALIKE_SHARE, REACHING_SHARE = 12.0 / 9.0, 10.0 / 9.0, 8.0 / 9.0
 """Of it out of a main road, between roads alike, and into one: RASt's 12 and 8 m at a right angle,
-and between them."""
-MIXED_SHARE = 6.0 / 9.0
-"""Of it between a main road and another: AASHTO's 6 m at a right angle, with tapers beside it."""
+and between them. Between a main road and another it is the country's."""
 MINOR_SHARE = 4.6 / 9.0
 """Of it between other roads, and into rings: PEDSAFE's 15 ft at a right angle."""
 MAIN_IMPORTANCE = 4.0
@@ -55,6 +54,8 @@ class _Legs(NamedTuple):
     half_lane_m: Array
     importance: Array
     main: Flags
+    mixed_share: Array
+    """(K,) of that radius between a main road and another."""
     ring: Flags
 
 
@@ -82,6 +83,7 @@ def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection]) -> _
     width = [(a.driven or b.driven)[-1:] for a, b in zip(into, out, strict=True)]
     lit = [c.junction is not None and c.junction.summary.control == "signals" for c in clusters]
     importance = np.array([_importance(leg.edge.road_class) for leg in legs]).reshape(shape)
+    mixed_m = [rules_of(c.legs[0].edge.country).mixed_corner_m for c in clusters]
     return _Legs(
         ways=without_repeats(Polylines.of([leg.xy_m for leg in legs])),
         into_m=np.array([lanes.reach_m for lanes in into]).reshape(*shape, 2),
@@ -91,6 +93,7 @@ def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection]) -> _
         ).reshape(shape),
         importance=importance,
         main=(importance >= MAIN_IMPORTANCE) | np.array(lit)[:, None],
+        mixed_share=np.array(mixed_m) / 9.0,
         ring=np.array([is_ring_edge(leg.edge) for leg in legs]).reshape(shape),
     )
 
@@ -135,6 +138,6 @@ def _radius_m(legs: _Legs, size: Array) -> Array:
     share = np.where(own == other, ALIKE_SHARE, share)
     mains = legs.main[:, :, None].astype(int) + legs.main[:, None, :]
     mains[legs.ring.any(axis=1)] = 0
-    share = np.choose(mains, [MINOR_SHARE, MIXED_SHARE, share])
+    share = np.choose(mains, [MINOR_SHARE, legs.mixed_share[:, None, None], share])
     lane_m = np.maximum(legs.half_lane_m[:, :, None], legs.half_lane_m[:, None, :])
     return np.asarray(np.interp(size, CORNER_AT_RAD, CORNER_M) * share + lane_m)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
@@ -17,6 +18,7 @@ from tests.world_gen.drawn_maps import CROSS, GERMANY, crossing, drawn_map, worl
 from tests.world_gen.drawn_stars import stars, world_of_star
 from tests.world_gen.path_shape import tightest_radius_m
 
+PITTSBURGH = GeoPoint(40.44, -79.99)
 MAIN = {"highway": "secondary", "name": "Main", "lanes": "2"}
 LANE_M = 3.0, 3.25
 """Of residential and of secondary roads, where a map says no width."""
@@ -37,9 +39,14 @@ def test_residential_streets_have_corners_of_4_6_m():
     assert list(radii.values()) == pytest.approx([4.6 + LANE_M[0] / 2] * 4, rel=0.12)
 
 
-def test_a_main_road_has_wider_corners_than_a_lesser_one_into_it():
-    radii = _right_turns(world_of(crossing(street=MAIN)))
-    assert list(radii.values()) == pytest.approx([6.0 + LANE_M[1] / 2] * 4, rel=0.12)
+@pytest.mark.parametrize(
+    ("origin", "corner_m", "lane_m"), [(GERMANY, 10.0, 3.25), (PITTSBURGH, 6.0, 3.35)]
+)
+def test_corners_of_a_main_road_and_a_lesser_one_are_as_wide_as_the_country_builds_them(
+    origin, corner_m, lane_m
+):
+    radii = _right_turns(world_of(crossing(street=MAIN, origin=origin)))
+    assert list(radii.values()) == pytest.approx([corner_m + lane_m / 2] * 4, rel=0.06)
 
 
 def test_between_main_roads_who_leaves_the_greater_turns_widest():

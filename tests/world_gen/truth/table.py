@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame
 from tests.benchmarks.measuring import UnavailableError
 from tests.world_gen.truth.argoverse import argoverse_maps
-from tests.world_gen.truth.berlin import berlin_truth
+from tests.world_gen.truth.berlin import berlin_truth, drives_without_map
 from tests.world_gen.truth.driven_again import Again, driven_again, simulated_again
 from tests.world_gen.truth.generators import RECOMMENDED, by_foretwin, by_netconvert
 from tests.world_gen.truth.hd_map import HdMap
@@ -22,7 +22,7 @@ from tests.world_gen.truth.mcity import drawn_map, mcity_passes
 from tests.world_gen.truth.reduced_map import reduced
 from tests.world_gen.truth.registration import laid_on
 from tests.world_gen.truth.scores import map_score
-from tests.world_gen.truth.tracks import beside, corner_radius_m, extended
+from tests.world_gen.truth.tracks import beside, corner_radii_m, corner_radius_m, extended
 
 LEAST_TO_LAY = 20
 """Fewer tracks tell nothing of how their recorder and the map differ."""
@@ -59,6 +59,12 @@ def rows(data: Path, work: Path) -> Iterator[Row]:
     berlin = berlin_truth(data)
     models = list(_models(berlin.map_file, berlin.frame, work))
     yield from _track_rows("berlin", "track", models, berlin.tracks, berlin.within_m)
+    for model in models:
+        yield _radii_row("berlin", model)
+    driven = {"berlin": berlin.whole_m} | drives_without_map(data)
+    for name, xy_m in driven.items():
+        radii = np.array(corner_radii_m(xy_m, left=False))
+        yield Row(name, "near-side radius, m", "tracks", quartiles(radii))
     once = once_driven(data, work)
     for name, again in once.passes.items():
         yield from _again_rows(name, again)
@@ -124,8 +130,13 @@ def _map_rows(hd: HdMap, model: LaneModel) -> Iterator[Row]:
     yield row("connection path, m", quartiles(score.path_m))
     share = f"{score.found} of {score.movements}, {score.extra} more"
     yield row("movements", share)
+    yield _radii_row(hd.name, model)
+
+
+def _radii_row(truth: str, model: LaneModel) -> Row:
     sharp = [corner_radius_m(extended(c.line), left=False) for c in model.connections]
-    yield row("near-side radius, m", quartiles(np.array([r for r in sharp if r is not None])))
+    radii = np.array([r for r in sharp if r is not None])
+    return Row(truth, "near-side radius, m", model.name, quartiles(radii))
 
 
 def _track_rows(

@@ -18,7 +18,7 @@ from tests.world_gen.truth.reduced_map import reduced
 from tests.world_gen.truth.registration import Move, laid_on
 from tests.world_gen.truth.scores import map_score
 from tests.world_gen.truth.table import as_text, once_driven, rows
-from tests.world_gen.truth.tracks import beside, corner_radius_m
+from tests.world_gen.truth.tracks import beside, corner_radii_m, corner_radius_m
 
 WIDTH_M = 3.0
 
@@ -129,6 +129,16 @@ def test_the_radius_of_a_driven_corner_is_that_of_its_arc(radius_m: float) -> No
     assert corner_radius_m(line, left=True) is None
 
 
+def test_a_drive_has_a_radius_for_each_turn_to_the_near_side() -> None:
+    angle = np.linspace(0.0, math.pi / 2.0, 40)
+    right = 9.0 * np.stack([np.sin(angle), np.cos(angle) - 1.0], axis=1)
+    left = np.array([9.0, -29.0]) + 14.0 * np.stack([1.0 - np.cos(angle), -np.sin(angle)], axis=1)
+    drive = np.concatenate([[[-20.0, 0.0]], right, left, left[-1:] + np.array([[20.0, 0.0]])])
+
+    assert corner_radii_m(drive, left=False) == pytest.approx([9.0], rel=0.06)
+    assert corner_radii_m(drive, left=True) == pytest.approx([14.0], rel=0.06)
+
+
 @pytest.mark.real_data
 @pytest.mark.judge
 def test_foretwin_stands_beside_netconvert_on_every_truth(data_dir: Path, tmp_path: Path) -> None:
@@ -138,13 +148,17 @@ def test_foretwin_stands_beside_netconvert_on_every_truth(data_dir: Path, tmp_pa
 
     assert movements["karlsruhe"] == "14 of 14, 0 more"
     assert {row.truth for row in found} >= {*movements, "berlin"}
-    laid = {
-        row.generator: float(row.text.split()[2])
-        for row in found
-        if row[:2] == ("karlsruhe", "laid track, turning, m")
-    }
+
+    def medians(truth: str, measure: str) -> dict[str, float]:
+        mine = [row for row in found if row[:2] == (truth, measure)]
+        return {row.generator: float(row.text.split()[2]) for row in mine}
+
+    laid = medians("karlsruhe", "laid track, turning, m")
     assert laid["foretwin"] < 0.8 * laid["netconvert"]
     assert laid["foretwin"] < 0.9 * laid["netconvert, recommended"]
+    berlin = medians("berlin", "track, turning, m")
+    assert berlin["foretwin"] < 0.8 * berlin["netconvert"]
+    assert berlin["foretwin"] < 0.8 * berlin["netconvert, recommended"]
 
 
 @pytest.mark.real_data

@@ -27,6 +27,8 @@ _TURN_WINDOW_M = 10.0
 _TURN_RAD = math.radians(20.0)
 _CORNER_RAD = (math.radians(55.0), math.radians(125.0))
 _SHARE = (0.2, 0.8)
+_BESIDE_TURN_M = 3.0
+_LEAST_TURN_M = 4.0
 _STILL_M = 0.3
 _LEAST_DRIVE_M = 5.0
 
@@ -107,3 +109,19 @@ def corner_radius_m(xy_m: Array, *, left: bool) -> float | None:
         for i, share in zip(at, _SHARE, strict=True)
     ]
     return float((places[1] - places[0]) * STEP_M / ((_SHARE[1] - _SHARE[0]) * total))
+
+
+def corner_radii_m(xy_m: Array, *, left: bool) -> list[float]:
+    """Return the radius of each near-side turn of a whole drive (N, 2)."""
+    track = driven(xy_m)
+    turning = np.flatnonzero(track.turning)
+    beside_turn = round(_BESIDE_TURN_M / STEP_M)
+    found = []
+    for turn in np.split(turning, np.flatnonzero(np.diff(turning) > 1) + 1):
+        if len(turn) * STEP_M < _LEAST_TURN_M:
+            continue
+        first, last = max(turn[0] - beside_turn, 0), turn[-1] + beside_turn
+        radius_m = corner_radius_m(track.xy_m[first:last], left=left)
+        if radius_m is not None:
+            found.append(radius_m)
+    return found
