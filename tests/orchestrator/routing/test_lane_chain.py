@@ -116,7 +116,7 @@ def test_the_lane_that_may_turn_is_taken_whichever_the_car_is_in(lateral_m: floa
 
 @pytest.mark.parametrize("leave_by", [NORTH, SOUTH])
 def test_a_turn_tighter_than_cars_are_driven_is_widened_and_nothing_else_is(leave_by: int) -> None:
-    town = Town(one_way(), leave_by)
+    town = Town(crossing(street=ARROWS | {"highway": "residential"}), leave_by)
     town.ids((-60.0, 0.0))
     assert town.path is not None
     turning = np.abs(town.path.s_m - 100.0) < 25.0
@@ -150,7 +150,8 @@ def test_through_a_bend_of_several_lanes_the_path_stays_in_the_car_s(
 
 
 def test_without_a_connection_the_road_is_followed_between_the_lanes() -> None:
-    town = Town(one_way(arrows=False), EAST, without=">w11")
+    street = TWO_LANES | {"highway": "residential"}
+    town = Town(crossing(street=street), EAST, without=">w11")
     guide = town.guided((-60.0, 1.6))
     assert town.path is not None
     s = town.path.s_m
