@@ -78,13 +78,13 @@ def tee(bearings_deg: tuple[float, ...] = (0.0, 180.0, 270.0), *, left_hand: boo
 
 @functools.cache
 def after_a_bend(left: float) -> World:
-    """A main road from the east that bends by 60° with a radius of 20 m, 12 m before a side road:
+    """A main road from the east that bends by 60° with a radius of 20 m, 18 m before a side road:
     to the left (1.0) or to the right (-1.0) of who comes along."""
     nodes = {0: (0.0, 0.0), 1: (-120.0, 0.0), 2: (0.0, 120.0), 3: (0.0, -120.0)}
     for k in range(13):
         angle = math.radians(5.0 * k)
         back_m, aside_m = 20.0 * math.sin(angle), 20.0 * (1.0 - math.cos(angle))
-        nodes[10 + k] = 12.0 + back_m, left * aside_m
+        nodes[10 + k] = 18.0 + back_m, left * aside_m
     x, y = nodes[22]
     nodes[23] = x + 40.0, y + left * 40.0 * math.sqrt(3.0)
     ways = [(1, [*range(23, 9, -1), 0], ROAD), (2, [0, 1], ROAD), (3, [2, 0, 3], STREET)]
