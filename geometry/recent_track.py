@@ -22,11 +22,14 @@ class RecentTrack:
         self._stamps_ns = np.empty(_LEAST_ROWS, dtype=np.int64)
         self._rows = np.empty((_LEAST_ROWS, width))
         self._first = self._end = 0
-        self.last_ns: int | None = None
-        """The newest stamp."""
 
     def __len__(self) -> int:
         return self._end - self._first
+
+    @property
+    def last_ns(self) -> int | None:
+        """The newest stamp, None where nothing is known."""
+        return int(self._stamps_ns[self._end - 1]) if len(self) else None
 
     @property
     def stamps_ns(self) -> Stamps:
@@ -40,11 +43,12 @@ class RecentTrack:
 
     def add(self, stamp_ns: int, row: Sequence[float]) -> None:
         """Add a row; raises ValueError for a stamp that is not after the last."""
-        if self.last_ns is not None and stamp_ns <= self.last_ns:
-            raise ValueError(f"stamp {stamp_ns} is not after {self.last_ns}")
+        last_ns = self.last_ns
+        if last_ns is not None and stamp_ns <= last_ns:
+            raise ValueError(f"stamp {stamp_ns} is not after {last_ns}")
         if self._end == len(self._stamps_ns):
             self._make_room()
-        self._stamps_ns[self._end] = self.last_ns = stamp_ns
+        self._stamps_ns[self._end] = stamp_ns
         self._rows[self._end] = row
         self._end += 1
 
@@ -55,8 +59,6 @@ class RecentTrack:
     def forget(self, count: int) -> None:
         """Forget the `count` oldest rows; none where that is not positive."""
         self._first += min(max(count, 0), len(self))
-        if not len(self):
-            self.last_ns = None
 
     def clear(self) -> None:
         """Forget all."""

@@ -108,7 +108,6 @@ class SignalLearner:
         self._cyclic: dict[str, _Group] = {}
         """Those of a known cycle, in the order of their names."""
         self._heard: dict[str, SignalState] = {}
-        self._newest: tuple[SignalState, ...] | None = ()
 
     def take(self, signal: SignalState) -> None:
         """Take a report; of too many groups the one silent for longest is forgotten."""
@@ -118,7 +117,7 @@ class SignalLearner:
             group = self._groups[name] = _Group(signal)
         else:
             group.take(signal)
-        self._heard[name], self._newest = group.last, None
+        self._heard[name] = group.last
         if group.has_cycle != (name in self._cyclic):
             self._cyclic = {n: one for n, one in sorted(self._groups.items()) if one.has_cycle}
         if len(self._groups) > MOST_SIGNALS:
@@ -134,9 +133,7 @@ class SignalLearner:
     @property
     def newest(self) -> tuple[SignalState, ...]:
         """The newest report of each group."""
-        if self._newest is None:
-            self._newest = tuple(self._heard.values())
-        return self._newest
+        return tuple(self._heard.values())
 
     def learnt(self, now_ns: int) -> tuple[LearntSignal, ...]:
         """Return the cycles that hold at a time of the vehicle's clock, by group."""

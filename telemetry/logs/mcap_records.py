@@ -51,9 +51,10 @@ class Record(NamedTuple):
     """By whose numbering that is; 0 where it is not told."""
 
 
-def _sender(channel: Channel) -> int:
+def _record(channel: Channel, kind: str, message: Message) -> Record:
     told = channel.metadata.get(SENDER, "")
-    return int(told) if told.isdecimal() and len(told) <= len(str(MOST_SENDER)) else 0
+    sender = int(told) if told.isdecimal() and len(told) <= len(str(MOST_SENDER)) else 0
+    return Record(channel.topic, kind, message.log_time, message.data, message.sequence, sender)
 
 
 class Contents(NamedTuple):
@@ -153,14 +154,7 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
             reader = make_reader(file, validate_crcs=True)
             for schema, channel, message in reader.iter_messages(topics=topics):
                 if schema is not None:
-                    yield Record(
-                        channel.topic,
-                        schema.name,
-                        message.log_time,
-                        message.data,
-                        message.sequence,
-                        _sender(channel),
-                    )
+                    yield _record(channel, schema.name, message)
         except (*BROKEN, OSError) as error:  # a place before the file's begin cannot be gone to
             raise LogError(f"{path}: damaged MCAP: {type(error).__name__} {error}") from None
 
@@ -242,8 +236,7 @@ class _Linear:
                         channel = channels[item.channel_id]
                         if channel.schema_id in by_id:
                             kind = by_id[channel.schema_id].name
-                            told = item.sequence, _sender(channel)
-                            yield Record(channel.topic, kind, item.log_time, item.data, *told)
+                            yield _record(channel, kind, item)
             except LogError:
                 raise
             except BROKEN:

@@ -44,23 +44,22 @@ def test_who_numbers_what_came_after_the_tally_is_read_from_the_file(tmp_path: P
     path = tmp_path / "drive.mcap"
     recording = DriveRecording(path)
 
-    def add(sender: int, numbers: range) -> None:
+    def add(recording: DriveRecording, sender: int, numbers: range) -> None:
         for seq in numbers:
             fix = GnssFix(stamp_ns=seq, position=GeoPoint(50.0, 8.0))
             recording.add("gnss", fix, sender=sender, seq=seq)
 
-    add(99, range(1000))
-    add(7, range(300))  # the car is heard last
+    add(recording, 99, range(1000))
+    add(recording, 7, range(300))  # the car is heard last
     recording.flush()
     told = tally_file(path).read_bytes()
-    add(99, range(1000, 1400))
+    add(recording, 99, range(1000, 1400))
     recording.finish()
     tally_file(path).write_bytes(told)  # as a kill leaves it
 
     again = DriveRecording(path)
     assert again.tally.recorded == {"gnss": 1700}
-    recording = again
-    add(7, range(300, 1500))
+    add(again, 7, range(300, 1500))
     again.finish()
     assert again.tally.recorded == {"gnss": 2900}
     assert again.missing == 0
