@@ -10,12 +10,9 @@ of places ahead, and between when and when they are said to be reached, is in `k
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import sys
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +20,7 @@ import numpy as np
 from foretwin.contracts.drive import VehicleState
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from tests.orchestrator.in_process_drive import LockStep
-from tests.trust.nominal_passes import passes
+from tests.trust.nominal_passes import asked_passes
 
 BEFORE_S = (10.0, 5.0)
 _WITHIN_S = 0.25
@@ -102,20 +99,15 @@ def row(name: str, groups: list[list[Shown]]) -> str:
 
 def main(arguments: list[str]) -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m tests.trust.arrivals")
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--group", action="append", default=[])
-    given = parser.parse_args(arguments)
+    asked = asked_passes("tests.trust.arrivals", arguments, driver=Watched)
     print("| drive | arrivals | 10 s before | 5 s before | departs s |")
     print("|" + " --- |" * 5)
     found: dict[str, list[list[Shown]]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        groups = given.group or ["given"]
-        for on in passes(given.names, groups, Path(folder), driver=Watched):
-            assert isinstance(on.drive, Watched)
-            base = on.truth.track.stamp_ns[0] * 1e-9
-            inside = [at for at in on.drive.shown if on.from_s <= at.time_s - base < on.until_s]
-            found.setdefault(on.name.split()[0], []).extend(arrivals(inside))
+    for on in asked:
+        assert isinstance(on.drive, Watched)
+        base = on.truth.track.stamp_ns[0] * 1e-9
+        inside = [at for at in on.drive.shown if on.from_s <= at.time_s - base < on.until_s]
+        found.setdefault(on.name.split()[0], []).extend(arrivals(inside))
     for name, of_drive in found.items():
         print(row(name, of_drive))
     if len(found) > 1:

@@ -10,21 +10,18 @@ they were driven.
 
 from __future__ import annotations
 
-import argparse
 import sys
-import tempfile
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import tangents
+from foretwin.geometry.polyline import kept_apart, tangents
 from foretwin.sim_worker.driver_model import COMFORT_DECEL_MPS2, LATERAL_ACCEL_MPS2
 from tests.orchestrator.in_process_drive import Round
 from tests.trust.nominal import known_path, nominal
-from tests.trust.nominal_passes import TIMES_S, Group, Pass, passes
+from tests.trust.nominal_passes import TIMES_S, Pass, asked_passes
 
 UPTO_S = 2.0
 MOVING_MPS = 4.0
@@ -64,15 +61,9 @@ def _too_fast(on: Pass, one: Round) -> tuple[Flags, Flags] | None:
     moving = (_WAY_S[:-1] >= 0.0) & (_WAY_S[:-1] < UPTO_S) & (step > MOVING_MPS)
     if not moving.any():
         return None
-    kept = [way[0]]
-    for xy in way[1:]:
-        if np.hypot(*(xy - kept[-1])) >= _LEAST_STEP_M:
-            kept.append(xy)
     places, speed = way[:-1][moving], step[moving]
-    return (
-        too_fast(one.job.path.xy_m, places, speed),
-        too_fast(np.array(kept), places, speed),
-    )
+    driven = way[kept_apart(way, least_m=_LEAST_STEP_M)]
+    return too_fast(one.job.path.xy_m, places, speed), too_fast(driven, places, speed)
 
 
 def row(name: str, rounds: list[tuple[Pass, Round]]) -> str:
@@ -91,19 +82,14 @@ def row(name: str, rounds: list[tuple[Pass, Round]]) -> str:
 
 def main(arguments: list[str]) -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m tests.trust.bends")
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--group", action="append", default=[])
-    given = parser.parse_args(arguments)
-    groups: list[Group] = given.group or ["given"]
+    asked = asked_passes("tests.trust.bends", arguments)
     rounds: dict[str, list[tuple[Pass, Round]]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for on in passes(given.names, groups, Path(folder)):
-            rounds.setdefault(on.name.split()[0], []).extend((on, one) for one in on.rounds)
-        print("| drive (rounds) | nominal: along, across | known path | too fast: path, driven |")
-        print("|" + " --- |" * 4)
-        for name, of_drive in rounds.items():
-            print(row(name, of_drive), flush=True)
+    for on in asked:
+        rounds.setdefault(on.name.split()[0], []).extend((on, one) for one in on.rounds)
+    print("| drive (rounds) | nominal: along, across | known path | too fast: path, driven |")
+    print("|" + " --- |" * 4)
+    for name, of_drive in rounds.items():
+        print(row(name, of_drive), flush=True)
     return 0
 
 

@@ -12,16 +12,13 @@ after what is told, after a stop too. Arrivals at junctions are few; places are 
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from tests.trust.nominal_passes import Pass, passes
+from tests.trust.nominal_passes import Group, Pass, asked_passes
 from tests.trust.places_ahead import (
     TOLD_S,
     Came,
@@ -93,23 +90,19 @@ def driven_in(on: Pass) -> tuple[list[Moment], WayDriven]:
 
 def main(arguments: list[str]) -> int:
     """Print both tables."""
-    parser = argparse.ArgumentParser(prog="python -m tests.trust.knowable")
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--group", action="append", default=[])
-    given = parser.parse_args(arguments)
-    groups = given.group or ["given", "tuned_on", "held_out"]
+    usual: tuple[Group, ...] = "given", "tuned_on", "held_out"
+    driven_ones = asked_passes("tests.trust.knowable", arguments, usual=usual, driver=Observed)
     told: dict[str, list[Came]] = {}
     learnt: list[Place] = []
     asked: list[Place] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for on in passes(given.names, groups, Path(folder), driver=Observed):
-            moments, driven = driven_in(on)
-            came = told.setdefault(f"{on.name.split()[0]}, {on.group}", [])
-            for moment in moments:
-                came += what_came(moment, driven)
-                found = places(moment, driven)
-                learnt += found if on.group != "held_out" else []
-                asked += [one for one in found if one.later_s == ASKED_S] * (on.group == "held_out")
+    for on in driven_ones:
+        moments, driven = driven_in(on)
+        came = told.setdefault(f"{on.name.split()[0]}, {on.group}", [])
+        for moment in moments:
+            came += what_came(moment, driven)
+            found = places(moment, driven)
+            learnt += found if on.group != "held_out" else []
+            asked += [one for one in found if one.later_s == ASKED_S] * (on.group == "held_out")
     print("| drive | between / before / after %, endless %, median length: 10 s | 5 s |")
     print("|---|---|---|")
     for name, of_drive in told.items():

@@ -10,11 +10,8 @@ the path which was then driven, at the speed that `before` aims at.
 
 from __future__ import annotations
 
-import argparse
 import sys
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -30,7 +27,7 @@ from foretwin.sim_worker.driver_model import (
     MAX_ACCEL_MPS2,
 )
 from tests.orchestrator.in_process_drive import Round
-from tests.trust.nominal_passes import TIMES_S, Group, Pass, passes
+from tests.trust.nominal_passes import TIMES_S, Pass, asked_passes
 
 UP_TO_S = (1.0, 2.0, 4.0, 8.0)
 _STEP_S = 0.1
@@ -154,20 +151,15 @@ def rows(name: str, errors: dict[str, Array]) -> list[str]:
 
 def main(arguments: list[str]) -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m tests.trust.nominal")
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--group", action="append", default=[])
-    given = parser.parse_args(arguments)
-    groups: list[Group] = given.group or ["given"]
+    asked = asked_passes("tests.trust.nominal", arguments)
     print("| pass (rounds) | forecast | 1 s | 2 s | 4 s | 8 s |\n|" + " --- |" * 6)
     of_drive: dict[str, list[dict[str, Array]]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for on in passes(given.names, groups, Path(folder)):
-            if not on.rounds:
-                continue
-            drive, drawn = on.name.split()[0], "drawn" in on.name
-            found = errors_m(on)
-            of_drive.setdefault(f"{drive}, drawn" if drawn else on.name, []).append(found)
+    for on in asked:
+        if not on.rounds:
+            continue
+        drive, drawn = on.name.split()[0], "drawn" in on.name
+        found = errors_m(on)
+        of_drive.setdefault(f"{drive}, drawn" if drawn else on.name, []).append(found)
     for name, parts in of_drive.items():
         joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
         print("\n".join(rows(name, joined)))

@@ -8,7 +8,9 @@ are driven again do not lie in it twice.
 
 from __future__ import annotations
 
+import argparse
 import os
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -112,6 +114,29 @@ def passes(
         wanted = source.name in names if names else source.group in groups
         if wanted and source.name in drives:
             yield from _passes_of(source, drives[source.name], folder, driver)
+
+
+def asked_passes(
+    command: str,
+    arguments: list[str],
+    *,
+    usual: tuple[Group, ...] = ("given",),
+    driver: type[LockStep] = LockStep,
+) -> Iterator[Pass]:
+    """Drive the passes that a command line asks for, [NAME ...] [--group GROUP], or the `usual`.
+
+    Ends the program, before anything is driven, for words that are no such line of `command`.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m {command}")
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--group", action="append", default=[])
+    given = parser.parse_args(arguments)
+    return _asked(given.names, given.group or [*usual], driver)
+
+
+def _asked(names: list[str], groups: list[Group], driver: type[LockStep]) -> Iterator[Pass]:
+    with tempfile.TemporaryDirectory() as folder:
+        yield from passes(names, groups, Path(folder), driver=driver)
 
 
 def _passes_of(
