@@ -106,6 +106,7 @@ def recover(
             healthy = not any(part.lost for part in parts)
             return Recovery(str(record.get("exit")), parts, healthy, record)
         try:
+            _begin_tables(results)
             judged = judge(run) if record.get("exit", RUNNING) == RUNNING else None
             if judged is not None:
                 _keep_verdicts(results, judged.rows)
@@ -126,6 +127,17 @@ def recover(
         except OSError as error:
             raise UserError(f"{run}: cannot be recovered: {one_line(error)}") from error
     return Recovery(str(record["exit"]), parts, healthy=False, record=record)
+
+
+def _begin_tables(results: Path) -> None:
+    """Begin the tables of a run that was killed before it had begun them all: rounds come last."""
+    if any(file.stat().st_size for file in results.glob("rounds*")):
+        return
+    for name, columns in TABLES.items():
+        stream = results / f"{name}{SUFFIX}"
+        in_parquet = parts_of_table(stream.with_suffix(".parquet"))
+        if not in_parquet and not (stream.exists() and stream.stat().st_size):
+            TableStream(stream, columns).close()
 
 
 def _let_leave(run: Path) -> None:

@@ -121,6 +121,14 @@ def contents(run: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
 
 
+def test_a_drive_killed_before_it_wrote_a_row_has_its_tables(tmp_path: Path) -> None:
+    run, _ = killed(tmp_path / "runs", LOCK_STEP, after_s=0.0)
+
+    assert command(["recover", str(run)]) == 0
+    recording = foretwin.open_run(run)
+    assert all(recording.table(name).schema.equals(columns) for name, columns in TABLES.items())
+
+
 @pytest.mark.parametrize("arguments", [LIVE, LOCK_STEP], ids=["live", "lock step"])
 def test_what_was_told_a_second_before_a_kill_is_recovered(
     tmp_path: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]

@@ -45,6 +45,24 @@ def test_a_killed_run_is_read_to_its_last_row(tmp_path: Path) -> None:
     assert json.loads((run / "log.jsonl").read_text())["text"] == "what it said last"
 
 
+def test_a_run_killed_before_it_had_begun_its_tables_has_all_of_them_empty(tmp_path: Path) -> None:
+    run = killed_run(tmp_path / "run")
+    results = run / "results"
+    for stream in results.glob("*.arrows"):
+        if stream.stem not in {"events", "jobs"}:
+            stream.unlink()
+    os.truncate(results / "jobs.arrows", 0)
+    done = recover(run)
+
+    assert done.lost == []
+    assert {path.name for path in results.iterdir()} == {f"{t}.parquet" for t in TABLES}
+    rows = {name: read_parts(results / f"{name}.parquet").num_rows for name in TABLES}
+    assert {name for name, count in rows.items() if count} == {"events"}
+    recovered = contents(run)
+    assert recover(run).healthy
+    assert contents(run) == recovered
+
+
 def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> None:
     run = killed_run(tmp_path / "run")
     recover(run)
