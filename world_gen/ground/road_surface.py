@@ -30,6 +30,8 @@ from foretwin.world_gen.polygon_areas import GRID_M, areas_of, lines_of, polygon
 
 CORNER_FILLET_M = 3.0
 SMALLEST_M2 = 0.5
+NO_STEP_M = 1e-9
+"""Rounding's errors are smaller, and no edge of a road is."""
 
 
 class Areas(NamedTuple):
@@ -111,11 +113,24 @@ def _place_polygons(
     groups = shapely.geometrycollections(pieces[order], indices=indices)
     whole = shapely.union_all(groups[:, None], axis=1)
     # Mitred outward and rounded inward: corners stay, and only what is filled becomes round.
-    grown = shapely.buffer(whole, CORNER_FILLET_M, join_style="mitre", mitre_limit=2.0)
-    closed = shapely.buffer(grown, -CORNER_FILLET_M, quad_segs=4)
+    closed = shapely.buffer(_grown(whole), -CORNER_FILLET_M, quad_segs=4)
     closed = shapely.set_precision(shapely.simplify(closed, 0.04), GRID_M)
     keep = shapely.area(closed) > SMALLEST_M2
     return used[keep].tolist(), closed[keep]
+
+
+def _grown(shapes: np.ndarray) -> np.ndarray:
+    """Return shapes that reach farther by a fillet on all sides, with mitred corners."""
+    mitred = {"join_style": "mitre", "mitre_limit": 2.0}
+    with np.errstate(divide="raise", invalid="raise"):
+        try:
+            grown: np.ndarray = shapely.buffer(shapes, CORNER_FILLET_M, **mitred)
+        except FloatingPointError:
+            # Where carriageways lie on one another their union may hold points so near to one
+            # another that GEOS divides nothing by nothing, and goes a mitre too far there.
+            apart = shapely.remove_repeated_points(shapes, NO_STEP_M)
+            grown = shapely.buffer(apart, CORNER_FILLET_M, **mitred)
+    return grown
 
 
 def _stubs_and_inner_edges(

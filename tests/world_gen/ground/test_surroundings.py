@@ -14,7 +14,6 @@ from tests.world_gen.drawn_maps import STREET, crossing, roundabout, world_of
 COVERS = (
     "foretwin.world_gen.ground.crossings",
     "foretwin.world_gen.ground.islands",
-    "foretwin.world_gen.ground.road_surface",
     "foretwin.world_gen.ground.sidewalks",
     "foretwin.world_gen.polygon_areas",
 )
