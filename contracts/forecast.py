@@ -32,6 +32,9 @@ class ProgressForecast(msgspec.Struct, frozen=True, kw_only=True):
 
     def at(self, level: float) -> Array:
         """Return (T,) the distance that is not exceeded with this probability."""
+        told = np.flatnonzero(self.levels == level)
+        if told.size:
+            return np.asarray(self.distance_m[:, told[0]])
         shares = np.full((len(self.time_s), 1), level)
         return value_at(self.levels, self.distance_m, shares)[:, 0]
 
