@@ -8,6 +8,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.frames import LocalFrame, wrap_angle
+from foretwin.contracts.gap import STATE_STDS, limits_after
 from foretwin.contracts.roles import MirrorCast, OtherVehicle, UseRoles
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.vehicle import VehicleParameters
@@ -24,17 +25,20 @@ from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 _ALONE = MirrorCast()
 _GRID_TOLERANCE = 0.05
 """Of a sample period: how early a state may be and still count for its instant."""
+_SURE_YAW_STD_RAD = limits_after(0.0)["yaw_rad"] / STATE_STDS
+"""A twin that started with a heading less sure than this departs by that alone."""
 
 
 class Mirror:
     """Steps the twin along with the measured states of one car; no clock, no bus.
 
     The free twin starts from the measured state, runs on commands alone, and starts anew after each
-    `window_s`, in each new World, where its physics diverged and where it runs into what stands:
-    what it loses there says nothing of the model. It never teleports otherwise. All gaps are its
-    own. Roles, corrections and other vehicles need a `VehicleGroup` beside it, which
-    is there only as long as something asks for it. States must come in time order; a command counts
-    from its stamp on and should come before the first state after it.
+    `window_s`, in each new World, where its physics diverged, where it runs into what stands, and
+    once the heading that it started with is surer: what it loses there says nothing of the model.
+    It never teleports otherwise. All gaps are its own. Roles, corrections and other vehicles need
+    a `VehicleGroup` beside it, which is there only as long as something asks for it. States must
+    come in time order; a command counts from its stamp on and should come before the first state
+    after it.
     """
 
     def __init__(
@@ -71,6 +75,7 @@ class Mirror:
             commands=self._commands,
         )
         self._map_shift_m = self._seed_map_shift_m = np.zeros(2)
+        self._is_sure = self._seed_is_sure = True
         self._seed_stamp_ns = 0
         self._steps = 0
         self._independent = False
@@ -127,6 +132,7 @@ class Mirror:
             return None
         self._change_vehicle(state.stamp_ns)
         self._change_world(state.stamp_ns)
+        self._is_sure = (state.yaw_std_rad or 0.0) <= _SURE_YAW_STD_RAD
         self._track.take(state)
         measured, before = self._track.state(), self._track.before
         self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
@@ -137,7 +143,8 @@ class Mirror:
             self._advance(state.stamp_ns)
         self._world.place(self._vehicle_id, measured[:3])
         self._touches |= self._met
-        if self._met or not np.isfinite(self._twin.state).all():
+        surer = self._is_sure and not self._seed_is_sure
+        if self._met or surer or not np.isfinite(self._twin.state).all():
             self._seed(measured, state.stamp_ns)
         self._role_manager.advance(state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
@@ -183,6 +190,7 @@ class Mirror:
         self._seed_stamp_ns, self._steps = stamp_ns, 0
         self._met = frozenset()
         self._seed_map_shift_m = self._map_shift_m
+        self._seed_is_sure = self._is_sure
         self._role_manager.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
 

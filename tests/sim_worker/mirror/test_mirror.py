@@ -125,6 +125,26 @@ def test_the_twin_starts_anew_every_window_and_not_between(hz: float) -> None:
             assert moved == pytest.approx(before.twin.speed_mps * passed_s, abs=0.12)
 
 
+@pytest.mark.parametrize(("first_std_rad", "anew"), [(0.15, 1), (0.071, 1), (0.069, 0)])
+def test_a_twin_starts_anew_once_the_heading_is_known_that_it_started_without(
+    first_std_rad: float, anew: int
+) -> None:
+    """For half a second the heading is 6 degrees off; 2 standard deviations may be 8 degrees."""
+    track = _circle(until_s=6.0)
+    wrong = [
+        msgspec.structs.replace(one, yaw_rad=one.yaw_rad - 0.1, yaw_std_rad=first_std_rad)
+        for one in track[:25]
+    ]
+    right = [msgspec.structs.replace(one, yaw_std_rad=0.03) for one in track[25:]]
+    samples = _samples(Mirror(CAR, drive_frame=FRAME), wrong + right)
+
+    alone = _samples(Mirror(CAR, drive_frame=FRAME), right)
+    times = itertools.pairwise(samples)
+    begins = [now for last, now in times if now.since_reset_s < last.since_reset_s]
+    assert [(one.stamp_ns, one.gap_m) for one in begins] == [(right[0].stamp_ns, 0.0)] * anew
+    assert (samples[-1].gap_m == pytest.approx(alone[-1].gap_m, abs=0.01)) == bool(anew)
+
+
 def test_a_new_world_starts_the_twin_anew_at_its_stamp() -> None:
     mirror = Mirror(CAR, drive_frame=FRAME)
     mirror.set_world(crossroads(), from_stamp_ns=9_000_000_000)
