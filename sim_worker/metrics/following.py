@@ -20,6 +20,8 @@ _SLOW_MPS = 1.0
 """Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
 _MOVES_MPS = 0.1
 """An ego slower than this has no headway in time."""
+_ROUNDING_MPS = 1e-9
+"""Speeds along the course that differ by less are the same."""
 
 
 class Leaders(NamedTuple):
@@ -136,7 +138,8 @@ def _user_acceleration(view: RolloutView, row: Indices, user: Indices) -> Array:
 
 def closing_mps(ahead: Leaders) -> Array:
     """Return how fast the ego nears each leader (K,) along the course, 0 where it does not."""
-    return np.maximum(ahead.ego_mps - ahead.other_mps, 0.0)
+    closing = ahead.ego_mps - ahead.other_mps
+    return np.where(closing > _ROUNDING_MPS, closing, 0.0)
 
 
 def aside_to_pass(ahead: Leaders, until_s: Array) -> Array:
@@ -159,7 +162,7 @@ def _longitudinal(ahead: Leaders) -> Array:
 
 def _lateral(ahead: Leaders) -> Array:
     closing = closing_mps(ahead)
-    approaching = closing > 1e-9
+    approaching = closing > 0.0
     until = np.where(approaching, ahead.gap_m, 1.0) / np.where(approaching, closing, 1.0)
     way = aside_to_pass(ahead, until)
     touching = until <= 0.0
