@@ -135,8 +135,7 @@ def _begin_tables(results: Path) -> None:
         return
     for name, columns in TABLES.items():
         stream = results / f"{name}{SUFFIX}"
-        in_parquet = parts_of_table(stream.with_suffix(".parquet"))
-        if not in_parquet and not (stream.exists() and stream.stat().st_size):
+        if not (stream.exists() and stream.stat().st_size):
             TableStream(stream, columns).close()
 
 

@@ -24,6 +24,7 @@ def measured(ego: Mover, *others: Mover) -> dict[str, float]:
 
 @settings(max_examples=80)
 @example(2.0, 2.0, 20.0, 0.0, 1.0)  # as fast as the leader, but for rounding
+@example(2.01, 2.0, 20.0, 0.0, 1.0)
 @given(speeds, speeds, st.floats(20.0, 60.0), st.floats(-0.8, 0.8), st.floats(-3.1, 3.1))
 def test_behind_a_leader_in_any_direction(
     speed: float, leader_mps: float, ahead: float, aside: float, yaw: float

@@ -125,9 +125,9 @@ def test_the_twin_starts_anew_every_window_and_not_between(hz: float) -> None:
             assert moved == pytest.approx(before.twin.speed_mps * passed_s, abs=0.12)
 
 
-@pytest.mark.parametrize(("first_std_rad", "anew"), [(0.15, 1), (0.071, 1), (0.069, 0)])
+@pytest.mark.parametrize(("first_std_rad", "anew"), [(0.15, 1), (0.071, 1), (0.069, 0), (None, 0)])
 def test_a_twin_starts_anew_once_the_heading_is_known_that_it_started_without(
-    first_std_rad: float, anew: int
+    first_std_rad: float | None, anew: int
 ) -> None:
     """For half a second the heading is 6 degrees off; 2 standard deviations may be 8 degrees."""
     track = _circle(until_s=6.0)
