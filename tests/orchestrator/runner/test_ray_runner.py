@@ -277,10 +277,10 @@ def test_whatever_happens_each_task_ends_once(
             take()
         elif step in acts and cluster.asked:
             acts[step]()
+    take()
     while cluster.asked:
         cluster.end()
         take()
-    take()
     assert ended + cancelled == Counter({str(n): 1 for n in range(submitted)})
     given_, *ends = counted(runner)
     assert given_ == submitted == sum(ends)
