@@ -7,6 +7,8 @@ prints one row for each map, one for all, and one for the tracks, which are meas
   those of them that leave so far the angle of lanes and of all the map's roads between them too,
   which turn where two arms of a crossing lie aside of one another; then U-turns;
 - `loops`: connections that turn by more than 270° from their lane, U-turns counted after them;
+- `beside`: how many but those back into the same road lie by more than 1, 2 and 4 m outside the
+  shape that their roads span, where these meet in one node: `beside_m`;
 - `radius`: quartiles of the least radius of near-side turns at lights, as `least_radius_m` has it,
   of those that turn by 45 to 135°, then of those by 50 to 85° as the tracks do;
 - `step`: 50 %, 90 % and 99 % of the greatest change of curvature in 0.5 m along a turn, in 1/m,
@@ -24,11 +26,12 @@ import math
 import os
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.world import Connection, World
@@ -63,6 +66,8 @@ STEP_M = 0.25
 NEAR_SIDE_RAD = math.radians(45.0), math.radians(135.0)
 TRACKED_RAD = math.radians(50.0), math.radians(85.0)
 ALLOWED_RAD = math.radians(30.0)
+LEAST_CROSSING_SIN, FARTHEST_CROSSING_M = math.sin(math.radians(3.0)), 30.0
+BESIDE_M = 1.0, 2.0, 4.0
 LOOP_RAD = math.radians(270.0)
 
 
@@ -74,6 +79,7 @@ class Turn(NamedTuple):
     turned_rad: float
     left_rad: float
     left_roads_rad: float
+    beside_m: float
     radius_m: float
     near_side_at_lights_rad: float
     """How far is turned; 0 for all others."""
@@ -107,6 +113,33 @@ def left_interval_rad(path: np.ndarray, *directions: np.ndarray) -> float:
     return float(max(yaw[0] + low - yaw.min(), yaw.max() - yaw[0] - high, 0.0))
 
 
+def beside_m(
+    path: np.ndarray, before: np.ndarray, behind: np.ndarray, roads: Sequence[np.ndarray]
+) -> float:
+    """Return how far a path (N, 2) lies outside what its roads span, over what its ends lie aside.
+
+    That is the hull of the roads from lane to lane, of the path's ends, and of where the lines of
+    both lanes, of directions (2,), cross ahead. NaN where its roads do not meet in one node.
+    """
+    if len(roads) != 2:
+        return math.nan
+    ends, driven = path[[0, -1]], np.concatenate(roads)
+    corners = [*ends, *driven]
+    gap = ends[1] - ends[0]
+    turned = _cross(before, behind)
+    if abs(turned) > LEAST_CROSSING_SIN * float(np.hypot(*before) * np.hypot(*behind)):
+        ahead, back = _cross(gap, behind) / turned, _cross(before, gap) / turned
+        if 0.0 < ahead * np.hypot(*before) < FARTHEST_CROSSING_M > back * np.hypot(*behind) > 0.0:
+            corners.append(ends[0] + ahead * before)
+    aside_m = shapely.distance(shapely.points(ends), shapely.LineString(driven)).max()
+    hull = shapely.MultiPoint(np.array(corners)).convex_hull
+    return float(shapely.distance(shapely.points(path), hull).max() - aside_m)
+
+
+def _cross(u: np.ndarray, v: np.ndarray) -> float:
+    return float(u[0] * v[1] - u[1] * v[0])
+
+
 def turned_rad(path: np.ndarray) -> float:
     """Return how far a path's heading comes from that of its first piece at most."""
     steps = np.diff(path, axis=0)
@@ -135,7 +168,7 @@ def region_of(path: Path) -> tuple[World, RoadsDriven]:
     lat, lon = np.array(list(osm.locations.values())).T
     bounds = LatLonBounds(lat.min(), lon.min(), lat.max(), lon.max())
     world = build_region(osm, graph, bounds, index=index, ground=False)
-    return world, RoadsDriven(graph.edges)
+    return world, RoadsDriven(graph, world.frame)
 
 
 def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
@@ -149,6 +182,9 @@ def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
         before, behind = start[-1] - start[-2], end[1] - end[0]
         angle = abs(math.remainder(_yaw(behind) - _yaw(before), math.tau))
         counts = c.turn == near_side and c.signal_group_id is not None
+        beside = math.nan
+        if c.turn != "u_turn":
+            beside = beside_m(c.centerline, before, behind, roads.lines(from_lane, to_lane))
         longer = np.concatenate([start[:-1], c.centerline, end[1:]])
         yield Turn(
             name=c.id,
@@ -158,6 +194,7 @@ def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
             left_roads_rad=left_interval_rad(
                 c.centerline, before, behind, *roads.directions(from_lane, to_lane)
             ),
+            beside_m=beside,
             radius_m=least_radius_m(longer),
             near_side_at_lights_rad=angle if counts else 0.0,
             step_pm=curvature_changes(whole)[0],
@@ -215,8 +252,9 @@ def row_of(turns: list[Turn]) -> str:
     looped = [t.kind for t in turns if t.turned_rad > LOOP_RAD]
     loops = f"loops {looped.count('turn')} + {looped.count('u_turn')} U"
     counts = f"{len(turned):4d} {len(off_roads):4d} + {len(u_turned):3d} U  {loops}"
+    aside = "/".join(str(sum(t.beside_m > m for t in turns)) for m in BESIDE_M)
     shape = f"step {_words(step)}  rate {_words(rate)}"
-    return f"{len(turns):7d} turned {counts}  radius {radii}  {shape}"
+    return f"{len(turns):7d} turned {counts}  beside {aside}  radius {radii}  {shape}"
 
 
 def _quartiles(values: list[float]) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 import shapely.ops
 
+from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.world import Lane
-from foretwin.world_gen.roads.road_graph import RoadEdge
+from foretwin.world_gen.roads.road_graph import RoadGraph
 
 FARTHEST_M = 150.0
 """Of roads between two lanes; no place is wider."""
@@ -31,29 +32,38 @@ class _Along(NamedTuple):
 class RoadsDriven:
     """Answers along which pieces of a map's roads one comes from lane to lane."""
 
-    def __init__(self, edges: Iterable[RoadEdge]) -> None:
-        """Index the edges by their way and nodes, and by where they end."""
+    def __init__(self, graph: RoadGraph, frame: LocalFrame) -> None:
+        """Index the edges, in a World's frame, by their way and nodes, and by where they end."""
         self._by_name: dict[tuple[int, int, int], np.ndarray] = {}
         self._onward: dict[int, list[tuple[int, np.ndarray, float]]] = {}
-        for edge in edges:
+        origin = graph.frame.origin
+        moved_m = local_from_geo(frame, np.array([origin.lat_deg]), np.array([origin.lon_deg]))
+        for edge in graph.edges:
+            line = edge.xy_m + moved_m
             for a, b, xy_m in (
-                (edge.start_node, edge.end_node, edge.xy_m),
-                (edge.end_node, edge.start_node, edge.xy_m[::-1]),
+                (edge.start_node, edge.end_node, line),
+                (edge.end_node, edge.start_node, line[::-1]),
             ):
                 self._by_name[edge.way_id, a, b] = xy_m
                 self._onward.setdefault(a, []).append((b, xy_m, edge.length_m))
 
-    def directions(self, start: Lane, end: Lane) -> Iterator[np.ndarray]:
-        """Yield the direction (2,) of each piece of road from the end of one lane to another.
+    def lines(self, start: Lane, end: Lane) -> list[np.ndarray]:
+        """Return the roads (N, 2) from the end of one lane to another, piece by piece.
 
-        They are the shortest way between the nodes at the ends of both lanes' edges, and what the
-        lanes leave of these edges.
+        They are the shortest way between the nodes at the ends of both lanes' edges, between what
+        the lanes leave of these edges, which may be a point.
         """
         first, last = self._edge_of(start), self._edge_of(end)
-        yield from _pieces(first.xy_m, start.centerline[-1], behind=True)
-        for line in self._between(first.end_node, last.start_node):
+        return [
+            _left_of_it(first.xy_m, start.centerline[-1], behind=True),
+            *self._between(first.end_node, last.start_node),
+            _left_of_it(last.xy_m, end.centerline[0], behind=False),
+        ]
+
+    def directions(self, start: Lane, end: Lane) -> Iterator[np.ndarray]:
+        """Yield the direction (2,) of each piece of road from the end of one lane to another."""
+        for line in self.lines(start, end):
             yield from np.diff(line, axis=0)
-        yield from _pieces(last.xy_m, end.centerline[0], behind=False)
 
     def _edge_of(self, lane: Lane) -> _Along:
         way, start, end, side = lane.id.split(".")
@@ -78,10 +88,9 @@ class RoadsDriven:
         return []
 
 
-def _pieces(xy_m: np.ndarray, at: np.ndarray, *, behind: bool) -> Iterator[np.ndarray]:
-    """Yield the directions of a road's pieces behind, or before, where a lane ends, or begins."""
+def _left_of_it(xy_m: np.ndarray, at: np.ndarray, *, behind: bool) -> np.ndarray:
+    """Return what is left of a road behind, or before, where a lane ends, or begins."""
     road = shapely.LineString(xy_m)
     at_m = road.project(shapely.Point(at))
     part = shapely.ops.substring(road, *((at_m, road.length) if behind else (0.0, at_m)))
-    if part.length > LEAST_M:
-        yield from np.diff(np.array(part.coords), axis=0)
+    return np.array(part.coords if part.length > LEAST_M else part.coords[:1])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import drawn_map, world_of
-from tests.world_gen.measure_turns import ALLOWED_RAD, turns_of
+from tests.world_gen.measure_turns import ALLOWED_RAD, beside_m, turns_of
 from tests.world_gen.roads_driven import RoadsDriven
 
 ROAD = {"highway": "residential", "lanes": "2"}
@@ -23,7 +24,8 @@ ASIDE = drawn_map(
 
 
 def bearings_deg(start_way: int, end_way: int) -> list[float]:
-    world, roads = world_of(ASIDE), RoadsDriven(build_road_graph(ASIDE).edges)
+    world = world_of(ASIDE)
+    roads = RoadsDriven(build_road_graph(ASIDE), world.frame)
     lanes = {lane.id: lane for lane in world.lanes}
     (one,) = (
         c
@@ -40,8 +42,21 @@ def test_who_crosses_where_arms_lie_aside_drives_along_the_road_between() -> Non
 
 
 def test_such_a_turn_leaves_the_angle_of_its_lanes_and_not_that_of_its_roads() -> None:
-    turns = turns_of(world_of(ASIDE), RoadsDriven(build_road_graph(ASIDE).edges))
+    world = world_of(ASIDE)
+    turns = turns_of(world, RoadsDriven(build_road_graph(ASIDE), world.frame))
     across = [t for t in turns if t.name.startswith("w10.") and ">w30." in t.name]
 
     assert across[0].left_rad > ALLOWED_RAD
     assert across[0].left_roads_rad == pytest.approx(0.0, abs=0.02)
+
+
+def test_who_turns_between_roads_stays_in_what_they_span_and_who_swings_out_does_not() -> None:
+    east, north = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    roads = [np.array([[-20.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 20.0]])]
+    cut = np.array([[-20.0, 0.0], [-6.0, 6.0], [0.0, 20.0]])
+    swung = np.array([[-20.0, -2.0], [3.0, -2.0], [7.0, 0.0], [2.0, 20.0]])
+
+    assert beside_m(cut, east, north, roads) == pytest.approx(0.0)
+    # The corner where its lanes' lines cross lies at (2, -2).
+    assert beside_m(swung, east, north, roads) == pytest.approx(5.0 - 2.0, abs=0.2)
+    assert math.isnan(beside_m(cut, east, north, [*roads, roads[0]]))

@@ -37,6 +37,9 @@ MAIN_IMPORTANCE = 4.0
 """Of tertiary roads, the least main ones. Where there are lights all roads are main ones."""
 USUAL_LANE_M = 3.25
 SOFTEST_TURN_RAD, SHARPEST_TURN_RAD = math.radians(20.0), math.radians(150.0)
+HAIRPIN_RAD, BEND_RAD = math.radians(135.0), math.radians(20.0)
+"""Lanes end before their road bends by so much, where they would turn by so much from behind it:
+such a path swings out beside both roads (to AASHTO's 135° corners grow tighter, then no more)."""
 SHARPEST_ARC_RAD = math.radians(140.0)
 """Sharper turns swing out instead of beginning farther back."""
 _ROUNDS = 2
@@ -69,9 +72,20 @@ def turning_trims(
     the lanes' lines cross, and farther for the way in which its curvature rises.
     """
     legs = _legs_of(clusters, sections)
+    most_m = np.maximum(most_m, least_m)
+    wide_m = _widened_m(legs, least_m, most_m)
+    bend_m = np.clip(_bends_at_m(legs, least_m), least_m, most_m)
+    before, behind = (_turned_rad(legs, m) for m in (np.minimum(wide_m, bend_m), wide_m))
+    swings_out = ((behind > HAIRPIN_RAD) & (before < HAIRPIN_RAD)).any(axis=2)
+    if not swings_out.any():
+        return wide_m
+    return _widened_m(legs, least_m, np.where(swings_out, bend_m, most_m))
+
+
+def _widened_m(legs: _Legs, least_m: Array, most_m: Array) -> Array:
     trim = least_m
     for _ in range(_ROUNDS):
-        trim = np.clip(trim + _missing_m(legs, trim), least_m, np.maximum(most_m, least_m))
+        trim = np.clip(trim + _missing_m(legs, trim), least_m, most_m)
     return np.asarray(trim)
 
 
@@ -104,12 +118,34 @@ def _importance(name: str) -> float:
     return max(rank, MAIN_IMPORTANCE) if name.endswith("_link") else rank
 
 
-def _missing_m(legs: _Legs, trim: Array) -> Array:
-    """Return how much farther back (K, n) lanes must end, negative where there is room to spare."""
+def _bends_at_m(legs: _Legs, from_m: Array) -> Array:
+    """Return how far along (K, n) legs bend that go straight on from `from_m`; else inf."""
+    ways, line = legs.ways, legs.ways.line
+    _, head = _ends(legs, from_m)
+    bent = np.abs(turn_rad(head.reshape(-1, 2)[line], ways.steps[0])) > BEND_RAD
+    bent &= ~ways.is_last & (ways.arc_m > from_m.ravel()[line])
+    found = np.minimum.reduceat(np.where(bent, ways.arc_m, np.inf), ways.first[:-1])
+    return np.asarray(found.reshape(from_m.shape))
+
+
+def _ends(legs: _Legs, trim: Array) -> tuple[Array, Array]:
+    """Return where legs that are cut begin, and their directions there, both (K, n, 2)."""
     which = np.arange(trim.size)
     at_m = np.minimum(trim.ravel(), legs.ways.length_m - _LOOK_M)
     at = points_at(legs.ways, which, at_m).reshape(*trim.shape, 2)
-    head = units(points_at(legs.ways, which, at_m + _LOOK_M).reshape(*trim.shape, 2) - at)
+    ahead = points_at(legs.ways, which, at_m + _LOOK_M).reshape(*trim.shape, 2)
+    return at, units(ahead - at)
+
+
+def _turned_rad(legs: _Legs, trim: Array) -> Array:
+    """Return by how much who comes from one leg turns into another, (K, n, n)."""
+    _, head = _ends(legs, trim)
+    return np.abs(turn_rad(-head[:, :, None], head[:, None, :]))
+
+
+def _missing_m(legs: _Legs, trim: Array) -> Array:
+    """Return how much farther back (K, n) lanes must end, negative where there is room to spare."""
+    at, head = _ends(legs, trim)
     # From leg i into leg j; an angle above 0 is a turn to the left.
     own, other = head[:, :, None], head[:, None, :]
     angle = turn_rad(-own, other)

@@ -128,3 +128,25 @@ def test_no_turn_at_one_node_leaves_the_angle_between_its_lanes_by_more_than_30_
         assert yaw.max() < max(yaw[-1], 0.0) + math.radians(30.0)
         assert yaw.min() > min(yaw[-1], 0.0) - math.radians(30.0)
         assert abs(yaw[-1]) < math.pi
+
+
+WEST_M = (-5.8, 2.4), (-7.9, 6.8), (-9.8, 12.1), (-8.5, 18.4), (-6.2, 27.9), (-4.0, 80.0)
+EAST_M = (5.0, 0.7), (9.9, 4.5), (12.4, 10.4), (14.6, 28.8), (15.0, 80.0)
+TAIL_M = (15.4, -17.4), (34.3, -33.2), (60.2, -45.9)
+
+
+def _cup() -> World:
+    """Return two roads from the north that bend towards one another, and one to the south."""
+    nodes = {0: (0.0, 0.0)} | dict(enumerate((*WEST_M, *EAST_M, *TAIL_M), start=1))
+    ways = [(11, [0, *range(1, 7)], MAIN), (12, [0, *range(7, 12)], MAIN)]
+    ways += [(13, [0, 12, 13, 14], {"highway": "unclassified"})]
+    return world_of(drawn_map(nodes, ways, origin=GERMANY))
+
+
+def test_lanes_end_before_bends_behind_which_a_turn_would_swing_out():
+    world = _cup()
+    across = [c.centerline for c in world.connections if "w13" not in c.id]
+    assert len(across) == 2
+    # Both bend within 12 m of the place: the turns go no farther beyond it than a road is wide.
+    assert all(path[:, 1].min() > -6.5 for path in across)
+    assert min(tightest_radius_m(path) for path in across) > 5.0
