@@ -9,6 +9,12 @@ import pytest
 from tests.test_layout import ROOT, tracked_files
 
 TEXT = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+MOST_WORDS = 1_650
+"""Two printed pages."""
+
+
+def test_it_is_read_in_two_pages() -> None:
+    assert len(TEXT.split()) <= MOST_WORDS
 
 
 def test_every_file_that_it_names_is_there() -> None:
