@@ -203,7 +203,7 @@ class RolloutView:
 
     @functools.cached_property
     def relative(self) -> Relative:
-        """All road users in the ego's axes."""
+        """All road users in the ego's axes, far to its left where absent."""
         x, y, yaw, speed = self.users
         found = Relative._make([*(np.empty(x.shape) for _ in range(6)), speed])
         for rows in self.blocks:
@@ -220,6 +220,11 @@ class RolloutView:
             np.multiply(speed[rows], aside, out=found.left_mps[rows])
             found.ahead_mps[rows] -= self.states[rows, :, 3, None]
             found.left_mps[rows] -= self.states[rows, :, 4, None]
+        if not self.there.all():
+            # Abeam, whichever way the ego looks: far ahead, it would be a leader in the end.
+            gone = ~self.there
+            np.copyto(found.ahead_m, 0.0, where=gone)
+            np.copyto(found.left_m, _FAR_M, where=gone)
         return found
 
     @functools.cached_property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -84,3 +85,20 @@ def test_without_a_leader_nothing_threatens() -> None:
     for found in (alone, crossing):
         assert found["btn"] == found["stn"] == found["rss_distance"] == 0.0
         assert all(found[name] == math.inf for name in ("ttb", "tts", "ttr", "rss_margin"))
+
+
+@settings(max_examples=40)
+@given(st.floats(-3.1, 3.1), st.floats(0.0, 25.0))
+@example(0.0, 10.0)
+def test_who_is_not_there_is_never_ahead(yaw: float, speed: float) -> None:
+    drawn = rollout(Mover(0, 0, yaw, speed), Mover(30.0, 0.0), time_s=times(2.0))
+    alone = drawn._replace(
+        users=np.full_like(drawn.users, np.nan),
+        user_speed_mps=np.full_like(drawn.user_speed_mps, np.nan),
+    )
+
+    found = evaluate(alone, ("thw", "ttc", "wttc", "ttb", "tts", "rss_margin", "drac"))
+
+    values = {name: float(one.values[0]) for name, one in found.items()}
+    assert values.pop("drac") == 0.0
+    assert set(values.values()) == {math.inf}
