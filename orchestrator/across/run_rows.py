@@ -13,6 +13,7 @@ import msgspec
 from foretwin.contracts.errors import one_line
 from foretwin.orchestrator.record.run_folder import SUMMARY
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, RUNNING, is_locked
+from foretwin.orchestrator.record.whereabouts import driven_s
 from foretwin.orchestrator.sweep.lock import LOCK
 
 DRIVE, SWEEP = "drive", "sweep"
@@ -45,6 +46,9 @@ class RunRow(msgspec.Struct, frozen=True, kw_only=True):
     vehicle_id: str | None = None
     seed: int | None = None
     drive_time_s: float | None = None
+    """When it ended, from where the log begins."""
+    driven_s: float | None = None
+    """How long it went: without what `--start` left out."""
     wall_s: float | None = None
     """How long it took; of a sweep, of its last start."""
     junctions: int | None = None
@@ -118,6 +122,7 @@ def drive_row(record: Mapping[str, Any], *, folder: str, record_text: str) -> Ru
         vehicle_id=config.get("vehicle_id"),
         seed=record.get("seed"),
         drive_time_s=record.get("drive_time_s"),
+        driven_s=driven_s(record),
         wall_s=record.get("wall_s"),
         junctions=None
         if junctions is None

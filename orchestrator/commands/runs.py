@@ -89,7 +89,7 @@ def _what(row: RunRow) -> str:
 
 
 def _lasted(row: RunRow) -> str:
-    lasted_s = row.wall_s if row.drive_time_s is None else row.drive_time_s
+    lasted_s = row.wall_s if row.driven_s is None else row.driven_s
     if lasted_s is None:
         return ""
     minutes, seconds = divmod(round(lasted_s), 60)

@@ -1,9 +1,19 @@
-"""Where a drive was at an instant, by the streets that it came to: told from its record."""
+"""Where a drive was at an instant, by the streets that it came to, and how long it went."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Any
+
+
+def driven_s(record: Mapping[str, Any]) -> float | None:
+    """Return how many seconds a drive went by its run.json, None where that is not told.
+
+    Its `drive_time_s` counts from where the log begins, which a drive with `--start` did not see.
+    """
+    ended_s = record.get("drive_time_s")
+    began_s = (record.get("config") or {}).get("start_s") or 0.0
+    return None if ended_s is None else max(float(ended_s) - float(began_s), 0.0)
 
 
 def where_at(drive_time_s: float, intersections: Iterable[Mapping[str, Any]]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from foretwin.orchestrator.progress import Progress, untold
+from foretwin.orchestrator.record.whereabouts import driven_s
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -85,11 +86,11 @@ def run_report(
 
 def _subtitle(run: RunMaterial) -> str:
     record = run.record
-    driven_s = record.get("drive_time_s")
+    seconds = driven_s(record)
     config = record.get("config") or {}
     said = [
         "no record of it" if not record else f"ended: {record.get('exit') or 'not told'}",
-        "" if driven_s is None else f"{driven_s:.1f} s driven",
+        "" if seconds is None else f"{seconds:.1f} s driven",
         f"source: {config['source']}" if config.get("source") else "",
         f"planner: {config['planner']}" if config.get("planner") else "",
     ]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from foretwin.orchestrator.progress import Progress, untold
+from foretwin.orchestrator.record.whereabouts import driven_s
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -178,7 +179,7 @@ def _gravest(one: _Seen) -> TableCell:
 
 
 _ROWS: tuple[tuple[str, _Get], ...] = (
-    ("driven", _recorded("drive_time_s", digits=1, unit="s")),
+    ("driven", lambda one: number(driven_s(one.run.record), 1, "s")),
     (
         "junctions reached",
         lambda one: number(float(sum(p.arrived_s is not None for p in one.passed)), 0),

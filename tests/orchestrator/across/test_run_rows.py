@@ -13,7 +13,8 @@ from tests.orchestrator.lake.made_runs import made_run, made_sweep
 
 
 def test_a_drive_is_told_by_its_record(tmp_path: Path) -> None:
-    config = {"vehicle_id": "ego", "log": "/logs/monday.mcap", "planner": "mine"}
+    config = {"vehicle_id": "ego", "log": "/logs/monday.mcap", "planner": "mine",
+              "start_s": 20.0}  # fmt: skip
     more: dict[str, Any] = {"config": config, "drive_time_s": 61.5, "intersections": [{}, {}],
             "left_out": {"intersections": 3},
             "tuning": {"verdicts": [{"culprit": "vehicle", "cause": "steering"}] * 2},
@@ -31,6 +32,7 @@ def test_a_drive_is_told_by_its_record(tmp_path: Path) -> None:
         "drive", "completed", "log monday.mcap", "town.osm",
     )  # fmt: skip
     assert (row.planner, row.drive_time_s, row.junctions, row.seed) == ("mine", 61.5, 5, 7)
+    assert row.driven_s == 41.5
     assert (row.futures, row.rounds_late, row.troubles) == (64, 1, 1)
     assert row.verdict == "vehicle: steering"
     assert json.loads(row.record)["drive_time_s"] == 61.5
