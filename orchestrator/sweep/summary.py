@@ -102,6 +102,18 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 4)
 
 
+def _counted(summary: dict[str, Any]) -> str:
+    rows, nowhere = summary["rows"], len(summary["unplaced"])
+    not_placed = rows - summary["placed"]
+    return (
+        f"{rows} rows of {summary['worlds']} Worlds"
+        f"{f', {not_placed} of them not placed' if not_placed else ''}, "
+        f"{summary['jobs_played']} of {summary['jobs']} jobs played now in "
+        f"{summary['playing_s']:.1f} s"
+        f"{f'; places not found: {nowhere}' if nowhere else ''}"
+    )
+
+
 def print_summary(out: Path, summary: dict[str, Any]) -> None:
     """Print a sweep's summary as a table."""
     from rich.table import Column, Table
@@ -123,11 +135,7 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
         shown.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
     shown.print(table)
     shard = f", shard {summary['shard']}" if "shard" in summary else ""
-    say(
-        f"{out}{shard}: {summary['rows']} rows of {summary['worlds']} Worlds, "
-        f"{summary['jobs_played']} of {summary['jobs']} jobs played now in "
-        f"{summary['playing_s']:.1f} s; {len(summary['unplaced'])} unplaced"
-    )
+    say(f"{out}{shard}: {_counted(summary)}")
     say(likeness_words())
     if summary["placed_nowhere"]:
         say(f"placed nowhere: {', '.join(summary['placed_nowhere'])}")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import statistics
 from pathlib import Path
 
+import pytest
 from msgspec.structs import replace
 
 from foretwin.contracts.parts import CaseCount
 from foretwin.orchestrator.sweep.spec import load_spec
-from foretwin.orchestrator.sweep.summary import Summary
+from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from tests.orchestrator.sweeps import small_sweep
 
 COUNT = CaseCount(scenario="scp", planner="x", cases=10, placed=9, collided=0, failed=0)
@@ -43,3 +44,21 @@ def test_in_whatever_order_parts_come_they_add_up_to_the_same(tmp_path: Path) ->
     scores = [score for part in parts for score in part.scores]
     assert entry["mean_score"] == round(statistics.fmean(scores), 4)
     assert forwards.totals() == {"rows": 500, "placed": 450, "collided": 0, "failed": 0}
+
+
+@pytest.mark.parametrize(
+    ("placed", "unplaced", "said"),
+    [
+        (8, [], "8 rows of 3 Worlds, 4 of 4 jobs played now in 0.6 s"),
+        (4, [], "8 rows of 3 Worlds, 4 of them not placed, 4 of 4 jobs played now in 0.6 s"),
+        (8, [{}], "in 0.6 s; places not found: 1"),
+    ],
+)
+def test_the_last_line_counts_what_was_not_placed(
+    placed: int, unplaced: list[dict[str, str]], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    counts = {"rows": 8, "placed": placed, "worlds": 3, "jobs": 4, "jobs_played": 4}
+    told = {"playing_s": 0.552, "unplaced": unplaced, "placed_nowhere": [], "failures": {}}
+    more = {"scenarios": [], "rows_sha256": "0", "attribution": ""}
+    print_summary(Path("out"), counts | told | more)
+    assert said in capsys.readouterr().out
