@@ -48,6 +48,8 @@ class MissionSettings:
     radius_m: float = 150.0
     look_ahead_s: float = 60.0
     horizon_s: float = 8.0
+    begins_s: float = 0.0
+    """Where in its log the drive begins: what its time is before the first state."""
 
 
 class Mission:
@@ -75,7 +77,7 @@ class Mission:
 
     def before_start(self, junctions: Iterable[Junction], *, mono_s: float) -> list[Instruction]:
         """Ask for the Worlds where a given route begins, before the car moves."""
-        at = Moment(mono_s, 0.0)
+        at = Moment(mono_s, self.drive_time_s)
         return [
             BuildWorld(junction.summary.id, load=True)
             for junction in junctions
@@ -134,7 +136,7 @@ class Mission:
     def drive_time_s(self) -> float:
         """Seconds since the drive's start, by the vehicle's clock."""
         if self._car is None:
-            return 0.0
+            return self._settings.begins_s
         return (self._car.stamp_ns - self.start_stamp_ns) / 1e9
 
     @property

@@ -82,6 +82,7 @@ class Orchestrator:
                 radius_m=plan.config.radius_m,
                 look_ahead_s=plan.config.look_ahead_s,
                 horizon_s=plan.config.horizon_s,
+                begins_s=plan.config.start_s,
             ),
         )
 

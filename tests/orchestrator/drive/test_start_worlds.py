@@ -46,6 +46,20 @@ def test_what_was_asked_for_before_the_start_is_not_asked_for_again() -> None:
     assert first[0].summary.id not in again
 
 
+def test_what_is_asked_for_before_the_first_state_is_asked_when_the_drive_begins() -> None:
+    inputs = town()
+    way = WayAhead(inputs.graph, inputs.junctions, inputs.routes, index=inputs.index)
+    mission = Mission(way, settings=MissionSettings(begins_s=640.0))
+    first = junctions_at_start(inputs.routes[0], inputs.junctions, 150.0)
+    mission.before_start(first, mono_s=0.0)
+    assert mission.drive_time_s == 640.0
+    assert mission.visits.latest(first[0].summary.id).seen.drive_time_s == 640.0
+    state = states_along(inputs.graph.frame, town_line())[0]
+    mission.start_stamp_ns = state.stamp_ns - 641 * 10**9
+    mission.on_state(state, mono_s=1.0)
+    assert mission.drive_time_s == 641.0
+
+
 def asked_from(folder: Path, plan: DrivePlan) -> list[str]:
     """The junctions whose Worlds are asked for before a drive's car is let go."""
     house = House(folder, at_once=True, plan=plan)
