@@ -18,7 +18,7 @@ _DEGREE = 4
 
 
 class Motion(NamedTuple):
-    """Derivatives (M, 2) of curves by their parameter, their lengths and curvatures (M,)."""
+    """Derivatives (P, K, 2) of curves by their parameter, their lengths and curvatures (P, K)."""
 
     velocity: Array
     speed: Array
@@ -54,10 +54,10 @@ def displacements(vectors: Array, at: Array) -> Array:
 
 
 def motion(vectors: Array, at: Array) -> Motion:
-    """Return how curves go on: `vectors` (5, M, 2), `at` (M,) from 0 to 1."""
-    velocity = np.einsum("im,imc->mc", _bernstein(at, _DEGREE), vectors)
-    change = np.einsum("im,imc->mc", _bernstein(at, _DEGREE - 1), np.diff(vectors, axis=0))
-    speed = np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), 1e-6)
+    """Return how K curves go on, all at P places: `vectors` (5, K, 2), `at` (P,) from 0 to 1."""
+    velocity = np.einsum("ip,ikc->pkc", _bernstein(at, _DEGREE), vectors)
+    change = np.einsum("ip,ikc->pkc", _bernstein(at, _DEGREE - 1), np.diff(vectors, axis=0))
+    speed = np.maximum(np.hypot(velocity[..., 0], velocity[..., 1]), 1e-6)
     return Motion(velocity, speed, np.asarray(_DEGREE * cross(velocity, change) / speed**3))
 
 

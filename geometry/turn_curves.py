@@ -156,14 +156,12 @@ def _vectors(ends: _LaneEnds, choice: _Choice) -> Array:
 
 def _rated(vectors: Array, angle: Array) -> _Rating:
     """Return how good curves are by some points of each; NaN is infinitely bad."""
-    count, many = len(angle), len(_RATED_AT)
-    # Point by point, then curve by curve.
-    found = motion(np.tile(vectors, (1, many, 1)), np.repeat(_RATED_AT, count))
-    bend, speed = (a.reshape(many, count) for a in (found.curvature_pm, found.speed))
+    found = motion(vectors, _RATED_AT)
+    bend, speed = found.curvature_pm, found.speed
     way_m = (speed[1:] + speed[:-1]) / 2.0 * np.diff(_RATED_AT)[:, None]
     rate = (np.abs(np.diff(bend, axis=0)) / way_m).max(axis=0)
     tightest = np.abs(bend).max(axis=0)
-    ways = np.concatenate([vectors[:1], found.velocity.reshape(many, count, 2), vectors[-1:]])
+    ways = np.concatenate([vectors[:1], found.velocity, vectors[-1:]])
     yaw = np.cumsum(turn_rad(ways[:-1], ways[1:]), axis=0)
     # Who turns back may do so to either side.
     whole = np.where(np.abs(angle) < _CROSSING_RAD[1], angle, yaw[-1])
