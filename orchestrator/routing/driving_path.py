@@ -32,6 +32,7 @@ from foretwin.orchestrator.routing.rounding import (
     turns,
     with_driven_bends,
     with_driven_turns,
+    with_whole_bends,
     without_straight,
 )
 from foretwin.orchestrator.routing.route import Route, turn_angle
@@ -96,7 +97,7 @@ def driving_path(
     xy = drivable(smoothed(centre + offset[:, None] * normals(centre), 0.5 * SMOOTHING_M))
     if onto_lanes is not None:
         xy, place = evenly_spaced(*with_driven_bends(onto_lanes(xy, place), place))
-        xy, place = with_driven_turns(xy, place, radii_m)
+        xy, place = with_driven_turns(with_whole_bends(xy), place, radii_m)
         xy = drivable(smoothed(xy, 0.5 * SMOOTHING_M))
     return _resampled(route, xy, place, begin, end)
 

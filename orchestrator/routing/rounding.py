@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import shapely
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
@@ -38,6 +38,13 @@ corners may be cut, 0.25 to 2 m, makes no difference there.
 """
 BEND_RAD = math.radians(20.0)
 """One that turns more at a node is a corner."""
+BEND_WITHIN_M = 1.0
+"""A bend leaves the map's line by no more: what lines of maps are wrong by, and less than lanes
+have beside a car."""
+BEND_SMOOTHING_M = 6.0
+"""Standard deviation of the smoothing that makes one bend of a map's corners."""
+TURN_WITHIN_M, TURNED_RAD = 30.0, math.radians(45.0)
+"""What turns more within so many metres is a turn at a junction, and stays as sharp as it is."""
 TURN_ROOM_M = 12.0
 """A wider turn begins and ends so far from the tight one at most."""
 
@@ -187,6 +194,27 @@ def with_driven_bends(points: Array, s: Array) -> tuple[Array, Array]:
     cut = 1.0 / np.cos(np.minimum(turn, 1.0) / 2.0) - 1.0
     radius = np.where(turn < BEND_RAD, SIMPLIFY_M / np.maximum(cut, 1e-9), 0.0)
     return fillet(line, s[corners], radius)
+
+
+def with_whole_bends(points: Array) -> Array:
+    """Return evenly spaced points (N, 2) with the corners of a road's bend driven as one bend.
+
+    A map has a bend as some corners, and a future would brake for each as if it were the bend. What
+    smoothing takes away is smoothed and given back, so that arcs stay where they are: Tukey (1977),
+    Exploratory Data Analysis, calls it twicing. Points move by `BEND_WITHIN_M` at most, and not in
+    turns at junctions.
+    """
+    once = smoothed(points, BEND_SMOOTHING_M)
+    moved = 2.0 * once - smoothed(once, BEND_SMOOTHING_M) - points
+    way, at = tangents(smoothed(points, 1.0)), np.arange(len(points))
+    half = round(TURN_WITHIN_M / 2.0 / FINE_M)
+    ahead, behind = np.minimum(at + half, at[-1]), np.maximum(at - half, 0)
+    turns_off = (way[ahead] * way[behind]).sum(axis=1) < math.cos(TURNED_RAD)
+    share = BEND_WITHIN_M / np.maximum(np.hypot(*moved.T), BEND_WITHIN_M)
+    room = 2 * round(BEND_SMOOTHING_M / FINE_M) + 1
+    least = minimum_filter1d(np.where(turns_off, 0.0, share), room, mode="nearest")
+    share = gaussian_filter1d(least, BEND_SMOOTHING_M / 2.0 / FINE_M, mode="nearest")
+    return np.asarray(points + share[:, None] * moved)
 
 
 def with_driven_turns(

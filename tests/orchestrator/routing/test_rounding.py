@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.rounding import (
+    BEND_WITHIN_M,
     FINE_M,
     SIMPLIFY_M,
     STRAIGHT_M,
@@ -22,6 +23,7 @@ from foretwin.orchestrator.routing.rounding import (
     smoothed,
     with_driven_bends,
     with_driven_turns,
+    with_whole_bends,
 )
 
 RADII_M = 9.5, 10.5
@@ -157,3 +159,51 @@ def test_a_bend_drawn_finely_and_a_corner_stay_as_they_are() -> None:
         driven, place = evenly_spaced(*with_driven_bends(drawn, s))
         near = np.stack([np.interp(s, place, driven[:, i]) for i in (0, 1)], axis=-1)
         assert np.hypot(*(near - drawn).T).max() < STRAIGHT_M + 0.01
+
+
+def test_the_corners_of_a_bend_become_one_bend() -> None:
+    # Five corners of 8 degrees, 12 m apart, as a hand draws a bend of 90 m, half a metre off.
+    heading = np.radians(8.0) * np.arange(6)
+    legs_m = np.array([60.0, 12.0, 12.0, 12.0, 12.0, 60.0])
+    step = legs_m[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    line = np.concatenate([[[0.0, 0.0]], np.cumsum(step, axis=0)])
+    line[3] += 0.5 * np.array([math.sin(0.28), -math.cos(0.28)])
+    drawn, _ = evenly_spaced(*with_driven_bends(*evenly_spaced(line, arc_lengths(line))))
+    driven = with_whole_bends(drawn)
+
+    bend = [np.abs(curvature_pm(smoothed(xy, 1.0))).max() for xy in (drawn, driven)]
+    assert bend[0] > 0.026
+    assert bend[1] < 0.6 * bend[0]
+    assert bend[1] > 1.0 / 90.0
+    assert 0.1 < np.hypot(*(driven - drawn).T).max() < BEND_WITHIN_M
+    assert driven[:60] == pytest.approx(drawn[:60], abs=0.005)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_bend_that_is_drawn_round_stays_where_it_is(side: float) -> None:
+    xy, _ = turn(side * 0.9, 60.0)
+    assert with_whole_bends(xy)[120:-120] == pytest.approx(xy[120:-120], abs=0.02)
+    assert with_whole_bends(xy) == pytest.approx(xy, abs=0.15)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_turn_at_a_junction_is_no_bend(side: float) -> None:
+    xy, _ = turn(side * math.pi / 2, 10.0)
+    assert np.hypot(*(with_whole_bends(xy) - xy).T).max() < 0.05
+
+
+@settings(max_examples=40, deadline=None)
+@given(angles=st.lists(st.floats(-0.7, 0.7), min_size=2, max_size=5), leg_m=st.floats(10.0, 60.0))
+def test_bends_leave_the_line_of_the_map_by_a_metre_at_most(
+    angles: list[float], leg_m: float
+) -> None:
+    heading = np.cumsum([0.0, *angles])
+    step = leg_m * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    line = np.concatenate([[[0.0, 0.0]], np.cumsum(step, axis=0)])
+    drawn, _ = evenly_spaced(line, arc_lengths(line))
+    driven = with_whole_bends(drawn)
+
+    assert np.hypot(*(driven - drawn).T).max() <= BEND_WITHIN_M + 1e-9
+    assert driven[[0, -1]] == pytest.approx(drawn[[0, -1]])
+    length = np.hypot(*np.diff(driven, axis=0).T)
+    assert 0.5 * FINE_M < length.min() <= length.max() < 1.5 * FINE_M

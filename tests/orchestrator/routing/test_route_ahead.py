@@ -124,7 +124,9 @@ def test_in_a_world_the_path_follows_its_lanes() -> None:
         off_lanes.append(way.off_lanes_m)
 
     every = np.concatenate(away)
-    assert every[np.isfinite(every)].max() < 0.2
+    # Beside turns, where bends are driven as one, and not as the town draws them.
+    assert every[np.isfinite(every)].max() < 0.35
+    assert np.quantile(every[np.isfinite(every)], 0.95) < 0.2
     assert max(off_lanes) == 0.0
     empty = msgspec.structs.replace(world, id="empty", lanes=(), connections=())
     assert way.path(empty, speed_mps=10.0, horizon_s=8.0) is not None
