@@ -179,6 +179,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """(K,) the speed that the nominal future aims at, `SPEED_AHEAD_STEP_S` apart from its start;
     then it stays. A job without it aims at `cruise_speed_mps`, and has the bytes that it had before
     there was one."""
+    bend_accel_mps2: float | msgspec.UnsetType = msgspec.UNSET
+    """What the driver takes across the way in bends. A job without it has an ordinary driver's, and
+    the bytes that it had before there was one."""
     planner_timing: PlannerTiming | msgspec.UnsetType = msgspec.UNSET
     """Of a driving stack that a sweep starts; a job without one has the bytes that it had before
     there was one."""

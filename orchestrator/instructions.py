@@ -56,6 +56,8 @@ class RoundIntent:
     cruise_speed_mps: float
     speed_ahead_mps: Array
     """(K,) what the nominal future aims at from instant to instant; see `Job`."""
+    bend_accel_mps2: float
+    """What the driver takes across the way in its bends."""
     off_lanes_m: float = 0.0
     next_junction: tuple[Control, float] | None = None
 

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import LATERAL_ACCEL_MPS2
 
 
 class SeenUsers(NamedTuple):
@@ -65,7 +66,8 @@ class PlannerView(NamedTuple):
     `ground` are None where there are none; `car_plan` where none was received; `heading` (2, S) is
     the cosine and sine of the states' yaw, where these are known already; `climb_mps2` (S,) is what
     the slope takes of the acceleration that is commanded, None where the World is flat;
-    `target_accel_mps2` (S,) is how the target speed changes, None where it stays.
+    `target_accel_mps2` (S,) is how the target speed changes, None where it stays; `bend_accel_mps2`
+    is what the nominal future takes across the way in bends.
     """
 
     time_s: float
@@ -86,6 +88,7 @@ class PlannerView(NamedTuple):
     heading: Array | None = None
     climb_mps2: Array | None = None
     target_accel_mps2: Array | None = None
+    bend_accel_mps2: float = LATERAL_ACCEL_MPS2
 
 
 class PlannerOutput(NamedTuple):

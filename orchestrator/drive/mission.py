@@ -177,7 +177,7 @@ class Mission:
 
     def plan_round(self) -> RoundIntent | NotReady | None:
         """Return the round to run now; None where no junction is within the look-ahead."""
-        car = self._car
+        car, horizon_s = self._car, self._settings.horizon_s
         if car is None or not self.wants_rounds:
             return None
         visit = self.visits.latest(self._current) if self._current else None
@@ -185,9 +185,7 @@ class Mission:
             return NotReady("the world is not ready", world_late=True)
         if not car.yaw_valid:
             return NotReady("the heading is not known", world_late=False)
-        path = self.way.path(
-            visit.world, speed_mps=car.speed_mps, horizon_s=self._settings.horizon_s
-        )
+        path = self.way.path(visit.world, speed_mps=car.speed_mps, horizon_s=horizon_s)
         if path is None:
             return NotReady("the road ends here", world_late=False)
         return RoundIntent(
@@ -195,7 +193,8 @@ class Mission:
             world_id=visit.world.id,
             path=path,
             cruise_speed_mps=self.way.cruise_speed_mps,
-            speed_ahead_mps=self.way.speeds_ahead(horizon_s=self._settings.horizon_s),
+            speed_ahead_mps=self.way.speeds_ahead(horizon_s=horizon_s),
+            bend_accel_mps2=self.way.bend_accel_mps2,
             off_lanes_m=self.way.off_lanes_m,
             next_junction=next(
                 ((a.junction.summary.control, a.distance_m) for a in self.way.junctions), None

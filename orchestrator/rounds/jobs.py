@@ -141,6 +141,7 @@ class RoundPlanner:
                     seed=config.seed,
                     cruise_speed_mps=intent.cruise_speed_mps,
                     speed_ahead_mps=speed_ahead,
+                    bend_accel_mps2=intent.bend_accel_mps2,
                     scenarios=tuple(s for s in scenarios if s.id in named),
                     road_users=users,
                     signals=signals,

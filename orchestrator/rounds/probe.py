@@ -19,6 +19,7 @@ from foretwin.geometry.polyline import densified, headings_rad, length, without_
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.instructions import LatestReports, RoundIntent
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
+from foretwin.sim_worker.driver_model import LATERAL_ACCEL_MPS2
 
 _ROUND_ID = 2**31 - 1
 """That of no round."""
@@ -71,6 +72,7 @@ def probe_task(
         path=PathAhead(xy_m=xy_m, speed_limit_mps=np.full(len(xy_m), into.speed_limit_mps.value)),
         cruise_speed_mps=_SPEED_MPS,
         speed_ahead_mps=np.array([_SPEED_MPS]),
+        bend_accel_mps2=LATERAL_ACCEL_MPS2,
     )
     planner = RoundPlanner(config, vehicle)
     planner.use_vehicle(vehicle, version)

@@ -201,6 +201,12 @@ class WayAhead:
         )
 
     @property
+    def bend_accel_mps2(self) -> float:
+        """What the driver takes across the latest path in its bends."""
+        assert self._speeds is not None
+        return self._speeds.bend_accel_mps2
+
+    @property
     def closed_to_cars(self) -> bool:
         """Whether the car is on a way that the map has, but gives to no car."""
         return self._match is not None and legality(self._match.directed_edge) == "no_car_road"
@@ -239,6 +245,6 @@ class WayAhead:
             driven_mps = self._earlier.along(
                 geometry.xy_m, stamp_ns=self._stamp_ns, car_xy_m=self._xy_m
             )
-        self._speeds = way_speeds(path, driven_mps)
+        self._speeds = way_speeds(path, driven_mps, speed_mps=self._cruise.speed_mps)
         self._bends = BendSpeeds(self.s_m, self._speeds.bend_mps)
         return path

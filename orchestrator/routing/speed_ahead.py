@@ -22,38 +22,57 @@ from foretwin.orchestrator.routing.going_on import (
 from foretwin.sim_worker.driver_model import (
     COMFORT_DECEL_MPS2,
     CURVE_TIME_S,
-    LATERAL_ACCEL_MPS2,
 )
 
+USUAL_BEND_MPS2, MOST_BEND_MPS2 = 2.25, 5.0
+"""What drivers take across the way in bends: before they have shown that they take more, and at
+most. Chosen on the drives given and to tune on (docs/trust.md)."""
 _STEP_S = 0.1
 
 
 class WaySpeeds(NamedTuple):
     """What a way says of speeds, every metre from the car on (M,): what its bends allow, its
-    limits, infinite where unknown, and what was driven there before, NaN where nobody did."""
+    limits, infinite where unknown, and what was driven there before, NaN where nobody did.
+
+    `bend_accel_mps2` is what the driver takes across the way in its bends.
+    """
 
     bend_mps: Sequence[float]
     limit_mps: Sequence[float]
     driven_mps: Sequence[float]
+    bend_accel_mps2: float
 
 
-def way_speeds(path: PathAhead, driven_mps: Array | None = None) -> WaySpeeds:
+def bend_accel_mps2(curvature_pm: Array, speed_mps: float) -> float:
+    """Return what the driver of a car takes across the way in bends, by how fast it is before them.
+
+    `curvature_pm` (N,) is that of the way, `SPACING_M` apart from the car on. Who would have to
+    brake harder than comfortably to take a bend as usual, takes it faster, or it is no such bend.
+    """
+    before_m = SPACING_M * np.arange(len(curvature_pm))
+    square = np.maximum(speed_mps**2 - 2.0 * COMFORT_DECEL_MPS2 * before_m, 0.0)
+    across = float((np.abs(curvature_pm) * square).max(initial=0.0))
+    return min(max(across, USUAL_BEND_MPS2), MOST_BEND_MPS2)
+
+
+def way_speeds(path: PathAhead, driven_mps: Array | None = None, *, speed_mps: float) -> WaySpeeds:
     """Return the speeds of a path that begins `PATH_BEHIND_M` behind the car.
 
-    `driven_mps` (N,) is what was driven before at its points, NaN where nobody did.
+    `driven_mps` (N,) is what was driven before at its points, NaN where nobody did; `speed_mps` is
+    the car's.
     """
     line = FrenetPath(path.xy_m, path.speed_limit_mps)
-    bend_mps = line.speed_profile(
-        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
-    )
     here = int((PATH_BEHIND_M - line.first_arc_m) / SPACING_M)
+    across = bend_accel_mps2(line.curvature_pm[here:], speed_mps)
+    bend_mps = line.speed_profile(lateral_accel_mps2=across, decel_mps2=COMFORT_DECEL_MPS2)
     driven = np.full(len(line.arc_m), math.nan)
     if driven_mps is not None:
         arc = arc_lengths(path.xy_m)
         near = np.clip(np.searchsorted(arc, line.arc_m), 0, len(arc) - 1)
         driven = np.where(line.arc_m <= arc[-1], driven_mps[near], math.nan)
     columns = (bend_mps, line.speed_limit_mps, driven)
-    return WaySpeeds(*(column[here:].tolist() for column in columns))
+    bends, limits, before = (column[here:].tolist() for column in columns)
+    return WaySpeeds(bends, limits, before, across)
 
 
 def speeds_ahead(

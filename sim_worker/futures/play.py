@@ -165,6 +165,7 @@ class Play:
             heading=heading,
             climb_mps2=self.stage.climb_mps2,
             target_accel_mps2=rising,
+            bend_accel_mps2=scene.bend_accel_mps2,
         )
 
 

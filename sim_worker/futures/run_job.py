@@ -193,6 +193,9 @@ def check_job(job: Job, stage: BatchSimulation) -> None:
     ahead = job.speed_ahead_mps
     if not isinstance(ahead, msgspec.UnsetType) and not (len(ahead) and np.isfinite(ahead).all()):
         raise ValueError(f"speed_ahead_mps needs speeds, all of them finite: {ahead.tolist()}")
+    bends_mps2 = job.bend_accel_mps2
+    if not isinstance(bends_mps2, msgspec.UnsetType) and not 0.0 < bends_mps2 < np.inf:
+        raise ValueError(f"bend_accel_mps2 is to be above 0 and finite, not {bends_mps2}")
     if abs(job.control_hz * stage.control_dt_s - 1.0) > 1e-9:
         raise ValueError(
             f"a job of {job.control_hz:g} control ticks a second on a stage of "

@@ -6,17 +6,17 @@ import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import SPEED_AHEAD_STEP_S, Future, Job
+from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.numbers import Quantity
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.futures.aims import Aims, aims_of, bend_accel_of, limit_share
 from foretwin.sim_worker.futures.lights import Lights, lights_of
 from foretwin.sim_worker.futures.number_columns import NumberColumns, number_columns
 from foretwin.sim_worker.metrics.ground import DrivableGround
@@ -38,7 +38,6 @@ from foretwin.sim_worker.scenarios.seen import SeenActors
 from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
 
-_MAX_OFFSET_M = 8.0
 _CAR_WITHIN_M = 60.0
 """The car is looked for on this much of the path's beginning."""
 
@@ -48,42 +47,18 @@ _PERCEPTION: tuple[Quantity, ...] = (
 """In the order of `PerceptionFaults`."""
 
 
-class Aims(NamedTuple):
-    """What each of S futures aims at; all (S,).
-
-    `speed_ahead_mps` (K, S), `SPEED_AHEAD_STEP_S` apart, goes before `target_speed_mps` where the
-    job says how the nominal future's speed changes; None where it does not.
-    """
-
-    target_speed_mps: Array
-    speed_factor: Array
-    offset_m: Array
-    speed_ahead_mps: Array | None = None
-
-    def at(self, time_s: float) -> tuple[Array, Array | None]:
-        """Return the speeds (S,) aimed at, and the accelerations (S,) with which these change,
-        None where they stay."""
-        ahead = self.speed_ahead_mps
-        if ahead is None:
-            return self.target_speed_mps, None
-        place = time_s / SPEED_AHEAD_STEP_S
-        node = int(place + 1e-9)  # ticks come a hair before their instants
-        if node >= len(ahead) - 1:
-            return ahead[-1], None
-        rise = ahead[node + 1] - ahead[node]
-        return ahead[node] + (place - node) * rise, rise / SPEED_AHEAD_STEP_S
-
-
 class JobScene(NamedTuple):
     """All that S futures of a job begin with; `traffic` is None without other road users.
 
-    `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
+    `limit_share` (M,) at the path's nodes is how far limits lie below that at the start;
+    `bend_accel_mps2` is what the nominal future takes across the way in bends.
     """
 
     path: FrenetPath
     starts: Array
     start_arc_m: Array
     aims: Aims
+    bend_accel_mps2: float
     planners: tuple[str, ...]
     numbers: NumberColumns
     limit_share: Array | None
@@ -173,7 +148,7 @@ class SceneMaker:
             # Ways may be long, and cross themselves.
             place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
         numbers = number_columns(job.futures)
-        aims = _aims(job, place.offset_m, numbers)
+        aims = aims_of(job, place.offset_m, numbers)
         live = any(v.scenario_id and not v.place for v in job.futures)
         on_path = self.scenarios.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = self._seen.actors(job.road_users)
@@ -221,10 +196,11 @@ class SceneMaker:
             starts=starts,
             start_arc_m=place.arc_m,
             aims=aims,
+            bend_accel_mps2=bend_accel_of(job),
             planners=tuple(future.planner for future in job.futures),
             numbers=numbers,
             # Staged, a case says how fast the ego drives.
-            limit_share=None if staged else _limit_share(path, float(place.arc_m[0])),
+            limit_share=None if staged else limit_share(path, float(place.arc_m[0])),
             traffic=traffic,
             sight=sight,
             rules=rules,
@@ -268,33 +244,3 @@ def _scenario_of(future: Future, known: Mapping[str, Scenario]) -> Scenario | No
 def _known_plan(job: Job) -> KnownPlan | None:
     plan = job.car_plan
     return None if plan is None else KnownPlan(plan.time_s, plan.xy_m, plan.yaw_rad, plan.speed_mps)
-
-
-def _aims(job: Job, present_offset_m: Array, numbers: NumberColumns) -> Aims:
-    cruise = np.array([future.values.get("ego.speed_mps", np.nan) for future in job.futures])
-    if job.starts is None:
-        cruise[[not future.place for future in job.futures]] = np.nan
-    cruise = np.where(np.isfinite(cruise), cruise, job.cruise_speed_mps)
-    target = numbers.applied("aim.target_speed_mps", cruise)
-    ahead = None
-    if not isinstance(job.speed_ahead_mps, msgspec.UnsetType):
-        speeds = [numbers.applied("aim.target_speed_mps", v) for v in job.speed_ahead_mps.tolist()]
-        ahead = np.maximum(speeds, 0.0)
-    factor = numbers.factor("aim.target_speed_mps")
-    factor = np.where(cruise > 1.0, target / np.maximum(cruise, 1.0), factor)
-    # The future keeps the car's present offset, or one would measure the map's error.
-    present = np.minimum(np.maximum(present_offset_m, -_MAX_OFFSET_M), _MAX_OFFSET_M)
-    return Aims(np.maximum(target, 0.0), factor, numbers.applied("aim.offset_m", present), ahead)
-
-
-def _limit_share(path: FrenetPath, start_arc_m: float) -> Array | None:
-    """Return (M,) how far the limits lie below the one where the car is, at most 1; None for 1.
-
-    A driver's speed relates to the limit, which the map may have guessed: only its drops count.
-    """
-    limits = path.speed_limit_mps
-    here = limits[int(np.clip(np.searchsorted(path.arc_m, start_arc_m), 0, len(limits) - 1))]
-    if not np.isfinite(here):
-        return None
-    share = np.minimum(np.where(np.isfinite(limits), limits, here) / here, 1.0)
-    return np.asarray(share) if share.min() < 1.0 else None

@@ -12,8 +12,9 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import touched
+from foretwin.sim_worker.futures.aims import Aims
 from foretwin.sim_worker.futures.play import Play
-from foretwin.sim_worker.futures.scene import Aims, JobScene
+from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.gym.episodes import Episodes
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView

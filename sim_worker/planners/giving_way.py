@@ -141,7 +141,7 @@ def _pace(view: PlannerView, ground: SharedGround, pieces: Indices) -> Array:
     """Return (S, W) the speed at which pieces of the ground are crossed, as bends allow."""
     middle = 0.5 * (ground.enter_arc_m + ground.leave_arc_m)[pieces]
     profile = view.path.speed_profile(
-        lateral_accel_mps2=driver.LATERAL_ACCEL_MPS2, decel_mps2=driver.COMFORT_DECEL_MPS2
+        lateral_accel_mps2=view.bend_accel_mps2, decel_mps2=driver.COMFORT_DECEL_MPS2
     )
     bend = view.path.at_nodes(profile, middle)
     pace = np.minimum(view.target_speed_mps[:, None], view.speed_factor[:, None] * bend)

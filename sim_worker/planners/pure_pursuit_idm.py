@@ -75,7 +75,7 @@ class PurePursuitIdm:
             np.asarray(view.offset_m, dtype=np.float64),
             np.asarray(view.desired_offset_m, dtype=np.float64),
             np.asarray(view.speed_factor, dtype=np.float64),
-            path.with_curve_speeds(driver.LATERAL_ACCEL_MPS2, driver.COMFORT_DECEL_MPS2),
+            path.with_curve_speeds(view.bend_accel_mps2, driver.COMFORT_DECEL_MPS2),
             path.first_arc_m,
             tuple(float(part.value) for part in limits),
             _TRACKING,

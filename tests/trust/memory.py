@@ -117,7 +117,7 @@ def errors_m(truth: Truth, seen: list[Moment], earlier: DrivenSpeeds) -> dict[st
             continue
         for name, known in (("without", None), ("with", driven)):
             speeds = speeds_ahead(
-                way_speeds(path, known),
+                way_speeds(path, known, speed_mps=one.speed_mps),
                 speed_mps=one.speed_mps,
                 acceleration_mps2=one.acceleration_mps2,
                 usual_share=one.share,

@@ -104,6 +104,7 @@ def test_a_round_with_a_forecast_aims_at_both(tmp_path: Path) -> None:
             np.testing.assert_array_equal(
                 job.speed_ahead_mps, partly_learnt(intent.speed_ahead_mps, job.progress)
             )
+        assert job.bend_accel_mps2 == intent.bend_accel_mps2
         return np.asarray(job.speed_ahead_mps)
 
     house.tables.close()

@@ -30,6 +30,7 @@ INTENT = RoundIntent(
     path=PATH,
     cruise_speed_mps=10.0,
     speed_ahead_mps=np.full(17, 10.0),
+    bend_accel_mps2=2.25,
     next_junction=("signals", 80),
 )
 

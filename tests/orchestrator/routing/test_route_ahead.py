@@ -15,6 +15,7 @@ from foretwin.contracts.frames import (
 from foretwin.contracts.tracks import DrivenTrack
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_ahead import MIN_PATH_M, WayAhead
+from foretwin.orchestrator.routing.speed_ahead import MOST_BEND_MPS2, USUAL_BEND_MPS2
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
 from tests.orchestrator.routing.path_against_lanes import LanesOfWorld
@@ -186,6 +187,22 @@ def test_arrivals_heed_the_bends_of_the_rounds_path() -> None:
     later_s = np.array([arrival.in_s for arrival in way.junctions[:2]]) - straight_s
     assert 0.5 < later_s[0] < 1.5
     assert 2.0 < later_s[1] < 3.5
+
+
+def test_who_comes_to_a_corner_fast_takes_it_faster_than_usual() -> None:
+    turning = Route(tuple(DirectedEdge(GRID.edges[index], False) for index in (4, 5, 23, 24)), 0.0)
+
+    def across_mps2(to_x: float, speed_mps: float) -> float:
+        way = WayAhead(GRID, CORNERS, (turning,))
+        for state in states_along(FRAME, drive([(110, 100), (to_x, 100)]), speed_mps=speed_mps):
+            way.take_speed(state)
+            way.locate(state)
+        assert way.path(EMPTY, speed_mps=speed_mps, horizon_s=8.0) is not None
+        return way.bend_accel_mps2
+
+    assert across_mps2(150, 10.0) == USUAL_BEND_MPS2
+    assert USUAL_BEND_MPS2 + 0.3 < across_mps2(185, 10.0) < MOST_BEND_MPS2
+    assert across_mps2(185, 20.0) == MOST_BEND_MPS2
 
 
 def test_with_tracks_the_nominal_speed_heeds_how_the_road_was_driven() -> None:

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.routing.going_on import FADING_S, USUAL_S
-from foretwin.orchestrator.routing.speed_ahead import speeds_ahead, way_speeds
+from foretwin.orchestrator.routing.speed_ahead import (
+    MOST_BEND_MPS2,
+    USUAL_BEND_MPS2,
+    bend_accel_mps2,
+    speeds_ahead,
+    way_speeds,
+)
 
 STRAIGHT = np.column_stack([np.arange(-10.0, 301.0), np.zeros(311)])
 
@@ -28,7 +34,7 @@ def ahead(
     """The speeds of a driver whose usual one is the present, unless a share of the limit is."""
     path = PathAhead(xy_m=xy_m, speed_limit_mps=np.full(len(xy_m), limit_mps))
     return speeds_ahead(
-        way_speeds(path),
+        way_speeds(path, speed_mps=speed_mps),
         speed_mps=speed_mps,
         acceleration_mps2=accel_mps2,
         usual_share=speed_mps / limit_mps if usual_share is None else usual_share,
@@ -89,8 +95,31 @@ def test_bends_ahead_are_braked_for() -> None:
     speeds = ahead(10.0, xy_m=np.concatenate([STRAIGHT[:50], arc, rest]))
 
     assert speeds[2] == pytest.approx(10.0, abs=0.2)
-    assert speeds.min() == pytest.approx(math.sqrt(2.5 * 10.0), abs=0.6)
+    assert speeds.min() == pytest.approx(math.sqrt(USUAL_BEND_MPS2 * 10.0), abs=0.6)
     assert speeds.argmin() in range(9, 15)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_who_comes_to_a_bend_faster_than_usual_takes_it_faster(side: float) -> None:
+    bend = np.where(np.arange(100) >= 20, side * 0.05, 0.0)
+
+    # 20 m before it, comfortable braking takes 80 m²/s² off the square of the speed.
+    assert bend_accel_mps2(bend, math.sqrt(80.0 + 20.0 * 3.0)) == pytest.approx(3.0)
+    assert bend_accel_mps2(bend, 10.0) == USUAL_BEND_MPS2
+    assert bend_accel_mps2(bend, 20.0) == MOST_BEND_MPS2
+    assert bend_accel_mps2(bend[20:], 8.0) == pytest.approx(3.2)
+    assert bend_accel_mps2(np.zeros(0), 8.0) == USUAL_BEND_MPS2
+
+
+def test_in_a_bend_that_is_driven_faster_than_usual_nobody_brakes_at_once() -> None:
+    turned = np.linspace(-0.4, 2.5, 120)
+    circle = 40.0 * np.column_stack([np.sin(turned), -np.cos(turned)])
+    path = PathAhead(xy_m=circle, speed_limit_mps=np.full(120, 14.0))
+    way = way_speeds(path, speed_mps=11.0)
+
+    assert way.bend_accel_mps2 == pytest.approx(11.0**2 / 40.0, rel=0.02)
+    assert ahead(11.0, xy_m=circle)[:9].min() > 10.8
+    assert way_speeds(path, speed_mps=8.0).bend_accel_mps2 == USUAL_BEND_MPS2
 
 
 def test_what_was_driven_before_is_come_back_to_sooner_than_what_is_usual() -> None:
@@ -98,7 +127,7 @@ def test_what_was_driven_before_is_come_back_to_sooner_than_what_is_usual() -> N
 
     def to(driven_mps: np.ndarray | None) -> np.ndarray:
         return speeds_ahead(
-            way_speeds(path, driven_mps), speed_mps=8.0, acceleration_mps2=0.0,
+            way_speeds(path, driven_mps, speed_mps=8.0), speed_mps=8.0, acceleration_mps2=0.0,
             usual_share=12.0 / 14.0, horizon_s=8.0,
         )  # fmt: skip
 

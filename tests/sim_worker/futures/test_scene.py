@@ -14,7 +14,7 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.places import crossroads, happening, job, state_at, straight_path
+from tests.sim_worker.places import crossroads, happening, job, state_at
 from tests.sim_worker.road_users.crossroads import crossroads as mapped_crossroads
 from tests.sim_worker.road_users.crossroads import straight_on
 
@@ -206,61 +206,3 @@ def test_metrics_that_a_job_names_come_back_for_every_future(stage: BatchSimulat
     assert metrics["ttc"][1] < 0.2
     with pytest.raises(ValueError, match="unknown metric fame"):
         run_job(msgspec.structs.replace(question, metrics=("fame",)), stage)
-
-
-def test_a_future_follows_the_speeds_ahead(stage: BatchSimulation) -> None:
-    speeds = np.concatenate([np.linspace(8.0, 12.0, 9), np.linspace(11.0, 5.0, 8)])
-    futures = (
-        Future(index=0, name="n"),
-        Future(index=1, name="s", numbers={"target_speed_factor": 0.5}),
-    )
-    asked = job(futures, state=state_at(-50.0, -1.5, speed=8.0))
-    told = msgspec.structs.replace(asked, speed_ahead_mps=speeds)
-    nominal, slow = run_job(told, stage).trajectory.states[:, :, 3]
-    at = np.interp(np.arange(81) * 0.1, np.arange(17) * 0.5, speeds)
-
-    np.testing.assert_allclose(nominal, at, atol=0.45)
-    assert nominal[40] == pytest.approx(12.0, abs=0.4)
-    assert (slow[20:] < 0.75 * nominal[20:]).all()
-
-
-def test_after_the_last_speed_ahead_it_stays(stage: BatchSimulation) -> None:
-    told = msgspec.structs.replace(
-        job((Future(index=0, name="n"),), state=state_at(-50.0, -1.5, speed=8.0)),
-        speed_ahead_mps=np.array([8.0, 8.5, 9.0]),
-    )
-    speed = run_job(told, stage).trajectory.states[0, :, 3]
-
-    np.testing.assert_allclose(speed[25:], 9.0, atol=0.2)
-
-
-def test_speeds_ahead_that_stay_are_the_cruise_speed(stage: BatchSimulation) -> None:
-    asked = job((Future(index=0, name="n"),), state=state_at(-50.0, -1.5, speed=6.0), cruise=9.0)
-    told = msgspec.structs.replace(asked, speed_ahead_mps=np.full(17, 9.0), cruise_speed_mps=9.0)
-
-    np.testing.assert_array_equal(
-        run_job(asked, stage).trajectory.states, run_job(told, stage).trajectory.states
-    )
-
-
-@pytest.mark.parametrize("ahead", [[], [8.0, float("nan")]])
-def test_speeds_ahead_that_are_none_are_refused(ahead: list[float], stage: BatchSimulation) -> None:
-    told = msgspec.structs.replace(
-        job((Future(index=0, name="n"),)), speed_ahead_mps=np.array(ahead)
-    )
-
-    with pytest.raises(ValueError, match="speed_ahead_mps needs speeds"):
-        run_job(told, stage)
-
-
-def test_where_the_limit_drops_speeds_ahead_rise_by_its_share(stage: BatchSimulation) -> None:
-    path = straight_path()
-    limit = np.where(path.xy_m[:, 0] < -45.0, 14.0, 7.0)
-    told = msgspec.structs.replace(
-        job((Future(index=0, name="n"),), state=state_at(-50.0, -1.5, speed=4.0)),
-        path=PathAhead(xy_m=path.xy_m, speed_limit_mps=limit),
-        speed_ahead_mps=np.linspace(4.0, 20.0, 17),
-    )
-    speed = run_job(told, stage).trajectory.states[0, :, 3]
-
-    np.testing.assert_allclose(speed[40:70], 0.5 * (4.0 + 0.2 * np.arange(40, 70)), atol=0.25)
