@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from tests.world_gen.drawn_maps import drawn_map, world_of
+from tests.world_gen.drawn_maps import CROSS, drawn_map, world_of
 from tests.world_gen.measure_turns import ALLOWED_RAD, beside_m, turns_of
 from tests.world_gen.roads_driven import RoadsDriven
 
@@ -41,6 +41,19 @@ def test_who_crosses_where_arms_lie_aside_drives_along_the_road_between() -> Non
     assert bearings_deg(30, 10) == [180, 270, 211, 180]
 
 
+def test_roads_lie_where_the_lanes_of_a_world_end() -> None:
+    far = {i: (x + 500.0, y - 300.0) for i, (x, y) in CROSS.items()}
+    osm = drawn_map(far, [(11, [0, 1], ROAD), (12, [0, 2], ROAD), (13, [3, 0], ROAD)])
+    world = world_of(osm)
+    roads = RoadsDriven(build_road_graph(osm), world.frame)
+    lanes = {lane.id: lane for lane in world.lanes}
+    for c in world.connections:
+        start, end = lanes[c.from_lane_id], lanes[c.to_lane_id]
+        before, behind = roads.lines(start, end)
+        assert math.dist(before[0], start.centerline[-1]) < 2.0
+        assert math.dist(behind[-1], end.centerline[0]) < 2.0
+
+
 def test_such_a_turn_leaves_the_angle_of_its_lanes_and_not_that_of_its_roads() -> None:
     world = world_of(ASIDE)
     turns = turns_of(world, RoadsDriven(build_road_graph(ASIDE), world.frame))
@@ -60,3 +73,5 @@ def test_who_turns_between_roads_stays_in_what_they_span_and_who_swings_out_does
     # The corner where its lanes' lines cross lies at (2, -2).
     assert beside_m(swung, east, north, roads) == pytest.approx(5.0 - 2.0, abs=0.2)
     assert math.isnan(beside_m(cut, east, north, [*roads, roads[0]]))
+    # Lanes side by side have no such corner, and what the roads span is all.
+    assert beside_m(np.concatenate(roads), east, east, roads) == pytest.approx(0.0)

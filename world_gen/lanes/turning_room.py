@@ -74,7 +74,7 @@ def turning_trims(
     legs = _legs_of(clusters, sections)
     most_m = np.maximum(most_m, least_m)
     wide_m = _widened_m(legs, least_m, most_m)
-    bend_m = np.clip(_bends_at_m(legs, least_m), least_m, most_m)
+    bend_m = np.minimum(_bends_at_m(legs, least_m), most_m)
     before, behind = (_turned_rad(legs, m) for m in (np.minimum(wide_m, bend_m), wide_m))
     swings_out = ((behind > HAIRPIN_RAD) & (before < HAIRPIN_RAD)).any(axis=2)
     if not swings_out.any():
@@ -119,7 +119,7 @@ def _importance(name: str) -> float:
 
 
 def _bends_at_m(legs: _Legs, from_m: Array) -> Array:
-    """Return how far along (K, n) legs bend that go straight on from `from_m`; else inf."""
+    """Return how far along (K, n) legs bend next beyond `from_m`; inf where they do not."""
     ways, line = legs.ways, legs.ways.line
     _, head = _ends(legs, from_m)
     bent = np.abs(turn_rad(head.reshape(-1, 2)[line], ways.steps[0])) > BEND_RAD

@@ -14,7 +14,7 @@ from foretwin.contracts.world import World
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from tests.world_gen.drawn_maps import CROSS, GERMANY, crossing, drawn_map, world_of
+from tests.world_gen.drawn_maps import CROSS, GERMANY, STREET, crossing, drawn_map, world_of
 from tests.world_gen.drawn_stars import stars, world_of_star
 from tests.world_gen.path_shape import tightest_radius_m
 
@@ -150,3 +150,13 @@ def test_lanes_end_before_bends_behind_which_a_turn_would_swing_out():
     # Both bend within 12 m of the place: the turns go no farther beyond it than a road is wide.
     assert all(path[:, 1].min() > -6.5 for path in across)
     assert min(tightest_radius_m(path) for path in across) > 5.0
+
+
+def test_a_side_road_that_comes_back_along_the_main_one_ends_at_its_mouth():
+    side_m = (9.2, -5.2), (12.7, -10.5), (15.0, -22.5), (14.7, -48.1), (14.0, -100.0)
+    nodes = {0: (0.0, 0.0), 1: (-50.0, -86.6), 2: (50.0, 86.6)} | dict(enumerate(side_m, start=3))
+    ways = [(11, [1, 0], MAIN), (12, [0, 2], MAIN), (13, [0, 3, 4, 5, 6, 7], STREET)]
+    world = world_of(drawn_map(nodes, ways, origin=GERMANY))
+    (end_m,) = (lane.centerline[-1] for lane in world.lanes if lane.id.startswith("w13.0.7.b"))
+    # From there one turns by 115°; behind the bends at (9, -5) and (13, -10) by 140°.
+    assert -10.0 < end_m[1] < -2.0
