@@ -62,6 +62,9 @@ class Recording:
         """
         try:
             table = table_at(self.folder, name)
+        except FileNotFoundError as error:
+            raise UserError(str(error)) from error
+        try:
             return read_parquet(table) if table.is_dir() else read_parts(table)
         except (OSError, pa.ArrowException) as error:
             raise UserError(f"{self.folder}: no table {name!r} to be read: {error}") from error

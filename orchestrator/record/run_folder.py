@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from foretwin.contracts.codec import encode, write_message
+from foretwin.contracts.did_you_mean import one_of
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.record.table_parts import table_of
@@ -34,7 +35,7 @@ def table_at(folder: Path, table: str) -> Path:
     there = {name: folder / "results" / f"{name}.parquet" for name in of_run}
     there = {name: path for name, path in swept.items() if path.exists()} | there
     if table not in there:
-        known = f"holds {', '.join(sorted(there))}" if there else "neither of a run nor a sweep"
+        known = one_of(table, sorted(there)) if there else "neither of a run nor a sweep"
         raise FileNotFoundError(f"{folder}: holds no table of {table}: {known}")
     return there[table]
 

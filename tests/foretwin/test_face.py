@@ -185,7 +185,7 @@ def test_what_a_sweep_left_is_read(tmp_path: Path) -> None:
     assert (metrics["ttc"]["unit"], metrics["ttc"]["better"]) == ("s", "higher")
     for wrong in ("comparisons", "no_such_table"):
         with pytest.raises(
-            foretwin.UserError, match=f"no table {wrong!r}.*futures, jobs, metrics, road_users"
+            foretwin.UserError, match=f"no table of {wrong}: .*futures, jobs, metrics, road_users"
         ):
             left.table(wrong)
     with pytest.raises(foretwin.UserError, match=r"no run\.json"):

@@ -44,6 +44,11 @@ def played(sweep: foretwin.Recording) -> dict[str, object]:
 
 def test_tables_and_worlds_are_named(sweep: foretwin.Recording) -> None:
     assert set(sweep.tables) >= {"futures", "jobs", "metrics"}
+    with pytest.raises(foretwin.UserError) as said:
+        sweep.table("futurs")
+    told = str(said.value)
+    assert f"no table of futurs: did you mean futures? one of {sweep.tables[0]}, " in told
+    assert told.count(str(sweep.folder)) == 1
     assert sweep.world(sweep.world_ids[0]).id == sweep.world_ids[0]
     with pytest.raises(foretwin.UserError, match=f"no World 'x' to be read: {sweep.world_ids[0]}"):
         sweep.world("x")
