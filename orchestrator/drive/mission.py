@@ -43,13 +43,12 @@ _WHY_OFF_ROAD = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionSettings:
-    """What decides when Worlds are built and rounds run."""
+    """When Worlds are built and rounds run; where in its log (`begins_s`) the drive begins."""
 
     radius_m: float = 150.0
     look_ahead_s: float = 60.0
     horizon_s: float = 8.0
     begins_s: float = 0.0
-    """Where in its log the drive begins: what its time is before the first state."""
 
 
 class Mission:
@@ -135,9 +134,8 @@ class Mission:
     @property
     def drive_time_s(self) -> float:
         """Seconds since the drive's start, by the vehicle's clock."""
-        if self._car is None:
-            return self._settings.begins_s
-        return (self._car.stamp_ns - self.start_stamp_ns) / 1e9
+        car, before_s = self._car, self._settings.begins_s
+        return before_s if car is None else (car.stamp_ns - self.start_stamp_ns) / 1e9
 
     @property
     def next_junction(self) -> NextJunction | None:

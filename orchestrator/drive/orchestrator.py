@@ -68,8 +68,7 @@ class Orchestrator:
         *,
         signer: OrderSigner | None = None,
     ) -> None:
-        self._plan, self._processes, self._life = plan, processes, life
-        self._signer = signer
+        self._plan, self._processes, self._life, self._signer = plan, processes, life, signer
         self._interruption = Interruption()
         self._watch = ProcessWatch(processes)
         self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
