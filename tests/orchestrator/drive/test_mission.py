@@ -13,6 +13,7 @@ from foretwin.orchestrator.drive.mission import MissionSettings
 from foretwin.orchestrator.instructions import NotReady, RoundIntent
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.orchestrator.routing.speed_ahead import USUAL_BEND_MPS2
 from tests.orchestrator.berlin import berlin
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
 from tests.orchestrator.trip import Trip, states_along, town, town_line, town_world, world_named
@@ -93,6 +94,7 @@ def test_rounds_run_in_the_world_that_counts(through_town: Trip) -> None:
         steps = np.hypot(*np.diff(intent.path.xy_m, axis=0).T)
         assert steps.max() < 1.1
     assert len(intents) > 100
+    assert min(intent.bend_accel_mps2 for _, intent in intents) == USUAL_BEND_MPS2
 
 
 def test_a_prediction_also_builds_what_other_turns_lead_to_but_loads_it_not() -> None:

@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foretwin.contracts.arrays import Array
 from foretwin.orchestrator.routing.driving_path import (
     FAR_TURN_RADIUS_M,
     KERB_TURN_RADIUS_M,
@@ -78,6 +80,23 @@ def test_a_turn_at_a_junction_is_an_arc_of_the_lanes_radius(north: float, radius
     assert bend.sum() == pytest.approx(math.copysign(math.pi / 2, north), abs=0.02)
     # Smoothing spreads the arc, so its middle is a little wider.
     assert 0.75 / radius_m < np.abs(bend).max() < 1.15 / radius_m
+
+
+def test_the_corners_of_lanes_in_a_bend_are_driven_as_one() -> None:
+    # A bend of 90 m, drawn with corners of 16 degrees.
+    heading = np.radians(16.0) * np.arange(5)
+    legs_m = np.array([100.0, 25.0, 25.0, 25.0, 100.0])[:, None]
+    nodes = np.cumsum(legs_m * np.stack([np.cos(heading), np.sin(heading)], axis=-1), axis=0)
+    line = shapely.LineString(np.concatenate([[[0.0, 0.0]], nodes]))
+    route = route_over(graph_of([road(0, 1, 2, [*line.coords])]))
+
+    def onto_lanes(xy_m: Array, _: Array) -> Array:
+        along = shapely.line_locate_point(line, shapely.points(xy_m))
+        return shapely.get_coordinates(shapely.line_interpolate_point(line, along))
+
+    path = driving_path(route, s_from_m=40.0, s_to_m=240.0, onto_lanes=onto_lanes)
+    assert np.abs(curvature(path)).max() < 2.5 / 90.0
+    assert shapely.distance(line, shapely.points(path.xy_m)).max() < 1.0
 
 
 def test_before_a_left_turn_the_path_moves_to_the_left_lane() -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.planner_interface import SharedGround
+from foretwin.sim_worker.planner_interface import SeenUsers, SharedGround
 from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance
-from foretwin.sim_worker.planners.giving_way import CRITICAL_GAP_S, ground_lines
+from foretwin.sim_worker.planners.giving_way import CRITICAL_GAP_S, ground_lines, wait_arcs
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import (
@@ -20,6 +20,7 @@ from tests.sim_worker.planners.driven import (
     at_rest_on,
     drive,
     straight,
+    view_of,
     walker,
 )
 
@@ -56,6 +57,25 @@ def cross_each(others_of: list[list[Other]], *, planner: object = None, waits: b
         path, at_rest_on(path, 0.0, speed, count), vehicle=VEHICLE, seconds=seconds,
         others_of=others_of if any(others_of) else None, ground=shared,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(("bend_accel_mps2", "waits"), [(1.0, True), (4.0, False)])
+def test_who_is_slow_in_bends_needs_longer_to_cross(bend_accel_mps2: float, waits: bool) -> None:
+    turned = np.linspace(0.0, math.pi, 60)
+    bend = 15.0 * np.stack([np.sin(turned), 1.0 - np.cos(turned)], axis=-1)
+    path = FrenetPath(np.concatenate([[[-30.0, 0.0]], bend]))
+    (x, y), yaw = path.point_at(np.array([45.0]))[0], -math.pi / 2
+    other = SeenUsers(
+        np.array([[[x, y + 52.0, yaw]]]), np.array([[10.0]]), np.array([[[4.5, 1.8]]]),
+        np.array([[45.0]]), np.array([[50.0]]), np.array([[False]]), np.array([[yaw]]),
+    )  # fmt: skip
+    crossed = SharedGround(
+        np.array([43.0]), np.array([47.0]), np.array([[x, y]]), np.array([True]), None
+    )
+    starts = at_rest_on(path, 29.0, 4.0, 1)
+    seen = {"users": other, "ground": crossed, "bend_accel_mps2": bend_accel_mps2}
+    view = view_of(path, starts, VEHICLE, target_mps=12.0, **seen)
+    assert np.isfinite(wait_arcs(view)).all() == waits
 
 
 def arrives(after_s: float, speed: float = 10.0) -> Other:
