@@ -271,13 +271,13 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
     """Return a row as it counts in one drive.
 
     In lock step nothing may be lost, and what was in a router that died is; nor may anybody begin
-    in the middle who answers for all samples from the first one on.
+    in the middle who answers for all samples from the first one on; and all are waited for.
     """
-    if row.name == ROUTER and plan.config.lock_step:
-        return row._replace(when_dead="end_drive")
+    if not plan.config.lock_step:
+        return row
     may_fall = (TUNING, sensors.SENSORS, RECORDER, VIEWER, COPILOT)
-    in_lock_step = row.name in may_fall and plan.config.lock_step
-    return row._replace(when_dead="report") if in_lock_step else row
+    when_dead: WhenDead = "report" if row.name in may_fall else row.when_dead
+    return row._replace(nice=0, when_dead="end_drive" if row.name == ROUTER else when_dead)
 
 
 def rows_by_id(plan: DrivePlan) -> dict[str, ProcessRow]:

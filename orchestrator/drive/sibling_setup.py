@@ -29,7 +29,7 @@ def made(plan: DrivePlan, base: dict[str, Any]) -> WorkerSetup:
         role="futures",
         worlds_dir=str(plan.worlds_dir),
         vehicle=plan.vehicle,
-        gives_way=True,
+        gives_way=not plan.config.lock_step,
         simulations=2,
         kept_worlds=KEPT_WORLDS,
         planners=tuple(planners_of(plan.config.planner)),

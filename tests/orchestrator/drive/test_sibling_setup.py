@@ -28,6 +28,15 @@ def test_it_is_a_worker_for_two_futures_that_gives_way_from_its_start(tmp_path: 
     assert "pure_pursuit_idm" in setup.planners
 
 
+def test_in_lock_step_which_waits_for_it_it_does_not_give_way(tmp_path: Path) -> None:
+    plan = town_plan(tmp_path, siblings=MULTIBODY, speed=None)
+    row = rows_by_id(plan)[SIBLING]
+    setup = row.setup(plan, SIBLING)
+    assert isinstance(setup, WorkerSetup)
+    assert (setup.gives_way, row.nice) == (False, 0)
+    assert {one.nice for one in rows_by_id(plan).values()} == {0}
+
+
 def test_a_drive_has_none_unless_asked(tmp_path: Path) -> None:
     assert SIBLING not in rows_by_id(town_plan(tmp_path))
 
