@@ -19,10 +19,7 @@ from foretwin.orchestrator.routing.going_on import (
     going_on_mps2,
     stands,
 )
-from foretwin.sim_worker.driver_model import (
-    COMFORT_DECEL_MPS2,
-    CURVE_TIME_S,
-)
+from foretwin.sim_worker.driver_model import COMFORT_DECEL_MPS2, CURVE_TIME_S
 
 USUAL_BEND_MPS2, MOST_BEND_MPS2 = 2.25, 5.0
 """What drivers take across the way in bends: before they have shown that they take more, and at

@@ -35,6 +35,7 @@ import shapely
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.world import Connection, World
+from foretwin.geometry.polyline import meeting, units
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
@@ -125,19 +126,13 @@ def beside_m(
         return math.nan
     ends, driven = path[[0, -1]], np.concatenate(roads)
     corners = [*ends, *driven]
-    gap = ends[1] - ends[0]
-    turned = _cross(before, behind)
-    if abs(turned) > LEAST_CROSSING_SIN * float(np.hypot(*before) * np.hypot(*behind)):
-        ahead, back = _cross(gap, behind) / turned, _cross(before, gap) / turned
-        if 0.0 < ahead * np.hypot(*before) < FARTHEST_CROSSING_M > back * np.hypot(*behind) > 0.0:
-            corners.append(ends[0] + ahead * before)
+    into, out = units(np.array([before, behind]))
+    ahead_m, past_m = meeting(ends[0], into, ends[1], out, parallel=LEAST_CROSSING_SIN)
+    if 0.0 < ahead_m < FARTHEST_CROSSING_M > -past_m > 0.0:
+        corners.append(ends[0] + ahead_m * into)
     aside_m = shapely.distance(shapely.points(ends), shapely.LineString(driven)).max()
     hull = shapely.MultiPoint(np.array(corners)).convex_hull
     return float(shapely.distance(shapely.points(path), hull).max() - aside_m)
-
-
-def _cross(u: np.ndarray, v: np.ndarray) -> float:
-    return float(u[0] * v[1] - u[1] * v[0])
 
 
 def turned_rad(path: np.ndarray) -> float:
