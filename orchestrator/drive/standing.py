@@ -52,6 +52,7 @@ class RoundsStanding:
     sickness: Sickness
     failed_jobs: int
     off_lanes_rounds: int
+    not_placed: Counter[str]
     siblings_dropped: Counter[str]
 
 
@@ -143,6 +144,7 @@ def standing_of(
                 sickness=dispatch.sickness,
                 failed_jobs=rounds.failed_jobs,
                 off_lanes_rounds=rounds.futures.off_lanes_rounds,
+                not_placed=rounds.futures.not_placed,
                 siblings_dropped=rounds.siblings.count.dropped,
             ),
             heard=heard,
@@ -231,6 +233,7 @@ def _go_on_with_rounds(conductor: Conductor, standing: RoundsStanding, results: 
     rounds.siblings.count = counts.siblings
     rounds.siblings.count.dropped = standing.siblings_dropped
     rounds.futures.off_lanes_rounds = standing.off_lanes_rounds
+    rounds.futures.not_placed = standing.not_placed
     rounds.windows.go_on(kept_windows(results).windows, conductor.worlds.world)
     rounds.next_round_id = max(standing.next_round_id, counts.last_round_id + 1)
     rounds.failed_jobs = standing.failed_jobs

@@ -13,6 +13,7 @@ from foretwin.orchestrator.rounds.siblings import SIBLING
 from foretwin.orchestrator.tuning.words import summary_lines
 
 DISAGREEMENTS_SHOWN = 12
+REASONS_SHOWN = 3
 BEGINNING_S = 0.5
 """Where a junction is near so soon, the drive began near it."""
 
@@ -72,6 +73,7 @@ def summary_text(record: dict[str, object]) -> str:
             f"  the machine was too slow for {futures['wanted_per_round']} futures in every round: "
             f"{', '.join(sizes)}, {futures['spared_rounds']} were left out"
         )
+    lines += _not_placed_lines(futures.get("not_placed"))
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction_name(junction)} ({junction['kind']}): "
         f"{_readiness(junction, config)}"
@@ -86,6 +88,16 @@ def summary_text(record: dict[str, object]) -> str:
     lines += _free_twin_lines(record.get("free_twin"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join(plain(line) for line in (*lines, attribution))
+
+
+def _not_placed_lines(reasons: dict[str, int] | None) -> list[str]:
+    """Say in how many futures the scenario had no place, and the commonest reasons."""
+    if not reasons:
+        return []
+    told = list(reasons.items())[:REASONS_SHOWN]
+    told += [("other reasons", sum(list(reasons.values())[REASONS_SHOWN:]))]
+    why = "; ".join(f"{reason} ({count})" for reason, count in told if count)
+    return [f"  in {sum(reasons.values())} of the futures the scenario was not placed: {why}"]
 
 
 def _pace(latency_ms: Any, *, lock_step: bool) -> str:

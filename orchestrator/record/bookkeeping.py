@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts.numbering import Numberings
-from foretwin.contracts.running import RunningMeans, RunningQuantiles
+from foretwin.contracts.running import MOST_LISTED, RunningMeans, RunningQuantiles
 from foretwin.contracts.simulation import Comparison, PlanComparison
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 
@@ -83,6 +83,8 @@ class FuturesCount:
     """Complete rounds that were so after the next one was due."""
     off_lanes_rounds: int = 0
     """Rounds whose paths are driven in part where their World has no lane that way."""
+    not_placed: Counter[str] = field(default_factory=Counter)
+    """Futures whose scenario had no place, by the reason; of these, the first so many."""
     _hash: Any = field(default_factory=hashlib.sha256)
 
     def take(self, done: RoundDone, *, distinct: int) -> str:
@@ -94,6 +96,9 @@ class FuturesCount:
             own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
+            for reason in filter(None, result.left_out):
+                if reason in self.not_placed or len(self.not_placed) < MOST_LISTED:
+                    self.not_placed[reason] += 1
         self.late_rounds += done.late
         futures = sum(len(result.future_indices) for result in done.results)
         self._add(own.digest(), futures, distinct, done.latency_ms)
@@ -123,7 +128,8 @@ class FuturesCount:
         Of these, `late_rounds` were complete after the next was due. `missed_rounds` were due and
         not begun, `unseeded_rounds` had nothing to start from. Since the
         machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
-        were not run. In `off_lanes_rounds` the path leaves the lanes of the World.
+        were not run. In `off_lanes_rounds` the path leaves the lanes of the World. `not_placed`
+        counts by the reason the futures whose scenario had no place: the car drives alone in them.
         """
         return {
             "count": self.count,
@@ -136,6 +142,7 @@ class FuturesCount:
             "spared_rounds": spared,
             "unseeded_rounds": unseeded,
             "off_lanes_rounds": self.off_lanes_rounds,
+            "not_placed": dict(self.not_placed.most_common()),
             "rounds": self.rounds,
             "late_rounds": self.late_rounds,
             "sim_seconds": round(self.sim_seconds, 3),

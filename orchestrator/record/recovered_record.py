@@ -41,7 +41,10 @@ _TOLD_WHILE_DRIVING = (
     *("agreement", "orchestrator", "workers", "dropped", "refused", "troubles", "off_road"),
     *("memory", "left_out", "wall_s"),
 )
-_OF_FUTURES = ("missed_rounds", "spared_rounds", "unseeded_rounds", "off_lanes_rounds")
+_OF_FUTURES = (
+    *("missed_rounds", "spared_rounds", "unseeded_rounds", "off_lanes_rounds"),
+    "not_placed",
+)
 """What no table tells: of the run, and of its futures."""
 
 

@@ -130,7 +130,8 @@ class PathScenarios(NamedTuple):
         """Return the road users of a case around a car at `ego_arc_m` of the path.
 
         Those who come from elsewhere are where they meet a car that keeps its speed, early or late
-        as `values` says. Says why where the case cannot be played, or is behind the car already.
+        as `values` says. Says why where the case cannot be played, is behind the car already, or
+        has somebody begin where the World has no road.
         """
         if self.passage is None:
             return Unplaced("", "the path leads through no junction of the World ahead", False)
@@ -153,14 +154,18 @@ class PathScenarios(NamedTuple):
             if there_s < LEAST_TIME_S:
                 return Unplaced(junction, "the place of the impact is behind the car", True)
             later_s = there_s - played.impact_time_s
-        return tuple(
-            self._beside(actor, played, place, ego_arc_m)
-            if actor.relation in ALONG
-            else _coming(
-                actor, place.way_named(actor.way), later_s + values[f"{actor.name}{_LATE}"]
-            )
-            for actor in played.actors
-        )
+        players = []
+        for actor in played.actors:
+            if actor.relation in ALONG:
+                players.append(self._beside(actor, played, place, ego_arc_m))
+                continue
+            way = place.way_named(actor.way)
+            player = _coming(actor, way, later_s + values[f"{actor.name}{_LATE}"])
+            if not way.first_m <= player.start_arc_m <= way.last_m:
+                reason = f"{actor.name} would begin beyond the roads of the World"
+                return Unplaced(junction, reason, True)
+            players.append(player)
+        return tuple(players)
 
     def _beside(
         self, actor: StagedActor, played: StagedCase, place: ScenarioPlace, ego_arc_m: float

@@ -225,6 +225,16 @@ def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(ended: Hous
     assert "): its world never came\n" in summary_text(record)
 
 
+def test_the_summary_says_in_how_many_futures_a_scenario_was_not_placed(house: House) -> None:
+    record = record_of(house)
+    assert "not placed" not in summary_text(record)
+
+    record["futures"]["not_placed"] = {"behind": 40, "beyond": 9, "in a house": 8, "in a pond": 2}
+    told = "behind (40); beyond (9); in a house (8); other reasons (2)"
+    said = f"\n  in 59 of the futures the scenario was not placed: {told}\n"
+    assert said in summary_text(record)
+
+
 def test_the_summary_owns_up_to_what_a_slow_machine_left_out(ended: House) -> None:
     record = record_of(ended)
     assert "too slow" not in summary_text(record)

@@ -53,6 +53,7 @@ def killed(folder: Path, *, open_round: bool = True, crashed: bool = False) -> T
     watched.troubles.append("w1 ended")
     watched.given_up.add("w1")
     first.conductor.rounds.siblings.count.dropped["late"] += 2
+    first.conductor.rounds.futures.not_placed["behind the car"] += 2
     left = standing_of(first.conductor, watched, grid=GRID, heard=heard_of(first.conductor))
     first.tables.leave()
     second = House(folder, at_once=True, plan=first.plan)

@@ -131,6 +131,19 @@ def test_a_futures_record_adds_up() -> None:
     assert percentile(count.latencies_ms, 50) == 100.0
 
 
+def test_futures_whose_scenario_has_no_place_are_counted_by_the_reason() -> None:
+    count, done = FuturesCount(), round_done(straight(), straight(), straight())
+    for reasons in (("", "behind", "beyond"), ("", "", "behind")):
+        results = tuple(
+            msgspec.structs.replace(result, left_out=(reason,))
+            for result, reason in zip(done.results, reasons, strict=True)
+        )
+        count.take(replace(done, results=results), distinct=3)
+    record = count.record(wanted=64, missed=0, spared=0, unseeded=0)
+
+    assert (record["count"], record["not_placed"]) == (6, {"behind": 2, "beyond": 1})
+
+
 def error(ade_m: float) -> HorizonError:
     return HorizonError(ade_m=ade_m, fde_m=0.0, lateral_m=0.0, longitudinal_m=0.0, heading_rad=0.0)
 

@@ -75,7 +75,8 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
     assert words == {"lost": [], "told_until_s": None}
     assert {name for name, value in record.items() if value is None} | {
         "futures.missed_rounds", "futures.spared_rounds", "futures.unseeded_rounds",
-        "futures.off_lanes_rounds", "ledger.telemetry", "ledger.rounds", "ledger.jobs",
+        "futures.off_lanes_rounds", "futures.not_placed",
+        "ledger.telemetry", "ledger.rounds", "ledger.jobs",
     } == unknown | {"agreement", "siblings"}  # fmt: skip
     assert {n: value for n, value in record.items() if value is not None} == {
         "run_id": "r1",
@@ -85,8 +86,9 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
             "count": 36, "wanted_per_round": None, "smaller_rounds": None,
             "rounds_by_futures": {"12": 3}, "distinct": 33,
             "distinct_min_per_round": 10, "missed_rounds": None, "spared_rounds": None,
-            "unseeded_rounds": None, "off_lanes_rounds": None, "rounds": 3, "late_rounds": 0,
-            "sim_seconds": 288.0, "cpu_seconds": 0.75, "sha256": digest.hexdigest(),
+            "unseeded_rounds": None, "off_lanes_rounds": None, "not_placed": None,
+            "rounds": 3, "late_rounds": 0, "sim_seconds": 288.0, "cpu_seconds": 0.75,
+            "sha256": digest.hexdigest(),
         },
         "state_to_result_ms_p50": 101.0,
         "state_to_result_ms_p95": 101.9,

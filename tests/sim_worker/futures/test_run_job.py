@@ -30,7 +30,6 @@ from tests.sim_worker.places import (
 COVERS = (
     "foretwin.sim_worker.futures.closed_loop",
     "foretwin.sim_worker.futures.job_accidents",
-    "foretwin.sim_worker.scenarios.live",
     "foretwin.sim_worker.vehicle.seeding",
 )
 

@@ -1,0 +1,41 @@
+"""Scenarios around a car as it drives: who comes to meet it is on the World's roads, or nowhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.futures import FuturesResult
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import crossroads, happening, job, state_at
+
+
+@pytest.fixture(scope="module")
+def stage() -> BatchSimulation:
+    return BatchSimulation(crossroads(), load_vehicle(), nsim=2)
+
+
+def coming(stage: BatchSimulation, *, speed: float, late_s: float = 0.0) -> FuturesResult:
+    """A car 59 m before the crossing, and who comes from the near side at 14 m/s to meet it."""
+    values = {"crossing_car__speed_mps": 14.0, "crossing_car__arrives_after_s": late_s}
+    case = happening(0, "cccscp", **values)
+    return run_job(job((case,), state=state_at(-59.0, -1.5, speed=speed)), stage)
+
+
+def test_who_meets_the_car_soon_is_on_the_roads_of_the_world(stage: BatchSimulation) -> None:
+    result = coming(stage, speed=10.0)
+    assert result.left_out == ("",)
+    (begins,) = result.road_users.poses[0, 0, :, :2]
+    assert np.hypot(*begins) < 141.0, "where its lane ends"
+
+
+@pytest.mark.parametrize(("speed", "late_s"), [(2.0, 0.0), (4.0, 0.0), (10.0, 9.0)])
+def test_who_would_begin_where_the_world_has_no_road_is_nowhere(
+    stage: BatchSimulation, speed: float, late_s: float
+) -> None:
+    result = coming(stage, speed=speed, late_s=late_s)
+    assert result.left_out == ("crossing_car would begin beyond the roads of the World",)
+    assert not np.isfinite(result.road_users.poses).any()
+    assert result.outcome.valid.all(), "the car drives all the same"
