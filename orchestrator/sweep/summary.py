@@ -22,6 +22,7 @@ COUNTS = ("cases", "placed", "collided", "failed")
 _REASONS = 1000
 """So many different ones are counted of each."""
 _PLAIN_WIDTH = 120
+_OTHERS = "other reasons"
 
 
 class _CaseSums:
@@ -31,6 +32,7 @@ class _CaseSums:
         self.scores, self.scored = 0.0, 0
         self.reasons: collections.Counter[str] = collections.Counter()
         self.not_placed: collections.Counter[str] = collections.Counter()
+        self.not_placed_rows = 0
 
     def add(self, count: CaseCount) -> None:
         for name in COUNTS:
@@ -39,6 +41,7 @@ class _CaseSums:
             self.clearance_m.take(clearance_m)
         self.scores = math.fsum((self.scores, *count.scores))
         self.scored += len(count.scores)
+        self.not_placed_rows += sum(count.not_placed.values())
         for mine, theirs in ((self.reasons, count.reasons), (self.not_placed, count.not_placed)):
             known = {why: n for why, n in theirs.items() if why in mine or len(mine) < _REASONS}
             mine.update(known)
@@ -74,6 +77,7 @@ class Summary:
                 ),
                 "reasons": _most(group.reasons),
                 "not_placed": _most(group.not_placed),
+                "not_placed_rows": group.not_placed_rows,
             }
             for (scenario, planner), group in sorted(self._groups.items())
         ]
@@ -104,7 +108,7 @@ def _rounded(value: float | None) -> float | None:
 
 def _counted(summary: dict[str, Any]) -> str:
     rows, nowhere = summary["rows"], len(summary["unplaced"])
-    not_placed = rows - summary["placed"]
+    not_placed = sum(entry["not_placed_rows"] for entry in summary["scenarios"])
     return (
         f"{rows} rows of {summary['worlds']} Worlds"
         f"{f', {not_placed} of them not placed' if not_placed else ''}, "
@@ -112,6 +116,19 @@ def _counted(summary: dict[str, Any]) -> str:
         f"{summary['playing_s']:.1f} s"
         f"{f'; places not found: {nowhere}' if nowhere else ''}"
     )
+
+
+def _not_placed_lines(entries: list[dict[str, Any]]) -> list[str]:
+    """Return how many rows of each scenario, by all planners, were not placed for which reason."""
+    counted: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+    for entry in entries:
+        more = entry["not_placed_rows"] - sum(entry["not_placed"].values())
+        counted[entry["scenario"]].update(entry["not_placed"] | ({_OTHERS: more} if more else {}))
+    return [
+        f"not placed: {count} row{'s' if count != 1 else ''} of {scenario}: {reason}"
+        for scenario, reasons in counted.items()
+        for reason, count in sorted(reasons.items(), key=lambda one: (one[0] == _OTHERS, -one[1]))
+    ]
 
 
 def print_summary(out: Path, summary: dict[str, Any]) -> None:
@@ -144,13 +161,7 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     for entry in summary["scenarios"]:
         for reason, count in entry["reasons"].items():
             say(plain(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}"))
-    # Where a case can be played is the same for all planners.
-    not_placed = {
-        (entry["scenario"], reason): f"not placed: {count} of {entry['scenario']}: {reason}"
-        for entry in summary["scenarios"]
-        for reason, count in entry["not_placed"].items()
-    }
-    for line in not_placed.values():
+    for line in _not_placed_lines(summary["scenarios"]):
         say(plain(line))
     say(f"sha256 of the rows: {summary['rows_sha256']}")
     say(summary["attribution"])

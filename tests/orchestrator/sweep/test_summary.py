@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -46,19 +47,39 @@ def test_in_whatever_order_parts_come_they_add_up_to_the_same(tmp_path: Path) ->
     assert forwards.totals() == {"rows": 500, "placed": 450, "collided": 0, "failed": 0}
 
 
-@pytest.mark.parametrize(
-    ("placed", "unplaced", "said"),
-    [
-        (8, [], "8 rows of 3 Worlds, 4 of 4 jobs played now in 0.6 s"),
-        (4, [], "8 rows of 3 Worlds, 4 of them not placed, 4 of 4 jobs played now in 0.6 s"),
-        (8, [{}], "in 0.6 s; places not found: 1"),
-    ],
-)
-def test_the_last_line_counts_what_was_not_placed(
-    placed: int, unplaced: list[dict[str, str]], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    counts = {"rows": 8, "placed": placed, "worlds": 3, "jobs": 4, "jobs_played": 4}
-    told = {"playing_s": 0.552, "unplaced": unplaced, "placed_nowhere": [], "failures": {}}
-    more = {"scenarios": [], "rows_sha256": "0", "attribution": ""}
+def printed(
+    capsys: pytest.CaptureFixture[str], scenarios: list[dict[str, Any]], unplaced: int = 0
+) -> str:
+    counts = {"rows": 24, "placed": 12, "worlds": 3, "jobs": 4, "jobs_played": 4}
+    told = {"playing_s": 0.552, "unplaced": [{}] * unplaced, "placed_nowhere": [], "failures": {}}
+    more = {"scenarios": scenarios, "rows_sha256": "0", "attribution": ""}
     print_summary(Path("out"), counts | told | more)
-    assert said in capsys.readouterr().out
+    return capsys.readouterr().out
+
+
+def test_the_last_line_counts_places_that_were_not_found(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert "24 rows of 3 Worlds, 4 of 4 jobs played now in 0.6 s\n" in printed(capsys, [])
+    assert "in 0.6 s; places not found: 1\n" in printed(capsys, [], unplaced=1)
+
+
+def test_rows_that_were_not_placed_are_counted_alike_in_all_and_by_the_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A row whose stack hung was placed all the same."""
+    summary = Summary(load_spec(small_sweep(tmp_path)).spec)
+    count = replace(COUNT, placed=2, not_placed={"too short": 3, "a": 1, "b": 2, "c": 1})
+    for planner in ("x", "y"):
+        summary.add(replace(count, planner=planner))
+    summary.add(replace(COUNT, scenario="cpta", planner="y", not_placed={"too short": 1}))
+    said = printed(capsys, summary.table())
+
+    assert "24 rows of 3 Worlds, 15 of them not placed, 4 of 4 jobs" in said
+    assert [line for line in said.splitlines() if line.startswith("not placed")] == [
+        "not placed: 1 row of cpta: too short",
+        "not placed: 6 rows of scp: too short",
+        "not placed: 4 rows of scp: b",
+        "not placed: 2 rows of scp: a",
+        "not placed: 2 rows of scp: other reasons",
+    ]
