@@ -22,7 +22,7 @@ from foretwin.contracts.simulation import (
 from foretwin.viewer.colours import CRITICAL, NOMINAL, ROAD_USER, SAFE, TWIN, WATCH, Colour
 from foretwin.viewer.danger import dangers_of, instant_of
 from foretwin.viewer.log_drive import PLAN
-from foretwin.viewer.rows import Row, document, in_markdown, point_at, raised, static
+from foretwin.viewer.rows import Row, document, in_markdown, place_text, point_at, raised, static
 
 BASELINES: dict[str, tuple[Colour, str]] = {
     "nominal": (TWIN, "nominal future"),
@@ -164,7 +164,7 @@ def scenario_table(view: RoundView) -> str:
         if view.min_clearance_m is None
         else f"least clearance {view.min_clearance_m:.1f} m"
     )
-    place = in_markdown(view.place or view.intersection_id)
+    place = in_markdown(place_text(view.place, view.intersection_id))
     lines = [
         f"**{place}** · {len(view.names)} futures · "
         f"{view.collided} collide · {clearance} · {view.latency_ms:.0f} ms",

@@ -10,6 +10,7 @@ import numpy as np
 import rerun as rr
 
 from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.left_out import LEFT_OUT, without
 
 APPLICATION_ID = "foretwin"
 TIMELINE = "drive_time"
@@ -55,24 +56,30 @@ def raised(line_m: Array | Array32, z_m: float) -> Array:
 
 
 def plain_text(text: str) -> str:
-    """Return `text` with what the viewer's fonts lack replaced by `?`.
+    """Return `text` with a mark for each run of letters that the viewer's fonts lack.
 
     Rerun 0.41's headless viewer crashes on CJK, Arabic and emoji glyphs, and street names have
     them. Letters with a Latin base keep it.
     """
-    out: list[str] = []
-    for letter in unicodedata.normalize("NFC", text):
-        if letter == "\n" or letter in _SAFE_BEYOND_LATIN:
-            out.append(letter)
-        elif ord(letter) <= _LAST_LATIN:
-            out.append(letter if letter.isprintable() else " ")
-        else:
-            base = [c for c in unicodedata.normalize("NFKD", letter) if ord(c) <= _LAST_LATIN]
-            if base:
-                out.extend(base)
-            elif not unicodedata.combining(letter):
-                out.append("?")
-    return "".join(out)
+    composed = unicodedata.normalize("NFC", text)
+    shown = {letter: _shown(letter) for letter in {*composed, LEFT_OUT}}
+    marked = without(composed, (letter for letter, how in shown.items() if how is None))
+    return "".join(shown[letter] or "" for letter in marked)
+
+
+def _shown(letter: str) -> str | None:
+    """Return what stands for a letter in the viewer, nothing for an accent; None: it cannot be."""
+    if letter == "\n" or letter in _SAFE_BEYOND_LATIN:
+        return letter
+    if ord(letter) <= _LAST_LATIN:
+        return letter if letter.isprintable() else " "
+    base = "".join(c for c in unicodedata.normalize("NFKD", letter) if ord(c) <= _LAST_LATIN)
+    return base or ("" if unicodedata.combining(letter) else None)
+
+
+def place_text(name: str, place_id: str) -> str:
+    """Return the name of a place, its id where it has none, both where not all of it is shown."""
+    return f"{name} {place_id}" if LEFT_OUT in plain_text(name) else name or place_id
 
 
 def in_markdown(text: str) -> str:
@@ -82,5 +89,6 @@ def in_markdown(text: str) -> str:
 
 
 def path_part(text: str) -> str:
-    """Return `text` escaped as one part of an entity path."""
-    return str(rr.escape_entity_path_part(plain_text(text)))
+    """Return `text` escaped as one part of an entity path; different texts give different ones."""
+    letters = (letter if letter.isascii() else f"u{ord(letter):x}" for letter in text)
+    return str(rr.escape_entity_path_part("".join(letters)))

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.left_out import LEFT_OUT
 from foretwin.contracts.terminal import plain
 from foretwin.contracts.world import World
 from foretwin.world_gen.export import picture_marks as marks
-from foretwin.world_gen.export.picture_fonts import LEFT_OUT, PLAIN, fonts_for
+from foretwin.world_gen.export.picture_fonts import PLAIN, fonts_for
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_style import View, view_around
 from foretwin.world_gen.export.picture_traffic import draw_traffic

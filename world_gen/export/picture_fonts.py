@@ -7,16 +7,16 @@ them; what no font has is left out, so that a picture holds no boxes.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cache
 from typing import NamedTuple
 
 from matplotlib.font_manager import FontEntry, fontManager, get_font
 
+from foretwin.contracts.left_out import without
+
 PLAIN, FIXED = "sans-serif", "monospace"
 _DEJAVU = {PLAIN: "DejaVu Sans", FIXED: "DejaVu Sans Mono"}
-LEFT_OUT = "…"
 _LATIN_END = 0x250
 """Letters below it are in every font that is tried."""
 _LAST_RESORT = "Last Resort"
@@ -35,10 +35,7 @@ class Fonts(NamedTuple):
 
     def drawable(self, text: str) -> str:
         """Return the text with a mark for each run of letters that no font has."""
-        if not self.missing:
-            return text
-        letters = re.escape("".join(sorted(self.missing)))
-        return re.sub(rf"[{letters}](?:\s*[{letters}])*", LEFT_OUT, text)
+        return without(text, self.missing)
 
 
 def fonts_for(text: str) -> Fonts:

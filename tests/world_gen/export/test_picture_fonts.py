@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.left_out import LEFT_OUT
 from foretwin.world_gen.export.picture import write_picture
-from foretwin.world_gen.export.picture_fonts import LEFT_OUT, PLAIN, Fonts, fonts_for
+from foretwin.world_gen.export.picture_fonts import PLAIN, Fonts, fonts_for
 from tests.world_gen.drawn_maps import STREET, crossing, world_of
 
 LINEAR_B = "\U00010000\U00010001"
