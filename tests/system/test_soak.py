@@ -22,7 +22,6 @@ from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.segments import Roll
 from foretwin.orchestrator.drive.intake import Intake
-from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.orchestrator.record.bookkeeping import FuturesCount
 from foretwin.telemetry.processes.recording import DriveRecording
 from foretwin.viewer.monitor import Monitor
@@ -32,6 +31,7 @@ from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
 from tests.system.busy_car import SPELL_S
+from tests.system.circuit import write_circuit
 from tests.system.foretwin_command import Finished, run_folder, started
 from tests.viewer import scene
 from tests.viewer.shown import monitor_of
@@ -41,6 +41,8 @@ SOAK_MIN = float(os.environ.get("FORETWIN_SOAK_MIN", "30"))
 MOST_MB_PER_H = 5.0
 VIEW_PART_MB = 40.0
 """What Rerun holds of the file that the viewer writes, at most: its index goes with each part."""
+LAP_S = 180.0
+"""The stand-in car needs longer for a lap of the circuit."""
 CALM_HZ = 320.0
 """So many samples a stand-in car sends in each second, at most."""
 DAY_GB = 40.0
@@ -157,14 +159,9 @@ def test_no_process_grows_over_a_long_drive(
     """Of 5 min in which it settles, and 10 over which growth can be told, nothing is shorter."""
     whole_s = 60.0 * SOAK_MIN
     monkeypatch.setenv(SPELL_S, f"0,{whole_s / 6.0}")
-    route = json.loads(ROUTE_FILE.read_text(encoding="utf-8"))
-    feature = route["features"][0] if "features" in route else route
-    there = feature["geometry"]["coordinates"]
-    back = there[-2:0:-1]
-    feature["geometry"]["coordinates"] = [*(there + back) * math.ceil(SOAK_MIN), there[0]]
-    (tmp_path / "loop.geojson").write_text(json.dumps(route), encoding="utf-8")
+    map_file, route_file = write_circuit(tmp_path, laps=math.ceil(whole_s / LAP_S))
     out = tmp_path / "runs"
-    arguments = ("--route", "loop.geojson", "--end", f"{whole_s:.0f}")
+    arguments = ("--map", str(map_file), "--route", str(route_file), "--end", f"{whole_s:.0f}")
     two = ("--workers", "2", "--tuning", "report")
     with started(out, *arguments, *two, entry=("-c", WITH_A_BUSY_CAR)) as process:
         screen, _ = process.communicate(timeout=whole_s + 300.0)
