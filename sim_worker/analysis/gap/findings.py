@@ -13,6 +13,15 @@ _DEGREES = 180.0 / math.pi
 GAIN_LEFT_OPEN = 0.2
 """Ratios this far from 1 are beyond what parameters of the right car leave open."""
 _SPEED_GAIN = 0.1
+_SAME = 0.08
+_MPH_MPS = 0.44704
+_UNITS = {
+    3.6: "sent in kilometres per hour",
+    1.0 / 3.6: "metres per second taken for kilometres per hour",
+    1.0 / _MPH_MPS: "sent in miles per hour",
+    _MPH_MPS: "metres per second taken for miles per hour",
+}
+"""By the gain that they would make, to a share of `_SAME`: what a wrong speed may be sent in."""
 _GYRO_RADPS = 0.045
 _OFFSET_RAD, _OFFSET_PM = 0.02, 0.01
 _MISSING_MPS2, _FOLLOWS = 0.5, 0.9
@@ -45,10 +54,11 @@ def findings_of(seen: Consistency) -> Finding | None:
     Sensors are judged before actuators, and these before the model: a wrong sensor makes
     whatever is compared with it look wrong.
     """
-    if seen.excited_s >= _SETTLED_S or seen.moved_s >= 2.0:
-        found = _sensors(seen)
-        if found is not None:
-            return found
+    found = speed_sensor(seen)
+    if found is None and (seen.excited_s >= _SETTLED_S or seen.moved_s >= 2.0):
+        found = _gyro_sensor(seen)
+    if found is not None:
+        return found
     if seen.excited_s >= _LEAST_EXCITED_S:
         if seen.measured_by_command is None:
             if seen.excited_s < _SETTLED_S:
@@ -81,13 +91,19 @@ def _offset(name: str, line: Line, text: str) -> Evidence:
     return _evidence(name, line.offset, 0.0, line.offset_std, text)
 
 
-def _sensors(seen: Consistency) -> Finding | None:
-    speed, gyro = seen.speed_by_gnss, seen.gyro_by_course
-    if speed is not None and abs(speed.gain - 1.0) > _SPEED_GAIN + 3.0 * speed.gain_std:
-        said = f"wheel speed is {speed.gain:.2f} times the speed of the positions"
-        unit = " (kilometres per hour?)" if abs(speed.gain - 3.6) < 0.3 else ""
-        text = f"the car's speed sensor disagrees with its positions: {said}{unit}"
-        return Finding("vehicle", "speed_sensor", text, (_of("speed_by_gnss", speed, said),))
+def speed_sensor(seen: Consistency) -> Finding | None:
+    """Return what is wrong with the measured speed, None where positions do not contradict it."""
+    speed = seen.speed_by_gnss
+    if speed is None or abs(speed.gain - 1.0) <= _SPEED_GAIN + 3.0 * speed.gain_std:
+        return None
+    said = f"wheel speed is {speed.gain:.2f} times the speed of the positions"
+    unit = [f" ({unit}?)" for gain, unit in _UNITS.items() if abs(speed.gain / gain - 1.0) < _SAME]
+    text = "".join([f"the car's speed sensor disagrees with its positions: {said}", *unit])
+    return Finding("vehicle", "speed_sensor", text, (_of("speed_by_gnss", speed, said),))
+
+
+def _gyro_sensor(seen: Consistency) -> Finding | None:
+    gyro = seen.gyro_by_course
     if gyro is None:
         return None
     if gyro.gain_std < 0.15 and abs(gyro.gain - 1.0) > GAIN_LEFT_OPEN + 2.5 * gyro.gain_std:
@@ -185,7 +201,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
             said += f"{car.delay_s:.2f} s"
             more = _evidence("model_delay_s", model.delay_s, car.delay_s, 0.02, said)
             return accuse("steering_delay", f"the model steers too late: {said}", more)
-    if line is None or (car is not None and not obeys) or not _gyro_confirmed(seen.gyro_by_course):
+    if line is None or (car is not None and not obeys) or not confirmed(seen.gyro_by_course):
         return None
     hard = seen.motion_by_measured_hard
     lag = seen.motion_lag or Lag(0.0, 0.0)
@@ -224,8 +240,8 @@ def _model_turns(seen: Consistency) -> Finding | None:
     return None
 
 
-def _gyro_confirmed(gyro: Line | None) -> bool:
-    """Whether the course over ground turns as the gyro shows; without one it may."""
-    if gyro is None:
+def confirmed(by_positions: Line | None) -> bool:
+    """Whether positions show that a sensor measures what it should; without any it may."""
+    if by_positions is None:
         return True
-    return abs(gyro.gain - 1.0) + gyro.gain_std < GAIN_LEFT_OPEN + 0.05
+    return abs(by_positions.gain - 1.0) + by_positions.gain_std < GAIN_LEFT_OPEN + 0.05

@@ -39,7 +39,9 @@ _SETTLED = round(0.4 / PERIOD_S)
 """A run that ended so long ago has all of its samples, from slow and late senders too."""
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
-"""Above them turning, and acceleration alone, say something."""
+"""Above them turning, and acceleration and speed alone, say something."""
+_MOST_ACROSS_MPS2 = 15.0
+"""No tyre of the road carries more: from a gyro that says so no model can begin."""
 FASTEST_MPS = 80.0
 """No car's: positions that leap say nothing of its sensors."""
 
@@ -180,7 +182,8 @@ def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
     turns = _change(course, _TURN_HALF) / (2 * _TURN_HALF * PERIOD_S)
     turns = np.where(np.abs(turns) < 1.5, turns, np.nan)
     gyro = smooth(smooth(rate, half), _TURN_HALF)
-    found = (turns, gyro, np.where(drives, gone, np.nan), smooth(record.speed_mps, half))
+    ground = np.where(gone > _ROLLS_MPS, gone, np.nan)
+    found = (turns, gyro, ground, smooth(record.speed_mps, half))
     return dict(zip(_SENSORS, found, strict=True))
 
 
@@ -195,6 +198,7 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
     eased = smooth(speed, _SMOOTH_HALF)
     eased = np.where(np.isfinite(eased), eased, speed)
     rolls = np.isfinite(speed) & np.isfinite(rate) & (speed > _ROLLS_MPS)
+    rolls &= np.abs(np.nan_to_num(rate * speed)) < _MOST_ACROSS_MPS2
     starts = np.arange(count - 1 - _SMOOTH_HALF - _RUN, -1, -_TAIL)[::-1]
 
     def throughout(known: Flags) -> Flags:

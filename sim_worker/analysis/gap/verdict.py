@@ -17,7 +17,12 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushTest
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, began_ns, consistency_of
-from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
+from foretwin.sim_worker.analysis.gap.findings import (
+    Finding,
+    confirmed,
+    findings_of,
+    speed_sensor,
+)
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner, RunMemory
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs, pairs_of
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
@@ -33,6 +38,8 @@ _AT_ONCE = 4
 _IN_A_ROW = 2
 _DENSE_S, _PRECISE_M = 0.25, 0.15
 """Positions this near to each other and this good may accuse another sensor."""
+_SPEED_NOISE_MPS = 0.4
+"""Such positions tell speeds over 0.6 s to 0.35 m/s: what is farther off is not the same speed."""
 _FORGOTTEN_S = 10.0
 """A finding that has not come back for so long is over, and a new one is reported anew."""
 
@@ -64,6 +71,8 @@ class FaultDetector:
         self._first_ns: int | None = None
         self._done = 0
         self._push = PushTest()
+        self._speed_agrees: bool | None = None
+        """Whether the measured speed is that of the positions, as last known; None before."""
         self._pending: tuple[str, str, int, int] | None = None
         self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
         self._reported: dict[tuple[str, str], int] = {}
@@ -103,22 +112,36 @@ class FaultDetector:
         if to_ns - from_ns < 1.5e9:
             return None
         record = without_manual_commands(self.recorder.record(from_ns, to_ns))
+        precise = self._precise()
         pairs = pairs_of(
             record,
             self._runner,
             antenna_ahead_m=self._ahead_m,
-            precise_positions=self._precise(),
+            precise_positions=precise,
             memory=self._runs,
         )
         self.latest = consistency_of(pairs)
+        self._hold_speed_against_positions(self.latest)
         pushed = self._push.handle(pairs.pushes)
+        if self._speed_agrees is False or (precise and self._speed_agrees is None):
+            pushed = ()  # all accelerations are those of the measured speed
         found = _found_in(pairs, self.latest)
         if found is None:
             # A departure that has just begun is a small part of the whole stretch.
             recent = pairs.latest(RECENT_S)
             if not recent.broken:
                 found = _found_in(recent, consistency_of(recent))
+        if self._speed_agrees is False and found is not None and found.cause != "speed_sensor":
+            found = None
         return self._weigh(pushed if found is None else (found,), to_ns)
+
+    def _hold_speed_against_positions(self, seen: Consistency) -> None:
+        if seen.speed_by_gnss is None:
+            return
+        if speed_sensor(seen) is not None:
+            self._speed_agrees = False
+        elif confirmed(seen.speed_by_gnss) and seen.speed_by_gnss.residual < _SPEED_NOISE_MPS:
+            self._speed_agrees = True
 
     def _precise(self) -> bool:
         """Whether positions are dense and good enough to judge other sensors by."""

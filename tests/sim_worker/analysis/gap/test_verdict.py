@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from tests.sim_worker.analysis.gap.judging_faults import (
     IN_TIME_S,
     NAMES,
     culprit_of,
+    drive_s,
     drive_with,
     excited_s,
     judged,
@@ -58,6 +60,44 @@ def test_an_injected_fault_is_found_and_named(fault: str) -> None:
     assert verdict.text
     assert 0.5 <= verdict.confidence <= 1.0
     assert excited_s(fault, verdict, seed=SEED, end_s=END_S) <= IN_TIME_S
+
+
+@pytest.mark.parametrize(
+    ("gain", "unit"),
+    [
+        (3.6, "sent in kilometres per hour?"),
+        (1.0 / 3.6, "metres per second taken for kilometres per hour?"),
+        (2.237, "sent in miles per hour?"),
+        (0.447, "metres per second taken for miles per hour?"),
+    ],
+)
+def test_a_speed_in_another_unit_is_the_sensors_and_no_pedals(gain: float, unit: str) -> None:
+    """Commanded accelerations look as wrong as the speed: they wait for the positions."""
+    drive = drive_of(SEED)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+    told = []
+    for channel, message in drive.samples:
+        if isinstance(message, SpeedSample):
+            message = msgspec.structs.replace(message, speed_mps=gain * message.speed_mps)
+        if (verdict := detector.handle(channel, message)) is not None:
+            told.append(verdict)
+    assert [f"{one.culprit} {one.cause}" for one in told] == ["vehicle speed_sensor"]
+    assert unit in told[0].text
+    assert drive_s(told[0]) < 4.0
+
+
+def test_a_gyro_in_degrees_per_second_is_the_gyros_and_no_models() -> None:
+    """No model can begin where a car is said to turn by ten radians a second."""
+    drive = drive_of(SEED)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+    told = []
+    for channel, message in drive.samples:
+        if isinstance(message, ImuSample):
+            x, y, z = message.rate_radps
+            message = msgspec.structs.replace(message, rate_radps=(x, y, math.degrees(z)))
+        if (verdict := detector.handle(channel, message)) is not None:
+            told.append(verdict)
+    assert {f"{one.culprit} {one.cause}" for one in told} == {"vehicle gyro_sensor"}
 
 
 @pytest.mark.parametrize("fault", ["weaker", "gyro"])
