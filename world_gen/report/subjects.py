@@ -52,6 +52,8 @@ _CONTROLS = {
     "give_way": "gives way at a sign",
     "none": "no sign or signal",
 }
+_NO_SIGN = "gives way, though the map has no sign"
+"""Of lesser roads and ways into a ring."""
 
 
 class Neighbourhood:
@@ -127,7 +129,7 @@ def junction_subjects(at: Neighbourhood, junction: WorldJunction) -> tuple[Subje
         "turns": [_turns(at, lane) for lane in entering],
         "directions": [_direction(at, lane) for lane in touching],
         "speed limits": [_speed(at, lane) for lane in touching],
-        "control": [_line(at, line) for line in lines],
+        "control": [_line(at, line, at.conflicts[place]) for line in lines],
         "signals": _signals(at, junction, heads.values()),
         "right of way": [_right_of_way(at, conflict) for conflict in at.conflicts[place]],
         "crossings": _crossings(at.crossings[place]),
@@ -200,12 +202,20 @@ def _speed(at: Neighbourhood, lane: Lane) -> Value:
     return Value(at.road_name(lane.id), f"{limit.value * _MPS_TO_KMPH:.0f} km/h", limit.source)
 
 
-def _line(at: Neighbourhood, line: StopLine) -> Value:
+def _line(at: Neighbourhood, line: StopLine, conflicts: Sequence[Conflict]) -> Value:
     words = _CONTROLS.get(line.control.value, line.control.value)
+    if line.control.value == "give_way" and line.control.source != "tagged":
+        rules = {one.rule for one in conflicts if _comes_by(at, one) == line.lane_id}
+        words = words if rules & {"give_way", "stop"} else _NO_SIGN
     onto = at.connections.get(line.connection_id or "")
     if onto is not None:
         words = f"{words} on the way into {at.road_name(onto.to_lane_id)}"
     return Value(at.road_name(line.lane_id), words, line.control.source)
+
+
+def _comes_by(at: Neighbourhood, conflict: Conflict) -> str:
+    """Return the lane by which who waits comes."""
+    return at.connections[conflict.yields_id].from_lane_id
 
 
 def _signals(at: Neighbourhood, junction: WorldJunction, heads: Iterable[Signal]) -> list[Value]:

@@ -84,6 +84,21 @@ def test_who_waits_for_whom_is_told(junction):
     )
 
 
+def test_a_lesser_road_gives_way_at_a_sign_only_where_the_map_has_one():
+    main = {**STREET, "highway": "tertiary"}
+    without = report_of(world_of(crossing(street=main, avenue=AVENUE))).junctions[0]
+    assert without.control == "uncontrolled"
+    told = _subject(without, "control").guessed
+    assert "Avenue: gives way, though the map has no sign, inferred (2 times)" in told
+    assert not any("at a sign" in words for words in told)
+    signed = crossing(street=main, avenue=AVENUE, node_tags={0: {"highway": "give_way"}})
+    junction = report_of(world_of(signed)).junctions[0]
+    assert junction.control == "give_way"
+    assert (
+        "Avenue: gives way at a sign, inferred (2 times)" in _subject(junction, "control").guessed
+    )
+
+
 def _who_waits(world: World) -> str:
     return "\n".join(_subject(report_of(world).junctions[0], "right of way").guessed)
 
