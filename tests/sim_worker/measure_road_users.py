@@ -11,7 +11,6 @@ control tick: from speed and heading, and from positions alone, 0.2 s apart.
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import sys
 from collections.abc import Iterator, Sequence
@@ -38,6 +37,7 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.data_maps import data_folder
 
 MAPS = (
     "osm-berlin-mitte/berlin-mitte.osm",
@@ -240,7 +240,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--cases", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args(arguments)
-    played = measure(Path(os.environ["FORETWIN_DATA"]), cases=asked.cases, seed=asked.seed)
+    played = measure(data_folder(), cases=asked.cases, seed=asked.seed)
     print(table(played))
     return 3 if any(one.beyond for one in played.moved) else 0
 

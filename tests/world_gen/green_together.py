@@ -7,11 +7,9 @@ groups, conflicts or clearances: cars are boxes drawn along the paths of connect
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -19,7 +17,7 @@ import shapely
 
 from foretwin.contracts.signals import SignalPlan
 from foretwin.contracts.world import Connection, Crossing, Lane, World
-from tests.world_gen.where_lanes_lead import maps_in, whole_world
+from tests.world_gen.where_lanes_lead import maps_named, whole_world
 
 HALF_CAR_M = 0.9
 SHARED_M2 = 1.5
@@ -150,9 +148,7 @@ def _passes(c: Connection, crossing: Crossing, lanes: Mapping[str, Lane]) -> boo
 
 def main(wanted: Sequence[str]) -> None:
     """Print what was looked at on every map, and each fault."""
-    for path in maps_in(Path(os.environ["FORETWIN_DATA"])):
-        if wanted and not any(word in str(path) for word in wanted):
-            continue
+    for path in maps_named(wanted):
         found = green_together(whole_world(path))
         counts = (f"{getattr(found, n)} {n}" for n in ("junctions", "lit", "bare", "pairs"))
         print(f"{path.name}: {', '.join(counts)}, {len(found.found)} faults")

@@ -15,6 +15,7 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.osm.osm_map import MapError
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.data_maps import named
 from tests.world_gen.junction_score import COLUMNS, Score, score
 from tests.world_gen.truth_sheet import TrueJunction, TrueMap, true_maps
 
@@ -93,10 +94,8 @@ def _line(name: str, found: Score, width: int) -> str:
 
 def main(wanted: Sequence[str]) -> None:
     """Score all maps, or those whose names hold one of the wanted words, and print the table."""
-    chosen = [
-        truth for truth in true_maps() if not wanted or any(word in truth.name for word in wanted)
-    ]
-    print(table({truth.name: score_map(truth) for truth in chosen}))
+    every = {truth.name: truth for truth in true_maps()}
+    print(table({name: score_map(every[name]) for name in named(wanted, every)}))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,6 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-import os
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -42,20 +41,9 @@ from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.data_maps import MAPS, data_folder, named
 from tests.world_gen.roads_driven import RoadsDriven
 
-MAPS = {
-    "austin": "osm-austin-downtown/austin.osm.gz",
-    "badhersfeld": "osm-badhersfeld/badhersfeld.osm.xml.gz",
-    "berlin-mitte": "osm-berlin-mitte/berlin-mitte.osm",
-    "grosser-stern": "osm-berlin-grosser-stern/berlin-siegessaeule.osm.gz",
-    "kingsway": "osm-kingsway/kingsway_junction.osm",
-    "leeds": "osm-leeds/leeds.osm.gz",
-    "liechtenstein": "osm-liechtenstein/liechtenstein-latest.osm.pbf",
-    "monaco": "osm-monaco/monaco.osm.gz",
-    "moritzplatz": "osm-berlin-moritzplatz/berlin-moritzplatz.osm",
-    "testfeld": "osm-testfeld-nds/TestfeldNDS_main_roads.osm.xml.gz",
-}
 TRACKS = "traffic-karlsruhe-k729"
 
 CHORD_M = 4.0
@@ -267,9 +255,9 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(MAPS))
     parser.add_argument("--worst", type=int, default=0)
     chosen = parser.parse_args()
-    data = Path(os.environ["FORETWIN_DATA"])
+    data = data_folder()
     every: list[Turn] = []
-    for name in chosen.names or MAPS:
+    for name in named(chosen.names, MAPS):
         begin_s = time.process_time()
         turns = list(turns_of(*region_of(data / MAPS[name])))
         every += turns

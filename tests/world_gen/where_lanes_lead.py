@@ -6,7 +6,6 @@ every lane that leads nowhere; with names (or parts of them), for those maps alo
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from foretwin.world_gen.build import build_region
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.data_maps import data_folder, named
 
 DRIVEN = ("driving", "bus")
 GOES_ON_M = 1.0
@@ -83,6 +83,13 @@ def maps_in(folder: Path) -> Iterator[Path]:
             yield path
 
 
+def maps_named(words: Sequence[str]) -> list[Path]:
+    """Return those whose path below the data folder holds one of the words, all without words."""
+    folder = data_folder()
+    names = [str(path.relative_to(folder)) for path in maps_in(folder)]
+    return [folder / name for name in named(words, names)]
+
+
 def whole_world(path: Path) -> World:
     """Return the World of all that a map holds."""
     osm = read_map(path)
@@ -93,9 +100,7 @@ def whole_world(path: Path) -> World:
 
 def main(wanted: Sequence[str]) -> None:
     """Print the counts of every map, and each lane that leads nowhere."""
-    for path in maps_in(Path(os.environ["FORETWIN_DATA"])):
-        if wanted and not any(word in str(path) for word in wanted):
-            continue
+    for path in maps_named(wanted):
         found = lane_ends(whole_world(path))
         counts = (f"{len(getattr(found, name))} {name}" for name in found.__struct_fields__)
         print(f"{path.name}: {', '.join(counts)}", *(f"  dead {n}" for n in found.dead), sep="\n")

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from foretwin.sim_worker.road_users.manners import SPREADS, Manners
 from tests.sim_worker.realism.figures import QUANTITIES, Crossing, crossing, distances, samples
 from tests.sim_worker.realism.fitting import fitted
 from tests.sim_worker.realism.recordings import karlsruhe, mcity
+from tests.world_gen.data_maps import data_folder
 
 MCITY_MPS, KARLSRUHE_MPS = 25 * 0.44704, 50 / 3.6
 """Limits: 25 mph is that of Mcity's streets, 50 km/h stands in Karlsruhe's meta_data.csv."""
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--draws", type=int, default=4)
     parser.add_argument("--write", action="store_true")
     asked = parser.parse_args(arguments)
-    spreads, places = SPREADS, crossings(Path(os.environ["FORETWIN_DATA"]))
+    spreads, places = SPREADS, crossings(data_folder())
     if asked.fit:
         (place,) = (one for one in places if one.name == asked.fit)
         spreads = fitted(place, tries=asked.tries)

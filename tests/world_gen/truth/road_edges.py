@@ -9,9 +9,7 @@ result.
 from __future__ import annotations
 
 import json
-import os
 import re
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +28,7 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.world_gen.data_maps import data_folder
 from tests.world_gen.truth.argoverse import argoverse_maps, drivable_area
 from tests.world_gen.truth.hd_map import HdMap
 from tests.world_gen.truth.reduced_map import reduced
@@ -92,14 +91,11 @@ def _beyond(hd: HdMap, area: shapely.Geometry, world: World) -> Iterator[float]:
                 yield float(away)
 
 
-def main() -> int:
-    """Print the quantiles; exit code 2 where the data are not named."""
-    data = os.environ.get("FORETWIN_DATA")
-    if not data:
-        print("FORETWIN_DATA names no folder with HD maps", file=sys.stderr)
-        return 2
+def main() -> None:
+    """Print the quantiles."""
+    data = data_folder()
     with tempfile.TemporaryDirectory(prefix="foretwin-edges-") as folder:
-        found = measure(Path(data) / "map-av2-pittsburgh", Path(folder))
+        found = measure(data / "map-av2-pittsburgh", Path(folder))
     told = (5, 50, 75, 90, 95, 99)
     for name, beyond_m in found._asdict().items():
         text = ", ".join(f"p{q} {np.percentile(beyond_m, q):.2f}" for q in told)
@@ -109,8 +105,7 @@ def main() -> int:
             {name: round(float(np.percentile(v, 95)), 2) for name, v in found._asdict().items()}
         )
     )
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

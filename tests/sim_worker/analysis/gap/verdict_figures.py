@@ -6,7 +6,6 @@ faults, `real` every drive of the data folder (FORETWIN_DATA).
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 from tests.sim_worker.analysis.gap.judging_faults import IN_TIME_S, Case, judged, verdicts_of
 from tests.sim_worker.analysis.gap.real_drives import accused_in
 from tests.sim_worker.faulty_standin import CAR_FAULTS, DURATION_S, MODEL_FAULTS
+from tests.world_gen.data_maps import data_folder
 
 FAULTS = (*CAR_FAULTS, *MODEL_FAULTS)
 
@@ -69,7 +69,7 @@ def main(words: list[str]) -> None:
         case ["quiet", first, end]:
             print_quiet(range(int(first), int(end)))
         case ["real"]:
-            print_real(Path(os.environ["FORETWIN_DATA"]))
+            print_real(data_folder())
         case _:
             print(__doc__)
 
