@@ -182,8 +182,9 @@ class Conflict(msgspec.Struct, frozen=True, kw_only=True):
 class StopLine(msgspec.Struct, frozen=True, kw_only=True):
     """Where vehicles stop; `ends` (2, 2) from left to right.
 
-    It lies across the lane `lane_id`, or, where `connection_id` is given, at a sign inside the
-    junction: across that connection, which begins at the lane.
+    It lies across the lane `lane_id`, or, where that begins behind the place, as where the map
+    parts a road at a crossing, across the lane that it goes on from. Where `connection_id` is
+    given, it lies at a sign inside the junction: across that connection, which begins at the lane.
     """
 
     id: str

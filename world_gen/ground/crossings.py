@@ -11,9 +11,9 @@ from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.world import Crossing
 from foretwin.geometry.polyline import left_of, unit
 from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.stopping import CROSSING_WIDTH_M
 from foretwin.world_gen.roads.beside_roads import BesideRoads
 
-CROSSING_WIDTH_M = 4.0
 _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
 
 

@@ -88,6 +88,16 @@ class LaneSet(msgspec.Struct, frozen=True):
     ends: Mapping[tuple[int, bool, int], LaneDraft]
     notes: tuple[str, ...]
 
+    @property
+    def before(self) -> dict[str, LaneDraft]:
+        """The lane that ends exactly where another one, by its id, goes on: one road's."""
+        return {
+            name: lane
+            for lane in self.lanes.values()
+            for name in lane.successors
+            if name in self.lanes
+        }
+
     def ending(self, toward: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that ends where `toward` ends; None where it was left out."""
         return self.ends.get((*toward.key, plan.number))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.lanes.cluster import Cluster
@@ -12,8 +12,13 @@ from foretwin.world_gen.roads.road_graph import DirectedEdge
 NodeTags = Mapping[int, Mapping[str, str]]
 OWN_LINE_M = 3.0
 """A sign or signal farther than this from the junction's node stands at the stop line."""
-BEFORE_CROSSING_M = 3.0
-"""From a crossing's middle to the line before it: half its width and a metre (RMS 2)."""
+CROSSING_WIDTH_M = 4.0
+BEFORE_CROSSING_M = CROSSING_WIDTH_M / 2.0 + 1.0
+"""From a crossing's middle to the line before it: half its width and a metre (RMS 2; MUTCD 3B.16
+has 4 ft)."""
+CAR_ROOM_M = 4.74
+"""Room behind a car that waits past a crossing: the length of RASt 06's car. With less it would
+block the crossing, and waits before it."""
 LINE_SETBACK_M = 0.3
 """From a stop line to where its lane ends."""
 CROSSING_NEAR_M = 16.0
@@ -54,6 +59,28 @@ def before_crossings_m(leg: DirectedEdge, node_tags: NodeTags) -> float:
     tagged = ((node_tags.get(node, {}), m) for node, m in zip(leg.node_ids, at_m, strict=False))
     crossings = (m for tags, m in tagged if tags.get("highway") == "crossing" or "crossing" in tags)
     return max(min(crossings, default=math.inf) - BEFORE_CROSSING_M, 0.0)
+
+
+def clear_of_crossings(
+    line_m: float,
+    crossings_m: Iterable[float],
+    *,
+    served_m: float = 0.0,
+    most_m: float = math.inf,
+) -> float:
+    """Return where cars stop who would stop at `line_m`: before each crossing that they would else
+    stand on, or past with less room behind them than a car needs, and before those up to
+    `served_m`, for which the line's light stands too.
+
+    All are metres on the way back from a junction, to the middles of crossings. No line lies
+    farther back than `most_m`, where the lane begins: it is then where it was.
+    """
+    for at_m in sorted(crossings_m):
+        before_m = at_m + BEFORE_CROSSING_M
+        blocked = at_m - CROSSING_WIDTH_M / 2.0 - line_m < CAR_ROOM_M
+        if line_m < before_m <= most_m and (blocked or at_m <= served_m):
+            line_m = before_m
+    return line_m
 
 
 def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:

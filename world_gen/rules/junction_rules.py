@@ -57,7 +57,7 @@ def junction_rules(
     """
     signs = signs_inside(connections, node_tags, around)
     found = approaches(around, node_tags, connections, junction_lights, signs)
-    lines = stop_lines(found, around, lanes)
+    lines = stop_lines(found, around, lanes, crossings)
     _control(connections, found, lines, signs, node_tags, around)
     whole = {id(junction) for junction in around.junctions}
     ruled = [c for c in connections if id(c.cluster.junction) in whole]

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.signals import Signal, SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.world import Crossing, StopLine
 from foretwin.geometry.polyline import length, locate, points_at
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
-from foretwin.world_gen.lanes.stopping import BEFORE_CROSSING_M, NodeTags, faces
+from foretwin.world_gen.lanes.stopping import (
+    BEFORE_CROSSING_M,
+    CROSSING_NEAR_M,
+    NodeTags,
+    clear_of_crossings,
+    faces,
+)
 from foretwin.world_gen.lanes.trims import MAX_TRIM_M
 from foretwin.world_gen.rules.control_devices import is_light
 from foretwin.world_gen.rules.signal_heads import (
@@ -24,12 +31,14 @@ from foretwin.world_gen.rules.signal_heads import (
     to_kerb_m,
     towards_drivers_rad,
 )
-from foretwin.world_gen.rules.stop_lines import lines_across
+from foretwin.world_gen.rules.stop_lines import lines_across, most_back_m
 
 DRIVING_S, WALKING_S = 40.0, 10.0
 AMBER_S, ALL_RED_S = 3.0, 2.0
 _REACH_M = 9.0
 """Lanes end up to this far from a node where they change their number."""
+_PAST_M = 1.0
+"""A lane that keeps to its place beside a crossing's node, but for so much, leads over it."""
 
 
 class LoneLights(NamedTuple):
@@ -71,6 +80,11 @@ def lone_lights(
                 if node not in taken and is_light(node_tags.get(node, {})):
                     places.setdefault(node, []).append((index, i))
     by_node = {c.osm_node: c for c in crossings}
+    walked = {
+        index: [edge.xy_m[i] for i, node in enumerate(edge.node_ids) if node in by_node]
+        for index, edge in around.edges.items()
+    }
+    before = lanes.before
     lines: list[StopLine] = []
     heads: list[Signal] = []
     plans: list[SignalPlan] = []
@@ -80,7 +94,9 @@ def lone_lights(
             for lane in on_edge.get(index, ()):
                 if faces(node_tags[node], not lane.key.reverse) is not False:
                     on_way = 0 < i < len(around.edges[index].node_ids) - 1
-                    line = _line(lane, node, around.edges[index].xy_m[i], node_tags, on_way)
+                    at_xy = around.edges[index].xy_m[i]
+                    place = _LightPlace(node, at_xy, node_tags[node], on_way, walked[index])
+                    line = _line(lane, place, before)
                     if line is not None:
                         stopped.append((lane, line))
         if not stopped:
@@ -91,29 +107,45 @@ def lone_lights(
     return LoneLights(tuple(lines), tuple(heads), tuple(plans))
 
 
-def _line(
-    lane: LaneDraft,
-    node: int,
-    at_xy: np.ndarray[tuple[int], np.dtype[np.float64]],
-    tags: NodeTags,
-    on_way: bool,
-) -> StopLine | None:
-    """Return the line of a light; `on_way` tells that it stands between the ends of its edge.
+class _LightPlace(NamedTuple):
+    """Where a light stands on an edge, between its ends or at one, and the crossings there."""
 
-    There a lane may begin behind it, where a junction took the room: the line is at its beginning.
-    Where it stands at a fork, whose turns take room as well, it is at the lane's end.
+    node: int
+    xy: Array
+    tags: Mapping[str, str]
+    on_way: bool
+    walked: Sequence[Array]
+
+
+def _line(lane: LaneDraft, light: _LightPlace, before: Mapping[str, LaneDraft]) -> StopLine | None:
+    """Return the line of a light; None where the lane does not come past it.
+
+    Between the ends of an edge a lane may begin behind it, where a junction took the room: the line
+    is at its beginning. Where it stands at a fork, whose turns take room as well, it is at the
+    lane's end. Cars wait before a crossing that they would block, and before any near one where the
+    light faces both ways, as it stands in the middle of what it is for.
     """
-    at_m = locate(lane.centerline, at_xy)
+    at_m, ends_m = locate(lane.centerline, light.xy), length(lane.centerline)
     cut = at_m <= 0.5
-    short = cut or at_m >= length(lane.centerline) - 0.5
-    reach = abs(lane.plan.left_m) + (MAX_TRIM_M if short else _REACH_M)
-    if (cut and not on_way) or math.hypot(*(points_at(lane.centerline, at_m) - at_xy)) > reach:
-        return None  # the lane begins here or does not come this way
-    if "crossing" in tags[node]:
-        at_m -= BEFORE_CROSSING_M
-    back_m = length(lane.centerline) - at_m
-    (line,) = lines_across([(lane, back_m, Choice("signal", "tagged"))], f"light{node}")
+    reach = abs(lane.plan.left_m) + (MAX_TRIM_M if cut or at_m >= ends_m - 0.5 else _REACH_M)
+    if (cut and not light.on_way) or _aside_m(lane, at_m, light.xy) > reach:
+        return None
+    own = "crossing" in light.tags
+    served_m = 0.0 if own or faces(light.tags, True) is not None else CROSSING_NEAR_M
+    met = ((locate(lane.centerline, xy), xy) for xy in light.walked)
+    back_m = clear_of_crossings(
+        ends_m - at_m + (BEFORE_CROSSING_M if own else 0.0),
+        [ends_m - m for m, xy in met if _aside_m(lane, m, xy) < abs(lane.plan.left_m) + _PAST_M],
+        served_m=ends_m - at_m + served_m,
+        most_m=most_back_m(lane, before),
+    )
+    name, control = f"light{light.node}", Choice("signal", "tagged")
+    (line,) = lines_across([(lane, back_m, control)], before, name)
     return line
+
+
+def _aside_m(lane: LaneDraft, at_m: float, xy: Array) -> float:
+    return math.hypot(*(points_at(lane.centerline, at_m) - xy))
 
 
 def _heads(

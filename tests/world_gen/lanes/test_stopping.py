@@ -10,7 +10,14 @@ from foretwin.world_gen.extent import Disc
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.lanes.clusters import surroundings, world_frame
-from foretwin.world_gen.lanes.stopping import LINE_SETBACK_M, faces, stop_line_m
+from foretwin.world_gen.lanes.stopping import (
+    BEFORE_CROSSING_M,
+    CAR_ROOM_M,
+    LINE_SETBACK_M,
+    clear_of_crossings,
+    faces,
+    stop_line_m,
+)
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, drawn_map
 
@@ -67,3 +74,24 @@ def test_a_sign_faces_who_its_tag_says():
     assert faces({"direction": "forward"}, False) is False
     assert faces({"stop:direction": "backward"}, False) is True
     assert faces({}, True) is None
+
+
+def test_cars_wait_before_a_crossing_that_leaves_no_room_for_one():
+    at_m = 10.0
+    room_m = at_m - 2.0 - CAR_ROOM_M
+    assert clear_of_crossings(room_m - 0.01, [at_m]) == room_m - 0.01
+    assert clear_of_crossings(room_m + 0.01, [at_m]) == at_m + BEFORE_CROSSING_M
+    assert clear_of_crossings(12.9, [at_m]) == at_m + BEFORE_CROSSING_M
+    assert clear_of_crossings(13.1, [at_m]) == 13.1
+    # Before it, the next one would be blocked too.
+    assert clear_of_crossings(9.0, [17.0, at_m]) == 17.0 + BEFORE_CROSSING_M
+
+
+def test_a_light_stands_for_crossings_that_are_near():
+    assert clear_of_crossings(0.0, [15.0]) == 0.0
+    assert clear_of_crossings(0.0, [15.0], served_m=16.0) == 18.0
+
+
+def test_a_line_stays_where_the_road_begins_before_a_crossing():
+    assert clear_of_crossings(4.0, [8.0], most_m=10.9) == 4.0
+    assert clear_of_crossings(4.0, [8.0], most_m=11.1) == 11.0

@@ -12,10 +12,7 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
 from tests.world_gen.plan_checks import check_plans
 
-COVERS = (
-    "foretwin.world_gen.rules.control_devices",
-    "foretwin.world_gen.rules.lone_lights",
-)
+COVERS = ("foretwin.world_gen.rules.control_devices",)
 
 LIGHT = {"highway": "traffic_signals"}
 

@@ -20,10 +20,7 @@ from tests.world_gen.slip_roads import (
     slip_world,
 )
 
-COVERS = (
-    "foretwin.world_gen.rules.junction_rules",
-    "foretwin.world_gen.rules.stop_lines",
-)
+COVERS = ("foretwin.world_gen.rules.junction_rules",)
 
 GIVE_WAY = {"highway": "give_way"}
 
