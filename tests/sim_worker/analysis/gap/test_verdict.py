@@ -86,6 +86,23 @@ def test_a_speed_in_another_unit_is_the_sensors_and_no_pedals(gain: float, unit:
     assert drive_s(told[0]) < 4.0
 
 
+def test_clocks_apart_accuse_nobody_or_are_named() -> None:
+    """By 0.2 s of speeds or positions; a gyro that is stamped early is a model that lags."""
+    drive = drive_of(SEED)
+    late_s = {"speed": 0.2, "gnss": -0.2, "imu": -0.1}
+    for channel in late_s:
+        detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+        told = []
+        for name, message in drive.samples:
+            if name == channel:
+                stamp_ns = message.stamp_ns + round(1e9 * late_s[channel])
+                message = msgspec.structs.replace(message, stamp_ns=stamp_ns)
+            told.append(detector.handle(name, message))
+        texts = [one.text for one in told if one is not None]
+        assert len(texts) == (channel == "imu")
+        assert all("stamped by clocks" in text for text in texts)
+
+
 def test_a_gyro_in_degrees_per_second_is_the_gyros_and_no_models() -> None:
     """No model can begin where a car is said to turn by ten radians a second."""
     drive = drive_of(SEED)
