@@ -18,6 +18,9 @@ STRAIGHT_RADPS = 1e-3
 """Who turns more slowly goes straight on: 5 cm beside it after 3 s at 10 m/s."""
 TURNS_BY_RAD, TURNS_FOR_S = math.pi, 8.0
 """Nobody is taken to turn on for more than half a circle, or longer. Chosen."""
+STRAIGHT_FOR_S = 3600.0
+"""Who is met later is never met: speeds that are the same differ by rounding, and one that stands
+is not quite 0. Chosen."""
 _LEAST_STEP_S = 0.02
 """Touches in a bend that are shorter than this may be overlooked."""
 _CLOSE_M, _CLOSE_S, _MOST_STEPS = 1e-9, 1e-10, 60
@@ -240,7 +243,7 @@ def least_until_touch(
                     first = max(first, -(per_speed * distance) - half)
                     last = min(last, half - per_speed * distance)
                 until = max(first, 0.0)
-                if until <= last and until < least_s[future, instant]:
+                if until <= min(last, STRAIGHT_FOR_S) and until < least_s[future, instant]:
                     least_s[future, instant] = until
 
 

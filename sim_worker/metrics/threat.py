@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.driver_model import MAX_DECEL_MPS2
+from foretwin.sim_worker.metrics.compiled_touch import STRAIGHT_FOR_S
 from foretwin.sim_worker.metrics.following import (
     Leaders,
     aside_to_pass,
@@ -103,7 +104,8 @@ def _until_touch(ahead: Leaders) -> tuple[Array, Array]:
     """Return closing speeds (K,), and times to collision along the course, infinite if none."""
     closing = closing_mps(ahead)
     nears = closing > 0.0
-    return closing, np.where(nears, ahead.gap_m, np.inf) / np.where(nears, closing, 1.0)
+    until = np.where(nears, ahead.gap_m, np.inf) / np.where(nears, closing, 1.0)
+    return closing, np.where(until <= STRAIGHT_FOR_S, until, np.inf)
 
 
 def _time_to_brake(ahead: Leaders) -> Array:

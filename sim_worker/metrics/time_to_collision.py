@@ -103,8 +103,8 @@ def _least_at_each_instant(view: RolloutView) -> Array:
     Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
     the road users instead of a common lane. Both keep their speed and yaw rate, so that who drives
     in a bend drives on in it: the model of constant turn rate and velocity of Schubert, Richter,
-    Wanielik (2008), Comparison and Evaluation of Advanced Motion Models. It holds for 10 s, or
-    half a circle; who goes straight on does so for ever.
+    Wanielik (2008), Comparison and Evaluation of Advanced Motion Models. It holds for 8 s, or
+    half a circle; who goes straight on does so for an hour.
     """
     seen = view.relative
     least = np.full(seen.ahead_m.shape[:2], np.inf)

@@ -64,7 +64,7 @@ def test_following_in_any_direction(
     )
 
     assert found["thw"] == pytest.approx(gaps.min() / speed, abs=1e-6)
-    if closing > 1e-3:
+    if closing > 0.02:
         until = gaps.min() / closing
         brake, swerve = closing / (2 * until), 2 * ((WIDTH_M + size[1]) / 2 - 0.3) / until**2
         assert found["ttc"] == pytest.approx(until, rel=1e-6)
@@ -74,7 +74,18 @@ def test_following_in_any_direction(
         assert found["required_acceleration"] == pytest.approx(math.hypot(brake, swerve), rel=1e-6)
     elif closing <= 0.0:
         assert found["drac"] == pytest.approx(0.0, abs=1e-6)
-        assert found["ttc"] > 1e4
+        assert found["ttc"] == math.inf
+
+
+@pytest.mark.parametrize("closing", [0.0, 1e-40, 1e-16, 1e-9, 1e-3])
+@pytest.mark.parametrize("speed", [0.0, 8.0])
+@pytest.mark.parametrize("yaw", [0.0, 1.0])
+def test_who_is_met_in_an_hour_is_never_met(closing: float, speed: float, yaw: float) -> None:
+    """A car that stands still moves by 1e-40 m/s; speeds that are the same differ by rounding."""
+    ego, leader = Mover(0, 0, 0, speed + closing), Mover(20.0, 0.3, 0, speed)
+    driven = rollout(turned(ego, yaw), turned(leader, yaw), time_s=times(0.1))
+
+    assert set(values(driven, "ttc", "ttb", "tts", "ttr").values()) == {math.inf}
 
 
 @settings(max_examples=60)
