@@ -7,6 +7,7 @@ shown as they are spelt, in the escapes that JSON has too.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from typing import TYPE_CHECKING
@@ -20,6 +21,10 @@ _COMMANDS = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]"
 )
 """Control characters, separators of lines, marks of direction, and halves of characters."""
+
+
+PLAIN_WIDTH = 120
+"""Of tables in a file or a pipe."""
 
 
 def visible(text: str) -> str:
@@ -38,10 +43,16 @@ def say(text: object, *, error: bool = False) -> None:
 
 
 def console(*, error: bool = False) -> Console:
-    """Return a console that takes nothing for markup; what it prints must be made `visible`."""
+    """Return a console that takes nothing for markup; what it prints must be made `visible`.
+
+    A file or a pipe has no width of its own to keep to.
+    """
     from rich.console import Console
 
-    return Console(stderr=error, markup=False, emoji=False, highlight=False)
+    made = Console(stderr=error, markup=False, emoji=False, highlight=False)
+    if not made.is_terminal and "COLUMNS" not in os.environ:
+        made.width = PLAIN_WIDTH
+    return made
 
 
 def words(text: str) -> Text:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from foretwin.contracts.world import IntersectionSummary
 from foretwin.orchestrator.commands.output import print_table
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.choice import choose_junctions
+
+_WHOLE = ("id", "lat", "lon")
 
 
 def list_intersections(
@@ -18,8 +22,16 @@ def list_intersections(
     """
     junctions = choose_junctions(map_file, route=route, service_roads=service_roads).junctions
     found = [junction.summary for junction in junctions]
-    columns = ("id", "kind", "control", "arms", "lat", "lon", "name")
+    return CommandResult(found, lambda: _print(map_file, found))
+
+
+def _print(map_file: Path, found: Sequence[IntersectionSummary]) -> None:
+    from rich.table import Column
+
+    # Ids and places are copied from here; words go on in the next line.
+    names = ("id", "kind", "control", "arms", "lat", "lon", "name")
+    columns = [Column(one, no_wrap=one in _WHOLE, overflow="fold") for one in names]
     rows = [
         (s.id, s.kind, s.control, s.arms, f"{s.lat:.6f}", f"{s.lon:.6f}", s.name) for s in found
     ]
-    return CommandResult(found, lambda: print_table(str(map_file), columns, rows))
+    print_table(str(map_file), columns, rows)

@@ -21,7 +21,6 @@ COUNTS = ("cases", "placed", "collided", "failed")
 """What is counted of each scenario and planner."""
 _REASONS = 1000
 """So many different ones are counted of each."""
-_PLAIN_WIDTH = 120
 _OTHERS = "other reasons"
 
 
@@ -147,10 +146,7 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
             "" if clearance is None else f"{clearance:.2f} m",
             "" if score is None else f"{score:.3f}",
         )
-    shown = console()
-    if not shown.is_terminal:
-        shown.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
-    shown.print(table)
+    console().print(table)
     shard = f", shard {summary['shard']}" if "shard" in summary else ""
     say(f"{out}{shard}: {_counted(summary)}")
     say(likeness_words())

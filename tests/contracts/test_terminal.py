@@ -56,6 +56,13 @@ def test_a_line_goes_where_it_belongs(capsys: pytest.CaptureFixture[str]) -> Non
     assert capsys.readouterr() == (SHOWN + "\n", SHOWN + "\n")
 
 
+def test_a_pipe_is_as_wide_as_tables_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert console().width == 120
+    monkeypatch.setenv("COLUMNS", "90")
+    assert console().width == 90
+
+
 def test_rich_takes_nothing_for_markup() -> None:
     shown, bar_shown = io.StringIO(), io.StringIO()
     made = console()

@@ -12,10 +12,7 @@ import pytest
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 
-COVERS = (
-    "foretwin.orchestrator.commands.cli",
-    "foretwin.orchestrator.commands.intersections",
-)
+COVERS = ("foretwin.orchestrator.commands.cli",)
 
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" creator="test" xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>
