@@ -138,5 +138,5 @@ def note_kind(note: str) -> str:
     text = _OBJECT.sub("", note)
     if text == note and ": " in note:
         text = note.rpartition(": ")[0]
-    text = _ID.sub(lambda found: found[1] or "…", text)
+    text = _ID.sub(lambda found: f"{found[1]} …" if found[1] else "…", text)
     return _NUMBER.sub("…", text)

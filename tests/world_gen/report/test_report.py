@@ -187,7 +187,7 @@ def test_names_from_the_map_cannot_break_a_page():
     [
         (
             "way 12: room for a radius of 4.0 m alone into way 34 (right)",
-            "room for a radius of … m alone into way (right)",
+            "room for a radius of … m alone into way … (right)",
         ),
         (
             "buildings cut back where a lane passes: w1, w2-1",
