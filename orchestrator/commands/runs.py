@@ -62,12 +62,12 @@ def _print(rows: Sequence[RunRow]) -> None:
     cells: dict[str, tuple[Column, Callable[[RunRow], object]]] = {
         "run": (Column("run", no_wrap=True), lambda row: row.run),
         "when": (Column("when", no_wrap=True), lambda row: (row.time or "")[:16]),
-        "what": (Column("what"), _what),
+        "what": (Column("what", overflow="fold"), _what),
         "lasted": (Column("lasted", justify="right", no_wrap=True), _lasted),
         "junctions": (Column("junctions", justify="right"), lambda row: _count(row.junctions)),
         "futures": (Column("futures", justify="right"), lambda row: _count(row.futures)),
         "state": (Column("state", no_wrap=True), lambda row: row.state),
-        "verdict": (Column("verdict"), _found),
+        "verdict": (Column("verdict", overflow="fold"), _found),
     }
     narrow = console().width < WIDE
     shown = [cells[name] for name in cells if not (narrow and name in _WHERE_WIDE)]

@@ -59,6 +59,16 @@ def test_a_terminal_shows_when_what_how_long_and_what_was_found(
     assert "20261123-000002-abcd: foretwin recover " in said.err
 
 
+def test_what_a_narrow_terminal_shows_of_a_run_is_not_cut(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "72")
+
+    assert command(["runs", str(folder)]) == 0
+
+    assert "…" not in capsys.readouterr().out
+
+
 def test_a_list_is_csv_too(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["runs", str(folder), "--csv"]) == 0
 
