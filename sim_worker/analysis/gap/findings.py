@@ -230,8 +230,8 @@ def _model_turns(seen: Consistency) -> Finding | None:
     if lag.seconds > _LATE_S + 3.0 * lag.std_s:
         said = f"the model's turning lags {lag.seconds:.2f} s behind the car's"
         more = _evidence("motion_lag_s", lag.seconds, 0.0, lag.std_s, said)
-        late = "or steering and gyro are stamped by clocks that far apart"
-        return accuse("inertia", f"{said}: its yaw inertia or tyres are wrong, {late}", more)
+        clocks = "or steering and gyro are stamped by clocks that far apart"
+        return accuse("inertia", f"{said}: its yaw inertia or tyres are wrong, {clocks}", more)
     if abs(line.offset) > _OFFSET_PM + 3.0 * line.offset_std:
         said = f"the model's curvature is off by {-line.offset:+.4f} 1/m"
         text = f"{said}: its steering offset or the car's steering sensor is wrong"
