@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from foretwin.contracts.parts import CaseCount
 from foretwin.contracts.running import RunningQuantiles
 from foretwin.contracts.terminal import console, plain, say, words
@@ -130,6 +132,22 @@ def _not_placed_lines(entries: list[dict[str, Any]]) -> list[str]:
     ]
 
 
+def _no_place_lines(unplaced: list[Any]) -> list[str]:
+    """Return at how many junctions, or Worlds, each scenario has no place, for which reason."""
+    counted: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+    for one in map(msgspec.to_builtins, unplaced):
+        counted[one["scenario_id"]][one["reason"]] += 1
+    lines = []
+    for scenario, reasons in sorted(counted.items()):
+        most = _most(reasons)
+        more = reasons.total() - sum(most.values())
+        lines += [
+            f"no place: {count} junction{'s' if count != 1 else ''} for {scenario}: {reason}"
+            for reason, count in (most | ({_OTHERS: more} if more else {})).items()
+        ]
+    return lines
+
+
 def print_summary(out: Path, summary: dict[str, Any]) -> None:
     """Print a sweep's summary as a table."""
     from rich.table import Column, Table
@@ -157,7 +175,7 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
     for entry in summary["scenarios"]:
         for reason, count in entry["reasons"].items():
             say(plain(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}"))
-    for line in _not_placed_lines(summary["scenarios"]):
+    for line in (*_no_place_lines(summary["unplaced"]), *_not_placed_lines(summary["scenarios"])):
         say(plain(line))
     say(f"sha256 of the rows: {summary['rows_sha256']}")
     say(summary["attribution"])

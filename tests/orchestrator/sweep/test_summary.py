@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import statistics
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from foretwin.contracts.parts import CaseCount
+from foretwin.contracts.placement import NotPlaced
 from foretwin.orchestrator.sweep.spec import load_spec
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
 from tests.orchestrator.sweeps import small_sweep
@@ -48,20 +51,34 @@ def test_in_whatever_order_parts_come_they_add_up_to_the_same(tmp_path: Path) ->
 
 
 def printed(
-    capsys: pytest.CaptureFixture[str], scenarios: list[dict[str, Any]], unplaced: int = 0
+    capsys: pytest.CaptureFixture[str],
+    scenarios: list[dict[str, Any]],
+    unplaced: Sequence[NotPlaced | dict[str, Any]] = (),
 ) -> str:
     counts = {"rows": 24, "placed": 12, "worlds": 3, "jobs": 4, "jobs_played": 4}
-    told = {"playing_s": 0.552, "unplaced": [{}] * unplaced, "placed_nowhere": [], "failures": {}}
+    told = {"playing_s": 0.552, "unplaced": unplaced, "placed_nowhere": [], "failures": {}}
     more = {"scenarios": scenarios, "rows_sha256": "0", "attribution": ""}
     print_summary(Path("out"), counts | told | more)
     return capsys.readouterr().out
 
 
-def test_the_last_line_counts_places_that_were_not_found(
+def test_places_that_were_not_found_are_counted_and_told_with_the_reason(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """As they are found, and as the shards of a sweep have them."""
+    short = NotPlaced(scenario_id="rtip", junction_id="n1", reason="too short", applies=True)
+    found = (short, msgspec.to_builtins(replace(short, junction_id="n2")))
+    others = [replace(short, reason=why) for why in ("built over", "c", "d", "e")]
+    said = printed(capsys, [], [*found, *others])
+
     assert "24 rows of 3 Worlds, 4 of 4 jobs played now in 0.6 s\n" in printed(capsys, [])
-    assert "in 0.6 s; places not found: 1\n" in printed(capsys, [], unplaced=1)
+    assert "in 0.6 s; places not found: 6\n" in said
+    assert [line for line in said.splitlines() if line.startswith("no place")] == [
+        "no place: 2 junctions for rtip: too short",
+        "no place: 1 junction for rtip: built over",
+        "no place: 1 junction for rtip: c",
+        "no place: 2 junctions for rtip: other reasons",
+    ]
 
 
 def test_rows_that_were_not_placed_are_counted_alike_in_all_and_by_the_reason(
