@@ -147,6 +147,9 @@ def sweep_row(record: Mapping[str, Any], *, folder: str, record_text: str) -> Ru
         run += f"-{shard.replace('/', 'of')}"
     failures = record.get("failures")
     placed, collided, failed = (record.get(name) for name in ("placed", "collided", "failed"))
+    # What a start that went on took is not what the sweep took; of shards it is the sum.
+    jobs = record.get("jobs")
+    at_once = "shards" in record or record.get("jobs_played", jobs) == jobs
     return RunRow(
         run=run,
         kind=SWEEP,
@@ -156,7 +159,7 @@ def sweep_row(record: Mapping[str, Any], *, folder: str, record_text: str) -> Ru
         planner=", ".join(spec.get("planners") or ()) or None,
         vehicle=", ".join(_name(one) or "" for one in spec.get("vehicles") or ()) or None,
         seed=spec.get("seed"),
-        wall_s=record.get("playing_s"),
+        wall_s=record.get("playing_s") if at_once else None,
         junctions=record.get("worlds"),
         futures=record.get("rows"),
         collided=collided,

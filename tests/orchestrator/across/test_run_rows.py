@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from foretwin.orchestrator.across.run_rows import row_of_folder
+from foretwin.orchestrator.across.run_rows import row_of_folder, sweep_row
 from foretwin.orchestrator.record.run_state import RunGoesOnError, run_lock
 from foretwin.orchestrator.sweep.lock import folder_lock
 from tests.orchestrator.lake.made_runs import made_run, made_sweep
@@ -51,6 +51,18 @@ def test_a_sweep_is_told_by_its_record(tmp_path: Path) -> None:
     assert row.verdict == "12 of 34 collided, 1 failed"
     assert (row.junctions, row.collided, row.troubles, row.wall_s) == (4, 12, 1, 2.5)
     assert row.time is not None
+
+
+@pytest.mark.parametrize(
+    ("jobs_played", "more", "wall_s"),
+    [(22, {}, 2.5), (0, {}, None), (9, {}, None), (0, {"shards": 3}, 2.5)],
+)
+def test_how_long_a_sweep_took_is_unknown_where_it_went_on(
+    jobs_played: int, more: dict[str, int], wall_s: float | None
+) -> None:
+    told = {"jobs": 22, "jobs_played": jobs_played, "playing_s": 2.5, **more}
+    row = sweep_row({"fingerprint": "0cdb", **told}, folder="sweep", record_text="")
+    assert row.wall_s == wall_s
 
 
 def test_a_drive_that_has_not_ended_runs_or_was_killed(tmp_path: Path) -> None:
