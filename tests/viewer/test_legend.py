@@ -48,7 +48,7 @@ def test_the_map_holds_every_road_the_route_and_names_that_the_fonts_have() -> N
     assert [len(strip) for strip in strips] == [2, 3]
     assert [point[:2] for point in strips[1]] == [[4.0, 5.0], [6.0, 7.0], [8.0, 9.0]]
     assert len(shown["map/route"].strips.as_arrow_array()) == 1
-    assert shown["map/names"].labels.as_arrow_array().to_pylist() == ["Mill Lane / ?"]
+    assert shown["map/names"].labels.as_arrow_array().to_pylist() == ["Mill Lane / …"]
 
 
 def test_a_map_without_a_route_or_roads_is_shown_as_far_as_it_is_there() -> None:
