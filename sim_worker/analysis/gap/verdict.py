@@ -40,6 +40,9 @@ _DENSE_S, _PRECISE_M = 0.25, 0.15
 """Positions this near to each other and this good may accuse another sensor."""
 _SPEED_NOISE_MPS = 0.4
 """Such positions tell speeds over 0.6 s to 0.35 m/s: what is farther off is not the same speed."""
+_AGREES_AGAIN = 30
+"""Stretches in a row, 6 s, after which a speed that was wrong counts again: one that is stuck is
+right whenever the car happens to drive as fast. Chosen."""
 _FORGOTTEN_S = 10.0
 """A finding that has not come back for so long is over, and a new one is reported anew."""
 
@@ -73,6 +76,8 @@ class FaultDetector:
         self._push = PushTest()
         self._speed_agrees: bool | None = None
         """Whether the measured speed is that of the positions, as last known; None before."""
+        self._agreed = 0
+        """In so many stretches in a row."""
         self._pending: tuple[str, str, int, int] | None = None
         self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
         self._reported: dict[tuple[str, str], int] = {}
@@ -139,9 +144,13 @@ class FaultDetector:
         if seen.speed_by_gnss is None:
             return
         if speed_sensor(seen) is not None:
-            self._speed_agrees = False
+            self._speed_agrees, self._agreed = False, 0
         elif confirmed(seen.speed_by_gnss) and seen.speed_by_gnss.residual < _SPEED_NOISE_MPS:
-            self._speed_agrees = True
+            self._agreed += 1
+            if self._speed_agrees is None or self._agreed >= _AGREES_AGAIN:
+                self._speed_agrees = True
+        else:
+            self._agreed = 0
 
     def _precise(self) -> bool:
         """Whether positions are dense and good enough to judge other sensors by."""

@@ -86,6 +86,35 @@ def test_a_speed_in_another_unit_is_the_sensors_and_no_pedals(gain: float, unit:
     assert drive_s(told[0]) < 4.0
 
 
+def test_a_speed_known_to_be_wrong_accuses_nobody_else_where_positions_end() -> None:
+    """All that is compared with it looks wrong: pedals, steering, the model's tyres."""
+    drive = drive_of(SEED)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+    ends_ns = drive.info.start_stamp_ns + 6_000_000_000
+    told = []
+    for channel, message in drive.samples:
+        if channel == "gnss" and message.stamp_ns > ends_ns:
+            continue
+        if isinstance(message, SpeedSample):
+            message = msgspec.structs.replace(message, speed_mps=1.6 * message.speed_mps)
+        if (verdict := detector.handle(channel, message)) is not None:
+            told.append(verdict.cause)
+    assert told == ["speed_sensor"]
+    assert detector.undecided == ""
+
+
+def test_a_speed_that_is_stuck_accuses_no_pedals_whenever_the_car_drives_as_fast() -> None:
+    drive = drive_of(SEED)
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+    told = []
+    for channel, message in drive.samples:
+        if isinstance(message, SpeedSample):
+            message = msgspec.structs.replace(message, speed_mps=5.0)
+        if (verdict := detector.handle(channel, message)) is not None:
+            told.append(verdict.cause)
+    assert set(told) == {"speed_sensor"}
+
+
 def test_clocks_apart_accuse_nobody_or_are_named() -> None:
     """By 0.2 s of speeds or positions; a gyro that is stamped early is a model that lags."""
     drive = drive_of(SEED)
