@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +15,8 @@ ACCURACY = 0.01
 """Those of more are within this part of the value."""
 MOST_LISTED = 1000
 """Entries of a list in run.json: the first ones; tables have all."""
+OTHER_REASONS = "other reasons"
+"""What all are called together that are not told one by one."""
 _LEAST, _MOST = 1e-9, 1e12
 _LOG = math.log((1.0 + ACCURACY) / (1.0 - ACCURACY))
 
@@ -135,3 +137,9 @@ def _middle(place: int) -> float:
     if place == 0:
         return 0.0
     return _LEAST * math.exp((place - 1) * _LOG) * (1.0 - ACCURACY)
+
+
+def with_others(told: Mapping[str, int], total: int) -> dict[str, int]:
+    """Return counts by the reason with one of all other reasons, where there are any of `total`."""
+    more = total - sum(told.values())
+    return {**told, OTHER_REASONS: more} if more else dict(told)

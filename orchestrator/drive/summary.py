@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from foretwin.contracts.running import with_others
 from foretwin.contracts.terminal import plain
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines
 from foretwin.orchestrator.record.sibling_count import sibling_lines
@@ -94,10 +95,10 @@ def _not_placed_lines(reasons: dict[str, int] | None) -> list[str]:
     """Say in how many futures the scenario had no place, and the commonest reasons."""
     if not reasons:
         return []
-    told = list(reasons.items())[:REASONS_SHOWN]
-    told += [("other reasons", sum(list(reasons.values())[REASONS_SHOWN:]))]
-    why = "; ".join(f"{reason} ({count})" for reason, count in told if count)
-    return [f"  in {sum(reasons.values())} of the futures the scenario was not placed: {why}"]
+    total = sum(reasons.values())
+    told = with_others(dict(list(reasons.items())[:REASONS_SHOWN]), total)
+    why = "; ".join(f"{reason} ({count})" for reason, count in told.items())
+    return [f"  in {total} of the futures the scenario was not placed: {why}"]
 
 
 def _pace(latency_ms: Any, *, lock_step: bool) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.parts import CaseCount
-from foretwin.contracts.running import RunningQuantiles
+from foretwin.contracts.running import OTHER_REASONS, RunningQuantiles, with_others
 from foretwin.contracts.terminal import console, plain, say, words
 from foretwin.orchestrator.sweep.manifest import PartEntry
 from foretwin.orchestrator.sweep.spec import SweepSpec
@@ -23,7 +23,6 @@ COUNTS = ("cases", "placed", "collided", "failed")
 """What is counted of each scenario and planner."""
 _REASONS = 1000
 """So many different ones are counted of each."""
-_OTHERS = "other reasons"
 
 
 class _CaseSums:
@@ -123,12 +122,14 @@ def _not_placed_lines(entries: list[dict[str, Any]]) -> list[str]:
     """Return how many rows of each scenario, by all planners, were not placed for which reason."""
     counted: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
     for entry in entries:
-        more = entry["not_placed_rows"] - sum(entry["not_placed"].values())
-        counted[entry["scenario"]].update(entry["not_placed"] | ({_OTHERS: more} if more else {}))
+        told = with_others(entry["not_placed"], entry["not_placed_rows"])
+        counted[entry["scenario"]].update(told)
     return [
         f"not placed: {count} row{'s' if count != 1 else ''} of {scenario}: {reason}"
         for scenario, reasons in counted.items()
-        for reason, count in sorted(reasons.items(), key=lambda one: (one[0] == _OTHERS, -one[1]))
+        for reason, count in sorted(
+            reasons.items(), key=lambda one: (one[0] == OTHER_REASONS, -one[1])
+        )
     ]
 
 
@@ -139,11 +140,9 @@ def _no_place_lines(unplaced: list[Any]) -> list[str]:
         counted[one["scenario_id"]][one["reason"]] += 1
     lines = []
     for scenario, reasons in sorted(counted.items()):
-        most = _most(reasons)
-        more = reasons.total() - sum(most.values())
         lines += [
             f"no place: {count} junction{'s' if count != 1 else ''} for {scenario}: {reason}"
-            for reason, count in (most | ({_OTHERS: more} if more else {})).items()
+            for reason, count in with_others(_most(reasons), reasons.total()).items()
         ]
     return lines
 

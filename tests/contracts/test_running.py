@@ -14,9 +14,11 @@ from foretwin.contracts.running import (
     ACCURACY,
     EXACT,
     MOST_LISTED,
+    OTHER_REASONS,
     FirstOf,
     RunningMeans,
     RunningQuantiles,
+    with_others,
 )
 from tests.pages import page
 
@@ -102,3 +104,8 @@ def test_what_was_kept_goes_on_alike_in_another_process() -> None:
     room: FirstOf[int] = pickle.loads(pickle.dumps(FirstOf[int](2)))
     room.extend((8, 9, 10))
     assert (room, room.left_out) == ([8, 9], 1)
+
+
+def test_counts_and_that_of_all_others_make_up_the_total() -> None:
+    assert with_others({"a": 3, "b": 2}, 7) == {"a": 3, "b": 2, OTHER_REASONS: 2}
+    assert with_others({"a": 3, "b": 2}, 5) == {"a": 3, "b": 2}
