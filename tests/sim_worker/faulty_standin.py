@@ -40,6 +40,10 @@ class FaultyDrive(NamedTuple):
     info: VehicleInfo
     samples: list[Sample]
 
+    def with_fault(self, change: Exit) -> FaultyDrive:
+        """Return the drive as a car says it whose samples leave it changed."""
+        return self._replace(samples=[(name, change(m)) for name, m in self.samples])
+
 
 def source_of(
     seed: int, *, end_s: float = DURATION_S, steering_delay_s: float | None = None
@@ -103,7 +107,9 @@ def _brake_fade() -> Entry:
     return fade
 
 
-def _with(kind: type, change: Callable[[Any], dict[str, Any]]) -> Exit:
+def said_as(kind: type, change: Callable[[Any], dict[str, Any]]) -> Exit:
+    """Return a fault of one sensor: what `change` gives replaces that of its samples."""
+
     def told(message: Any) -> Any:
         if not isinstance(message, kind):
             return message
@@ -112,8 +118,9 @@ def _with(kind: type, change: Callable[[Any], dict[str, Any]]) -> Exit:
     return told
 
 
-def _gyro(scale: float, bias: float) -> Exit:
-    return _with(
+def gyro_as(scale: float, bias: float) -> Exit:
+    """Return the fault of a gyro."""
+    return said_as(
         ImuSample,
         lambda m: {"rate_radps": (*m.rate_radps[:2], scale * m.rate_radps[2] + bias)},
     )
@@ -127,21 +134,23 @@ ENTRY_FAULTS: dict[str, Callable[[], Entry]] = {
     "brake_fade": _brake_fade,
 }
 EXIT_FAULTS: dict[str, Exit] = {
-    "steering_read_in_degrees": _with(
+    "steering_read_in_degrees": said_as(
         SteeringSample, lambda m: {"steering_wheel_rad": math.degrees(m.steering_wheel_rad)}
     ),
     # The car takes the number for degrees: a driver who knows sends them, and so it is recorded.
-    "steering_commanded_in_degrees": _with(
+    "steering_commanded_in_degrees": said_as(
         ControlCommand, lambda m: {"steering_wheel_rad": math.degrees(m.steering_wheel_rad)}
     ),
-    "steering_sign": _with(ControlCommand, lambda m: {"steering_wheel_rad": -m.steering_wheel_rad}),
-    "offset_steering_sensor": _with(
+    "steering_sign": said_as(
+        ControlCommand, lambda m: {"steering_wheel_rad": -m.steering_wheel_rad}
+    ),
+    "offset_steering_sensor": said_as(
         SteeringSample, lambda m: {"steering_wheel_rad": m.steering_wheel_rad + 0.5}
     ),
-    "offset_gyro": _gyro(1.0, 0.1),
-    "scaled_gyro": _gyro(0.65, 0.0),
-    "scaled_speed": _with(SpeedSample, lambda m: {"speed_mps": 1.3 * m.speed_mps}),
-    "offset_speed": _with(SpeedSample, lambda m: {"speed_mps": m.speed_mps + 1.5}),
+    "offset_gyro": gyro_as(1.0, 0.1),
+    "scaled_gyro": gyro_as(0.65, 0.0),
+    "scaled_speed": said_as(SpeedSample, lambda m: {"speed_mps": 1.3 * m.speed_mps}),
+    "offset_speed": said_as(SpeedSample, lambda m: {"speed_mps": m.speed_mps + 1.5}),
 }
 CAR_FAULTS = ("slow_steering", *ENTRY_FAULTS, *EXIT_FAULTS)
 MODEL_FAULTS: dict[str, dict[str, float]] = {
@@ -163,9 +172,7 @@ MODEL_FAULTS: dict[str, dict[str, float]] = {
 def drive_of(seed: int, fault: str | None = None, *, end_s: float = DURATION_S) -> FaultyDrive:
     """Return one drive of the car with a fault of CAR_FAULTS, or without; simulated once."""
     if fault in EXIT_FAULTS:
-        whole = drive_of(seed, end_s=end_s)
-        change = EXIT_FAULTS[fault]
-        return FaultyDrive(whole.info, [(name, change(m)) for name, m in whole.samples])
+        return drive_of(seed, end_s=end_s).with_fault(EXIT_FAULTS[fault])
     # Its driver knows of the delay: one who did not would leave the road within seconds.
     slow = 0.4 if fault == "slow_steering" else None
     source = source_of(seed, end_s=end_s, steering_delay_s=slow)

@@ -198,7 +198,7 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
     eased = smooth(speed, _SMOOTH_HALF)
     eased = np.where(np.isfinite(eased), eased, speed)
     rolls = np.isfinite(speed) & np.isfinite(rate) & (speed > _ROLLS_MPS)
-    rolls &= np.abs(np.nan_to_num(rate * speed)) < _MOST_ACROSS_MPS2
+    rolls &= np.abs(rate * speed) < _MOST_ACROSS_MPS2
     starts = np.arange(count - 1 - _SMOOTH_HALF - _RUN, -1, -_TAIL)[::-1]
 
     def throughout(known: Flags) -> Flags:

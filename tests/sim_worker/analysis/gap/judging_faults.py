@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -31,15 +33,16 @@ def verdicts_of(
     """Return what is said of a drive; with `until_first` the first verdict alone."""
     drive = drive_with(fault, seed=seed, end_s=end_s)
     model = model_with(fault if fault in MODEL_FAULTS else None)
-    detector = FaultDetector(drive.info, model, frame=FRAME)
-    told = []
-    for channel, message in drive.samples:
-        verdict = detector.handle(channel, message)
+    said = verdicts_on(FaultDetector(drive.info, model, frame=FRAME), drive)
+    return list(islice(said, 1) if until_first else said)
+
+
+def verdicts_on(detector: FaultDetector, drive: FaultyDrive) -> Iterator[Verdict]:
+    """Yield what a detector says of a drive as it goes on."""
+    for sample in drive.samples:
+        verdict = detector.handle(*sample)
         if verdict is not None:
-            told.append(verdict)
-            if until_first:
-                break
-    return told
+            yield verdict
 
 
 class Case(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import pytest
 
 from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample
 from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.gap import Verdict
 from foretwin.sim_worker.analysis.gap.verdict import FaultDetector
 from tests.sim_worker.analysis.gap.judging_faults import (
     IN_TIME_S,
@@ -23,10 +24,19 @@ from tests.sim_worker.analysis.gap.judging_faults import (
     excited_s,
     judged,
     verdicts_of,
+    verdicts_on,
 )
 from tests.sim_worker.analysis.gap.real_drives import accused_in
 from tests.sim_worker.driving import altered
-from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
+from tests.sim_worker.faulty_standin import (
+    CAR_FAULTS,
+    MODEL_FAULTS,
+    Exit,
+    drive_of,
+    gyro_as,
+    model_with,
+    said_as,
+)
 from tests.telemetry.standin_drive import FRAME
 
 COVERS = ("foretwin.sim_worker.analysis.gap.findings",)
@@ -45,6 +55,18 @@ FOUND = (
     "friction",
     "drive_gain",
 )
+
+
+def judged_as(change: Exit, *, gnss_ends_ns: float = math.inf) -> tuple[list[Verdict], str]:
+    """Return what is said of a sound car whose samples leave it changed, and what stays open."""
+    drive = drive_of(SEED).with_fault(change)
+    kept = [one for one in drive.samples if one[0] != "gnss" or one[1].stamp_ns <= gnss_ends_ns]
+    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
+    return list(verdicts_on(detector, drive._replace(samples=kept))), detector.undecided
+
+
+def speed_as(change: Callable[[float], float]) -> Exit:
+    return said_as(SpeedSample, lambda m: {"speed_mps": change(m.speed_mps)})
 
 
 def test_a_car_and_a_model_that_agree_are_left_alone() -> None:
@@ -73,14 +95,7 @@ def test_an_injected_fault_is_found_and_named(fault: str) -> None:
 )
 def test_a_speed_in_another_unit_is_the_sensors_and_no_pedals(gain: float, unit: str) -> None:
     """Commanded accelerations look as wrong as the speed: they wait for the positions."""
-    drive = drive_of(SEED)
-    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
-    told = []
-    for channel, message in drive.samples:
-        if isinstance(message, SpeedSample):
-            message = msgspec.structs.replace(message, speed_mps=gain * message.speed_mps)
-        if (verdict := detector.handle(channel, message)) is not None:
-            told.append(verdict)
+    told, _ = judged_as(speed_as(lambda speed_mps: gain * speed_mps))
     assert [f"{one.culprit} {one.cause}" for one in told] == ["vehicle speed_sensor"]
     assert unit in told[0].text
     assert drive_s(told[0]) < 4.0
@@ -88,61 +103,29 @@ def test_a_speed_in_another_unit_is_the_sensors_and_no_pedals(gain: float, unit:
 
 def test_a_speed_known_to_be_wrong_accuses_nobody_else_where_positions_end() -> None:
     """All that is compared with it looks wrong: pedals, steering, the model's tyres."""
-    drive = drive_of(SEED)
-    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
-    ends_ns = drive.info.start_stamp_ns + 6_000_000_000
-    told = []
-    for channel, message in drive.samples:
-        if channel == "gnss" and message.stamp_ns > ends_ns:
-            continue
-        if isinstance(message, SpeedSample):
-            message = msgspec.structs.replace(message, speed_mps=1.6 * message.speed_mps)
-        if (verdict := detector.handle(channel, message)) is not None:
-            told.append(verdict.cause)
-    assert told == ["speed_sensor"]
-    assert detector.undecided == ""
+    ends_ns = drive_of(SEED).info.start_stamp_ns + 6_000_000_000
+    told, undecided = judged_as(speed_as(lambda speed_mps: 1.6 * speed_mps), gnss_ends_ns=ends_ns)
+    assert [one.cause for one in told] == ["speed_sensor"]
+    assert undecided == ""
 
 
 def test_a_speed_that_is_stuck_accuses_no_pedals_whenever_the_car_drives_as_fast() -> None:
-    drive = drive_of(SEED)
-    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
-    told = []
-    for channel, message in drive.samples:
-        if isinstance(message, SpeedSample):
-            message = msgspec.structs.replace(message, speed_mps=5.0)
-        if (verdict := detector.handle(channel, message)) is not None:
-            told.append(verdict.cause)
-    assert set(told) == {"speed_sensor"}
+    told, _ = judged_as(speed_as(lambda speed_mps: 5.0))
+    assert {one.cause for one in told} == {"speed_sensor"}
 
 
 def test_clocks_apart_accuse_nobody_or_are_named() -> None:
     """By 0.2 s of speeds or positions; a gyro that is stamped early is a model that lags."""
-    drive = drive_of(SEED)
-    late_s = {"speed": 0.2, "gnss": -0.2, "imu": -0.1}
-    for channel in late_s:
-        detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
-        told = []
-        for name, message in drive.samples:
-            if name == channel:
-                stamp_ns = message.stamp_ns + round(1e9 * late_s[channel])
-                message = msgspec.structs.replace(message, stamp_ns=stamp_ns)
-            told.append(detector.handle(name, message))
-        texts = [one.text for one in told if one is not None]
-        assert len(texts) == (channel == "imu")
-        assert all("stamped by clocks" in text for text in texts)
+    for kind, late_s in ((SpeedSample, 0.2), (GnssFix, -0.2), (ImuSample, -0.1)):
+        late_ns = round(1e9 * late_s)
+        told, _ = judged_as(said_as(kind, lambda m, ns=late_ns: {"stamp_ns": m.stamp_ns + ns}))
+        assert len(told) == (kind is ImuSample)
+        assert all("stamped by clocks" in one.text for one in told)
 
 
 def test_a_gyro_in_degrees_per_second_is_the_gyros_and_no_models() -> None:
     """No model can begin where a car is said to turn by ten radians a second."""
-    drive = drive_of(SEED)
-    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
-    told = []
-    for channel, message in drive.samples:
-        if isinstance(message, ImuSample):
-            x, y, z = message.rate_radps
-            message = msgspec.structs.replace(message, rate_radps=(x, y, math.degrees(z)))
-        if (verdict := detector.handle(channel, message)) is not None:
-            told.append(verdict)
+    told, _ = judged_as(gyro_as(math.degrees(1.0), 0.0))
     assert {f"{one.culprit} {one.cause}" for one in told} == {"vehicle gyro_sensor"}
 
 
