@@ -130,8 +130,9 @@ class PathScenarios(NamedTuple):
         """Return the road users of a case around a car at `ego_arc_m` of the path.
 
         Those who come from elsewhere are where they meet a car that keeps its speed, early or late
-        as `values` says. Says why where the case cannot be played, is behind the car already, or
-        has somebody begin where the World has no road.
+        as `values` says; who drives ahead of the car does so wherever it is. Says why where the
+        case cannot be played, is behind the car already, or has somebody begin where the World has
+        no road.
         """
         if self.passage is None:
             return Unplaced("", "the path leads through no junction of the World ahead", False)
@@ -147,7 +148,7 @@ class PathScenarios(NamedTuple):
             return played
         speed = max(ego_speed_mps, LEAST_START_MPS)
         later_s = 0.0
-        if math.isfinite(played.impact_time_s):
+        if math.isfinite(played.impact_time_s) and not _met_anywhere(played):
             met = played.ego_arc_m + played.ego_speed_mps * played.impact_time_s
             meets = place.ego.path.point_at(np.array([met]), played.ego_lateral_m)
             there_s = (float(self.path.locate(meets).arc_m[0]) - ego_arc_m) / speed
@@ -178,6 +179,12 @@ class PathScenarios(NamedTuple):
         else:
             arc += ego_arc_m - played.ego_arc_m
         return player_on(actor, self.path, arc)
+
+
+def _met_anywhere(played: StagedCase) -> bool:
+    """Return whether the planned impact is with one that drives ahead, and not at a place."""
+    ahead = (actor.name for actor in played.actors if actor.relation == "ahead")
+    return played.impact_with in ahead
 
 
 def _coming(actor: StagedActor, way: Way, later_s: float) -> Player:

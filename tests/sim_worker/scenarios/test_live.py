@@ -39,3 +39,17 @@ def test_who_would_begin_where_the_world_has_no_road_is_nowhere(
     assert result.left_out == ("crossing_car would begin beyond the roads of the World",)
     assert not np.isfinite(result.road_users.poses).any()
     assert result.outcome.valid.all(), "the car drives all the same"
+
+
+def test_the_car_ahead_stops_though_the_junction_is_behind_the_car(stage: BatchSimulation) -> None:
+    case = happening(0, "lead_stopping")
+    result = run_job(job((case,), state=state_at(4.0, -1.5, speed=10.0)), stage)
+    assert result.left_out == ("",)
+    (begins,) = result.road_users.poses[0, 0, :, :2]
+    assert 5.0 < begins[0] - 4.0 < 60.0, "ahead on the car's own lane"
+    assert begins[1] == pytest.approx(-1.5, abs=0.1)
+
+
+def test_a_crossing_that_the_car_has_passed_is_left_out(stage: BatchSimulation) -> None:
+    result = run_job(job((happening(0, "scp"),), state=state_at(7.0, -1.5, speed=10.0)), stage)
+    assert result.left_out == ("the place of the impact is behind the car",)
