@@ -42,4 +42,7 @@ def likeness_words() -> str:
     what = ", ".join(
         f"{row.quantity} {row.distance:.2f} {row.unit} ({row.deviations:.2f} sd)" for row in rows
     )
-    return f"law-abiding drivers against recorded ones ({rows[0].crossing}, not fitted): {what}"
+    return (
+        "law-abiding drivers differ from recorded ones, at a crossing that they were not fitted to "
+        f"({rows[0].crossing}), in {what}; sd: of what was recorded"
+    )

@@ -18,7 +18,7 @@ BEFORE = {
 
 def test_the_line_names_every_quantity_with_its_unit() -> None:
     said = likeness_words()
-    assert "karlsruhe, not fitted" in said
+    assert "not fitted to (karlsruhe)" in said
     for row in likenesses():
         assert row.fitted or f"{row.quantity} {row.distance:.2f} {row.unit}" in said
 
