@@ -133,8 +133,8 @@ def turning_lines(turning: TurningGap) -> list[str]:
         f"as it is); each second's 95 % interval, told by the others, is ±{np.median(half):.2f} "
         f"°/s wide (median; ±{np.max(half):.2f} at most) and holds {turning.within:.0%} of them",
         late,
-        f"gyro bias {_DEGREES * bias:+.2f} ± {_SURE * _DEGREES * bias_std:.2f} °/s, steering "
-        f"{_DEGREES * zero:+.2f} ± {_SURE * _DEGREES * zero_std:.2f}° at the tyres beside the "
+        f"gyro bias {_DEGREES * bias:+z.2f} ± {_SURE * _DEGREES * bias_std:.2f} °/s, steering "
+        f"{_DEGREES * zero:+z.2f} ± {_SURE * _DEGREES * zero_std:.2f}° at the tyres beside the "
         f"file; the car turns {turning.gain:.2f} ± {_SURE * turning.gain_std:.2f} times as the "
         "model",
         f"intervals (95 %) hold given {_CONDITION}",
@@ -143,7 +143,7 @@ def turning_lines(turning: TurningGap) -> list[str]:
 
 
 def _clock(clock: ClockOffset) -> str:
-    return f"{1e3 * clock.late_s:+.0f} ± {1e3 * _SURE * clock.std_s:.0f} ms"
+    return f"{1e3 * clock.late_s:+z.0f} ± {1e3 * _SURE * clock.std_s:.0f} ms"
 
 
 def _rms(values: Array) -> float:

@@ -89,7 +89,7 @@ class FarMember:
         if not self.clock.beyond(MOST_CLOCK_OFFSET_S):
             return None
         return (
-            f"the clock of {self.machine} is {self.clock.best.offset_s:+.3f} s off, at most "
+            f"the clock of {self.machine} is {self.clock.best.offset_s:+z.3f} s off, at most "
             f"{MOST_CLOCK_OFFSET_S:g} s is allowed: set it (timedatectl set-ntp true)"
         )
 
@@ -110,7 +110,7 @@ class FarMember:
         best, cores = self.clock.best, 0 if self.said is None else self.said.machine.cores
         return (
             f"{cores} cores, {self.futures_per_s:.0f} futures/s, link {1e3 * best.link_s:.1f} ms, "
-            f"clock {1e3 * best.offset_s:+.1f} ms"
+            f"clock {1e3 * best.offset_s:+z.1f} ms"
         )
 
     @property

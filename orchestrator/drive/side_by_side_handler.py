@@ -127,7 +127,7 @@ def disagreement_text(one: Disagreement, junction: str | None) -> str:
     apart = (
         f"{abs(one.lateral_m):.1f} m to the {'left' if one.lateral_m > 0.0 else 'right'}"
         if one.aspect == "way"
-        else f"{one.speed_mps:+.1f} m/s, {one.along_m:+.1f} m"
+        else f"{one.speed_mps:+z.1f} m/s, {one.along_m:+z.1f} m"
     )
     return f"{WORDS[one.kind]} ({apart}) from {where}"
 

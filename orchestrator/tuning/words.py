@@ -27,8 +27,8 @@ def alarm_text(alarm: GapAlarm) -> str:
     name, unit, scale = _QUANTITIES.get(alarm.quantity, (alarm.quantity, "", 1.0))
     limit = f"limit {scale * alarm.limit:.2g} {unit}"
     if alarm.over:
-        return f"gap: {name} off by {scale * alarm.value:+.2f} {unit} ({alarm.manoeuvre}, {limit})"
-    return f"gap: {name} within its limit again ({scale * alarm.value:+.2f} {unit}, {limit})"
+        return f"gap: {name} off by {scale * alarm.value:+z.2f} {unit} ({alarm.manoeuvre}, {limit})"
+    return f"gap: {name} within its limit again ({scale * alarm.value:+z.2f} {unit}, {limit})"
 
 
 def verdict_text(verdict: Verdict) -> str:

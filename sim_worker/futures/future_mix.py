@@ -90,7 +90,7 @@ def _fault(index: int, speed: float, point: Array, planner: str, theme: str) -> 
         words += f", delay +{delay:.2f} s"
     if theme == "shift" or mixed:
         shift = aims["lateral_shift_m"] = round((2.0 * float(point[2]) - 1.0) * MAX_SHIFT_M, 3)
-        words += f", shift {shift:+.2f} m"
+        words += f", shift {shift:+z.2f} m"
     return Future(index=index, name=words, planner=planner, numbers=aims)
 
 
@@ -117,7 +117,7 @@ def _happening(
     times = {name: late for name in case if name.endswith(".arrives_after_s")}
     return Future(
         index=index,
-        name=f"{scenario.id} {late:+.2f} s, {words}",
+        name=f"{scenario.id} {late:+z.2f} s, {words}",
         planner=planner,
         numbers=aims,
         scenario_id=scenario.id,

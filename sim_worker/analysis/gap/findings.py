@@ -111,7 +111,7 @@ def _gyro_sensor(seen: Consistency) -> Finding | None:
         text = f"the car's gyro disagrees with its positions: {said}"
         return Finding("vehicle", "gyro_sensor", text, (_of("gyro_by_course", gyro, said),))
     if abs(gyro.offset) > _GYRO_RADPS + 3.0 * gyro.offset_std:
-        said = f"the gyro shows {gyro.offset:+.3f} rad/s more than the course over ground turns"
+        said = f"the gyro shows {gyro.offset:+z.3f} rad/s more than the course over ground turns"
         text = f"the car's gyro disagrees with its positions: {said}"
         return Finding("vehicle", "gyro_sensor", text, (_offset("gyro_offset", gyro, said),))
     return None
@@ -167,7 +167,7 @@ def _actuator(seen: Consistency, pair: DelayedLine) -> Finding | None:
         return accuse("steering_delay", "the car steers late")
     if abs(line.offset) > _OFFSET_RAD + 3.0 * line.offset_std:
         evidence.append(
-            _offset("measured_offset", line, f"{math.degrees(line.offset):+.1f}° at the tyres")
+            _offset("measured_offset", line, f"{math.degrees(line.offset):+z.1f}° at the tyres")
         )
         if by_command is not None and abs(by_command.offset) < _OFFSET_PM:
             return accuse("offset_sensor", "the steering sensor is off while the motion is as told")
@@ -233,7 +233,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
         clocks = "or steering and gyro are stamped by clocks that far apart"
         return accuse("inertia", f"{said}: its yaw inertia or tyres are wrong, {clocks}", more)
     if abs(line.offset) > _OFFSET_PM + 3.0 * line.offset_std:
-        said = f"the model's curvature is off by {-line.offset:+.4f} 1/m"
+        said = f"the model's curvature is off by {-line.offset:+z.4f} 1/m"
         text = f"{said}: its steering offset or the car's steering sensor is wrong"
         if obeys:
             text = f"{said}, though car and command agree: the model's steering offset is wrong"

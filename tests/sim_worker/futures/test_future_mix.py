@@ -64,3 +64,8 @@ def test_scenarios_happen_in_every_second_future_in_turn() -> None:
     assert min(late) < -0.5
     assert max(late) > 0.5
     assert len({v.name for v in futures}) == 64
+
+
+def test_no_name_has_a_nought_with_a_sign_of_its_own() -> None:
+    names = (v.name for seed in range(40) for v in plan_futures(count=64, seed=seed, planners="a"))
+    assert not any("-0.00" in name for name in names)
