@@ -19,6 +19,15 @@ _MARKUP = re.compile(r"[\\`*\[\]<>|!&~]")
 _SAFE_BEYOND_LATIN = frozenset("–—‘’“”„•…→←↑↓≤≥≈−")  # noqa: RUF001
 """Signs of our own texts; every font of the viewer has them."""
 _LAST_LATIN = 0x24F
+_SHOWN_BEYOND_LATIN = (
+    range(0x386, 0x3CF),  # Greek
+    range(0x400, 0x460),  # Cyrillic, and of other languages than Slavic ones
+    range(0x490, 0x49C),
+    range(0x4A0, 0x500),
+    range(0x1E00, 0x1F00),  # Latin with accents, as in Vietnamese
+    range(0x1F00, 0x2000),  # Greek with more accents
+)
+"""Letters that Rerun 0.41's own font has: each was drawn."""
 
 
 class Row(NamedTuple):
@@ -58,8 +67,8 @@ def raised(line_m: Array | Array32, z_m: float) -> Array:
 def plain_text(text: str) -> str:
     """Return `text` with a mark for each run of letters that the viewer's fonts lack.
 
-    Rerun 0.41's headless viewer crashes on CJK, Arabic and emoji glyphs, and street names have
-    them. Letters with a Latin base keep it.
+    Rerun 0.41's headless viewer crashes on all of them, CJK, Arabic and emoji among them, and
+    street names have such. Letters with a Latin base keep it.
     """
     composed = unicodedata.normalize("NFC", text)
     shown = {letter: _shown(letter) for letter in {*composed, LEFT_OUT}}
@@ -73,6 +82,8 @@ def _shown(letter: str) -> str | None:
         return letter
     if ord(letter) <= _LAST_LATIN:
         return letter if letter.isprintable() else " "
+    if letter.isalpha() and any(ord(letter) in letters for letters in _SHOWN_BEYOND_LATIN):
+        return letter
     base = "".join(c for c in unicodedata.normalize("NFKD", letter) if ord(c) <= _LAST_LATIN)
     return base or ("" if unicodedata.combining(letter) else None)
 

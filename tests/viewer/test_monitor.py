@@ -32,8 +32,6 @@ from foretwin.viewer.log_scenarios import (
     scenario_table,
 )
 from foretwin.viewer.monitor import Monitor, read_world
-from foretwin.viewer.rows import path_part, place_text, plain_text
-from foretwin.world_gen.export.picture_fonts import Fonts
 from tests.viewer import scene
 from tests.viewer.copilot.rounds import line, round_of
 from tests.viewer.shown import Shown, monitor_of, text_of
@@ -42,7 +40,6 @@ COVERS = (
     "foretwin.viewer.log_drive",
     "foretwin.viewer.log_run",
     "foretwin.viewer.log_scenarios",
-    "foretwin.viewer.rows",
 )
 
 
@@ -162,32 +159,6 @@ def test_criticality_runs_from_green_to_red(values: list[float]) -> None:
     assert tuple(colours[0]) == SAFE
     assert tuple(colours[-1]) == CRITICAL
     assert tuple(criticality_colours(np.array([np.nan]))[0]) == CRITICAL
-
-
-@given(st.text())
-def test_labels_keep_to_glyphs_that_the_viewer_has(text: str) -> None:
-    told = plain_text(text)
-    assert all(ord(letter) < 0x250 or letter in "–—‘’“”„•…→←↑↓≤≥≈−" for letter in told)  # noqa: RUF001
-    assert plain_text(told) == told
-
-
-def test_street_names_stay_readable() -> None:
-    assert plain_text("Kronenstraße · Łódź · © Žižka") == "Kronenstraße · Łódź · © Žižka"
-    assert plain_text("東京 🚗") == "…"
-
-
-def test_what_the_viewer_cannot_show_has_one_mark_as_in_pictures() -> None:
-    assert plain_text("国道304号線 / Main Street") == "…304… / Main Street"
-    missing = frozenset("国道号線")
-    assert Fonts(missing=missing).drawable("国道304号線 / Main Street") == (
-        plain_text("国道304号線 / Main Street")
-    )
-    assert place_text("国道304号線", "n7") == "国道304号線 n7"
-    assert (place_text("Main Street", "n7"), place_text("", "n7")) == ("Main Street", "n7")
-
-
-def test_entities_of_any_name_stay_apart() -> None:
-    assert len({path_part(name) for name in ("車", "東", "car", "東1")}) == 4
 
 
 def test_a_world_id_is_no_path(tmp_path: Any) -> None:

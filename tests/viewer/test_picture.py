@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from foretwin.viewer.log_drive import LIMIT
 from foretwin.viewer.log_world import ROAD
 from foretwin.viewer.monitor import Monitor
 from foretwin.viewer.picture import Picture, has_vulkan, main, take_picture
+from foretwin.viewer.rows import Row, document, plain_text
 from foretwin.viewer.sinks import FileStream
 from foretwin.viewer.views import title_of
 from tests.viewer import scene
@@ -38,7 +40,7 @@ def _needs_vulkan() -> None:
     pytest.skip("no Vulkan driver to render with (Debian: mesa-vulkan-drivers)")
 
 
-def _record(path: Path, *, without: tuple[str, ...] = ()) -> Path:
+def _record(path: Path, *, without: tuple[str, ...] = (), more: Sequence[Row] = ()) -> Path:
     monitor = Monitor(
         drive_frame=scene.DRIVE_FRAME,
         find_start=lambda _first: scene.START_NS,
@@ -50,6 +52,7 @@ def _record(path: Path, *, without: tuple[str, ...] = ()) -> Path:
     for channel, message in scene.drive(duration_s=AT_S + 1.0):
         if channel not in without:
             file.write(monitor.handle(channel, message))
+    file.write(more)
     file.close()
     return path
 
@@ -99,6 +102,15 @@ def test_each_gap_plot_shows_its_curve_and_limit(whole: Picture, empty: Picture,
     assert _count(whole.views[name], LIMIT, within=40.0) > 150
     assert _count(empty.views[name], TWIN) == 0
     assert _count(empty.views[name], LIMIT, within=40.0) == 0
+
+
+def test_every_letter_that_names_keep_is_drawn(tmp_path: Path, whole: Picture) -> None:
+    """Rerun's viewer ends at the first letter that its font lacks."""
+    letters = plain_text("".join(map(chr, range(0x250, 0x2000))))
+    status = Row("status", round(1e9 * AT_S), document(letters))
+    recording = _record(tmp_path / "letters.rrd", more=[status])
+    shown = take_picture(recording, at_s=AT_S, size=SIZE)
+    assert _contrast(shown.views["Status"]) > 1.2 * _contrast(whole.views["Status"])
 
 
 def test_views_behind_tabs_are_not_on_the_picture(whole: Picture) -> None:
