@@ -150,9 +150,9 @@ def _turn_rates(pairs: SignalPairs) -> Line | None:
     # The course is by far the noisier: over it the gyro's gain would come out too small.
     bends = float(np.ptp(gyro)) > _LEAST_TURN_RADPS
     line = line_through(gyro, course, independent=independent) if bends else None
-    if line is not None and line.gain > 5.0 * line.gain_std:
+    if line is not None and abs(line.gain) > 5.0 * line.gain_std:
         gain = 1.0 / line.gain
-        gain_std, offset_std = line.gain_std * gain**2, line.offset_std * gain
+        gain_std, offset_std = line.gain_std * gain**2, line.offset_std * abs(gain)
         offset = -line.offset * gain
         return line._replace(gain=gain, gain_std=gain_std, offset=offset, offset_std=offset_std)
     # The slower the car, the less its positions say of its course.

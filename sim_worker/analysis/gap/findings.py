@@ -108,6 +108,7 @@ def _gyro_sensor(seen: Consistency) -> Finding | None:
         return None
     if gyro.gain_std < 0.15 and abs(gyro.gain - 1.0) > GAIN_LEFT_OPEN + 2.5 * gyro.gain_std:
         said = f"the gyro shows {gyro.gain:.2f} of the turn of the course over ground"
+        said += " (its sign is wrong?)" if gyro.gain < 0.0 else ""
         text = f"the car's gyro disagrees with its positions: {said}"
         return Finding("vehicle", "gyro_sensor", text, (_of("gyro_by_course", gyro, said),))
     if abs(gyro.offset) > _GYRO_RADPS + 3.0 * gyro.offset_std:

@@ -129,6 +129,12 @@ def test_a_gyro_in_degrees_per_second_is_the_gyros_and_no_models() -> None:
     assert {f"{one.culprit} {one.cause}" for one in told} == {"vehicle gyro_sensor"}
 
 
+def test_a_gyro_that_turns_the_other_way_is_told_as_such() -> None:
+    told, _ = judged_as(gyro_as(-1.0, 0.0))
+    assert [f"{one.culprit} {one.cause}" for one in told] == ["vehicle gyro_sensor"]
+    assert "(its sign is wrong?)" in told[0].text
+
+
 @pytest.mark.parametrize("fault", ["weaker", "gyro"])
 def test_a_fault_that_begins_while_driving_is_dated(fault: str) -> None:
     """The drive of a sound car goes over into that of one whose commands or gyro are off."""
