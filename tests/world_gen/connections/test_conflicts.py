@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.world import Conflict, Connection, World
 from foretwin.world_gen.build import build_region
+from foretwin.world_gen.connections import conflicts
 from foretwin.world_gen.connections.conflicts import SWEPT_HALF_WIDTH_M
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.osm.read_osm import read_map
@@ -153,6 +154,14 @@ def test_ring_and_entries_meet_across_places(clockwise):
     for c in entering:
         assert role[by_id[c.yields_id].from_lane_id] == "approach"
         assert c.source == "tagged"
+
+
+def test_what_two_threads_find_is_what_one_does(monkeypatch):
+    world = world_of(star([0.0, 80.0, 170.0, 260.0]))
+    assert len(world.conflicts) % 2 == 0
+    monkeypatch.setattr(conflicts, "_WORTH_A_THREAD", 3)
+    shared = world_of(star([0.0, 80.0, 170.0, 260.0]))
+    assert [str(c) for c in shared.conflicts] == [str(c) for c in world.conflicts]
 
 
 @pytest.mark.real_data
