@@ -91,20 +91,25 @@ class FrenetPath:
 
     def _lay(self, x_m: Array, y_m: Array) -> None:
         """Lay the nodes (M,) where they are."""
-        self._x, self._y = x_m, y_m
         self._heading = np.unwrap(np.arctan2(np.gradient(y_m), np.gradient(x_m)))
         # Tables have a row for each quantity: a look-up gives columns that lie in order.
-        self._nodes = np.stack([x_m, y_m, -np.sin(self._heading), np.cos(self._heading)])
-        """(4, M) x, y and the unit vector to the left."""
-        self._pieces = _with_steps(self._nodes)
+        self._pieces = _with_steps(
+            np.stack([x_m, y_m, -np.sin(self._heading), np.cos(self._heading)])
+        )
+        """(8, M) x, y and the unit vector to the left, and the steps of these to the next node."""
+        self._nodes = self._pieces[:4]
+        self._x, self._y = self._nodes[:2]
+
+    @functools.cached_property
+    def _segments(self) -> Array:
+        """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
+        length. Of many paths nobody asks where a position lies along them."""
         step = np.diff(self._nodes[:2])
         length = np.hypot(*step)
         cos, sin = step / length
-        self._segments = np.stack(
+        return np.stack(
             [*self._nodes[:2, :-1], cos / length, -sin, sin / length, cos, self.arc_m[:-1]]
         )
-        """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
-        length."""
 
     def __reduce__(self) -> tuple[object, tuple[object, ...]]:
         """Travel to another process as what the path was made of."""
@@ -140,7 +145,7 @@ class FrenetPath:
         each node is moved to the mean of those a car's length around it, and keeps its arc length.
         """
         path = copy.copy(self)
-        for found in ("_profiles", "_bounds", "curvature_pm"):
+        for found in ("_profiles", "_bounds", "_segments", "curvature_pm"):
             path.__dict__.pop(found, None)
         path.__dict__["eased"] = path
         path._lay(_eased(self._x), _eased(self._y))
