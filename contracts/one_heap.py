@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
+import sys
 
 _M_ARENA_MAX = -8
 """glibc, malloc.h."""
@@ -16,7 +18,13 @@ def share_one_heap() -> None:
     glibc gives threads heaps of their own, up to eight for each processor. The bus's threads
     allocate what ours free and the other way round, and what is free in one heap is of no use to
     another: processes grew for hours without holding more. Elsewhere nothing happens.
+
+    Arrow has a heap of its own besides (mimalloc), which gives nothing back: it takes from this
+    one, here and in processes that are started from here.
     """
+    os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"
+    if (arrow := sys.modules.get("pyarrow")) is not None:
+        arrow.set_memory_pool(arrow.system_memory_pool())
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, 1)
 

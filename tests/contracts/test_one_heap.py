@@ -45,6 +45,25 @@ def test_threads_share_the_heap_that_there_is() -> None:
     assert heaps() > 1, "what it is for"
 
 
+ARROWS = """
+import sys
+if "before" in sys.argv:
+    import pyarrow
+    pyarrow.array([1])
+from foretwin.contracts.one_heap import share_one_heap
+share_one_heap()
+import pyarrow
+print(pyarrow.default_memory_pool().backend_name)
+"""
+
+
+@pytest.mark.parametrize("imported", ["before", "after"])
+def test_arrow_takes_from_that_heap(imported: str) -> None:
+    command = [sys.executable, "-c", ARROWS, imported]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "system"
+
+
 HOLES = """
 import ctypes
 from foretwin.contracts.one_heap import GIVE_BACK_EVERY_S, FreeMemory
