@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 
 import pytest
@@ -53,3 +54,17 @@ def test_a_folder_for_a_while_is_gone_even_after_a_kill() -> None:
         if f"tempfile.{word}" in path.read_text(encoding="utf-8")
     }
     assert made_by == MAKES_FOLDERS, "use contracts.owned_folder: the next one removes what is left"
+
+
+def test_a_nought_has_no_sign_of_its_own() -> None:
+    """`:+.2f` writes what is nearly nothing as -0.00; `:+z.2f` does not."""
+    signed = re.compile(r":\+\.\d[efg]")
+    texts = {
+        path.relative_to(ROOT): path.read_text(encoding="utf-8")
+        for path in tracked_files()
+        if path.suffix == ".py" and path.relative_to(ROOT).parts[0] != "tests"
+    }
+    assert sum(len(re.findall(r":\+z\.\d", text)) for text in texts.values()) > 20
+    assert {
+        str(name): signed.findall(text) for name, text in texts.items() if signed.search(text)
+    } == {}

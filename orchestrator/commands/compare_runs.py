@@ -165,8 +165,8 @@ def _place_lines(rows: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def _interval(change: dict[str, Any], scale: float) -> str:
-    mean = f"{scale * change['mean']:+.3g}"
+    mean = f"{scale * change['mean']:+z.3g}"
     units = f"{change['units']} {'places' if change['of_places'] else 'pairs'}"
     if change["low"] is None:
         return f"{mean} (too few to tell: {units})"
-    return f"{mean} [{scale * change['low']:+.3g}, {scale * change['high']:+.3g}] ({units})"
+    return f"{mean} [{scale * change['low']:+z.3g}, {scale * change['high']:+z.3g}] ({units})"

@@ -47,7 +47,7 @@ class TelemetryWatch:
         """Return a warning for each new step of the clock and each channel of a wrong type."""
         steps = estimator.clock.steps if estimator.clock_steps > self._steps else ()
         warnings = [
-            f"telemetry: the vehicle's clock stepped by {step.step_ns * 1e-9:+.3f} s "
+            f"telemetry: the vehicle's clock stepped by {step.step_ns * 1e-9:+z.3f} s "
             f"({step.channel}); its new time counts from here"
             for step in steps[self._steps :]
         ]

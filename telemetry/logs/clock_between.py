@@ -79,7 +79,7 @@ class ClockBetween(NamedTuple):
 
     def said(self, second: str, first: str) -> str:
         """Return in a line what was found."""
-        drift = f"drift {self.drift_ppm:+.1f} ± {self.drift_std_ppm:.1f} ppm"
+        drift = f"drift {self.drift_ppm:+z.1f} ± {self.drift_std_ppm:.1f} ppm"
         if self.drift_ppm == 0.0:
             drift = "no drift that can be told"
             if math.isfinite(self.drift_std_ppm):
@@ -132,7 +132,7 @@ def clock_between(first: Log, second: Log) -> ClockBetween:
     drift, drift_std = drift_ppm_of(stretches)
     if (leap := leap_of(stretches)) is not None:
         raise LogError(
-            f"{second.info.source}: its clock leaps by {leap.by_s:+.2f} s beside"
+            f"{second.info.source}: its clock leaps by {leap.by_s:+z.2f} s beside"
             f" {first.info.source}'s between {leap.before_s:.0f} and {leap.after_s:.0f} s into"
             " that; cut it there"
         )
@@ -140,7 +140,7 @@ def clock_between(first: Log, second: Log) -> ClockBetween:
     drift = drift if abs(drift) > _SURE * drift_std else 0.0
     if abs(drift) > MOST_DRIFT_PPM:
         raise LogError(
-            f"{second.info.source}: its clock drifts by {drift:+.0f} ppm beside"
+            f"{second.info.source}: its clock drifts by {drift:+z.0f} ppm beside"
             f" {first.info.source}'s, and no clock does by more than {MOST_DRIFT_PPM:.0f}: it leaps"
             " somewhere"
         )
@@ -151,7 +151,7 @@ def clock_between(first: Log, second: Log) -> ClockBetween:
         (before_s, one_s, _), (after_s, other_s, _) = stretches[where : where + 2]
         raise LogError(
             f"{second.info.source}: its clock does not run evenly beside {first.info.source}'s: it"
-            f" changes by {other_s - one_s:+.2f} s between {before_s:.0f} and {after_s:.0f} s into"
+            f" changes by {other_s - one_s:+z.2f} s between {before_s:.0f} and {after_s:.0f} s into"
             " that; if it jumps, cut it there"
         )
     return ClockBetween(

@@ -141,7 +141,7 @@ def _connections(
         rise_m = end.height_m - begin.height_m
         if abs(rise_m) > STEEPEST * max(along, 1.0):
             notes.append(
-                f"lane {connection.from_lane_id}: leads {rise_m:+.1f} m up within {along:.1f} m, "
+                f"lane {connection.from_lane_id}: leads {rise_m:+z.1f} m up within {along:.1f} m, "
                 f"into {connection.to_lane_id}: the map joins what does not meet"
             )
             continue

@@ -125,7 +125,7 @@ class Sections:
         name, mean_g = sensors.gravity
         if not self.together([given["accel_x"].column, name]):
             return {}
-        said.append(f"accel_z is {name}: gravity, {mean_g:+.3f} g in the mean")
+        said.append(f"accel_z is {name}: gravity, {mean_g:+z.3f} g in the mean")
         return {"accel_z": col(name, given["accel_x"].unit, negate=mean_g < 0.0)}
 
     def _rows(
@@ -143,7 +143,7 @@ class Sections:
             said.append("lateness against positions: not observable")
         else:
             said.append(
-                f"late against positions by {late.late_s:+.3f} s ± {late.std_s:.3f}"
+                f"late against positions by {late.late_s:+z.3f} s ± {late.std_s:.3f}"
                 + ("" if late.sure else ": not plain enough to correct")
             )
             if late.sure:
@@ -165,7 +165,7 @@ class Sections:
         direction = "clockwise" if fit.clockwise else "counterclockwise"
         said = [
             f"{fit.column} in {fit.unit}: the course {direction} from {zero}"
-            f" {'within' if plain else 'and'} {offset_deg:+.2f} deg, scatter"
+            f" {'within' if plain else 'and'} {offset_deg:+z.2f} deg, scatter"
             f" {math.degrees(fit.spread_rad):.2f} deg; growing the other way"
             f" {math.degrees(fit.other_spread_rad):.1f} deg and more"
         ]
