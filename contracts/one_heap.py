@@ -17,7 +17,7 @@ def share_one_heap() -> None:
 
     glibc gives threads heaps of their own, up to eight for each processor. The bus's threads
     allocate what ours free and the other way round, and what is free in one heap is of no use to
-    another: processes grew for hours without holding more. Elsewhere nothing happens.
+    another: processes grew for hours without holding more. Elsewhere threads keep theirs.
 
     Arrow has a heap of its own besides (mimalloc), which gives nothing back: it takes from this
     one, here and in processes that are started from here.
