@@ -104,7 +104,8 @@ class Intake:
             now_ns=time.time_ns(),
         )
         if isinstance(message, PlannedTrajectory):
-            self.plan = message
+            # Stacks without a route say so by a plan without points: that is none.
+            self.plan = message if len(message.time_from_stamp_s) else None
         elif isinstance(message, VehicleStatus):
             self.status = message
         elif isinstance(message, RoadUsers):

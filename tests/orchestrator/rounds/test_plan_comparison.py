@@ -113,7 +113,7 @@ def test_what_a_late_round_says_of_a_plan_is_recorded_and_not_told(
     now_ns[0] += 10**10
     house.work()
 
-    assert house.watched("plan_comparison") == []
+    assert house.conductor.rounds.plans.record() is None
     assert house.conductor.rounds.plans.record()["count"] == 1
 
 
@@ -123,10 +123,29 @@ def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
     assert house.conductor.start_round()
     house.work()
 
-    assert house.watched("plan_comparison") == []
+    assert house.conductor.rounds.plans.record() is None
 
 
 def test_without_a_plan_there_is_nothing_to_compare(house: House) -> None:
     done, world = round_done(straight()), town_world("n4")
     path = done.order.jobs[0].path
     assert plan_compared(done, None, house.states[0], path, world) is None
+
+
+def test_a_plan_without_points_is_none(house: House) -> None:
+    """Autoware sends such where it has no route; nothing may be followed or compared, nor fail."""
+    house.drive(49)
+    some = car_plan(house, 49, left_m=1.0)
+    none = np.zeros(0)
+    empty = PlannedTrajectory(
+        stamp_ns=some.stamp_ns + 1, time_from_stamp_s=none, lat_deg=none, lon_deg=none,
+        yaw_rad=none, speed_mps=none,
+    )  # fmt: skip
+    for plan in (some, empty):
+        house.bus.publish("plan", plan, vehicle="ego")
+    house.drive(50)
+    assert house.conductor.start_round()
+    house.work()
+
+    assert house.conductor.rounds.tally.run == 1
+    assert house.conductor.rounds.plans.record() is None
