@@ -54,8 +54,9 @@ def _sample(channel: str, read: Callable[[Any, int], msgspec.Struct], stream: st
 def _fix(ros: Any, stamp_ns: int) -> drive.GnssFix:
     if ros.status.status < 0:
         raise UnusableError(NO_FIX)
-    known = ros.position_covariance_type != 0
-    variance = max(float(ros.position_covariance[0] + ros.position_covariance[4]) / 2.0, 0.0)
+    variance = float(ros.position_covariance[0] + ros.position_covariance[4]) / 2.0
+    # Drivers that know none say so by the type, or leave NaN, 0 or -1 where it would stand.
+    known = ros.position_covariance_type != 0 and variance > 0.0
     # NavSatFix: "NaN if no altitude is available".
     alt_m = ros.altitude if ros.altitude == ros.altitude else 0.0
     position = GeoPoint(ros.latitude, ros.longitude, alt_m)

@@ -156,6 +156,21 @@ def test_no_fix_zero_stamp_and_imu_without_values(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("variance", [float("nan"), 0.0, -1.0])
+def test_a_receiver_that_tells_no_covariance_is_of_unknown_spread(
+    tmp_path: Path, variance: float
+) -> None:
+    file = ForeignFile(tmp_path / "bag.mcap")
+    message = fix(START_NS, 52.5)
+    message.position_covariance = np.full(9, variance)
+    assert message.position_covariance_type != 0
+    file.add("/fix", "sensor_msgs/msg/NavSatFix", message, START_NS)
+    log = open_log(file.close())
+    position = GeoPoint(52.5, 13.4, 30.0)
+    wanted = drive.GnssFix(stamp_ns=START_NS, position=position, std_m=None)
+    assert list(log.samples()) == [("gnss", wanted)]
+
+
 def test_a_file_without_positions_is_no_log(tmp_path: Path) -> None:
     file = ForeignFile(tmp_path / "bag.mcap")
     file.add("/twist", "geometry_msgs/msg/Vector3", vector_from(1.0, 2.0, 3.0), 5)
