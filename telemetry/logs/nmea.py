@@ -6,7 +6,8 @@ between two GGAs has the altitude and HDOP of the last GGA and the quality of it
 RMC's in knots, else VTG's. Yaw is HDT's heading; without any HDT it is RMC's course over ground
 above MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are RMC's or ZDA's, else the one
 declared in `NAME.toml` beside the log; without any of them times count from the log's first. Where
-only times are told, one that falls by half a day or more begins the next day.
+only times are told, one that falls by half a day or more begins the next day, and one of just
+before midnight that comes after it is of the day before.
 Sentences without a time (VTG, HDT) get that of the sentence before. Lines may have something before
 the `$`; a wrong checksum is counted, a missing one is let pass.
 """
@@ -32,7 +33,7 @@ from foretwin.telemetry.logs.log import (
     Sample,
 )
 from foretwin.telemetry.logs.map_origin import declaration_beside
-from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.merge import LATE_NS, reordered
 from foretwin.telemetry.logs.nmea_positions import (
     QUALITY_OF_MODE,
     STD_M,
@@ -183,12 +184,17 @@ def _samples(path: Path, found: _Found, skipped: Skipped) -> Iterator[Sample]:
         try:
             time_ns = time_of_day_ns(sentence)
             if time_ns is not None:
-                if (stated := date_of(sentence)) is not None:
+                stated = date_of(sentence)
+                late = stated is None and time_ns - latest_ns > DAY_NS - LATE_NS
+                if stated is not None:
                     date = stated
                 elif latest_ns - time_ns > DAY_NS // 2:
                     date += datetime.timedelta(days=1)
-                latest_ns = time_ns
                 stamp_ns = midnight_ns(date) + time_ns - zero_ns
+                if late:  # of the day before, and told after midnight
+                    stamp_ns -= DAY_NS
+                else:
+                    latest_ns = time_ns
             if stamp_ns is None:
                 skipped[NO_TIME] += 1
                 continue

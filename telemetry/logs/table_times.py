@@ -1,7 +1,8 @@
 """Times as tables write them: numbers in a unit, days, dates in any order, times of the day.
 
 A time of the day that tells no date counts from midnight before the first row; one that falls by
-half a day or more begins the next day. Dates without a zone are UTC.
+half a day or more begins the next day, and one of just before midnight that comes after it is of
+the day before. Dates without a zone are UTC.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from decimal import Decimal, InvalidOperation
 
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.gpx import representable_ns, stamp_ns_from_iso
+from foretwin.telemetry.logs.merge import LATE_NS
 
 DATES = {"ymd": (0, 1, 2), "dmy": (2, 1, 0), "mdy": (2, 0, 1)}
 """Where year, month and day stand in a date of such a unit."""
@@ -63,9 +65,13 @@ def days_counted(stamps_ns: Sequence[int | None]) -> list[int | None]:
     found: list[int | None] = []
     for stamp_ns in stamps_ns:
         if stamp_ns is not None:
-            if latest_ns is not None and latest_ns - stamp_ns > _DAY_NS // 2:
-                day_ns += _DAY_NS
-            latest_ns, stamp_ns = stamp_ns, stamp_ns + day_ns
+            before_ns = stamp_ns if latest_ns is None else latest_ns
+            if stamp_ns - before_ns > _DAY_NS - LATE_NS:  # told after midnight
+                stamp_ns += day_ns - _DAY_NS
+            else:
+                if before_ns - stamp_ns > _DAY_NS // 2:
+                    day_ns += _DAY_NS
+                latest_ns, stamp_ns = stamp_ns, stamp_ns + day_ns
         found.append(stamp_ns)
     return found
 

@@ -175,6 +175,18 @@ def test_midnight_begins_the_next_day(tmp_path: Path, dated: bool) -> None:
     assert second - first == 10**9
 
 
+@pytest.mark.parametrize("dated", [True, False])
+def test_a_sentence_of_before_midnight_that_comes_late_begins_no_day(
+    tmp_path: Path, dated: bool
+) -> None:
+    day = rmc("235959.00", "280226")
+    after = rmc("000000.25", "010326") if dated else gga("000000.25")
+    _, found = opened(tmp_path, day, gga("235959.00"), after, gga("235959.75"), gga("000000.50"))
+    first_ns = NOON_NS - 12 * 3600 * 10**9 - 10**9
+    after_ms = [(fix.stamp_ns - first_ns) // 10**6 for fix in found["gnss"]]
+    assert after_ms == [0, 750, 1250, 1500]
+
+
 def test_times_before_the_first_date_are_of_the_day_before_where_midnight_lies_between(
     tmp_path: Path,
 ) -> None:

@@ -68,6 +68,13 @@ def test_midnight_begins_the_next_day_and_a_step_back_does_not() -> None:
     ]  # fmt: skip
 
 
+def test_a_time_of_before_midnight_that_comes_late_is_of_the_day_before() -> None:
+    late, early = DAY_NS - 10**9, 10**9
+    assert days_counted([late, early, late + 5, early + 5]) == [
+        late, DAY_NS + early, late + 5, DAY_NS + early + 5,
+    ]  # fmt: skip
+
+
 def test_a_zone_is_told_or_not() -> None:
     assert tells_zone("2024-03-01T10:00:00+01:00")
     assert tells_zone("10:00:00 UTC")
