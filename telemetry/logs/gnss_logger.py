@@ -161,8 +161,7 @@ def _read(path: Path, fixes: dict[str, list[_Fix]], sensors: dict[str, _Sensor])
                 cells = rest.strip().split(",")
                 fixes.setdefault(cells[0].strip().lower(), []).append(_fix(cells, places))
             elif kind in _SENSORS:
-                sensor = sensors.setdefault(kind, _Sensor(array("d"), array("q"), array("d")))
-                _add(sensor, rest.split(","), biased=kind.startswith("Uncal"))
+                _add(sensors, kind, rest.split(","))
         except (ValueError, IndexError, OverflowError, KeyError):
             refused[UNREADABLE_ROW] += 1
     return refused
@@ -206,14 +205,15 @@ def _fix(cells: list[str], places: dict[str, int]) -> _Fix:
     )
 
 
-def _add(sensor: _Sensor, cells: list[str], *, biased: bool) -> None:
+def _add(sensors: dict[str, _Sensor], kind: str, cells: list[str]) -> None:
     unix_ms, boot_ns = float(cells[0]), int(cells[1] or 0)
     xyz = [float(cell) for cell in cells[2:5]]
     if len(xyz) < 3 or not abs(unix_ms) * 1e6 < 2**62 or abs(boot_ns) > 2**61:
         raise ValueError("no three axes, or no time")
-    if biased and len(cells) >= 8:
+    if kind.startswith("Uncal") and len(cells) >= 8:
         # Of an uncalibrated sensor the phone's own estimate of the bias stands behind it.
         xyz = [value - float(bias) for value, bias in zip(xyz, cells[5:8], strict=True)]
+    sensor = sensors.setdefault(kind, _Sensor(array("d"), array("q"), array("d")))
     sensor.unix_ms.append(unix_ms)
     sensor.boot_ns.append(boot_ns)
     sensor.xyz.extend(xyz)

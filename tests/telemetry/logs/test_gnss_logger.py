@@ -137,6 +137,15 @@ def test_what_is_damaged_is_counted_and_what_is_wrong_told_in_a_line(tmp_path: P
         opened(tmp_path, V2, fix(0), mounting='forward = "x"\nup = "w"\n')
 
 
+def test_a_sensor_of_which_no_row_can_be_read_is_none(tmp_path: Path) -> None:
+    log, found = opened(
+        tmp_path, V2, fix(0), sensor("Accel", 0, "?,?,?"), sensor("Gyro", 0, "0,0,0.1"),
+        mounting='forward = "y"\nup = "z"\n',
+    )  # fmt: skip
+    assert "imu" not in found
+    assert log.skipped[UNREADABLE_ROW] == 1
+
+
 def test_real_logs_of_phones_that_stand(tmp_path: Path) -> None:
     """Nobody drove: place, gravity and the two clocks are shown, not the signs of driving."""
     path = public_drive("gnsslogger-phones/gnss_log_2026_02_25_23_25_37.txt")
