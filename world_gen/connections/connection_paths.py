@@ -149,6 +149,7 @@ def _along_path(
     around: Surroundings,
 ) -> Array:
     """Return a path that follows the inner edges on the driver's side of them."""
+    back = connection.turn == "u_turn"
     points = [begin, begin + 2.0 * heading]
     for part in connection.movement.inside:
         lanes = around.lanes_along(part).driven
@@ -158,8 +159,9 @@ def _along_path(
         points.extend(
             p
             for p in keep
-            if (p - points[-1]) @ (p - begin) > 0.0 and np.hypot(*(p - points[-1])) > 3.0
+            # Who turns back comes nearer to where the turn began.
+            if (back or (p - points[-1]) @ (p - begin) > 0.0) and np.hypot(*(p - points[-1])) > 3.0
         )
     points.extend([finish - 2.0 * end_heading, finish])
     line = without_repeats(np.array(points))
-    return with_bows(line) if connection.turn == "u_turn" else line
+    return with_bows(line) if back else line

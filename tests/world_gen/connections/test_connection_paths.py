@@ -35,3 +35,22 @@ def test_who_turns_sharply_into_a_road_beside_swings_out_instead_of_turning_on_t
         start, end = lanes[c.from_lane_id].centerline, lanes[c.to_lane_id].centerline
         assert max(end_bends_rad(start, c.centerline, end)) < math.radians(1.0)
         assert tightest_radius_m(c.centerline) > 2.5
+
+
+def test_who_turns_back_where_two_dual_carriageways_cross_on_the_skew_stays_between_them():
+    """East and west 8 m from the middle, north and south 6 m, leaning by 17°."""
+    corners = {1: (6.0, -8.0), 2: (6.0, 8.0), 3: (-6.0, 8.0), 4: (-6.0, -8.0)}
+    far = {11: (-120.0, -8.0), 12: (120.0, -8.0), 13: (120.0, 8.0), 14: (-120.0, 8.0)}
+    far |= {15: (6.0, -120.0), 16: (6.0, 120.0), 17: (-6.0, 120.0), 18: (-6.0, -120.0)}
+    nodes = {node: (x - 0.3 * y, y) for node, (x, y) in (corners | far).items()}
+    across, along = ({**road, "oneway": "yes", "lanes": "2"} for road in (AVENUE, STREET))
+    ways = [(21, [11, 4, 1, 12], across), (22, [13, 2, 3, 14], across)]
+    ways += [(23, [15, 1, 2, 16], along), (24, [17, 3, 4, 18], along)]
+    back = [c for c in world_of(drawn_map(nodes, ways)).connections if c.turn == "u_turn"]
+    assert len(back) == 4
+    for c in back:
+        upright = c.centerline + np.outer(c.centerline[:, 1], (0.3, 0.0))
+        axis = int(np.argmax(abs(upright[0])))
+        beyond_m = -(np.sign(upright[0, axis]) * upright[:, axis]).min()
+        # Lanes of the farther carriageway reach 3.25 m beyond its middle.
+        assert beyond_m < (6.0, 8.0)[axis] + 3.25
