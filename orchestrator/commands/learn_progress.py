@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -39,9 +40,8 @@ def learn_progress(
     if not logs and not check:
         raise UserError("nothing to do: name drives to learn from, or with --check some to check")
     if logs and out is not None:
-        learnt = learn(
-            {str(path.stem): _examples(path) for path in logs}, words={"licence": licence}
-        )
+        drives = {name: _examples(path) for name, path in _named(logs).items()}
+        learnt = learn(drives, words={"licence": licence})
         write_trees(learnt, out)
         model: ProgressModel | None = ProgressModel(learnt)
         told = f"{out}: {len(learnt.value)} nodes, learnt from {learnt.words['drives']}"
@@ -50,10 +50,26 @@ def learn_progress(
         told = ""
     if model is None:
         raise UserError("--table off: nothing to check")
-    scores = {path.stem: score(model, _examples(path)) for path in check}
+    scores = {name: score(model, _examples(path)) for name, path in _named(check).items()}
     return CommandResult(
         {name: _figures(of) for name, of in scores.items()}, lambda: _say(told, scores)
     )
+
+
+def _named(paths: Sequence[Path]) -> dict[str, Path]:
+    """Return drives by what tells their names apart, the stem where it does; each counts once."""
+    whole = {path.resolve(): path for path in paths}
+    called = {one: (one.stem, *_endings(one)) for one in whole}
+    often = Counter(name for names in called.values() for name in set(names))
+    return {
+        next(name for name in names if often[name] == 1): whole[one]
+        for one, names in called.items()
+    }
+
+
+def _endings(path: Path) -> list[str]:
+    """Return the file's name, that with its folder, and so on up to the root."""
+    return ["/".join(path.parts[-count:]) for count in range(1, len(path.parts) + 1)]
 
 
 def _say(told: str, scores: dict[str, DriveScore]) -> None:

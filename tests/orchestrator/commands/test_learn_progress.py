@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.drive import VehicleState
+from foretwin.orchestrator.commands import learn_progress
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
 from foretwin.orchestrator.forecast import learning
+from foretwin.orchestrator.forecast.examples import Examples
 from foretwin.orchestrator.forecast.progress_model import SHIPPED_TABLE
-from foretwin.orchestrator.forecast.quantile_trees import read_trees
+from foretwin.orchestrator.forecast.quantile_trees import QuantileTrees, read_trees
 from tests.orchestrator.forecast.town_drives import town_states
 
 COVERS = ("foretwin.orchestrator.commands.cli_progress",)
@@ -72,6 +74,33 @@ def test_the_shipped_table_is_checked_on_ones_own_drive(
     (told,) = json.loads(capsys.readouterr().out).values()
     assert 0.4 < told["p10_p90_coverage"] < 1.0
     assert told["count"] > 100
+
+
+def test_drives_whose_files_are_called_alike_all_count_and_one_named_twice_counts_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learnt: list[dict[str, object]] = []
+
+    def learn(drives: dict[str, Examples], *, words: dict[str, str]) -> QuantileTrees:
+        learnt.append({name: len(drive.stamp_ns) for name, drive in drives.items()})
+        return read_trees(SHIPPED_TABLE)
+
+    monkeypatch.setattr(learn_progress, "learn", learn)
+    drives = []
+    for seed, day in enumerate(("monday", "tuesday", "friday")):
+        (tmp_path / day).mkdir()
+        states = list(town_states(seed=seed + 1, minutes=0.5 + 0.25 * seed))
+        drives.append(str(log_of(states, tmp_path / day / "drive.csv")))
+    checks = [word for drive in drives[1:] for word in ("--check", drive)]
+
+    out = str(tmp_path / "mine.npz")
+    assert run(["learn-progress", *drives[:2], drives[0], "--out", out]) == 0
+    capsys.readouterr()
+    assert run(["learn-progress", *checks, "--json"]) == 0
+
+    assert set(learnt[0]) == {"monday/drive.csv", "tuesday/drive.csv"}
+    assert learnt[0]["monday/drive.csv"] != learnt[0]["tuesday/drive.csv"]
+    assert set(json.loads(capsys.readouterr().out)) == {"tuesday/drive.csv", "friday/drive.csv"}
 
 
 @pytest.mark.parametrize(
