@@ -32,7 +32,9 @@ def changes_between(first: ComparedSide, second: ComparedSide) -> dict[str, Any]
     """Return what changed from the first to the second, as an object that JSON holds.
 
     A case fails where its future collides. `failing` counts cases that were played on both sides,
-    by exact McNemar; `measures` and `places` have p values adjusted for how many of them there are.
+    by exact McNemar; `measures` are of those in which both have a value, `alone` counts those in
+    which one side has. `measures`, `alone` and `places` have p values adjusted for how many of them
+    there are.
     Raises UserError where both sides have no case in common.
     """
     if first.row.kind != second.row.kind:
@@ -65,6 +67,7 @@ def changes_between(first: ComparedSide, second: ComparedSide) -> dict[str, Any]
         },
         "failing": _failing(played),
         "measures": _measures(played, first, second),
+        "alone": _alone(played, first, second),
         "places": _places(played),
         "newly_failing": [_case(b) for a, b in played if b["collided"] and not a["collided"]],
         "fixed": [_case(b) for a, b in played if a["collided"] and not b["collided"]],
@@ -106,10 +109,7 @@ def _measures(
 ) -> list[dict[str, Any]]:
     """Return each measure that both sides have, over the pairs in which both have a value."""
     rows: list[dict[str, Any]] = []
-    meaning = dict(_ALWAYS)
-    for name in first.units.keys() & second.units.keys():
-        meaning[_METRIC + name] = second.units[name], second.better[name]
-    for name, (unit, better) in sorted(meaning.items()):
+    for name, (unit, better) in _meaning(first, second):
         both = [(a, b) for a, b in played if _number(a.get(name)) and _number(b.get(name))]
         if not both:
             continue
@@ -135,6 +135,38 @@ def _measures(
     return rows
 
 
+def _alone(
+    played: Sequence[Pair], first: ComparedSide, second: ComparedSide
+) -> list[dict[str, Any]]:
+    """Return each measure that one side alone has a value of in some pairs: nothing is infinite in
+    a table, so that a mean of both says nothing of who was never near anybody before."""
+    rows: list[dict[str, Any]] = []
+    for name, _ in _meaning(first, second):
+        has = [(_number(a.get(name)), _number(b.get(name))) for a, b in played]
+        counts = {
+            "first": sum(a and not b for a, b in has),
+            "second": sum(b and not a for a, b in has),
+            "both": sum(a and b for a, b in has),
+        }
+        if counts["first"] or counts["second"]:
+            p_value = mcnemar_p(counts["second"], counts["first"])
+            rows.append({"measure": name, **counts, "p_value": p_value})
+    return _with_adjusted(rows)
+
+
+def _meaning(first: ComparedSide, second: ComparedSide) -> list[tuple[str, tuple[str, str]]]:
+    """Return the measures of both sides by name, with their units and which direction is better."""
+    both = first.units.keys() & second.units.keys()
+    metrics = {_METRIC + name: (second.units[name], second.better[name]) for name in both}
+    return sorted((_ALWAYS | metrics).items())
+
+
+def _with_adjusted(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    for row, of_many in zip(rows, adjusted([row["p_value"] for row in rows]), strict=True):
+        row["p_adjusted"] = of_many
+    return rows
+
+
 def _word(change: PairedChange, better: str) -> str:
     if better == "neither":
         return "changed"
@@ -155,9 +187,9 @@ def _places(played: Sequence[Pair]) -> list[dict[str, Any]]:
         counts = _counts(pairs)
         p_value = mcnemar_p(counts["newly"], counts["fixed"])
         rows.append({"junction_id": junction_id, **counts, "p_value": p_value})
-    for row, of_many in zip(rows, adjusted([row["p_value"] for row in rows]), strict=True):
-        row["p_adjusted"] = of_many
-    return sorted(rows, key=lambda row: (row["fixed"] - row["newly"], row["junction_id"]))
+    return sorted(
+        _with_adjusted(rows), key=lambda row: (row["fixed"] - row["newly"], row["junction_id"])
+    )
 
 
 def _case(row: dict[str, Any]) -> dict[str, Any]:

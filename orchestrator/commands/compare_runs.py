@@ -109,6 +109,7 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
     if failing["change"] is not None:
         yield f"change of the share: {_interval(failing['change'], 100.0)} %"
     yield from _measure_lines(found["measures"], every=every)
+    yield from _alone_lines(found["alone"], every=every)
     yield from _place_lines(found["places"])
     for name, side in (("newly failing", "second"), ("fixed", "second")):
         cases = found[name.replace(" ", "_")]
@@ -143,6 +144,21 @@ def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
     if chance := len(changed) - len(sure):
         measures = "measure" if chance == 1 else "measures"
         yield f"{chance} {measures} changed not significantly: --all"
+
+
+def _alone_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
+    """Yield of which measures one side alone has a value, significantly oftener than the other;
+    with `every` all."""
+    ordered = sorted(rows, key=_doubt)
+    shown = ordered if every else [row for row in ordered if _doubt(row) < LEVEL][:_MOST_LISTED]
+    for row in shown:
+        yield (
+            f"{row['measure']}: only A has a value in {row['first']} cases, only B in {row['second']}, "
+            f"p adjusted {row['p_adjusted']:.3g}; what changed is told of {row['both']} with both"
+        )
+    if left := len(rows) - len(shown):
+        measures = "measure has" if left == 1 else "measures have"
+        yield f"{left} more {measures} a value on one side alone in some cases: --all"
 
 
 def _order(row: dict[str, Any]) -> tuple[bool, bool, float]:

@@ -96,6 +96,24 @@ def test_two_planners_of_one_sweep_are_paired_case_by_case(tmp_path: Path) -> No
     assert compared(sweep, sweep)["pairs"] == 28
 
 
+def test_what_one_side_alone_has_a_value_of_is_counted_beside_the_means(tmp_path: Path) -> None:
+    near = [number % 2 == 0 for number in range(28)]
+    before = [case(n, metric_ttc=2.0 if near[n] else None) for n in range(28)]
+    after = [case(n, metric_ttc=2.1 if near[n] else 0.5) for n in range(28)]
+    first, second = sweep_of(tmp_path / "a", before), sweep_of(tmp_path / "b", after)
+
+    found = compared(first, second)
+
+    (ttc,) = [row for row in found["measures"] if row["measure"] == "metric_ttc"]
+    assert (ttc["pairs"], ttc["word"]) == (14, "better")  # of those that were near before
+    (alone,) = found["alone"]
+    assert {name: alone[name] for name in ("measure", "first", "second", "both")} == {
+        "measure": "metric_ttc", "first": 0, "second": 14, "both": 14,
+    }  # fmt: skip
+    assert alone["p_adjusted"] == pytest.approx(2.0 * 0.5**14)
+    assert compared(first, first)["alone"] == []
+
+
 def test_numbers_and_seeds_tell_cases_apart(tmp_path: Path) -> None:
     first = sweep_of(tmp_path / "a", [case(n, friction_factor=1.0) for n in range(4)])
     second = sweep_of(tmp_path / "b", [case(n, friction_factor=0.5) for n in range(4)])

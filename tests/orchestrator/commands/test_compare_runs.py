@@ -55,6 +55,26 @@ def test_changes_that_may_be_chance_are_counted_and_listed_with_all(
     assert "--all" not in whole
 
 
+def test_measures_that_one_side_alone_has_are_told_where_that_is_no_chance(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = str(sweep_of(tmp_path / "before", [case(n, metric_ttc=None) for n in range(28)]))
+    rows = [case(n, metric_ttc=0.5 if n < 9 else None) for n in range(28)]
+    rows[9] = case(9, metric_ttc=None, progress_m=1.0)
+    second = str(sweep_of(tmp_path / "after", rows, seed=4))
+
+    assert command(["compare", first, second]) == 0
+    short = capsys.readouterr().out
+    assert command(["compare", first, second, "--all"]) == 0
+    whole = capsys.readouterr().out
+
+    ttc = "metric_ttc: only A has a value in 0 cases, only B in 9, p adjusted 0.00781; what "
+    assert f"{ttc}changed is told of 0 with both" in short
+    assert "1 more measure has a value on one side alone in some cases: --all" in short
+    assert "progress_m: only A has a value in 0 cases, only B in 1, p adjusted 1;" in whole
+    assert "on one side alone" not in whole
+
+
 def test_what_is_surest_stands_first() -> None:
     change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
     rows = [
