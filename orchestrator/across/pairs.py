@@ -17,10 +17,12 @@ from foretwin.orchestrator.across.tables import RunTables
 from foretwin.orchestrator.record.run_state import check_finished
 
 _CASE = {
-    SWEEP: ("junction_id", "place", "scenario", "case", "vehicle", "seed", *FUTURE_NUMBERS),
+    SWEEP: ("junction_id", "place", "scenario", "case", "seed", *FUTURE_NUMBERS),
     DRIVE: ("junction_id", "stamp_ns", "index", "scenario", "name"),
 }
-"""What two futures have in common that are the same case, besides the planner."""
+"""What two futures have in common that are the same case, besides who drives what."""
+_DRIVEN = {SWEEP: ("planner", "vehicle"), DRIVE: ("planner",)}
+"""What they have in common too, unless each side has a single one: then these are compared."""
 
 
 class ComparedSide(NamedTuple):
@@ -35,7 +37,11 @@ class ComparedSide(NamedTuple):
     @property
     def planners(self) -> list[str]:
         """Return who drives in its futures."""
-        return sorted({row["planner"] for row in self.futures})
+        return self.names_of("planner")
+
+    def names_of(self, column: str) -> list[str]:
+        """Return what its futures have in a column of names."""
+        return sorted({row[column] for row in self.futures})
 
 
 class Paired(NamedTuple):
@@ -76,10 +82,11 @@ def side_of(folder: Path, planner: str | None) -> ComparedSide:
 def paired(first: ComparedSide, second: ComparedSide) -> Paired:
     """Return the futures of both sides that are the same case.
 
-    By planner too, unless each side has a single one: then these are what is compared.
+    By planner and, of sweeps, vehicle too, unless each side has a single one.
     """
-    one_each = len(first.planners) == len(second.planners) == 1
-    names = _CASE[first.row.kind] + (() if one_each else ("planner",))
+    kind, sides = first.row.kind, (first, second)
+    apart = (one for one in _DRIVEN[kind] if any(len(side.names_of(one)) > 1 for side in sides))
+    names = (*_CASE[kind], *apart)
     others = _by_case(second.futures, names)
     mine = _by_case(first.futures, names)
     pairs = [(row, others[case]) for case, row in mine.items() if case in others]

@@ -122,6 +122,15 @@ def test_numbers_and_seeds_tell_cases_apart(tmp_path: Path) -> None:
         compared(first, second)
 
 
+def test_vehicles_are_compared_where_each_sweep_has_one(tmp_path: Path) -> None:
+    car, van = ([case(n, vehicle=name) for n in range(4)] for name in ("car", "van"))
+    first, second = sweep_of(tmp_path / "a", car), sweep_of(tmp_path / "b", van)
+    both = sweep_of(tmp_path / "both", [*car, *van])
+
+    assert compared(first, second)["pairs"] == 4
+    assert (compared(both, both)["pairs"], compared(both, second)["pairs"]) == (8, 4)
+
+
 def test_what_was_not_played_on_both_sides_is_counted_apart(tmp_path: Path) -> None:
     first = [case(0), case(1, left_out="no room"), case(2, valid=False), case(3)]
     second = [case(0, failure="died"), case(1), case(2, valid=False), case(3)]
