@@ -21,7 +21,13 @@ from foretwin.orchestrator.report.blocks import (
     plural,
     row,
 )
-from foretwin.orchestrator.report.material import RunMaterial, TableRow, in_lock_step, part_of
+from foretwin.orchestrator.report.material import (
+    RunMaterial,
+    TableRow,
+    changes_of_driver,
+    in_lock_step,
+    part_of,
+)
 from foretwin.orchestrator.report.passages import JunctionPassed
 from foretwin.orchestrator.report.plots import latency_plot
 
@@ -62,8 +68,9 @@ def disagreement_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Cha
     anchors = {str(one.place["id"]): one for one in passed}
     blocks: list[Block] = []
     if segments:
-        takeovers = max(0, len(segments) - 1)
-        blocks.append(Prose(f"{plural(takeovers, 'takeover')} in this drive."))
+        takeovers = plural(changes_of_driver(segments, to="manual"), "takeover")
+        others = changes_of_driver(segments, to="autonomous")
+        blocks.append(Prose(f"{takeovers} by the human, {others} by the software."))
         blocks.append(
             Listed(
                 "Stretches between takeovers, and how far plans lay from what was driven (95 %)",

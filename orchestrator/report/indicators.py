@@ -28,7 +28,13 @@ from foretwin.orchestrator.report.indicator_statistics import (
     share_of,
     trend_of,
 )
-from foretwin.orchestrator.report.material import RunMaterial, TableRow, in_lock_step, part_of
+from foretwin.orchestrator.report.material import (
+    RunMaterial,
+    TableRow,
+    changes_of_driver,
+    in_lock_step,
+    part_of,
+)
 from foretwin.sim_worker.analysis.occurred.rows import THRESHOLDS
 
 ExposureUnit = Literal["km", "h", "pass", "trial"]
@@ -260,10 +266,11 @@ def _occurred(run: RunMaterial) -> Occurred | None:
 
 def row_counts(segments: Sequence[TableRow], marks: Sequence[TableRow]) -> RowCounts:
     """Return what rows of `driven_segments` and `marks` come to: a note that came later is a row
-    of its own."""
+    of its own, and what the human takes over is what the software drove."""
+    by_software = any(one["control_mode"] == "autonomous" for one in segments)
     return RowCounts(
         marked=len({one["mark_id"] for one in marks}),
-        takeovers=len(segments) - 1 if segments else None,
+        takeovers=changes_of_driver(segments, to="manual") if by_software else None,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -195,6 +196,15 @@ def _known(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
         if not isinstance(record.get(key) or [], list):
             raise UserError(f"{folder}/run.json: {key}: a list is asked for, as a drive writes it")
     return record
+
+
+def changes_of_driver(segments: Sequence[TableRow], *, to: str) -> int:
+    """Return how often driving went over to `manual` or to `autonomous` from the other, by rows of
+    `driven_segments`: one that begins where nobody says who drives is no change."""
+    modes = [one["control_mode"] for one in sorted(segments, key=lambda one: one["number"])]
+    return sum(
+        after == to and before not in (to, "unknown") for before, after in itertools.pairwise(modes)
+    )
 
 
 def in_lock_step(record: Mapping[str, Any]) -> bool:

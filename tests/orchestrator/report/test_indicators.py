@@ -66,11 +66,26 @@ def test_events_are_held_against_kilometres_and_hours() -> None:
         assert found[IndicatorKey(name, "h")] == CountedEvents(count, 0.5)
 
 
-def test_a_note_that_came_later_is_no_second_mark_and_takeovers_lie_between_segments() -> None:
+def test_a_note_that_came_later_is_no_second_mark() -> None:
     marks = [{"mark_id": "a"}, {"mark_id": "b"}, {"mark_id": "a", "note": "later"}]
 
-    assert row_counts([{}, {}, {}], marks) == RowCounts(marked=2, takeovers=2)
-    assert row_counts([], []) == RowCounts(marked=0, takeovers=None)
+    assert row_counts([], marks) == RowCounts(marked=2, takeovers=None)
+
+
+@pytest.mark.parametrize(
+    ("modes", "takeovers"),
+    [
+        (["autonomous", "manual", "autonomous", "manual"], 2),
+        (["manual", "autonomous"], 0),
+        (["unknown", "manual", "manual", "autonomous", "manual"], 1),
+        (["manual"], None),  # nothing that anybody could have taken over
+        (["unknown", "manual"], None),
+    ],
+)
+def test_takeovers_are_of_what_the_software_drove(modes: list[str], takeovers: int | None) -> None:
+    rows = [{"number": place, "control_mode": mode} for place, mode in enumerate(modes)]
+
+    assert row_counts(rows[::-1], []) == RowCounts(marked=0, takeovers=takeovers)
 
 
 def test_conflicts_at_junctions_are_held_against_passes_by_kind() -> None:

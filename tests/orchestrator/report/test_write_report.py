@@ -26,7 +26,6 @@ from tests.orchestrator.report.told_runs import (
 )
 
 COVERS = (
-    "foretwin.orchestrator.report.conduct_parts",
     "foretwin.orchestrator.report.driven_track",
     "foretwin.orchestrator.report.first_page",
     "foretwin.orchestrator.report.junction_parts",
