@@ -153,8 +153,9 @@ def _alone_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
     shown = ordered if every else [row for row in ordered if _doubt(row) < LEVEL][:_MOST_LISTED]
     for row in shown:
         yield (
-            f"{row['measure']}: only A has a value in {row['first']} cases, only B in {row['second']}, "
-            f"p adjusted {row['p_adjusted']:.3g}; what changed is told of {row['both']} with both"
+            f"{row['measure']}: only A has a value in {row['first']} cases, "
+            f"only B in {row['second']}, p adjusted {row['p_adjusted']:.3g}; "
+            f"what changed is told of {row['both']} with both"
         )
     if left := len(rows) - len(shown):
         measures = "measure has" if left == 1 else "measures have"
