@@ -11,16 +11,13 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 
 from foretwin.contracts import drive
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Stamps
 from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, Sample
 from foretwin.telemetry.logs.merge import merged
-
-Stamps = npt.NDArray[np.int64]
+from foretwin.telemetry.logs.one_drive import of_one_drive
 
 
 class ChannelColumns(NamedTuple):
@@ -100,6 +97,11 @@ class Stream(NamedTuple):
     stamps_ns: Stamps
     columns: Mapping[str, Array]
 
+    def of(self, rows: Flags) -> Stream:
+        """Return those of some rows (N,)."""
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return Stream(self.stamps_ns[rows], columns)
+
 
 def stream_of(channel: str, stamps_ns: Stamps, array: Array) -> Stream:
     """Return the stream of an array (N, F) with the channel's first F fields, in their order."""
@@ -119,14 +121,23 @@ def table_log(
 ) -> Log:
     """Return the log of streams by channel; the drive lasts from the first stamp to the latest.
 
-    `unreadable` rows, and what a reader has `refused` by reason, are counted with what is refused.
+    `unreadable` rows, and what a reader has `refused` by reason, are counted with what is refused,
+    and so are samples whose stamps cannot be of one drive.
     """
+    kept = {}
+    counted = Counter(refused or {})
+    for channel, stream in streams.items():
+        flags, why = of_one_drive(stream.stamps_ns, time_base)
+        kept[channel] = stream if flags.all() else stream.of(flags)
+        counted += why
+    flags, _ = of_one_drive(stamps_ns, time_base)
+    stamps_ns = stamps_ns[flags]
 
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if unreadable:
             skipped[UNREADABLE_ROW] += unreadable
-        skipped.update(refused or {})
-        return merged(*(_samples(channel, stream) for channel, stream in streams.items()))
+        skipped.update(counted)
+        return merged(*(_samples(channel, stream) for channel, stream in kept.items()))
 
     return Log(
         info=drive.VehicleInfo(

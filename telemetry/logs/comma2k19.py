@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import geo_from_ecef
-from foretwin.telemetry.logs.columns import Stamps, stream_of, table_log
+from foretwin.telemetry.logs.columns import stream_of, table_log
 from foretwin.telemetry.logs.log import MOST_TIME_S, Log, LogError
 
 MOST_VALUE = 1e12

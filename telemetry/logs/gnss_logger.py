@@ -31,9 +31,9 @@ from typing import Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.drive import Vector3
-from foretwin.telemetry.logs.columns import Stamps, Stream, stream_of, table_log
+from foretwin.telemetry.logs.columns import Stream, stream_of, table_log
 from foretwin.telemetry.logs.gpx import representable_ns
 from foretwin.telemetry.logs.log import LAST_LINE_OPEN, UNREADABLE_ROW, Log, LogError
 from foretwin.telemetry.logs.map_origin import declaration_beside
