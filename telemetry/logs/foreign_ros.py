@@ -2,10 +2,11 @@
 
 Topics are chosen by message type, one topic per stream of `ros_messages.foreign`: the first type
 that occurs, and among its topics the one with the most messages. The stamp is that of the header,
-and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
-a declaration tells the origin of their frame. Where static transforms lead from base_link to the
-frame of the fixes, the antenna's place is theirs; so are an inertial unit's axes (mountings.py).
-Without any fixes an Odometry in `map` gives positions and headings, where that frame is placed.
+and the log time where that is 0; what is ahead of the positions' clock is left out. Plans and
+objects are read only where metadata `foretwin.frame` or a declaration tells the origin of their
+frame. Where static transforms lead from base_link to the frame of the fixes, the antenna's place is
+theirs; so are an inertial unit's axes (mountings.py). Without any fixes an Odometry in `map` gives
+positions and headings, where that frame is placed.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.logs.fix_clock import OTHER_CLOCK, FixClock
 from foretwin.telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Log, LogError, Sample
 from foretwin.telemetry.logs.map_origin import RecordingDeclaration
 from foretwin.telemetry.logs.mcap_records import Contents, Record
@@ -78,7 +80,8 @@ def open_foreign(
             skipped[FILE_CUT_SHORT] += 1
         if not mounting.upright:
             skipped[NOT_UPRIGHT] += contents.counts[imu or ""]
-        samples = _foreign_samples(recording, chosen, decode, frame, mounting, skipped)
+        clock = FixClock(lag_ns, most_ahead_ns=WINDOW_NS)
+        samples = _foreign_samples(recording, chosen, decode, frame, mounting, clock, skipped)
         return _joined(reordered(samples, window_ns=WINDOW_NS))
 
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
@@ -156,17 +159,22 @@ def _foreign_samples(
     decode: Decode,
     frame: LocalFrame | None,
     mounting: ImuMounting,
+    clock: FixClock,
     skipped: Counter[str],
 ) -> Iterator[Sample]:
     readers: dict[str, list[Foreign]] = {}
     for one in chosen:
         readers.setdefault(one.topic, []).append(one.how)
+    fixes = {one.topic for one in chosen if "gnss" in one.how.channels}
     for record in recording.chosen(set(readers), skipped):
         try:
             ros = decode(record)
             stamp_ns = stamp_of(ros) or record.log_time_ns
         except Exception:  # whatever rosbags raises over broken bytes
             skipped[UNREADABLE_ROW] += 1
+            continue
+        if not clock.takes(stamp_ns, record.log_time_ns, is_fix=record.topic in fixes):
+            skipped[OTHER_CLOCK] += 1
             continue
         for how in readers[record.topic]:
             try:
