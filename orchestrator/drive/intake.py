@@ -114,8 +114,10 @@ class Intake:
             self.signals.take(message)
         if self._estimator is None:
             return None
-        received_ns = self._drive_ns(item.received_mono_ns)
+        received_ns, steps = self._drive_ns(item.received_mono_ns), self._estimator.clock_steps
         state = self._estimator.handle(item.channel, message, received_ns=received_ns)
+        if self._estimator.clock_steps != steps:
+            self.signals = SignalLearner()  # by the old clock, they would be the newest for long
         if state is not None:
             state = self._with_tire_angle(state)
             self.latest = LatestState(state, item.received_mono_ns)

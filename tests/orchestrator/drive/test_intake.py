@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.codec import SchemaMismatch, encode
-from foretwin.contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
+from foretwin.contracts.drive import (
+    DriveEnd,
+    GnssFix,
+    PlannedTrajectory,
+    SignalColour,
+    SignalState,
+)
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Mailbox, Received
@@ -129,6 +135,26 @@ def heard(intake: Intake, sample: GnssFix, mono_ns: int) -> list[str]:
     item.received_mono_ns = mono_ns
     intake.take(item)
     return intake.warnings(mono_ns)
+
+
+def test_lights_that_were_heard_by_a_clock_that_has_stepped_count_no_more() -> None:
+    """A clock that is set back by an hour must not cost the lights of that hour."""
+    intake = Intake(town().vehicle, pace=1.0)
+    intake.take_info(INFO)
+    step_ns = 3600 * 10**9
+    later = [msgspec.structs.replace(fix, stamp_ns=fix.stamp_ns - step_ns) for fix in FIXES]
+    span_ns = FIXES[-1].stamp_ns - FIXES[0].stamp_ns + 10**8
+    for fix in (*FIXES, *later):
+        mono_ns = 10**9 + fix.stamp_ns - START_NS
+        heard(intake, fix, mono_ns if fix in FIXES else mono_ns + step_ns + span_ns)
+        colour: SignalColour = "green" if fix in FIXES else "red"
+        light = SignalState(stamp_ns=fix.stamp_ns, group_id="1", colour=colour)
+        intake.take(Received("signals", "…/signals", encode(light), SignalState))
+
+    assert intake.estimator is not None
+    assert intake.estimator.clock_steps == 1
+    newest = SignalState(stamp_ns=later[-1].stamp_ns, group_id="1", colour="red")
+    assert intake.surroundings.signals == (newest,)
 
 
 def test_a_live_vehicles_clock_is_recorded_and_its_silence_told_once() -> None:
