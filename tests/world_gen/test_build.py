@@ -270,6 +270,18 @@ def test_lanes_end_at_the_worlds_edge():
     assert max(np.hypot(*lane.centerline.T).max() for lane in world.lanes) <= 40.1
 
 
+def test_roads_of_the_junction_that_begin_beyond_the_world_are_named():
+    # Ways in and out begin some 25 m from the middle of the ring, whose radius is 20 m.
+    near, far = (world_of(roundabout(), radius_m=radius_m) for radius_m in (22.0, 40.0))
+    assert {lane.role for lane in near.lanes} == {"ring"}
+    beyond = [note for note in near.notes if "begins beyond the World" in note]
+    assert sorted(beyond) == [
+        f"way {way}: begins beyond the World, 22 m about the junction; left out, with its turns"
+        for way in sorted({lane.osm_way for lane in far.lanes if lane.role != "ring"})
+    ]
+    assert not any("beyond" in note for note in far.notes)
+
+
 def test_a_radius_out_of_range_is_refused():
     osm = crossing()
     graph = build_road_graph(osm)

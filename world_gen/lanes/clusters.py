@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import compress
 from types import MappingProxyType
 from typing import NamedTuple
@@ -14,6 +14,7 @@ import shapely.ops
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source_m
 from foretwin.contracts.world import DrivingSide
+from foretwin.geometry.polyline import points_at
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.extent import Extent
 from foretwin.world_gen.junctions.intersections import Junction
@@ -115,6 +116,7 @@ def surroundings(
     shifts = transition_shifts(clusters, edges, sections)
     heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
     side = made_for[0].summary.driving_side if made_for else side_of(edges.values())
+    cut_m = trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags)
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),
@@ -124,13 +126,14 @@ def surroundings(
         edges=edges,
         sections=sections,
         clusters=clusters,
-        trims_m=trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags),
+        trims_m=cut_m,
         heads=heads,
         shifts_m=shifts,
         ring_edges=ring_edges,
         notes=(
             *restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
             *_side_notes(edges, side),
+            *_beyond_notes(made_for, edges, cut_m, extent),
         ),
     )
 
@@ -141,6 +144,24 @@ def _side_notes(edges: Mapping[int, RoadEdge], side: DrivingSide) -> list[str]:
         edge.way_id: edge.driving_side for edge in edges.values() if edge.driving_side != side
     }
     return [f"way {way}: traffic keeps {its}, around it {side}" for way, its in others.items()]
+
+
+def _beyond_notes(
+    made_for: tuple[Junction, ...],
+    edges: Mapping[int, RoadEdge],
+    trims_m: Mapping[tuple[int, bool], float],
+    extent: Extent,
+) -> Iterator[str]:
+    """Name the ways in and out of the junctions in `made_for` whose lanes begin beyond."""
+    legs = (leg for junction in made_for for arm in junction.arms for leg in arm.outward)
+    for leg in legs:
+        if leg.edge.index in edges:
+            line = DirectedEdge(edges[leg.edge.index], leg.reverse).xy_m
+            if not extent.holds(points_at(line, np.array([trims_m.get(leg.key, 0.0)]))).all():
+                yield (
+                    f"way {leg.edge.way_id}: begins beyond the World, {extent.radius_m:.0f} m "
+                    "about the junction; left out, with its turns"
+                )
 
 
 _WITHOUT_EFFECT_ON_LANES = frozenset(
