@@ -6,7 +6,7 @@ import shutil
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import msgspec
 
@@ -14,8 +14,14 @@ from foretwin.contracts.new_folder import named_in_errors, trouble_with_folder
 from foretwin.contracts.partial_file import PARTIAL, partial_file
 from foretwin.telemetry.logs import Log, LogError, open_log
 
+if TYPE_CHECKING:
+    from foretwin.telemetry.logs.write_bag import BagWriter
+    from foretwin.telemetry.logs.write_mcap import DriveWriter
+
 Target = Literal["mcap", "ros2", "ros1", "csv"]
 TARGETS: tuple[Target, ...] = get_args(Target)
+NO_ROS_MESSAGE = "sample that no ROS message holds"
+"""Such as one of after 2038-01-19, or a plan without points before any position."""
 _BY_SUFFIX: dict[str, Target] = {".mcap": "mcap", ".bag": "ros1", ".csv": "csv", "": "ros2"}
 
 
@@ -104,9 +110,10 @@ def _check_own(declaration: Path) -> None:
         )
 
 
-def _check(source: Path, log: Log, counts: Counter[str]) -> None:
+def _check(source: Path, log: Log, counts: Counter[str], left_out: Counter[str]) -> None:
     if not counts:
-        reasons = ", ".join(f"{count} x {reason}" for reason, count in log.skipped.items())
+        refused = log.skipped + left_out
+        reasons = ", ".join(f"{count} x {reason}" for reason, count in refused.items())
         raise LogError(f"{source}: holds no valid sample ({reasons or 'it is empty'})")
 
 
@@ -115,19 +122,28 @@ def _to_mcap(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counte
 
     with partial_file(target) as partial:
         with create(partial, info=log.info) as writer:
-            for channel, message in log.samples():
-                writer.add(channel, message)
+            left_out = _add_all(log, writer)
         if writer.error is not None:
             raise writer.error
-        _check(source, log, writer.counts)
-    return writer.counts, Counter()
+        _check(source, log, writer.counts, left_out)
+    return writer.counts, left_out
+
+
+def _add_all(log: Log, writer: DriveWriter | BagWriter) -> Counter[str]:
+    """Write all samples of a log; return what of them is left out."""
+    left_out = Counter[str]()
+    for channel, message in log.samples():
+        try:
+            writer.add(channel, message)
+        except ValueError:
+            left_out[NO_ROS_MESSAGE] += 1
+    return left_out
 
 
 def _to_ros1(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
     with partial_file(target) as partial:
         partial.unlink(missing_ok=True)
-        counts = _to_bag(source, log, partial, ros1=True)
-    return counts, Counter()
+        return _to_bag(source, log, partial, ros1=True)
 
 
 def _to_ros2(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
@@ -136,26 +152,25 @@ def _to_ros2(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counte
     shutil.rmtree(around, ignore_errors=True)
     try:
         around.mkdir()
-        counts = _to_bag(source, log, around / target.name, ros1=False)
+        written = _to_bag(source, log, around / target.name, ros1=False)
         (around / target.name).replace(target)
     finally:
         shutil.rmtree(around, ignore_errors=True)
-    return counts, Counter()
+    return written
 
 
-def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> Counter[str]:
+def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> tuple[Counter[str], Counter[str]]:
     from foretwin.telemetry.logs.write_bag import BagWriter
 
     writer = BagWriter(path, ros1=ros1, info=log.info)
     try:
-        for channel, message in log.samples():
-            writer.add(channel, message)
-        _check(source, log, writer.counts)
+        left_out = _add_all(log, writer)
+        _check(source, log, writer.counts, left_out)
     except BaseException:
         writer.abort()
         raise
     writer.close()
-    return writer.counts
+    return writer.counts, left_out
 
 
 def _to_csv(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
@@ -165,7 +180,7 @@ def _to_csv(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter
         try:
             counts, left_out = write_csv(log.samples, log.info, table, declaration)
         except LogError:
-            _check(source, log, Counter(channel for channel, _ in log.samples()))
+            _check(source, log, Counter(channel for channel, _ in log.samples()), Counter())
             raise
     return counts, left_out
 

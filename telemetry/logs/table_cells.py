@@ -96,6 +96,21 @@ def read_cells(
     """
     if is_parquet(path):
         return CellTable(_parquet_cells(path, wanted, declared_in))
+    try:
+        return _separated_cells(path, wanted, declared_in, delimiter, header, skip_lines)
+    except csv.Error as error:
+        what = f"{path}: {error}: a quotation mark may be opened there and never closed"
+        raise LogError(what) from None
+
+
+def _separated_cells(
+    path: Path,
+    wanted: Collection[str],
+    declared_in: str,
+    delimiter: str,
+    header: bool,
+    skip_lines: int,
+) -> CellTable:
     encoding = encoding_of(path)
     with path.open(encoding=encoding, errors="replace", newline="") as text:
         reader = rows_of(itertools.islice(text, skip_lines, None), delimiter)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.telemetry.logs import LogError, open_log
-from foretwin.telemetry.logs.convert import convert
+from foretwin.telemetry.logs.convert import NO_ROS_MESSAGE, convert
 from foretwin.telemetry.logs.write_csv import DECLARATION_MARK
 from tests.telemetry.test_drive_mcap import assert_same
 
@@ -37,6 +37,18 @@ def test_what_is_refused_is_reported(tmp_path: Path) -> None:
     report = convert(source, tmp_path / "gt.mcap")
     assert report.counts == {"gnss": 2}
     assert report.skipped == {"position not finite": 1}
+
+
+@pytest.mark.parametrize("name", ["gt.mcap", "gt.bag", "bag"])
+def test_a_stamp_that_no_ros_time_holds_costs_its_sample(tmp_path: Path, name: str) -> None:
+    source, far = tmp_path / "gt.txt", GOOD.format(2_540_000_000)
+    source.write_text(GOOD.format(0) + far)
+    report = convert(source, tmp_path / name)
+    assert (report.counts, report.skipped) == ({"gnss": 1}, {NO_ROS_MESSAGE: 1})
+    assert [channel for channel, _ in open_log(tmp_path / name).samples()] == ["gnss"]
+    source.write_text(far)
+    with pytest.raises(LogError, match=f"holds no valid sample \\(1 x {NO_ROS_MESSAGE}"):
+        convert(source, tmp_path / f"other{name}")
 
 
 def test_nothing_is_left_behind_where_nothing_is_valid(tmp_path: Path) -> None:
