@@ -6,7 +6,6 @@ index arithmetic and a vehicle never runs out of path.
 
 from __future__ import annotations
 
-import copy
 import functools
 import math
 import operator
@@ -17,6 +16,15 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry import compiled
+from foretwin.geometry.path_nodes import (
+    NodePlace,
+    between,
+    cut_corners,
+    headings,
+    node_table,
+    prolonged,
+    with_steps,
+)
 from foretwin.geometry.polyline import apart, arc_lengths
 
 SPACING_M = 1.0
@@ -28,8 +36,6 @@ _MANY = 32
 """Points, from which on a tree of the nodes is searched faster than all of them."""
 _SMOOTH_NODES = 2
 """Curvature is the heading change over this many nodes on either side."""
-_EASED_NODES = 2
-"""A car cuts corners by as much as means over so many nodes on either side do: it is so long."""
 
 
 class FrenetPoint(NamedTuple):
@@ -37,13 +43,6 @@ class FrenetPoint(NamedTuple):
 
     arc_m: Array
     offset_m: Array
-
-
-class NodePlace(NamedTuple):
-    """Places between a path's nodes: which is before (…), what share (…) of the way to the next."""
-
-    node: npt.NDArray[np.intp]
-    share: Array
 
 
 class PathPose(NamedTuple):
@@ -56,8 +55,9 @@ class PathPose(NamedTuple):
 class FrenetPath:
     """A polyline with arc length 0 at its first given point.
 
-    `xy_m` (N, 2), `speed_limit_mps` (N,) or None; `before_m` of straight are put in front. Raises
-    ValueError for less than two distinct points or numbers that are not finite.
+    `xy_m` (N, 2), `speed_limit_mps` (N,) or None, both of which stay as they are; `before_m` of
+    straight are put in front. Raises ValueError for less than two distinct points or numbers that
+    are not finite.
     """
 
     def __init__(
@@ -67,43 +67,55 @@ class FrenetPath:
         points = np.asarray(xy_m, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise ValueError(f"a path needs finite points (N, 2), not shape {points.shape}")
-        keep = apart(points, tolerance_m=1e-6)
-        points = points[keep]
-        if len(points) < 2:
+        self._kept = apart(points, tolerance_m=1e-6)
+        self._points = points if self._kept.all() else points[self._kept]
+        if len(self._points) < 2:
             raise ValueError("a path needs at least two distinct points")
-        arc = arc_lengths(points)
-        self.length_m = float(arc[-1])
+        self._arc = arc_lengths(self._points)
+        self.length_m = float(self._arc[-1])
 
         before, after = int(before_m / SPACING_M), int((self.length_m + _AFTER_M) / SPACING_M)
         self.first_arc_m = -before * SPACING_M
-        self.arc_m: Array = np.arange(-before, after + 1, dtype=np.float64) * SPACING_M
-        """(M,) arc length of the nodes."""
-        self._last = len(self.arc_m) - 1
-        self._lay(*(_prolonged(self.arc_m, arc, column) for column in points.T))
-        if speed_limit_mps is None:
-            self.speed_limit_mps = np.full(len(self.arc_m), np.inf)
-        else:
-            limit = np.asarray(speed_limit_mps, dtype=np.float64)[keep]
-            limit = np.where(np.isfinite(limit) & (limit > 0.0), limit, np.inf)
-            nearest = np.clip(np.searchsorted(arc, self.arc_m, side="right") - 1, 0, len(arc) - 1)
-            self.speed_limit_mps = limit[nearest]
-        """(M,) limits at the nodes, infinite where unknown."""
+        self._last = before + after
 
-    def _lay(self, x_m: Array, y_m: Array) -> None:
-        """Lay the nodes (M,) where they are."""
-        self._heading = np.unwrap(np.arctan2(np.gradient(y_m), np.gradient(x_m)))
-        # Tables have a row for each quantity: a look-up gives columns that lie in order.
-        self._pieces = _with_steps(
-            np.stack([x_m, y_m, -np.sin(self._heading), np.cos(self._heading)])
-        )
+    @functools.cached_property
+    def arc_m(self) -> Array:
+        """(M,) arc length of the nodes."""
+        before = round(-self.first_arc_m / SPACING_M)
+        return np.arange(-before, self._last - before + 1, dtype=np.float64) * SPACING_M
+
+    @functools.cached_property
+    def speed_limit_mps(self) -> Array:
+        """(M,) limits at the nodes, infinite where unknown."""
+        _, given, _ = self._given
+        if given is None:
+            return np.full(self._last + 1, np.inf)
+        limit = np.asarray(given, dtype=np.float64)[self._kept]
+        limit = np.where(np.isfinite(limit) & (limit > 0.0), limit, np.inf)
+        nearest = np.searchsorted(self._arc, self.arc_m, side="right") - 1
+        return np.asarray(limit[np.clip(nearest, 0, len(limit) - 1)])
+
+    # Of many paths nobody asks where they lead: what a table holds of the nodes is made when asked.
+
+    @functools.cached_property
+    def _pieces(self) -> Array:
         """(8, M) x, y and the unit vector to the left, and the steps of these to the next node."""
-        self._nodes = self._pieces[:4]
-        self._x, self._y = self._nodes[:2]
+        return node_table(*(prolonged(self.arc_m, self._arc, column) for column in self._points.T))
+
+    @functools.cached_property
+    def _nodes(self) -> Array:
+        """(4, M) x, y and the unit vector to the left."""
+        return self._pieces[:4]
+
+    @functools.cached_property
+    def _heading(self) -> Array:
+        """(M,) headings without jumps."""
+        return headings(*self._nodes[:2])
 
     @functools.cached_property
     def _segments(self) -> Array:
         """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
-        length. Of many paths nobody asks where a position lies along them."""
+        length."""
         step = np.diff(self._nodes[:2])
         length = np.hypot(*step)
         cos, sin = step / length
@@ -122,7 +134,7 @@ class FrenetPath:
     @property
     def node_poses(self) -> Array:
         """(M, 3) x, y and heading without jumps at the nodes."""
-        return np.column_stack([self._x, self._y, self._heading])
+        return np.column_stack([*self._nodes[:2], self._heading])
 
     @functools.cached_property
     def curvature_pm(self) -> Array:
@@ -144,11 +156,10 @@ class FrenetPath:
         """The path as a vehicle drives it that does not turn at once where the line has a corner:
         each node is moved to the mean of those a car's length around it, and keeps its arc length.
         """
-        path = copy.copy(self)
-        for found in ("_profiles", "_bounds", "_segments", "curvature_pm"):
-            path.__dict__.pop(found, None)
+        xy_m, speed_limit_mps, before_m = self._given
+        path = FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
         path.__dict__["eased"] = path
-        path._lay(_eased(self._x), _eased(self._y))
+        path.__dict__["_pieces"] = node_table(*map(cut_corners, self._nodes[:2]))
         return path
 
     def bounded_squares(
@@ -186,7 +197,7 @@ class FrenetPath:
             slope = 2.0 * decel_mps2 * self.arc_m
             ahead = np.minimum.accumulate((square + slope)[::-1])[::-1]
             speed = np.sqrt(np.minimum(ahead - slope, square))
-            self._profiles[key] = _with_steps(np.concatenate([self._nodes, speed[None]]))
+            self._profiles[key] = with_steps(np.concatenate([self._nodes, speed[None]]))
         return self._profiles[key]
 
     def place(self, arc_m: Array) -> NodePlace:
@@ -206,7 +217,7 @@ class FrenetPath:
 
     def point_of(self, place: NodePlace, offset_m: Array | float = 0.0) -> Array:
         """Return positions (2, …), x and y, at places and offsets to the left."""
-        found = _between(self._pieces, place)
+        found = between(self._pieces, place)
         found[2:] *= offset_m
         found[:2] += found[2:]
         return found[:2]
@@ -228,7 +239,8 @@ class FrenetPath:
             from scipy.spatial import cKDTree
 
             return np.asarray(cKDTree(self._nodes[:2, :end].T).query(xy_m)[1], dtype=np.intp)
-        dx, dy = self._x[:end] - xy_m[:, 0, None], self._y[:end] - xy_m[:, 1, None]
+        x_m, y_m = self._nodes[:2, :end]
+        dx, dy = x_m - xy_m[:, 0, None], y_m - xy_m[:, 1, None]
         dx *= dx
         dy *= dy
         dx += dy
@@ -257,35 +269,3 @@ class FrenetPath:
         found = np.empty((2, xy.shape[1]))
         compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
         return FrenetPoint(found[0], found[1])
-
-
-def _eased(values: Array) -> Array:
-    """Return means of values (M,) over a car's length; both ends are straight."""
-    k = _EASED_NODES
-    whole = np.pad(values, k, mode="reflect", reflect_type="odd")
-    sums = np.cumsum(np.pad(whole, (1, 0)))
-    return np.asarray((sums[2 * k + 1 :] - sums[: -2 * k - 1]) / (2 * k + 1))
-
-
-def _with_steps(values: Array) -> Array:
-    """Return (2 K, M): values (K, M) at nodes, and their steps to the next."""
-    return np.concatenate([values, np.diff(values, append=values[:, -1:])])
-
-
-def _between(table: Array, place: NodePlace) -> Array:
-    """Return values (K, …) at places, from a table (2 K, M) of them with their steps."""
-    found = table.take(place.node, axis=1, mode="clip")
-    half = len(table) // 2
-    steps = found[half:]
-    steps *= place.share
-    steps += found[:half]
-    return np.asarray(steps)
-
-
-def _prolonged(at: Array, arc: Array, values: Array) -> Array:
-    """Interpolate `values` over `arc`, going on straight beyond both ends."""
-    inside = np.interp(at, arc, values)
-    first = (values[1] - values[0]) / (arc[1] - arc[0])
-    last = (values[-1] - values[-2]) / (arc[-1] - arc[-2])
-    inside = np.where(at < arc[0], values[0] + (at - arc[0]) * first, inside)
-    return np.asarray(np.where(at > arc[-1], values[-1] + (at - arc[-1]) * last, inside))

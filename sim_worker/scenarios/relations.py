@@ -44,10 +44,13 @@ def ways_of(actor: ActorPart, network: RoadNetwork, ego: Passage, ego_way: Way) 
         yield from _circulating(network, ego)
     elif actor.relation == "joins_ring":
         yield from _joining(network, ego)
-    elif actor.relation == "crosses_exit":
-        yield from _walking(actor, network, ego_way, at_exit=True)
-    elif actor.relation == "crosses_entry":
-        yield from _walking(actor, network, ego_way, at_exit=False)
+    elif actor.relation in ("crosses_exit", "crosses_entry"):
+        # Many scenarios ask for the same walks.
+        key = (ego.name, actor.relation, actor.turn)
+        if key not in network.walks:
+            at_exit = actor.relation == "crosses_exit"
+            network.walks[key] = tuple(_walking(actor.turn, network, ego_way, at_exit=at_exit))
+        yield from network.walks[key]
 
 
 def comes_from(relation: Relation, angle_rad: float, near_sign: float) -> float | None:
@@ -99,7 +102,7 @@ def _joining(network: RoadNetwork, ego: Passage) -> Iterator[Way]:
 
 
 def _walking(
-    actor: ActorPart, network: RoadNetwork, ego_way: Way, *, at_exit: bool
+    turn: TrafficTurn, network: RoadNetwork, ego_way: Way, *, at_exit: bool
 ) -> Iterator[Way]:
     """Yield the lines across the arm that the ego leaves or enters by, in either direction."""
     inside, outside = _CROSSING_AROUND_M
@@ -118,7 +121,7 @@ def _walking(
     straight = [
         way
         for where, line in lines.items()
-        for way in ways_over(line, actor.turn, ego_way, network.near_sign, where=where)
+        for way in ways_over(line, turn, ego_way, network.near_sign, where=where)
     ]
     yield from straight
     away = 1.0 if at_exit else -1.0

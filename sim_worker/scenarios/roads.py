@@ -10,7 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
-from foretwin.contracts.scenario import TrafficTurn
+from foretwin.contracts.scenario import Relation, TrafficTurn
 from foretwin.contracts.world import Connection, DrivingSide, Lane, World
 from foretwin.geometry.polyline import apart, arc_lengths, length
 from foretwin.sim_worker.scenarios.walls import Walls
@@ -68,6 +68,8 @@ class RoadNetwork:
                 self._link(lane.id, successor)
         self._passages: dict[str, tuple[Passage, ...]] = {}
         self._ways: dict[str, Way] = {}
+        self.walks: dict[tuple[str, Relation, TrafficTurn], tuple[Way, ...]] = {}
+        """Those on foot across an arm of a passage, once they were asked for."""
 
     def _link(self, before: str, after: str) -> None:
         known = self._out_of.setdefault(before, [])
@@ -129,11 +131,8 @@ class RoadNetwork:
             if after in self.connections:
                 found.append(self.connections[after])
             elif after in self.lanes and self._ring(after) and after != lane_id:
-                found.extend(
-                    self.connections[c]
-                    for c in self._out_of.get(after, ())
-                    if c in self.connections
-                )
+                on = self._out_of.get(after, ())
+                found.extend(self.connections[c] for c in on if c in self.connections)
         return found
 
     def _passage(self, junction_id: str, chain: tuple[Connection, ...]) -> Passage:

@@ -42,6 +42,27 @@ def test_the_speed_profile_brakes_ahead_of_a_curve() -> None:
     assert at_50 == pytest.approx(math.sqrt(40.0 + 2 * 2.0 * 29.0), rel=0.05)
 
 
+def test_a_path_that_nobody_follows_holds_what_it_was_made_of_alone() -> None:
+    def held_bytes(path: FrenetPath) -> int:
+        return sum(one.nbytes for one in vars(path).values() if isinstance(one, np.ndarray))
+
+    path = FrenetPath(np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([8.0, 8.0]))
+    assert held_bytes(path) < 100
+    path.point_at(np.array([3.0]))
+    assert held_bytes(path) > 8 * 8 * len(path.arc_m)
+
+
+def test_an_eased_corner_is_another_path_in_all_that_it_is_asked() -> None:
+    path = FrenetPath(np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 30.0]]))
+    at, bounds = np.array([29.0, 31.0]), {"lateral_accel_mps2": 2.0, "decel_mps2": 2.0}
+    plain, slow = path.pose_at(at), path.speed_profile(**bounds)
+    eased, brisk = path.eased.pose_at(at), path.eased.speed_profile(**bounds)
+    assert np.hypot(*(eased.xy_m - plain.xy_m).T).min() > 0.2
+    assert np.abs(eased.yaw_rad - plain.yaw_rad).max() > 0.1
+    assert path.eased.locate(eased.xy_m).offset_m == pytest.approx(0.0, abs=1e-9)
+    assert brisk.min() > slow.min() + 0.1
+
+
 def test_a_path_goes_on_straight_beyond_both_ends() -> None:
     path = FrenetPath(np.array([[0.0, 0.0], [10.0, 0.0]]))
     assert path.point_at(np.array([-5.0, 60.0])) == pytest.approx(np.array([[-5.0, 0], [60.0, 0]]))

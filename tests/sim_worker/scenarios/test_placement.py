@@ -10,14 +10,22 @@ import pytest
 import shapely
 
 from foretwin.contracts.frames import wrap_angle
-from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Where
+from foretwin.contracts.scenario import (
+    ActorPart,
+    EgoPart,
+    Relation,
+    Scenario,
+    TrafficTurn,
+    Where,
+)
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import passage_on_path
+from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.relations import ways_of
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import unlike_its_turn
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -261,3 +269,23 @@ def test_an_adult_walks_over_the_crossing_that_the_map_has_beyond_the_exit() -> 
     }
     assert ("w13", True) in exits_and_crossings
     assert {exit_ for exit_, over in exits_and_crossings if over} == {"w13"}
+
+
+def test_scenarios_share_the_walks_over_an_arm() -> None:
+    network = RoadNetwork(cross())
+    (junction,) = network.world.junctions
+    near = next(p for p in network.passages(junction.summary.id) if p.turn == "near")
+    first, other = (
+        [place.actor_ways[0][0] for place in places_on_passage(catalogue()[id_], network, near)]
+        for id_ in ("cbta", "latency")
+    )
+    assert len(first) >= 4
+    assert {id(way) for way in first} == {id(way) for way in other}
+
+    def over(relation: Relation, turn: TrafficTurn) -> set[str]:
+        walker = ActorPart(name="walker", relation=relation, turn=turn)
+        return {str(way.path.node_poses) for way in ways_of(walker, network, near, ego)}
+
+    ego = network.way(near)
+    assert not over("crosses_exit", "straight") & over("crosses_entry", "straight")
+    assert over("crosses_exit", "across") < over("crosses_exit", "straight")
