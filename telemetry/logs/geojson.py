@@ -53,18 +53,19 @@ def _lines(node: object, properties: dict[str, Any], seen: list[str]) -> Iterato
         return
     kind = node.get("type")
     if kind == "FeatureCollection":
-        for feature in node.get("features") or []:
+        for feature in _listed(node.get("features")):
             yield from _lines(feature, {}, seen)
     elif kind == "GeometryCollection":
-        for geometry in node.get("geometries") or []:
+        for geometry in _listed(node.get("geometries")):
             yield from _lines(geometry, properties, seen)
     elif kind == "Feature":
-        yield from _lines(node.get("geometry"), node.get("properties") or {}, seen)
+        told = node.get("properties")
+        yield from _lines(node.get("geometry"), told if isinstance(told, dict) else {}, seen)
     elif kind in ("LineString", "MultiLineString"):
-        given = node.get("coordinates") or []
+        given = _listed(node.get("coordinates"))
         several = kind == "MultiLineString"
         for part in given if several else [given]:
-            positions = [_position(position) for position in part]
+            positions = [_position(position) for position in _listed(part)]
             if positions:
                 yield GeoLine(positions, {} if several else properties)
             else:
@@ -73,10 +74,15 @@ def _lines(node: object, properties: dict[str, Any], seen: list[str]) -> Iterato
         seen.append(str(kind))
 
 
+def _listed(value: object) -> list[Any]:
+    """Return a list, nothing where what stands there is none."""
+    return value if isinstance(value, list) else []
+
+
 def _position(position: object) -> tuple[float, float, float]:
     try:
         lon_deg, lat_deg, *rest = (float(number) for number in position)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return math.nan, math.nan, 0.0
     return lon_deg, lat_deg, rest[0] if rest else 0.0
 
@@ -115,6 +121,9 @@ def _timed_line(path: Path) -> tuple[GeoLine, list[Any]]:
 def _stamp_ns(time: object) -> int | None:
     if isinstance(time, str):
         return stamp_ns_from_iso(time)
-    if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
+    if isinstance(time, bool) or not isinstance(time, int | float):
         return None
-    return representable_ns(round(time * 1e6) if abs(time) > 1e11 else round(time * 1e9))
+    try:
+        return representable_ns(round(time * 1e6) if abs(time) > 1e11 else round(time * 1e9))
+    except (OverflowError, ValueError):  # infinite, or no number
+        return None

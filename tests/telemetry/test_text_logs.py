@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
+from foretwin.telemetry.logs.log import UNREADABLE_ROW
 
 COVERS = (
     "foretwin.telemetry.logs",
@@ -98,6 +99,12 @@ def test_geojson_line_with_times_is_a_log(tmp_path: Path, name: str, times: list
         ('{"type": "LineString", "coordinates": []}', "an empty LineString"),
         ('{"type": "LineString", "coordinates": [[13.4, 52.5]]}', "a line needs two"),
         ("{", "no valid JSON"),
+        ('{"type": "FeatureCollection", "features": 5}', "holds no LineString but nothing"),
+        ('{"type": "GeometryCollection", "geometries": 1}', "holds no LineString but nothing"),
+        ('{"type": "LineString", "coordinates": 5}', "an empty LineString"),
+        ('{"type": "MultiLineString", "coordinates": [5]}', "an empty MultiLineString"),
+        ('{"type": "LineString", "coordinates": [[1e400, 1]]}', "a line needs two"),
+        (f'{{"type": "LineString", "coordinates": [[1{400 * "0"}, 1]]}}', "a line needs two"),
     ],
 )
 def test_geojson_without_a_line(tmp_path: Path, text: str, told: str) -> None:
@@ -105,6 +112,17 @@ def test_geojson_without_a_line(tmp_path: Path, text: str, told: str) -> None:
         read_line(write(tmp_path, "bad.geojson", text))
     assert "bad.geojson" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_geojson_of_odd_properties_and_times(tmp_path: Path) -> None:
+    odd = feature(times=[1e308, 1_772_359_201]).replace("1e+308", "1" + 400 * "0")
+    for text in (odd, odd.replace("1" + 400 * "0", "1e308"), odd.replace("1" + 400 * "0", "NaN")):
+        log = open_log(write(tmp_path, "drive.geojson", text))
+        assert len(list(log.samples())) == 1
+        assert log.skipped == {UNREADABLE_ROW: 1}
+    listed = json.loads(feature()) | {"properties": [1]}
+    with pytest.raises(LogError, match="line without time"):
+        open_log(write(tmp_path, "drive.geojson", json.dumps(listed)))
 
 
 def test_geojson_times_must_fit_the_line(tmp_path: Path) -> None:
