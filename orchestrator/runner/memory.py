@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from foretwin.contracts.running import RunningMeans
+
 LOOK_EVERY_S = 5.0
 SETTLED_AFTER_S = 300.0
 """What a process grows by later it may grow by for ever."""
@@ -37,6 +39,9 @@ class _Watched:
     """When it had run for long enough, and the least that it held in the minute before."""
     last_s: float = 0.0
     _recent: deque[tuple[float, float]] = field(default_factory=deque)
+    _floors: RunningMeans = field(default_factory=RunningMeans)
+    """Of hours since it settled, the floor in MB, and products of these, each minute."""
+    _next_floor_s: float = -math.inf
     tell_at_mb: float = MOST_MB
 
     def take(self, now_s: float, now_mb: float) -> bool:
@@ -49,6 +54,10 @@ class _Watched:
         if self.settled is None and now_s - self.since_s >= SETTLED_AFTER_S:
             self.settled = now_s, self.floor_mb
             self.tell_at_mb = min(self.tell_at_mb, self.floor_mb + GROWN_MB)
+        if self.settled is not None and now_s >= self._next_floor_s:
+            self._next_floor_s = now_s + FLOOR_S
+            hours, floor_mb = (now_s - self.settled[0]) / 3600.0, self.floor_mb
+            self._floors.take((hours, floor_mb, hours * hours, hours * floor_mb))
         if now_mb < self.tell_at_mb:
             return False
         self.tell_at_mb = 2.0 * now_mb
@@ -61,10 +70,15 @@ class _Watched:
 
     @property
     def mb_per_h(self) -> float | None:
-        """How fast its floor has grown since it settled, None before that can be told."""
+        """How fast its floor has grown since it settled, None before that can be told.
+
+        It is the slope of a line through the floors of all minutes, as what a process does differs
+        between any two of them.
+        """
         if self.settled is None or self.last_s - self.settled[0] < _LEAST_SPAN_S:
             return None
-        return 3600.0 * (self.floor_mb - self.settled[1]) / (self.last_s - self.settled[0])
+        hours, floor_mb, square, product = self._floors.means
+        return (product - hours * floor_mb) / (square - hours * hours)
 
 
 class _Sought(NamedTuple):
