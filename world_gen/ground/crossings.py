@@ -13,6 +13,7 @@ from foretwin.geometry.polyline import left_of, unit
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.stopping import CROSSING_WIDTH_M
 from foretwin.world_gen.roads.beside_roads import BesideRoads
+from foretwin.world_gen.roads.road_tags import is_crossed
 
 _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
 
@@ -30,7 +31,7 @@ def crossings(
     for index, edge in sorted(around.edges.items()):
         for i, node in enumerate(edge.node_ids[: len(edge.xy_m)]):
             tags = node_tags.get(node)
-            if tags is None or not (tags.get("highway") == "crossing" or "crossing" in tags):
+            if tags is None or not is_crossed(tags):
                 way = drawn.get(node)
                 if way is None or node in amid:
                     continue

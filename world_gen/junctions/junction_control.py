@@ -9,6 +9,7 @@ from foretwin.contracts.world import Control
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.junctions.chains import Chain, Mark, Tags
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_tags import is_crossed
 
 SIGNALS_WITHIN_M, SIGNS_WITHIN_M = 40.0, 30.0
 PEDESTRIAN_LIGHT_M = 15.0
@@ -101,7 +102,7 @@ def _is_light(tags: Tags, distance_m: float) -> bool:
 
 
 def _for_walkers(tags: Tags) -> bool:
-    return "crossing" in tags or tags.get("traffic_signals") == "pedestrian_crossing"
+    return is_crossed(tags) or tags.get("traffic_signals") == "pedestrian_crossing"
 
 
 def facing(chain: Chain, within_m: float, word: str) -> Iterator[Mark]:
@@ -123,5 +124,5 @@ def facing(chain: Chain, within_m: float, word: str) -> Iterator[Mark]:
             # The chain leaves the junction: who comes in drives against it.
             if faced == ("forward" if along.reverse else "backward"):
                 yield mark
-        elif distance_m <= nearer_m or (chain.one_way and "crossing" not in tags):
+        elif distance_m <= nearer_m or (chain.one_way and not is_crossed(tags)):
             yield mark

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_tags import is_crossed
 
 NodeTags = Mapping[int, Mapping[str, str]]
 OWN_LINE_M = 3.0
@@ -40,7 +41,7 @@ def stop_line_m(leg: DirectedEdge, cluster: Cluster, node_tags: NodeTags) -> flo
         kind = tags.get("highway")
         if at_m > _LINE_NEAR_M or faces(tags, leg.reverse) is False:
             continue
-        on_foot = kind == "crossing" or "crossing" in tags
+        on_foot = is_crossed(tags)
         if kind == "traffic_signals" and at_m > OWN_LINE_M:
             lights.append(at_m + (BEFORE_CROSSING_M if on_foot else 0.0))
         elif on_foot and lit and 1.0 < at_m <= CROSSING_NEAR_M:
@@ -57,7 +58,7 @@ def before_crossings_m(leg: DirectedEdge, node_tags: NodeTags) -> float:
         return math.inf
     at_m = arc_lengths(leg.xy_m).tolist()
     tagged = ((node_tags.get(node, {}), m) for node, m in zip(leg.node_ids, at_m, strict=False))
-    crossings = (m for tags, m in tagged if tags.get("highway") == "crossing" or "crossing" in tags)
+    crossings = (m for tags, m in tagged if is_crossed(tags))
     return max(min(crossings, default=math.inf) - BEFORE_CROSSING_M, 0.0)
 
 

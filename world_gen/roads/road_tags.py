@@ -147,3 +147,10 @@ def below_buildings(tags: Mapping[str, str]) -> bool:
 def in_tunnel(tags: Mapping[str, str]) -> bool:
     """Tell whether the road runs below ground, which the way through a house does not."""
     return tags.get("tunnel", "no") not in ("no", "building_passage")
+
+
+def is_crossed(tags: Mapping[str, str]) -> bool:
+    """Tell whether people cross the road on foot at a node; `crossing=no` is how to deny it."""
+    if "crossing" in tags:
+        return tags["crossing"] != "no"
+    return tags.get("highway") == "crossing"

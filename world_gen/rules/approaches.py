@@ -21,6 +21,7 @@ from foretwin.world_gen.lanes.stopping import (
     NodeTags,
 )
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_tags import is_crossed
 from foretwin.world_gen.rules.control_devices import (
     Met,
     is_light,
@@ -233,7 +234,7 @@ def _for_all(drafts: list[_ApproachDraft]) -> bool:
     return (
         len(lit) != 1
         or len(drafts) == 1
-        or any(m.distance_m <= OWN_LINE_M or "crossing" not in m.tags for m in lit[0].lights)
+        or any(m.distance_m <= OWN_LINE_M or not is_crossed(m.tags) for m in lit[0].lights)
     )
 
 
@@ -245,7 +246,7 @@ def _approach(d: _ApproachDraft, standing: Standing, signalled: bool, for_all: b
         far = max(on_leg, key=lambda m: m.distance_m, default=None)
         line = _before_crossing(d.met)
         if far is not None and far.distance_m > OWN_LINE_M:
-            line = far.distance_m + (BEFORE_CROSSING_M if "crossing" in far.tags else 0.0)
+            line = far.distance_m + (BEFORE_CROSSING_M if is_crossed(far.tags) else 0.0)
         nodes = tuple(dict.fromkeys(m.node for m in d.lights))
         word = Choice("signal", "tagged" if nodes else "inferred")
         lit_inside = bool(d.lights) and not on_leg
@@ -275,6 +276,6 @@ def _word(standing: Standing) -> Choice:
 
 def _before_crossing(met: list[Met]) -> float | None:
     """Return where cars wait for a light before the crossing that they would else block."""
-    crossings = [m for m in met if m.tags.get("highway") == "crossing" or "crossing" in m.tags]
+    crossings = [m for m in met if is_crossed(m.tags)]
     at = [m.distance_m for m in crossings if 1.0 < m.distance_m <= CROSSING_NEAR_M]
     return max(at) + BEFORE_CROSSING_M if at else None

@@ -23,6 +23,7 @@ from foretwin.world_gen.lanes.stopping import (
     faces,
 )
 from foretwin.world_gen.lanes.trims import MAX_TRIM_M
+from foretwin.world_gen.roads.road_tags import is_crossed
 from foretwin.world_gen.rules.control_devices import is_light
 from foretwin.world_gen.rules.signal_heads import (
     BESIDE_HEIGHT_M,
@@ -130,7 +131,7 @@ def _line(lane: LaneDraft, light: _LightPlace, before: Mapping[str, LaneDraft]) 
     reach = abs(lane.plan.left_m) + (MAX_TRIM_M if cut or at_m >= ends_m - 0.5 else _REACH_M)
     if (cut and not light.on_way) or _aside_m(lane, at_m, light.xy) > reach:
         return None
-    own = "crossing" in light.tags
+    own = is_crossed(light.tags)
     served_m = 0.0 if own or faces(light.tags, True) is not None else CROSSING_NEAR_M
     met = ((locate(lane.centerline, xy), xy) for xy in light.walked)
     back_m = clear_of_crossings(

@@ -34,6 +34,7 @@ def signed(word: str, distances_m: dict[float, float], **tags: str) -> Sketch:
         (signed("traffic_signals", {0.0: 35.0}), "signals"),
         (signed("traffic_signals", {0.0: 90.0}), "uncontrolled"),
         (signed("traffic_signals", {0.0: 30.0}, crossing="traffic_signals"), "uncontrolled"),
+        (signed("traffic_signals", {0.0: 30.0}, crossing="no"), "signals"),
         (signed("traffic_signals", {0.0: 12.0}, direction="backward"), "uncontrolled"),
         (signed("traffic_signals", {0.0: 12.0}, direction="forward"), "signals"),
         (signed("traffic_signals", {0.0: 12.0}, crossing="traffic_signals"), "uncontrolled"),

@@ -64,6 +64,11 @@ def test_cars_stop_before_the_crossing_of_a_light():
     assert _lines({5: {"highway": "crossing"}})[13] == math.inf  # nothing stops cars there
 
 
+def test_a_light_without_a_crossing_stands_at_its_line():
+    alone = LIGHT | {"crossing": "no"}
+    assert _lines({5: alone})[13] == pytest.approx(9.0 - LINE_SETBACK_M)
+
+
 def test_the_nearest_sign_counts():
     sign = {"highway": "give_way", "direction": "forward"}
     assert _lines({5: sign, 6: sign})[13] == pytest.approx(9.0 - LINE_SETBACK_M)

@@ -8,6 +8,7 @@ from foretwin.contracts.provenance import Quantity
 from foretwin.world_gen.roads.road_tags import (
     below_buildings,
     directions,
+    is_crossed,
     lane_counts,
     open_to_cars,
     road_layer,
@@ -84,3 +85,18 @@ def test_layers() -> None:
 )
 def test_what_leads_below_buildings(tags: dict[str, str], below: bool) -> None:
     assert below_buildings(tags) == below
+
+
+@pytest.mark.parametrize(
+    ("tags", "crossed"),
+    [
+        ({"highway": "crossing"}, True),
+        ({"highway": "crossing", "crossing": "unmarked"}, True),
+        ({"highway": "crossing", "crossing": "no"}, False),
+        ({"highway": "traffic_signals"}, False),
+        ({"highway": "traffic_signals", "crossing": "traffic_signals"}, True),
+        ({"highway": "traffic_signals", "crossing": "no"}, False),
+    ],
+)
+def test_where_people_cross_on_foot(tags: dict[str, str], crossed: bool) -> None:
+    assert is_crossed(tags) is crossed
