@@ -143,7 +143,7 @@ def _survey(path: Path, declared: datetime.date | None) -> _Found:
         formatters.add(sentence.formatter)
         try:
             time_ns, date = time_of_day_ns(sentence), date_of(sentence)
-        except (ValueError, IndexError):  # counted when it is read
+        except (ValueError, IndexError, OverflowError):  # counted when it is read
             continue
         if time_ns is None:
             continue

@@ -195,6 +195,13 @@ def test_times_before_the_first_date_are_of_the_day_before_where_midnight_lies_b
     assert found["speed"][0].stamp_ns - found["gnss"][1].stamp_ns == 250_000_000
 
 
+def test_a_year_beyond_all_calendars_is_an_unreadable_row(tmp_path: Path) -> None:
+    beyond = line(f"GPZDA,120000.00,01,03,{10**12},00,00")
+    log, found = opened(tmp_path, beyond, rmc("120000", "010326"))
+    assert len(found["gnss"]) == 1
+    assert log.skipped == {"unreadable row": 1}
+
+
 def test_what_is_refused_is_counted(tmp_path: Path) -> None:
     broken = rmc("120001", "010326").replace("5230", "5231")
     log, found = opened(
