@@ -22,8 +22,9 @@ _HEAD_BYTES = 1 << 16
 
 
 class CellTable(NamedTuple):
-    """Texts by column, each as long as there are whole rows, how many rows were cut short, and
-    whether the last line was left out because it has no end: digits of it may be missing."""
+    """Texts by column, each as long as there are whole rows, how many rows were cut short or are
+    lost in a cell of another, and whether the last line was left out because it has no end: digits
+    of it may be missing."""
 
     cells: dict[str, Cells]
     short_rows: int = 0
@@ -129,11 +130,17 @@ def _separated_cells(
             if not any(map(str.strip, row)):
                 continue
             if len(row) < width:
-                short += 1
+                short += 1 + _lines_in(row)
                 continue
             for add, place in kept:
                 add(row[place])
+    short += sum(map(_lines_in, cells.values()))
     return CellTable(cells, short, open_end)
+
+
+def _lines_in(cells: Iterable[str]) -> int:
+    """Return how many lines a quotation mark that is never closed has made part of some cells."""
+    return sum(cell.rstrip("\r\n").count("\n") for cell in cells)
 
 
 def _ends_its_last_line(path: Path, encoding: str) -> bool:
