@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Indices
+from foretwin.contracts.arrays import Flags, Indices
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.gap import (
     ALARM_HORIZON_S,
@@ -38,7 +38,8 @@ from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.analysis.road_grade import climb_under
 from foretwin.sim_worker.vehicle.lag import without_lags
 
-_EVERY_S = 1.0
+_EVERY_S, _TOLD = 1.0, 0.95
+"""Between starts; so much of a run is commanded, through the rest commands hold. Chosen."""
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
 """Of a sample; a row has `position_m` too, how far apart both are."""
 ALL_MANOEUVRES: Literal["all"] = "all"
@@ -85,14 +86,17 @@ class GapMeter:
 
         Where no commands were recorded the model steers and rolls as `measured`; without that,
         commands are estimated from the motion and the samples are not independent. Runs that meet
-        a gap in the measured motion are left out.
+        a gap in the measured motion, or in the commands, are left out.
         """
-        known = motion.known
+        known, told = motion.known, self._told(record)
         shortest = round(min(horizons_s) / PERIOD_S)
         starts = np.arange(0, len(known) - shortest, round(_EVERY_S / PERIOD_S))
         starts = starts[known[starts]]
         wanted = [(row, horizon) for row in range(len(starts)) for horizon in horizons_s]
-        return self._measure(record, motion, starts, wanted, measured)
+        whole = [one for one in wanted if _throughout(told, int(starts[one[0]]), one[1])]
+        commanded = bool(whole) and bool(told[starts].mean() > 0.9)
+        wanted = whole if commanded else wanted
+        return self._measure(record, motion, starts, wanted, measured, commanded=commanded)
 
     def latest(
         self, record: MotionRecord, motion: MeasuredMotion, *, horizons_s: Sequence[float]
@@ -102,7 +106,14 @@ class GapMeter:
         steps = {horizon: round(horizon / PERIOD_S) for horizon in horizons_s}
         fitting = [h for h, back in steps.items() if back <= last and motion.known[last - back]]
         starts = np.array([last - steps[horizon] for horizon in fitting], dtype=np.intp)
-        return self._measure(record, motion, starts, list(enumerate(fitting)))
+        told, wanted = self._told(record), list(enumerate(fitting))
+        commanded = all(_throughout(told, int(starts[row]), horizon) for row, horizon in wanted)
+        return self._measure(record, motion, starts, wanted, commanded=commanded)
+
+    def _told(self, record: MotionRecord) -> Flags:
+        """Return where (N,) the car was commanded."""
+        steer = tire_angles(record, self._runner.vehicle).commanded_rad
+        return np.asarray(np.isfinite(steer) & np.isfinite(record.command_accel_mps2))
 
     def _measure(
         self,
@@ -111,6 +122,8 @@ class GapMeter:
         starts: Indices,
         wanted: Sequence[tuple[int, float]],
         measured: MeasuredDrive | None = None,
+        *,
+        commanded: bool,
     ) -> list[GapSample]:
         """Run from each of `starts`; return the gap of each (row, horizon) wanted."""
         if not len(starts):
@@ -119,8 +132,6 @@ class GapMeter:
         found: list[GapSample] = []
         vehicle, runner = self._runner.vehicle, self._runner
         signals = tire_angles(record, vehicle)
-        recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
-        commanded = bool(recorded[starts].mean() > 0.9)
         measured = None if commanded else measured
         independent = commanded or measured is not None
         tire, climb = signals.measured_rad, climb_under(record, runner.roads)
@@ -188,6 +199,11 @@ class GapMeter:
                 )
             )
         return sorted(found, key=lambda sample: sample.stamp_ns)
+
+
+def _throughout(told: Flags, start: int, horizon_s: float) -> bool:
+    """Return whether a run was commanded to its end: no command says what a human does."""
+    return bool(told[start : start + round(horizon_s / PERIOD_S)].mean() >= _TOLD)
 
 
 def _open_by_states(
