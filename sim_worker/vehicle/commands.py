@@ -16,6 +16,8 @@ from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 STEP_BACK_NS = 1_000_000_000
 """A stamp that lies this far behind the last one is of a clock that has stepped back."""
+HELD_NS = 500_000_000
+"""A command older than this holds no longer: a human took over, or those after it were lost."""
 _STANDS_MPS = 0.05
 
 
@@ -28,7 +30,7 @@ class TwinCommand(NamedTuple):
 
 
 class CommandMemory:
-    """The car's recorded commands, in time; each holds until the next."""
+    """The car's recorded commands, in time; each holds until the next, or until it is lost."""
 
     def __init__(self, vehicle: VehicleParameters, *, keep_s: float) -> None:
         self._vehicle = vehicle
@@ -71,10 +73,10 @@ class CommandMemory:
             self._commands.popleft()
 
     def at(self, stamp_ns: int) -> TwinCommand | None:
-        """Return the command that holds at `stamp_ns`, None before the first."""
+        """Return the command that holds at `stamp_ns`; None before the first and once lost."""
         for command in reversed(self._commands):
             if command.stamp_ns <= stamp_ns:
-                return command
+                return command if stamp_ns - command.stamp_ns <= HELD_NS else None
         return None
 
     def angles_before(self, stamp_ns: int, *, count: int, step_ns: int) -> Array | None:

@@ -239,6 +239,23 @@ def test_estimated_or_missing_commands_are_not_independent() -> None:
     assert not later.independent
 
 
+def test_what_a_human_does_after_the_last_command_is_no_gap_of_the_twin() -> None:
+    """Commanded to keep 8 m/s for 4 s; then a human brakes to a stop."""
+    mirror = Mirror(CAR, drive_frame=FRAME, commands_recorded=True, window_s=8.0)
+    x, speed, gaps = 0.0, 8.0, []
+    for k in range(300):
+        t = k / 50.0
+        speed = max(speed - 0.06, 0.0) if t > 4.0 else speed
+        x += speed / 50.0
+        if t <= 4.0:
+            push = ControlCommand(stamp_ns=round(t * 1e9), accel_mps2=0.15, tire_angle_rad=0.0)
+            mirror.handle_command(push)
+        if sample := mirror.handle_state(state_at(x, 0.0, 0.0, speed, stamp_ns=round(t * 1e9))):
+            gaps.append((t, sample.independent))
+    assert all(told for t, told in gaps if t <= 4.0)
+    assert not any(told for t, told in gaps if t > 4.6)
+
+
 def test_states_without_heading_or_out_of_order_are_passed_over() -> None:
     mirror = Mirror(CAR, drive_frame=FRAME)
     blind = msgspec.structs.replace(state_at(0.0, 0.0, stamp_ns=5), yaw_valid=False)

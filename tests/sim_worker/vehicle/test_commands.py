@@ -7,7 +7,12 @@ import pytest
 
 from foretwin.contracts.drive import ControlCommand
 from foretwin.sim_worker.driver_model import HOLD_MPS2
-from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory, estimated_command
+from foretwin.sim_worker.vehicle.commands import (
+    HELD_NS,
+    STEP_BACK_NS,
+    CommandMemory,
+    estimated_command,
+)
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
 
@@ -27,6 +32,16 @@ def test_a_command_holds_until_the_next_and_none_before_the_first() -> None:
     assert memory.at(9) is None
     held = [found.accel_mps2 for t in (10, 19, 20, 99) if (found := memory.at(t)) is not None]
     assert held == [10.0, 10.0, 20.0, 20.0], "one from before the latest is ignored"
+
+
+def test_a_command_without_another_after_it_holds_no_longer_once_lost() -> None:
+    memory = CommandMemory(CAR, keep_s=10.0)
+    memory.add(command(10))
+    assert memory.at(10 + HELD_NS) is not None
+    assert memory.at(11 + HELD_NS) is None
+    assert memory.angles_before(11 + HELD_NS, count=2, step_ns=1) is None
+    memory.add(command(4 * HELD_NS))
+    assert memory.at(4 * HELD_NS) is not None
 
 
 def test_a_steering_wheel_is_turned_into_tyres_and_without_either_the_last_angle_holds() -> None:
@@ -52,7 +67,7 @@ def test_a_clock_that_steps_back_begins_anew() -> None:
     memory = CommandMemory(CAR, keep_s=100.0)
     memory.add(command(5 * STEP_BACK_NS))
     memory.add(command(STEP_BACK_NS, accel_mps2=3.0))
-    found = memory.at(9 * STEP_BACK_NS)
+    found = memory.at(STEP_BACK_NS + 1)
     assert found is not None
     assert found.accel_mps2 == 3.0
 
