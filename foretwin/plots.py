@@ -85,9 +85,11 @@ def plot_driven(way: MotionArrays, world: World, axes: Axes | None = None) -> Ax
 def plot_gap(recording: Recording, axes: Axes | None = None) -> Axes:
     """Draw how far the model was from the car by horizon: RMS along and across, of table `gaps`.
 
-    Raises UserError where the run has none.
+    Rows by estimated commands count where there are no others. Raises UserError without any.
     """
     table = expect("recording", recording, Recording).table("gaps")
+    commanded = table.filter(table["independent"])
+    table = commanded if commanded.num_rows else table
     if not table.num_rows:
         raise UserError(f"{recording.folder}: no gap was measured in this drive")
     axes = _axes(axes)

@@ -135,10 +135,20 @@ def test_a_gap_is_drawn_by_horizon_and_its_lack_is_told(tmp_path: Path) -> None:
     run = made_run(tmp_path)
     with pytest.raises(foretwin.UserError, match="no gap was measured"):
         foretwin.plot_gap(foretwin.open_run(run))
-    gaps = {"horizon_s": [1.0, 1.0, 2.0], "along_m": [3.0, 4.0, -2.0], "across_m": [0.0, 0.0, 1.0]}
+    gaps = {
+        "horizon_s": [1.0, 1.0, 2.0, 1.0],
+        "along_m": [3.0, 4.0, -2.0, 90.0],
+        "across_m": [0.0, 0.0, 1.0, 90.0],
+        "independent": [True, True, True, False],
+    }
     pq.write_table(pa.table(gaps), run / "results" / "gaps.parquet")
 
     along, across = foretwin.plot_gap(foretwin.open_run(run)).lines
 
-    assert along.get_ydata() == pytest.approx([12.5**0.5, 2.0])
+    assert along.get_ydata() == pytest.approx([12.5**0.5, 2.0]), "by estimates alone: left out"
     assert across.get_ydata() == pytest.approx([0.0, 1.0])
+
+    gaps["independent"] = [False] * 4
+    pq.write_table(pa.table(gaps), run / "results" / "gaps.parquet")
+    of_all, _ = foretwin.plot_gap(foretwin.open_run(run)).lines
+    assert of_all.get_ydata()[0] == pytest.approx(np.sqrt(np.mean([9.0, 16.0, 8100.0])))
