@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -11,7 +12,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.told import CommandResult
-from foretwin.orchestrator.commands.world_files import write_each, write_report
+from foretwin.orchestrator.commands.world_files import kind_lines, write_each, write_report
 from foretwin.orchestrator.config import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
@@ -127,6 +128,8 @@ def _region(
 def _write_one(
     world: World, request: WorldRequest, format_: Format, options: ExportOptions
 ) -> CommandResult:
+    from foretwin.world_gen.report.report import note_kind
+
     format_.write(world, request.out, options)
     s = world.intersection
     place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
@@ -146,6 +149,9 @@ def _write_one(
         report = write_report(world, request.out)
         body["report"] = report
         words += f"\n{report.as_text().rstrip()}"
+    else:
+        kinds = Counter(note_kind(note) for note in world.notes)
+        words = "\n".join([words, *kind_lines(kinds)])
     return CommandResult(body, words)
 
 

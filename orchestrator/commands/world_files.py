@@ -76,10 +76,7 @@ def _summary(
 ) -> CommandResult:
     listed = folder / FAILURES_FILE
     listed.unlink(missing_ok=True)
-    lines = [f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}"]
-    lines += [f"  {junctions:6d}  {kind}" for kind, junctions in kinds.most_common(_SHOWN_KINDS)]
-    if len(kinds) > _SHOWN_KINDS:
-        lines.append(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
+    written = f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}"
     body = {
         "folder": folder,
         "written": count - len(failures),
@@ -89,7 +86,16 @@ def _summary(
     }
     if failures:
         _list_failures(failures, listed)
-    return CommandResult(body, "\n".join(lines), SOME_FAILED if failures else 0)
+    words = "\n".join([written, *kind_lines(kinds)])
+    return CommandResult(body, words, SOME_FAILED if failures else 0)
+
+
+def kind_lines(kinds: Counter[str]) -> list[str]:
+    """Return a line for each of the commonest kinds of notes, with how many there are."""
+    lines = [f"  {count:6d}  {kind}" for kind, count in kinds.most_common(_SHOWN_KINDS)]
+    if len(kinds) > _SHOWN_KINDS:
+        lines.append(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
+    return lines
 
 
 def _list_failures(failures: list[str], listed: Path) -> None:

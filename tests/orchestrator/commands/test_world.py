@@ -243,6 +243,21 @@ def test_a_report_says_beside_the_file_what_was_guessed(
     assert told["attribution"] in (tmp_path / "world.geojson.report.md").read_text("utf-8")
 
 
+def test_what_one_world_lacks_is_told_below_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Roads leave the town's roundabout farther out than its World reaches."""
+    place = ["world", MAP, "--id", "n10", "--radius", "20", "--out", str(tmp_path / "ring.svg")]
+    assert run(place) == 0
+    line, *kinds = capsys.readouterr().out.splitlines()
+    assert ", 4 notes. " in line
+    assert kinds == [
+        "       4  begins beyond the World, … m about the junction; left out, with its turns"
+    ]
+    assert run([*place, "--report"]) == 0
+    assert capsys.readouterr().out.count("begins beyond the World, … m") == 1
+
+
 def test_each_of_many_worlds_has_its_report(tmp_path: Path) -> None:
     arguments = ["--route", str(ROUTE_FILE), "--format", "geojson", "--out", str(tmp_path)]
     assert run(["world", MAP, *arguments, "--report"]) == 0
