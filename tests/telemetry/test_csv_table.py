@@ -16,7 +16,6 @@ COVERS = (
     "foretwin.telemetry.logs.csv_table",
     "foretwin.telemetry.logs.units",
     "foretwin.telemetry.logs.columns",
-    "foretwin.telemetry.logs.table_cells",
 )
 
 DECLARATION = """

@@ -18,7 +18,6 @@ from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.write_declaration import declaration_toml
 from tests.telemetry.logs.declare.test_propose import country, drawn_drive
 
-COVERS = ("foretwin.telemetry.logs.table_cells",)
 SPRING = datetime.datetime(2024, 5, 3, 23, 58, 40, tzinfo=datetime.UTC)
 """A drive of 150 s from here goes over midnight."""
 
