@@ -47,15 +47,22 @@ def nearest_junction(opened: OpenMap, lat: float, lon: float) -> Junction:
     if not opened.junctions:
         raise UserError(f"{opened.file}: no intersection in this map")
     GeoPoint(lat, lon).validate()
-    here = local_from_geo(opened.osm.frame, lat, lon)
-    away = [float(np.hypot(*(j.centre_xy_m - here))) for j in opened.junctions]
-    best = int(np.argmin(away))
-    if not away[best] <= FARTHEST_M:
+    away_m = _away_m(opened, lat, lon)
+    best = int(np.argmin(away_m))
+    if not away_m[best] <= FARTHEST_M:
+        turned = abs(lon) <= 90.0 and _away_m(opened, lon, lat).min() <= FARTHEST_M
         raise UserError(
             f"{lat},{lon}: the nearest intersection of {opened.file} is "
-            f"{away[best]:.0f} m away, more than {FARTHEST_M:.0f}"
+            f"{away_m[best]:.0f} m away, more than {FARTHEST_M:.0f}"
+            + (f"; latitude comes first: {lon},{lat}?" if turned else "")
         )
     return opened.junctions[best]
+
+
+def _away_m(opened: OpenMap, lat: float, lon: float) -> Array:
+    """Return how far each junction is from a place, (J,)."""
+    here = local_from_geo(opened.osm.frame, lat, lon)
+    return np.array([np.hypot(*(j.centre_xy_m - here)) for j in opened.junctions])
 
 
 def parse_place(at: str) -> tuple[float, float]:

@@ -154,7 +154,10 @@ def test_other_ways_to_say_the_same(
         (lambda town: town.world("n1"), "^n1: .*drawn_town.osm holds no such intersection; "),
         (lambda town: town.world(town.intersections[0].id, radius_m=5), "between 10 and 2000 m"),
         (lambda town: town.world(town.intersections[0].id, radius_m="a"), "must be a number"),
-        (lambda town: town.nearest(0, 0), "^0.0,0.0: the nearest intersection of .* m away"),
+        (
+            lambda town: town.nearest(0, 0),
+            "^0.0,0.0: the nearest intersection of .* m away, more than 200$",
+        ),
         (lambda town: town.nearest(math.nan, 7), "is not finite"),
         (lambda town: town.nearest(95, 700), "outside latitude"),
         (lambda _: foretwin.open_map(None), "file must be a path, not NoneType"),  # type: ignore[arg-type]

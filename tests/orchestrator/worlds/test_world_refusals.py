@@ -20,6 +20,7 @@ WRONG = [
     (["--at", "95,-30"], "latitude -90 to 90"),
     (["--at", "nan,-30"], "LAT,LON"),
     (["--at", "46,-30"], "nearest intersection"),
+    (["--at", "-30,45"], "more than 200; latitude comes first: 45.0,-30.0?"),
     (["--id", "nowhere"], "nowhere"),
     (["--id", "n1"], "holds no such intersection"),
     (["--bbox", "1,2,3"], "W,S,E,N"),
