@@ -113,7 +113,7 @@ class RoundPlanner:
     ) -> tuple[Job, ...]:
         """Return the jobs of a round of `count` futures, with what `progress` forecasts."""
         config = self._config
-        scenarios = self._fitting(world, intent.path)
+        scenarios = self._fitting(world, intent.path, state.speed_mps)
         planned = self._futures_with(scenarios)
         futures = some_of(planned, count, turn=round_id, first=self._worst)
         users = near_car(reports.road_users, state, world.frame)
@@ -178,8 +178,8 @@ class RoundPlanner:
             )
         return self._futures[key]
 
-    def _fitting(self, world: World, path: PathAhead) -> tuple[Scenario, ...]:
-        """Return the scenarios that can take place on the way through the junction ahead."""
+    def _fitting(self, world: World, path: PathAhead, speed_mps: float) -> tuple[Scenario, ...]:
+        """Return the scenarios that can take place on the way that is left through a junction."""
         if not self._scenarios:
             return ()
         if world.id not in self._known:
@@ -188,10 +188,7 @@ class RoundPlanner:
             self._known[world.id] = KnownScenarios(RoadNetwork(world))
         known = self._known[world.id]
         on = known.on(FrenetPath(path.xy_m), PATH_BEHIND_M, self._vehicle)
-        passage = on.passage
-        if passage is None:
-            return ()
-        return tuple(s for s in self._scenarios if known.places(s, passage))
+        return on.ahead(self._scenarios, ego_arc_m=PATH_BEHIND_M, ego_speed_mps=speed_mps)
 
 
 def _begun_by_car(path: PathAhead, state: VehicleState, frame: LocalFrame) -> PathAhead:

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
@@ -41,6 +42,7 @@ class KnownScenarios:
         self._network = network
         self._places: dict[tuple[Scenario, str], tuple[ScenarioPlace, ...]] = {}
         self._named: dict[tuple[Scenario, str], ScenarioPlace | None] = {}
+        self._met_m: dict[tuple[Scenario, str], float] = {}
         self._casts: dict[tuple[object, ...], StagedCase | Unplaced] = {}
         self._ways: dict[int, Way | None] = {}
         """Those that cases were cast on: as long as they are kept, no other has their identity."""
@@ -50,12 +52,25 @@ class KnownScenarios:
         found = passage_on_path(self._network, path, from_arc_m)
         return PathScenarios(self, path, vehicle, found)
 
+    def way(self, passage: Passage) -> Way:
+        """Return the way that takes a passage."""
+        return self._network.way(passage)
+
     def places(self, scenario: Scenario, passage: Passage) -> tuple[ScenarioPlace, ...]:
         """Return where a scenario can take place on a passage, none where it does not apply."""
         key = (scenario, passage.name)
         if key not in self._places:
             self._places[key] = places_on_passage(scenario, self._network, passage)
         return self._places[key]
+
+    def met_m(self, scenario: Scenario, passage: Passage) -> float:
+        """Return how far along a passage's way the last place is at which a scenario's road users
+        come upon it: infinite where that is wherever the car is, minus infinite where nowhere."""
+        key = (scenario, passage.name)
+        if key not in self._met_m:
+            met = (_come_upon_m(scenario, place) for place in self.places(scenario, passage))
+            self._met_m[key] = max(met, default=-math.inf)
+        return self._met_m[key]
 
     def named(self, scenario: Scenario, name: str) -> ScenarioPlace | None:
         """Return the place of that name, None where the scenario has none so named."""
@@ -118,6 +133,18 @@ class PathScenarios(NamedTuple):
     vehicle: VehicleParameters
     passage: Passage | None
 
+    def ahead(
+        self, scenarios: Sequence[Scenario], *, ego_arc_m: float, ego_speed_mps: float
+    ) -> tuple[Scenario, ...]:
+        """Return those that can take place on the path ahead of a car at `ego_arc_m` of it."""
+        if self.passage is None:
+            return ()
+        way, car = self.known.way(self.passage), self.path.point_at(np.array([ego_arc_m]))
+        front_m = self.vehicle.length_m.value - self.vehicle.rear_overhang_m.value
+        soon_m = LEAST_TIME_S * max(ego_speed_mps, LEAST_START_MPS)
+        past_m = float(way.path.locate(car).arc_m[0]) + front_m + soon_m
+        return tuple(s for s in scenarios if self.known.met_m(s, self.passage) > past_m)
+
     def players(
         self,
         scenario: Scenario,
@@ -179,6 +206,17 @@ class PathScenarios(NamedTuple):
         else:
             arc += ego_arc_m - played.ego_arc_m
         return player_on(actor, self.path, arc)
+
+
+def _come_upon_m(scenario: Scenario, place: ScenarioPlace) -> float:
+    """Return how far along the ego's way others first come upon it, infinite where none do."""
+    ego, met = shapely.LineString(place.ego.xy_m), [math.inf]
+    for part, ways in zip(scenario.actors, place.actor_ways, strict=True):
+        if part.relation not in ALONG:
+            shared = shapely.intersection(ego, [shapely.LineString(way.xy_m) for way in ways])
+            points = shapely.points(shapely.get_coordinates(shared))
+            met.extend(shapely.line_locate_point(ego, points).tolist())
+    return min(met)
 
 
 def _met_anywhere(played: StagedCase) -> bool:

@@ -165,7 +165,7 @@ def test_of_eight_worlds_it_is_known_what_can_happen_in_them(tmp_path: Path) -> 
     assert isinstance(intent, RoundIntent)
     world = town_world(intent.junction_id)
     for number in range(10):
-        planner._fitting(msgspec.structs.replace(world, id=f"w{number}"), intent.path)
+        planner._fitting(msgspec.structs.replace(world, id=f"w{number}"), intent.path, 8.0)
     assert list(planner._known) == [f"w{number}" for number in range(2, 10)]
 
 

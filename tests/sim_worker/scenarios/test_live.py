@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import FuturesResult
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.scenarios.live import KnownScenarios
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.places import crossroads, happening, job, state_at
+from tests.sim_worker.places import crossroads, happening, job, state_at, straight_path
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +57,20 @@ def test_the_car_ahead_stops_though_the_junction_is_behind_the_car(stage: BatchS
 def test_a_crossing_that_the_car_has_passed_is_left_out(stage: BatchSimulation) -> None:
     result = run_job(job((happening(0, "scp"),), state=state_at(7.0, -1.5, speed=10.0)), stage)
     assert result.left_out == ("the place of the impact is behind the car",)
+
+
+@pytest.mark.parametrize(
+    ("x", "speed", "left"),
+    [
+        (-40.0, 10.0, {"occluded_pedestrian", "cccscp", "lead_stopping"}),
+        (-23.0, 10.0, {"cccscp", "lead_stopping"}),  # its walker is met at -12 m
+        (-18.0, 1.0, {"occluded_pedestrian", "cccscp", "lead_stopping"}),
+        (-2.0, 10.0, {"lead_stopping"}),
+    ],
+)
+def test_what_can_take_place_is_ahead_of_the_car(x: float, speed: float, left: set[str]) -> None:
+    path = straight_path()
+    on = KnownScenarios(RoadNetwork(crossroads())).on(FrenetPath(path.xy_m), 0.0, load_vehicle())
+    asked = [catalogue()[id_] for id_ in ("occluded_pedestrian", "cccscp", "lead_stopping", "ltip")]
+    found = on.ahead(asked, ego_arc_m=x + 60.0, ego_speed_mps=speed)
+    assert {one.id for one in found} == left
