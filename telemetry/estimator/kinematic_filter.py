@@ -32,6 +32,7 @@ from foretwin.telemetry.estimator.filter_state import (
     Y,
 )
 from foretwin.telemetry.estimator.innovations import PositionInnovation
+from foretwin.telemetry.estimator.measured import MOST_SPEED_MPS
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 _MAX_STEP_S = 0.05
@@ -68,6 +69,15 @@ class KinematicFilter:
         other = shallow_copy(self)
         other.mean, other.covariance = self.mean.copy(), self.covariance.copy()
         return other
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether this is a car's motion, and its spreads are any.
+
+        A sensor that is wrong beyond all noise, such as a yaw rate in degrees, can end both.
+        """
+        speed = self.mean.item(SPEED)
+        return abs(speed) <= MOST_SPEED_MPS and bool(self.covariance.diagonal().min() >= 0.0)
 
     @property
     def yaw_rate_radps(self) -> float:

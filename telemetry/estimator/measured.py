@@ -26,8 +26,9 @@ _CHANNEL_FIELDS = {
     "heading": ("yaw_rad",),
     "steering": ("tire_angle_rad",),
 }
+MOST_SPEED_MPS = 100.0
 _LIMITS = {
-    "speed_mps": 100.0,
+    "speed_mps": MOST_SPEED_MPS,
     "accel_mps2": 100.0,
     "rate_radps": 20.0,
     "yaw_rad": 100.0,

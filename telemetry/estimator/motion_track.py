@@ -120,6 +120,7 @@ class MotionTrack:
         self._corrections.watch(message, standing=self._standing)
         if filter_ is not None:
             self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
+            self._give_up_unsound(filter_)
         elif isinstance(message, HeadingSample):
             local_yaw = message.yaw_rad + self._convergence_rad
             self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
@@ -171,6 +172,7 @@ class MotionTrack:
             self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
         else:
             self._correct(filter_, xy, fix, verdict)
+            self._give_up_unsound(filter_)
         if self._filter is not None:
             self._positions.check_told(self._filter, fix, time_s, xy)
         return True
@@ -221,6 +223,12 @@ class MotionTrack:
             self._filter.expect_wander(noise.std_m(fix))
             innovation = self._filter.position_innovation(at, self._lever[:2], wander=True)
             self._filter.correct_position(innovation, noise.white_std_m(fix))
+
+    def _give_up_unsound(self, filter_: KinematicFilter) -> None:
+        """Begin anew with the next fix or heading where a correction led to no motion of a car."""
+        if filter_ is self._filter and not filter_.is_sound:
+            self.skipped["motion_contradicted"] += 1
+            self._filter = None
 
     def _advance(self, stamp_ns: int) -> KinematicFilter | None:
         if self._filter is not None and stamp_ns > self._filter_stamp_ns:

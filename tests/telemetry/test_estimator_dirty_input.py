@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import msgspec
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import GnssFix, HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.measured import MOST_SPEED_MPS
 from tests.telemetry.position_track import (
     Sample,
     along,
@@ -237,3 +239,21 @@ def test_whatever_arrives_whenever_no_state_is_broken(
             numbers = (state.yaw_rad, state.speed_mps, state.yaw_rate_radps, state.accel_mps2)
             assert all(math.isfinite(number) for number in numbers)
             state.position.validate()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_yaw_rates_beyond_all_sense_end_no_estimate(seed: int) -> None:
+    """Such as in degrees: states stay those of a car, and the filter one."""
+    drawn, estimator, stamp_ns = random.Random(seed), StateEstimator(info()), 0
+    for _ in range(600):
+        stamp_ns += drawn.choice([20_000_000] * 9 + [20_000_000_000])
+        rate = drawn.choice([20.0, -20.0, 0.0])
+        place = fix(stamp_ns * 1e-9, drawn.gauss(0.0, 0.1), drawn.gauss(0.0, 0.1), 0.02)
+        for channel, message in (
+            ("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=0.1, yaw_rate_radps=rate)),
+            ("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=drawn.choice([0.0, 10.0, 40.0]))),
+            place,
+        ):
+            state = estimator.handle(channel, message)
+            assert state is None or abs(state.speed_mps) <= MOST_SPEED_MPS
+    assert estimator.skipped["motion_contradicted"] > 0
