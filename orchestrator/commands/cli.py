@@ -218,7 +218,9 @@ def world(
             "[default: as the suffix of --out says; mjcf for .xml and in a folder]",
         ),
     ] = None,
-    radius_m: Annotated[float, typer.Option("--radius", help="metres around the junction")] = 150.0,
+    radius_m: Annotated[
+        float | None, typer.Option("--radius", help="metres around a junction [default: 150]")
+    ] = None,
     opendrive_version: Annotated[
         str | None, typer.Option(help="opendrive: 1.8, or 1.4 for CARLA [default: 1.8]")
     ] = None,

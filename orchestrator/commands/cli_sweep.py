@@ -55,8 +55,17 @@ def sweep(
     from foretwin.orchestrator.sweep.engines import Engine
 
     if merge:
-        if shard is not None:
-            raise UserError(f"--shard {shard}: goes with a SPEC, not with --merge")
+        for_playing = {
+            "--shard": shard,
+            "--workers": workers,
+            "--engine": None if engine == "zenoh" else engine,
+            "--address": address,
+            "--fresh": "" if fresh else None,
+        }
+        for option, value in for_playing.items():
+            if value is not None:
+                said = f"{option} {value}".rstrip()
+                raise UserError(f"{said}: goes with a SPEC, not with --merge")
         return merge_shards(specs, out=out)
     if len(specs) != 1:
         raise UserError("sweep takes one SPEC; --merge takes the folders of shards")

@@ -39,6 +39,10 @@ def learn_progress(
         raise UserError("learning needs --out FILE, where the table goes")
     if not logs and not check:
         raise UserError("nothing to do: name drives to learn from, or with --check some to check")
+    if out is not None and not logs:
+        raise UserError(f"--out {out}: nothing is learnt without drives to learn from")
+    if table is not None and logs:
+        raise UserError(f"--table {table}: goes with --check alone, where nothing is learnt")
     if logs and out is not None:
         drives = {name: _examples(path) for name, path in _named(logs).items()}
         learnt = learn(drives, words={"licence": licence})

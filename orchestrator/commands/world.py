@@ -18,7 +18,7 @@ from foretwin.orchestrator.worlds.choice import choose_junctions, parse_bbox
 from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.orchestrator.worlds.track_store import tracks_for
-from foretwin.world_gen.build import build_region, build_world
+from foretwin.world_gen.build import DEFAULT_RADIUS_M, build_region, build_world
 from foretwin.world_gen.export.choices import (
     LANELET2_DIALECTS,
     OPENDRIVE_VERSIONS,
@@ -58,7 +58,7 @@ class WorldRequest:
     tracks: str | None = None
     file_format: str | None = None
     """None goes by the suffix of `out`."""
-    radius_m: float = 150.0
+    radius_m: float | None = None
     opendrive_version: str | None = None
     lanelet2_dialect: str | None = None
     simulator: str | None = None
@@ -85,12 +85,13 @@ def write_worlds(request: WorldRequest) -> CommandResult:
     options = _options(request, format_)
     if request.bbox is not None:
         return _region(request, parse_bbox("--bbox", request.bbox), format_, options)
+    radius_m = DEFAULT_RADIUS_M if request.radius_m is None else request.radius_m
     opened, junctions = choose_junctions(
         request.map_file,
         at=request.at,
         junction_id=request.junction_id,
         route=request.route,
-        radius_m=request.radius_m,
+        radius_m=radius_m,
         service_roads=request.service_roads,
     )
     if many and not junctions:
@@ -99,7 +100,6 @@ def write_worlds(request: WorldRequest) -> CommandResult:
     index = _index(opened, request)
 
     def built(junction: Junction) -> World:
-        radius_m = request.radius_m
         return build_world(opened.osm, opened.graph, junction, radius_m=radius_m, index=index)
 
     if not many:
@@ -175,10 +175,12 @@ def _check_place(request: WorldRequest) -> None:
             "name the place by exactly one of --at LAT,LON, --id ID, --bbox W,S,E,N, "
             f"--route FILE or --all; got {' and '.join(chosen) or 'none'}"
         )
-    if not MIN_RADIUS_M <= request.radius_m <= MAX_RADIUS_M:
-        raise UserError(
-            f"--radius {request.radius_m}: {MIN_RADIUS_M:.0f} to {MAX_RADIUS_M:.0f} metres"
-        )
+    if request.radius_m is not None:
+        told = f"--radius {request.radius_m:g}"
+        if request.bbox is not None:
+            raise UserError(f"{told}: goes with junctions, and not with --bbox")
+        if not MIN_RADIUS_M <= request.radius_m <= MAX_RADIUS_M:
+            raise UserError(f"{told}: {MIN_RADIUS_M:.0f} to {MAX_RADIUS_M:.0f} metres")
 
 
 def _format(name: str | None, file: Path | None) -> Format:

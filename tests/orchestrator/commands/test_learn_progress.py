@@ -110,6 +110,8 @@ def test_drives_whose_files_are_called_alike_all_count_and_one_named_twice_count
         ([], "nothing to do"),
         (["LOG", "--out", "t.npz", "--check", "LOG"], "proves nothing"),
         (["--check", "LOG", "--table", "LOG"], "no table of progress"),
+        (["--check", "LOG", "--out", "t.npz"], "--out t.npz: nothing is learnt"),
+        (["LOG", "--out", "t.npz", "--table", "off"], "--table off: goes with --check alone"),
         (["missing.csv", "--out", "t.npz"], "missing.csv"),
     ],
 )

@@ -224,4 +224,7 @@ def test_shards_by_the_command_come_to_the_same(
     assert (merged["rows_sha256"], merged["jobs"]) == (whole["rows_sha256"], whole["jobs"])
     assert run(["sweep", spec, "--workers", "1", "--shard", "8/9"]) in (0, 3)  # few jobs
     assert run(["sweep", spec, spec]) == 2
-    assert run(["sweep", "--merge", *found, "--shard", "0/2"]) == 2
+    capsys.readouterr()
+    for words in ("--shard 0/2", "--workers 3", "--engine ray", "--address auto", "--fresh"):
+        assert run(["sweep", "--merge", *found, *words.split()]) == 2
+        assert f"{words}: goes with a SPEC, not with --merge" in capsys.readouterr().err

@@ -34,6 +34,7 @@ WRONG = [
     (["--all", "--format", "stl"], "mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg, png"),
     (["--all", "--radius", "5"], "20 to 2000"),
     (["--all", "--radius", "nan"], "20 to 2000"),
+    (["--bbox", "7,50,8,51", "--radius", "80"], "--radius 80: goes with junctions"),
     (["--all", "--format", "opendrive", "--opendrive-version", "1.9"], "1.8, 1.4"),
     (["--all", "--format", "sdf", "--simulator", "carla"], "classic, gazebo"),
     (["--all", "--format", "sdf", "--vehicles", "ego:car"], "twin, shadow, ghost"),
