@@ -26,8 +26,8 @@ mislead. Chosen: with less, wheels that say nought for half a second stop a car 
 
 
 class MotionCorrections:
-    """Gives each kind of sample its weight; speeds, headings and forward forces lose theirs as they
-    surprise."""
+    """Gives each kind of sample its weight; speeds, headings, yaw rates that come with these and
+    forward forces lose theirs as they surprise."""
 
     def __init__(
         self, measured: MotionSamples, surprises: SurpriseCount, *, wheelbase_m: float
@@ -36,6 +36,7 @@ class MotionCorrections:
         self._wheelbase_m = wheelbase_m
         self._speed_doubt = Doubt(0.05, _MOST_SPEED_STD_MPS)
         self._yaw_doubt = Doubt(0.02)
+        self._yaw_rate_doubt = Doubt(0.01)
         self._accel_doubt = Doubt(0.5)
         self._gyro = Gyro()
         self._stands = False
@@ -51,6 +52,7 @@ class MotionCorrections:
         other._measured = measured
         other._speed_doubt = shallow_copy(self._speed_doubt)
         other._yaw_doubt = shallow_copy(self._yaw_doubt)
+        other._yaw_rate_doubt = shallow_copy(self._yaw_rate_doubt)
         other._accel_doubt = shallow_copy(self._accel_doubt)
         other._gyro = shallow_copy(self._gyro)
         other._surprises = surprises
@@ -108,7 +110,8 @@ class MotionCorrections:
                 square = filter_.correct_yaw(local_yaw, self._yaw_doubt.std(surprise))
                 self._surprises.take("heading", square, LINE_95)
                 if yaw_rate is not None:
-                    filter_.correct_yaw_rate(yaw_rate, 0.01, biased=False)
+                    std = self._yaw_rate_doubt.std(abs(yaw_rate - filter_.yaw_rate_radps))
+                    filter_.correct_yaw_rate(yaw_rate, std, biased=False)
             case SteeringSample():
                 angle = self._measured.tire_angle_rad
                 if angle is not None:

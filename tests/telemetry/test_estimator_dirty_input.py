@@ -242,18 +242,37 @@ def test_whatever_arrives_whenever_no_state_is_broken(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_yaw_rates_beyond_all_sense_end_no_estimate(seed: int) -> None:
+def test_a_gyro_beyond_all_sense_ends_no_estimate(seed: int) -> None:
     """Such as in degrees: states stay those of a car, and the filter one."""
     drawn, estimator, stamp_ns = random.Random(seed), StateEstimator(info()), 0
     for _ in range(600):
         stamp_ns += drawn.choice([20_000_000] * 9 + [20_000_000_000])
-        rate = drawn.choice([20.0, -20.0, 0.0])
-        place = fix(stamp_ns * 1e-9, drawn.gauss(0.0, 0.1), drawn.gauss(0.0, 0.1), 0.02)
+        rates = (0.0, 0.0, drawn.choice([20.0, -20.0, 0.0]))
+        force = (0.0, 0.0, 9.8)
         for channel, message in (
-            ("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=0.1, yaw_rate_radps=rate)),
+            ("imu", ImuSample(stamp_ns=stamp_ns, accel_mps2=force, rate_radps=rates)),
+            ("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=0.1)),
             ("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=drawn.choice([0.0, 10.0, 40.0]))),
-            place,
+            fix(stamp_ns * 1e-9, drawn.gauss(0.0, 0.1), drawn.gauss(0.0, 0.1), 0.02),
         ):
             state = estimator.handle(channel, message)
             assert state is None or abs(state.speed_mps) <= MOST_SPEED_MPS
     assert estimator.skipped["motion_contradicted"] > 0
+
+
+@pytest.mark.parametrize(("gain", "noise_radps"), [(math.degrees(1.0), 0.0), (1.0, 0.5)])
+def test_a_wrong_yaw_rate_beside_headings_leads_no_speed_away(
+    gain: float, noise_radps: float
+) -> None:
+    """In degrees, or noisy: wheels, headings and fixes say what the car does."""
+    drawn, estimator, yaw, x, y = random.Random(3), StateEstimator(info()), 0.0, 0.0, 0.0
+    for tick in range(1, 3000):
+        speed, rate = 6.0 + 4.0 * math.sin(tick / 500.0), 0.3 * math.sin(tick / 160.0)
+        yaw += 0.02 * rate
+        x, y = x + 0.02 * speed * math.cos(yaw), y + 0.02 * speed * math.sin(yaw)
+        told, stamp_ns = gain * rate + drawn.gauss(0.0, noise_radps), tick * 20_000_000
+        heading = HeadingSample(stamp_ns=stamp_ns, yaw_rad=math.remainder(yaw, math.tau))
+        estimator.handle("heading", msgspec.structs.replace(heading, yaw_rate_radps=told))
+        estimator.handle("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=speed))
+        state = estimator.handle(*fix(stamp_ns * 1e-9, x, y, 0.02))
+        assert state is None or state.speed_mps == pytest.approx(speed, abs=1.0)
