@@ -23,11 +23,15 @@ it for the time that braking takes, and half a second more. Chosen."""
 _MOST_SPEED_STD_MPS = 3.0
 """However much a measured speed surprises: heard less, it could not contradict a filter that forces
 mislead. Chosen: with less, wheels that say nought for half a second stop a car at 9 m/s."""
+_USUAL_SURPRISE = 3.0
+"""A gyro, whose noise is known, is doubted for what surprises by more than so many times less.
+Chosen: from 3 on no figure of `python -m tests.telemetry.estimator_figures` changes by over 2 mm or
+.01°; with 1 or 2 a phone's headings lead the yaw more."""
 
 
 class MotionCorrections:
-    """Gives each kind of sample its weight; speeds, headings, yaw rates that come with these and
-    forward forces lose theirs as they surprise."""
+    """Gives each kind of sample its weight, which it loses as it surprises; a gyro's is known, and
+    is lost where its surprises are beyond that."""
 
     def __init__(
         self, measured: MotionSamples, surprises: SurpriseCount, *, wheelbase_m: float
@@ -37,6 +41,7 @@ class MotionCorrections:
         self._speed_doubt = Doubt(0.05, _MOST_SPEED_STD_MPS)
         self._yaw_doubt = Doubt(0.02)
         self._yaw_rate_doubt = Doubt(0.01)
+        self._gyro_doubt = Doubt(0.0)
         self._accel_doubt = Doubt(0.5)
         self._gyro = Gyro()
         self._stands = False
@@ -53,6 +58,7 @@ class MotionCorrections:
         other._speed_doubt = shallow_copy(self._speed_doubt)
         other._yaw_doubt = shallow_copy(self._yaw_doubt)
         other._yaw_rate_doubt = shallow_copy(self._yaw_rate_doubt)
+        other._gyro_doubt = shallow_copy(self._gyro_doubt)
         other._accel_doubt = shallow_copy(self._accel_doubt)
         other._gyro = shallow_copy(self._gyro)
         other._surprises = surprises
@@ -99,7 +105,10 @@ class MotionCorrections:
             case SpeedSample(speed_mps=speed):
                 self._correct_speed(filter_, speed)
             case ImuSample(accel_mps2=accel, rate_radps=rate):
-                square = filter_.correct_yaw_rate(rate[2], self._gyro.std_radps, biased=True)
+                off = abs(rate[2] - filter_.yaw_rate_radps - filter_.mean.item(GYRO_BIAS))
+                doubt = self._gyro_doubt.std(off / _USUAL_SURPRISE)
+                std = max(self._gyro.std_radps, doubt)
+                square = filter_.correct_yaw_rate(rate[2], std, biased=True)
                 self._surprises.take("imu", square, LINE_95)
                 self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
                 expected = filter_.mean.item(ACCEL) + filter_.mean.item(ACCEL_BIAS)
