@@ -33,7 +33,7 @@ from foretwin.telemetry.logs.log import (
     Sample,
 )
 from foretwin.telemetry.logs.map_origin import declaration_beside
-from foretwin.telemetry.logs.merge import LATE_NS, reordered
+from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.nmea_positions import (
     QUALITY_OF_MODE,
     STD_M,
@@ -41,7 +41,6 @@ from foretwin.telemetry.logs.nmea_positions import (
     joined,
 )
 from foretwin.telemetry.logs.nmea_sentences import (
-    DAY_NS,
     Fields,
     Sentence,
     date_of,
@@ -52,6 +51,7 @@ from foretwin.telemetry.logs.nmea_sentences import (
     time_of_day_ns,
     yaw_rad_of,
 )
+from foretwin.telemetry.logs.table_times import DAY_NS, days_on
 from foretwin.telemetry.ros_messages.foreign import NO_FIX
 
 NO_TIME = "sentence before any time"
@@ -185,16 +185,9 @@ def _samples(path: Path, found: _Found, skipped: Skipped) -> Iterator[Sample]:
             time_ns = time_of_day_ns(sentence)
             if time_ns is not None:
                 stated = date_of(sentence)
-                late = stated is None and time_ns - latest_ns > DAY_NS - LATE_NS
-                if stated is not None:
-                    date = stated
-                elif latest_ns - time_ns > DAY_NS // 2:
-                    date += datetime.timedelta(days=1)
+                days = datetime.timedelta(days=days_on(time_ns, latest_ns))
+                date, latest_ns = stated or date + days, time_ns
                 stamp_ns = midnight_ns(date) + time_ns - zero_ns
-                if late:  # of the day before, and told after midnight
-                    stamp_ns -= DAY_NS
-                else:
-                    latest_ns = time_ns
             if stamp_ns is None:
                 skipped[NO_TIME] += 1
                 continue

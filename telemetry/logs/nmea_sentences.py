@@ -10,9 +10,9 @@ import re
 from typing import NamedTuple
 
 from foretwin.contracts.frames import wrap_angle
+from foretwin.telemetry.logs.table_times import DAY_NS
 
 CHECKSUM_WRONG = "checksum wrong"
-DAY_NS = 86_400 * 10**9
 _SENTENCE = re.compile(r"\$([A-Z]{2}|P[A-Z]*)(RMC|GGA|VTG|HDT|ZDA),([^*\r\n$]*)(?:\*(\w*))?")
 _ANY = re.compile(r"\$([A-Z]{2}[A-Z]{3},[^*$]*)\*([0-9A-Fa-f]{2})")
 

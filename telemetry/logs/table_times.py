@@ -29,7 +29,7 @@ UNITS = (*units.TIME_NS, *TEXTS, HHMMSS, *DAYS)
 
 StampOf = Callable[[str], int | None]
 
-_DAY_NS = 86_400 * 10**9
+DAY_NS = 86_400 * 10**9
 _ZONE = r"(Z|UTC|GMT|[+-]\d{2}:?\d{2})"
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2})\2(\d{1,4})(?:[T ,;]+(.+))?")
 _TIME = re.compile(
@@ -50,7 +50,7 @@ def stamp_reader(unit: str, decimal: str = ".") -> StampOf:
     if unit == HHMMSS:
         return lambda text: _digits_ns(text.strip().replace(decimal, "."))
     if unit in DAYS:
-        return _number_reader(Decimal(_DAY_NS), Decimal(DAYS[unit]), decimal)
+        return _number_reader(Decimal(DAY_NS), Decimal(DAYS[unit]), decimal)
     return _number_reader(units.TIME_NS[unit], Decimal(0), decimal)
 
 
@@ -65,15 +65,18 @@ def days_counted(stamps_ns: Sequence[int | None]) -> list[int | None]:
     found: list[int | None] = []
     for stamp_ns in stamps_ns:
         if stamp_ns is not None:
-            before_ns = stamp_ns if latest_ns is None else latest_ns
-            if stamp_ns - before_ns > _DAY_NS - LATE_NS:  # told after midnight
-                stamp_ns += day_ns - _DAY_NS
-            else:
-                if before_ns - stamp_ns > _DAY_NS // 2:
-                    day_ns += _DAY_NS
-                latest_ns, stamp_ns = stamp_ns, stamp_ns + day_ns
+            day_ns += DAY_NS * days_on(stamp_ns, stamp_ns if latest_ns is None else latest_ns)
+            latest_ns, stamp_ns = stamp_ns, stamp_ns + day_ns
         found.append(stamp_ns)
     return found
+
+
+def days_on(time_ns: int, before_ns: int) -> int:
+    """Return by how many days a time of the day is beyond the one before: 1 where it falls by half
+    a day or more and begins the next, -1 where it is of before midnight and comes late."""
+    if time_ns - before_ns > DAY_NS - LATE_NS:
+        return -1
+    return int(before_ns - time_ns > DAY_NS // 2)
 
 
 def tells_zone(text: str) -> bool:
@@ -107,7 +110,7 @@ def _date_ns(text: str, order: tuple[int, int, int]) -> int | None:
     of_day_ns = 0 if match[5] is None else _time_ns(match[5].strip())
     if of_day_ns is None:
         return None
-    return representable_ns((date - _EPOCH).days * _DAY_NS + of_day_ns)
+    return representable_ns((date - _EPOCH).days * DAY_NS + of_day_ns)
 
 
 def _time_ns(text: str) -> int | None:
