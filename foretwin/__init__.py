@@ -65,10 +65,11 @@ if TYPE_CHECKING:
     from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView
     from foretwin.sim_worker.planners.one_at_a_time import CarView
     from foretwin.sim_worker.planners.registry import planner_names
-    from foretwin.sim_worker.planners.tracking import front_from_base_m, pure_pursuit
+    from foretwin.sim_worker.planners.tracking import pure_pursuit
     from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
     from foretwin.sim_worker.scenarios.ways import Way
     from foretwin.sim_worker.vehicle.parameters import load_vehicle
+    from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
     from foretwin.simulation import Futures, run_futures, state_on, ways_through
 
 _MAPS = "Map", "drawn_town", "export_formats", "export_world", "open_map"
@@ -100,10 +101,11 @@ _FROM = {
     "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
     "foretwin.sim_worker.planners.one_at_a_time": ("CarView",),
     "foretwin.sim_worker.planners.registry": ("planner_names",),
-    "foretwin.sim_worker.planners.tracking": ("front_from_base_m", "pure_pursuit"),
+    "foretwin.sim_worker.planners.tracking": ("pure_pursuit",),
     "foretwin.sim_worker.scenarios.reading": ("catalogue", "find_scenario", "read_scenario"),
     "foretwin.sim_worker.scenarios.ways": ("Way",),
     "foretwin.sim_worker.vehicle.parameters": ("load_vehicle",),
+    "foretwin.sim_worker.vehicle.reference_points": ("front_from_base_m",),
     "foretwin.simulation": ("Futures", "run_futures", "state_on", "ways_through"),
 }
 _MODULE_OF = {name: module for module, names in _FROM.items() for name in names}

@@ -15,8 +15,7 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.sim_worker.driver_model import COMFORT_DECEL_MPS2, LATERAL_ACCEL_MPS2
 from foretwin.sim_worker.gym.rows import Sighting
 from foretwin.sim_worker.planner_interface import PlannerView
-from foretwin.sim_worker.planners.tracking import front_from_base_m
-from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m, front_from_base_m
 
 Observation = npt.NDArray[np.float32]
 

@@ -11,7 +11,7 @@ from foretwin.sim_worker.driver_model import DECIDE_EVERY_S
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs, walker_gap_m
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from foretwin.sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
 
 
 class GapAcceptance:

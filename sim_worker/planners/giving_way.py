@@ -18,7 +18,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import wrap_angle
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers, SharedGround, rows_of
-from foretwin.sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
 
 CRITICAL_GAP_S = 4.1
 FOLLOW_UP_S = 2.9

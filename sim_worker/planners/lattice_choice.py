@@ -27,7 +27,7 @@ from foretwin.sim_worker.planners.polynomials import (
     to_speed,
 )
 from foretwin.sim_worker.planners.prediction import Changes
-from foretwin.sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
 
 _SPEED_SHARES = np.array([1.0, 0.8, 0.6, 0.35, 0.0])
 _SPEED_TIMES_S = np.array([2.5, 5.0])

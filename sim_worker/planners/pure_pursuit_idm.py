@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array, Flags
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled, tracking
-from foretwin.sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 TURNING_ACCEL_MPS2 = 4.0

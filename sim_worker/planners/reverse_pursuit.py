@@ -7,7 +7,8 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.driver_model import HOLD_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
-from foretwin.sim_worker.planners.tracking import front_from_base_m, steer_towards
+from foretwin.sim_worker.planners.tracking import steer_towards
+from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 _LOOKAHEAD_M, _LOOKAHEAD_S, _LOOKAHEAD_ASIDE = 1.2, 0.7, 1.0

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.planner_interface import PlannerView
 
 MIN_LOOKAHEAD_M = 4.0
@@ -54,11 +53,6 @@ def steer_towards(view: PlannerView, goal: Array) -> Array:
     most = wheelbase * MAX_LATERAL_ACCEL_MPS2 / np.square(np.maximum(states[3], 1.0))
     most = np.minimum(most, math.tan(view.vehicle.max_tire_angle_rad.value))
     return np.asarray(np.arctan(np.maximum(np.minimum(slope, most), -most)))
-
-
-def front_from_base_m(vehicle: VehicleParameters) -> float:
-    """Return how far the front bumper lies ahead of base_link."""
-    return vehicle.length_m.value - vehicle.rear_overhang_m.value
 
 
 def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps2: float) -> Array:

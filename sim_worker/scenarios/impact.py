@@ -20,6 +20,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.rectangles import Rectangles, overlapping
 from foretwin.sim_worker.road_users.paces import Paces
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m, front_from_base_m
 
 TOLERANCE_M = 0.08
 """How far from its plan the first touch may be, in place and from the front's point."""
@@ -121,10 +122,10 @@ def ego_box(
     reverse: bool = False,
 ) -> MovingBox:
     """Return the ego's box on a path; in reverse its rear leads."""
-    length, rear = vehicle.length_m.value, vehicle.rear_overhang_m.value
-    front, centre = length - rear, length / 2.0 - rear
+    length, front = vehicle.length_m.value, front_from_base_m(vehicle)
+    centre = box_centre_from_base_m(vehicle)
     if reverse:
-        front, centre = rear, -centre
+        front, centre = vehicle.rear_overhang_m.value, -centre
     return MovingBox(
         path, speed_mps, length, vehicle.width_m.value, offset_m, front_m=front, centre_m=centre
     )

@@ -30,6 +30,7 @@ from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
 from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.staged import player_on
 from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.reference_points import front_from_base_m
 
 _MOST_CASTS = 5000
 _LATE = ".arrives_after_s"
@@ -140,7 +141,7 @@ class PathScenarios(NamedTuple):
         if self.passage is None:
             return ()
         way, car = self.known.way(self.passage), self.path.point_at(np.array([ego_arc_m]))
-        front_m = self.vehicle.length_m.value - self.vehicle.rear_overhang_m.value
+        front_m = front_from_base_m(self.vehicle)
         soon_m = LEAST_TIME_S * max(ego_speed_mps, LEAST_START_MPS)
         past_m = float(way.path.locate(car).arc_m[0]) + front_m + soon_m
         return tuple(s for s in scenarios if self.known.met_m(s, self.passage) > past_m)

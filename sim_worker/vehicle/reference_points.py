@@ -16,6 +16,11 @@ def box_centre_from_base_m(vehicle: VehicleParameters) -> float:
     return vehicle.length_m.value / 2.0 - vehicle.rear_overhang_m.value
 
 
+def front_from_base_m(vehicle: VehicleParameters) -> float:
+    """Return how far the front bumper lies ahead of base_link."""
+    return vehicle.length_m.value - vehicle.rear_overhang_m.value
+
+
 def cog_from_base(vehicle: VehicleParameters, states: Array) -> tuple[Array, Array]:
     """Return joint positions (S, 4) and velocities (S, 4) of base_link `states` (S, 8).
 
