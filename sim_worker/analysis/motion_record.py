@@ -24,6 +24,7 @@ from foretwin.contracts.drive import (
     VehicleStatus,
 )
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.sim_worker.vehicle.commands import HELD_NS
 
 PERIOD_S = 0.02
 
@@ -69,7 +70,14 @@ _MEASURED = {
     "steering": ("wheel_rad", "tire_rad"),
 }
 _HELD = {"control": ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")}
-_GAP_S = {"gnss": 2.5, "heading": 0.5, "speed": 0.3, "imu": 0.2, "steering": 0.3, "control": 0.5}
+_GAP_S = {
+    "gnss": 2.5,
+    "heading": 0.5,
+    "speed": 0.3,
+    "imu": 0.2,
+    "steering": 0.3,
+    "control": HELD_NS / 1e9,
+}
 """Two neighbours further apart than this leave a gap."""
 
 
