@@ -127,10 +127,8 @@ def _measures(
                 "word": _word(change, better),
             }
         )
-    told = adjusted([row["change"]["p_value"] for row in rows])
-    for row, of_many in zip(rows, told, strict=True):
-        row["p_adjusted"] = of_many
-        if of_many is None or of_many >= LEVEL:
+    for row in _with_adjusted(rows, [row["change"]["p_value"] for row in rows]):
+        if row["p_adjusted"] is None or row["p_adjusted"] >= LEVEL:
             row["word"] = "the same" if row["change"]["mean"] == 0.0 else "not significant"
     return rows
 
@@ -151,7 +149,7 @@ def _alone(
         if counts["first"] or counts["second"]:
             p_value = mcnemar_p(counts["second"], counts["first"])
             rows.append({"measure": name, **counts, "p_value": p_value})
-    return _with_adjusted(rows)
+    return _with_adjusted(rows, [row["p_value"] for row in rows])
 
 
 def _meaning(first: ComparedSide, second: ComparedSide) -> list[tuple[str, tuple[str, str]]]:
@@ -161,8 +159,10 @@ def _meaning(first: ComparedSide, second: ComparedSide) -> list[tuple[str, tuple
     return sorted((_ALWAYS | metrics).items())
 
 
-def _with_adjusted(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    for row, of_many in zip(rows, adjusted([row["p_value"] for row in rows]), strict=True):
+def _with_adjusted(
+    rows: list[dict[str, Any]], p_values: Sequence[float | None]
+) -> list[dict[str, Any]]:
+    for row, of_many in zip(rows, adjusted(p_values), strict=True):
         row["p_adjusted"] = of_many
     return rows
 
@@ -187,9 +187,8 @@ def _places(played: Sequence[Pair]) -> list[dict[str, Any]]:
         counts = _counts(pairs)
         p_value = mcnemar_p(counts["newly"], counts["fixed"])
         rows.append({"junction_id": junction_id, **counts, "p_value": p_value})
-    return sorted(
-        _with_adjusted(rows), key=lambda row: (row["fixed"] - row["newly"], row["junction_id"])
-    )
+    _with_adjusted(rows, [row["p_value"] for row in rows])
+    return sorted(rows, key=lambda row: (row["fixed"] - row["newly"], row["junction_id"]))
 
 
 def _case(row: dict[str, Any]) -> dict[str, Any]:
