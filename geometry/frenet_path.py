@@ -81,8 +81,7 @@ class FrenetPath:
     @functools.cached_property
     def arc_m(self) -> Array:
         """(M,) arc length of the nodes."""
-        before = round(-self.first_arc_m / SPACING_M)
-        return np.arange(-before, self._last - before + 1, dtype=np.float64) * SPACING_M
+        return np.asarray(self.first_arc_m + SPACING_M * np.arange(self._last + 1))
 
     @functools.cached_property
     def speed_limit_mps(self) -> Array:

@@ -24,9 +24,9 @@ _MOST_SPEED_STD_MPS = 3.0
 """However much a measured speed surprises: heard less, it could not contradict a filter that forces
 mislead. Chosen: with less, wheels that say nought for half a second stop a car at 9 m/s."""
 _USUAL_SURPRISE = 3.0
-"""A gyro, whose noise is known, is doubted for what surprises by more than so many times less.
-Chosen: from 3 on no figure of `python -m tests.telemetry.estimator_figures` changes by over 2 mm or
-.01°; with 1 or 2 a phone's headings lead the yaw more."""
+"""A gyro's noise is known: of its surprises only one part in so many counts as a doubt. Chosen:
+from 3 on no figure of `python -m tests.telemetry.estimator_figures` changes by over 2 mm or .01°;
+with 1 or 2 a phone's headings lead the yaw more."""
 
 
 class MotionCorrections:
