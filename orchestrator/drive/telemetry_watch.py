@@ -26,6 +26,7 @@ class TelemetryWatch:
         self._silent: tuple[str, ...] = ()
         self._steps = 0
         self._wrong: set[str] = set()
+        self._gyro_told = False
 
     def overdue(self, channels: tuple[str, ...], now_ns: int) -> list[str]:
         """Take which channels are overdue now; return a warning of those that are so newly."""
@@ -44,7 +45,8 @@ class TelemetryWatch:
         return [f"telemetry overdue: {', '.join(newly)}; states go on without"]
 
     def estimator(self, estimator: StateEstimator) -> list[str]:
-        """Return a warning for each new step of the clock and each channel of a wrong type."""
+        """Return a warning for each new step of the clock, each channel of a wrong type, and a
+        gyro that does not turn as the car does."""
         steps = estimator.clock.steps if estimator.clock_steps > self._steps else ()
         warnings = [
             f"telemetry: the vehicle's clock stepped by {step.step_ns * 1e-9:+z.3f} s "
@@ -57,6 +59,12 @@ class TelemetryWatch:
                 self._wrong.add(reason)
                 channel = reason.removesuffix("_wrong_type")
                 warnings.append(f"telemetry: {channel} carries messages of another type; refused")
+        if estimator.gyro_refused and not self._gyro_told:
+            self._gyro_told = True
+            warnings.append(
+                "telemetry: the gyro does not turn as positions do: left out until it does; its z "
+                "axis should point up, its yaw rates be in rad/s, to the left positive"
+            )
         return warnings
 
 

@@ -17,6 +17,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
 from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.telemetry.estimator.motion_corrections import TURNS_OTHERWISE
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import Reordering
 from foretwin.telemetry.estimator.reported_state import StateConsistency
@@ -129,9 +130,9 @@ class StateEstimator:
         return self._track.consistency
 
     @property
-    def gyro_bias_radps(self) -> float:
-        """The gyro's bias as learnt so far; 0 before the heading is known."""
-        return self._track.gyro_bias_radps
+    def gyro_refused(self) -> bool:
+        """Whether the gyro was ever found not to turn as positions do."""
+        return self._track.skipped[TURNS_OTHERWISE] > 0
 
     def handle(
         self, channel: str, message: Any, *, received_ns: int | None = None

@@ -88,6 +88,11 @@ class MotionSamples:
             self._steering = message
         return True
 
+    def disbelieve(self, name: str, reason: str) -> None:
+        """Count by `reason` a sample by which field `name` is not measured after all."""
+        self._skipped[reason] += 1
+        self._field_ns.pop(name, None)
+
     def _leaps(self, channel: str, stamp_ns: int) -> bool:
         """Return whether the stamp is far ahead without a second one to bear witness."""
         if stamp_ns - self._sample_ns.get(channel, stamp_ns) <= CLOCK_LEAP_NS:

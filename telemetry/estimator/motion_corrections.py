@@ -9,12 +9,15 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.filter_state import ACCEL, ACCEL_BIAS, GYRO_BIAS, SPEED, YAW
 from foretwin.telemetry.estimator.gyro import Gyro
+from foretwin.telemetry.estimator.gyro_trust import GyroTrust
 from foretwin.telemetry.estimator.innovations import LINE_95, SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
 from foretwin.telemetry.estimator.mounting import MountingLearner
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
+TURNS_OTHERWISE = "imu_turns_otherwise"
+"""Why a gyro's yaw rate is not used: it does not turn as positions do."""
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
 _STOPPING_MPS, _STOPPING_S, _STOPPING_MPS2 = 1.0, 0.5, 4.0
@@ -44,6 +47,7 @@ class MotionCorrections:
         self._gyro_doubt = Doubt(0.0)
         self._accel_doubt = Doubt(0.5)
         self._gyro = Gyro()
+        self._trust = GyroTrust()
         self._stands = False
         self._nought_ns: int | None = None
         self.gyro_bias_radps = 0.0
@@ -61,6 +65,7 @@ class MotionCorrections:
         other._gyro_doubt = shallow_copy(self._gyro_doubt)
         other._accel_doubt = shallow_copy(self._accel_doubt)
         other._gyro = shallow_copy(self._gyro)
+        other._trust = self._trust.copy()
         other._surprises = surprises
         other.mounting = self.mounting.copy()
         return other
@@ -70,7 +75,10 @@ class MotionCorrections:
         if isinstance(message, ImuSample):
             standing = standing and self._measured.fresh("speed_mps", message.stamp_ns)
             self._gyro.take(message.stamp_ns, message.rate_radps[2], standing=standing)
-            if self._measured.fresh("speed_mps", message.stamp_ns):
+            self._trust.turn(message.stamp_ns, message.rate_radps[2] - self._gyro.bias_radps)
+            if not self._trust.believed:
+                self._measured.disbelieve("yaw_rate_radps", TURNS_OTHERWISE)
+            elif self._measured.fresh("speed_mps", message.stamp_ns):
                 rate = message.rate_radps[2] - self.gyro_bias_radps
                 self.mounting.turn(message.stamp_ns, rate, self._measured.speed_mps)
 
@@ -87,10 +95,16 @@ class MotionCorrections:
         self._stands = faster_mps < _STOPPING_MPS or braked
         return self._stands
 
-    def watch_fix(self, stamp_ns: int, xy_m: Array, std_m: float) -> None:
-        """Let a believed fix show where the antenna is, as far as wheels and gyro are heard."""
+    def watch_fix(self, stamp_ns: int, xy_m: Array, std_m: float) -> bool:
+        """Let a believed fix show where the antenna is, as far as wheels and gyro are heard.
+
+        Returns whether it shows as well that the gyro has led the filter astray.
+        """
+        believed = self._trust.believed
+        self._trust.take(stamp_ns, xy_m, std_m)
         if self._measured.fresh("speed_mps", stamp_ns):
             self.mounting.take(stamp_ns, xy_m, std_m, self._measured.speed_mps)
+        return believed and not self._trust.believed
 
     def begin(self, filter_: KinematicFilter) -> None:
         """Give a new filter what is known of the sensors already."""
@@ -105,12 +119,8 @@ class MotionCorrections:
             case SpeedSample(speed_mps=speed):
                 self._correct_speed(filter_, speed)
             case ImuSample(accel_mps2=accel, rate_radps=rate):
-                off = abs(rate[2] - filter_.yaw_rate_radps - filter_.mean.item(GYRO_BIAS))
-                doubt = self._gyro_doubt.std(off / _USUAL_SURPRISE)
-                std = max(self._gyro.std_radps, doubt)
-                square = filter_.correct_yaw_rate(rate[2], std, biased=True)
-                self._surprises.take("imu", square, LINE_95)
-                self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
+                if self._trust.believed:
+                    self._correct_turning(filter_, rate[2])
                 expected = filter_.mean.item(ACCEL) + filter_.mean.item(ACCEL_BIAS)
                 filter_.correct_accel(accel[0], self._accel_doubt.std(abs(accel[0] - expected)))
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
@@ -126,6 +136,14 @@ class MotionCorrections:
                 if angle is not None:
                     # Understeer and an unknown offset make steering a rough witness of the path.
                     filter_.correct_curvature(math.tan(angle) / self._wheelbase_m, 0.03)
+
+    def _correct_turning(self, filter_: KinematicFilter, rate_radps: float) -> None:
+        off = abs(rate_radps - filter_.yaw_rate_radps - filter_.mean.item(GYRO_BIAS))
+        doubt = self._gyro_doubt.std(off / _USUAL_SURPRISE)
+        std = max(self._gyro.std_radps, doubt)
+        square = filter_.correct_yaw_rate(rate_radps, std, biased=True)
+        self._surprises.take("imu", square, LINE_95)
+        self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
 
     def _correct_speed(self, filter_: KinematicFilter, speed_mps: float) -> None:
         if speed_mps < -0.1:

@@ -122,8 +122,7 @@ class MotionTrack:
             self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
             self._give_up_unsound(filter_)
         elif isinstance(message, HeadingSample):
-            local_yaw = message.yaw_rad + self._convergence_rad
-            self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
+            self._start(message.stamp_ns, message.yaw_rad + self._convergence_rad, yaw_std_rad=0.02)
 
     def _road(self, line: RoadLine) -> bool:
         """Take a map's line where positions say of themselves how far they can be off."""
@@ -167,7 +166,8 @@ class MotionTrack:
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
         self._positions.noise.take(time_s, xy)
-        self._corrections.watch_fix(fix.stamp_ns, xy, self._positions.noise.white_std_m(fix))
+        if self._corrections.watch_fix(fix.stamp_ns, xy, self._positions.noise.white_std_m(fix)):
+            filter_ = self._filter = None  # all that it knows of turning came from the gyro
         if filter_ is None:
             self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
         else:

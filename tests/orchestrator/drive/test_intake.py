@@ -18,7 +18,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Mailbox, Received
 from foretwin.orchestrator.drive.intake import Intake
-from foretwin.orchestrator.drive.telemetry_watch import estimate_object
+from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, estimate_object
 from foretwin.telemetry.estimator.innovations import Surprises
 from foretwin.telemetry.estimator.mounting import Learnt, Mounting
 from foretwin.telemetry.estimator.reported_state import StateConsistency
@@ -26,6 +26,7 @@ from foretwin.telemetry.estimator.told_spreads import Stretched
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
+from tests.telemetry.winding_drive import driven
 
 COVERS = ("foretwin.orchestrator.drive.telemetry_watch",)
 
@@ -222,3 +223,12 @@ def test_a_run_says_how_far_its_states_can_be_trusted() -> None:
     assert estimate["receiver_slips"] == 0
     assert 0.0 < record["speed_std_mps"] < 2.0
     assert 0.0 < record["yaw_std_rad"] < 1.0
+
+
+def test_a_gyro_that_turns_the_other_way_is_told_once() -> None:
+    estimator, _ = driven(-1.0)
+    watch = TelemetryWatch()
+    (warning,) = watch.estimator(estimator)
+    assert warning.startswith("telemetry: the gyro does not turn as positions do")
+    assert watch.estimator(estimator) == []
+    assert TelemetryWatch().estimator(driven(1.0)[0]) == []
