@@ -211,6 +211,8 @@ class VehicleState(msgspec.Struct, frozen=True, kw_only=True):
     of the car; None where the position comes from the vehicle's sensors alone."""
     yaw_valid: bool = True
     """False until the vehicle has moved far enough for a heading to be known."""
+    control_mode: ControlMode = "unknown"
+    """Who drives, as the vehicle last said."""
 
 
 class VehicleTime(msgspec.Struct, frozen=True, kw_only=True):

@@ -119,7 +119,7 @@ class Intake:
         if self._estimator.clock_steps != steps:
             self.signals = SignalLearner()  # by the old clock, they would be the newest for long
         if state is not None:
-            state = self._with_tire_angle(state)
+            state = self._with_mode(self._with_tire_angle(state))
             self.latest = LatestState(state, item.received_mono_ns)
             self.states += 1
         return state
@@ -142,6 +142,11 @@ class Intake:
         return msgspec.structs.replace(
             state, tire_angle_rad=column_of(self._vehicle).tire_rad(wheel)
         )
+
+    def _with_mode(self, state: VehicleState) -> VehicleState:
+        if self.status is None:
+            return state
+        return msgspec.structs.replace(state, control_mode=self.status.control_mode)
 
     def _drive_ns(self, mono_ns: int) -> int | None:
         """Return our monotonic clock at the vehicle's pace, None in lock step."""

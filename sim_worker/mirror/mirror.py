@@ -134,6 +134,8 @@ class Mirror:
         self._change_world(state.stamp_ns)
         self._is_sure = (state.yaw_std_rad or 0.0) <= _SURE_YAW_STD_RAD
         self._track.take(state)
+        if state.control_mode == "manual":
+            self._commands.human_drives(state.stamp_ns)
         measured, before = self._track.state(), self._track.before
         self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
         self._role_manager.before(state, self._free_twin)

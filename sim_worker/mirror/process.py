@@ -86,7 +86,7 @@ class MirrorWorker:
         self._release(everything=True)
 
     def _release(self, *, everything: bool = False) -> None:
-        while self._held and (everything or self._complete(self._held[0].stamp_ns)):
+        while self._held and (everything or self._complete(self._held[0])):
             state = self._held.popleft()
             while self._others and self._others[0].stamp_ns <= state.stamp_ns:
                 for other in self._others.popleft().heard:
@@ -95,9 +95,11 @@ class MirrorWorker:
             if sample is not None:
                 self._bus.publish("mirror", sample, run=self._run_id)
 
-    def _complete(self, stamp_ns: int) -> bool:
+    def _complete(self, state: VehicleState) -> bool:
         """Whether all is there that a state must wait for."""
-        commanded = self._commanded_ns is not None and stamp_ns <= self._commanded_ns
+        stamp_ns, told_ns = state.stamp_ns, self._commanded_ns
+        human = state.control_mode == "manual"  # no command moves the car, if any comes
+        commanded = human or (told_ns is not None and stamp_ns <= told_ns)
         accompanied = bool(self._others) and stamp_ns <= self._others[-1].stamp_ns
         return (commanded or not self._waits) and (accompanied or not self._waits_for_others)
 

@@ -30,12 +30,16 @@ class TwinCommand(NamedTuple):
 
 
 class CommandMemory:
-    """The car's recorded commands, in time; each holds until the next, or until it is lost."""
+    """The car's recorded commands, in time; each holds until the next, or until it is lost.
+
+    What a stack commands while a human drives moves nothing, and never did.
+    """
 
     def __init__(self, vehicle: VehicleParameters, *, keep_s: float) -> None:
         self._vehicle = vehicle
         self._keep_ns = round(keep_s * 1e9)
         self._commands: deque[TwinCommand] = deque()
+        self._human_ns: int | None = None
         self.estimated = False
         """Whether any command received was itself an estimate."""
 
@@ -51,6 +55,7 @@ class CommandMemory:
         latest = self._commands[-1] if self._commands else None
         if latest is not None and command.stamp_ns < latest.stamp_ns - STEP_BACK_NS:
             self._commands.clear()
+            self._human_ns = None
             latest = latest._replace(stamp_ns=command.stamp_ns - 1)
         if latest is not None and command.stamp_ns <= latest.stamp_ns:
             return
@@ -66,6 +71,13 @@ class CommandMemory:
         if np.isfinite(angle) and np.isfinite(command.accel_mps2):
             self._commands.append(TwinCommand(command.stamp_ns, command.accel_mps2, angle))
 
+    def human_drives(self, stamp_ns: int) -> None:
+        """Let no command up to `stamp_ns` have moved the car, those yet to come included."""
+        self._human_ns = stamp_ns
+
+    def _moved(self, stamp_ns: int) -> bool:
+        return self._human_ns is None or stamp_ns > self._human_ns
+
     def forget_before(self, stamp_ns: int) -> None:
         """Drop what lies further back than is kept, the one that still holds excepted."""
         oldest = stamp_ns - self._keep_ns
@@ -76,15 +88,17 @@ class CommandMemory:
         """Return the command that holds at `stamp_ns`; None before the first and once lost."""
         for command in reversed(self._commands):
             if command.stamp_ns <= stamp_ns:
-                return command if stamp_ns - command.stamp_ns <= HELD_NS else None
+                held = stamp_ns - command.stamp_ns <= HELD_NS and self._moved(command.stamp_ns)
+                return command if held else None
         return None
 
     def angles_before(self, stamp_ns: int, *, count: int, step_ns: int) -> Array | None:
         """Return (count,) tyre angles commanded up to `stamp_ns`, latest last; None if unknown."""
         if self.at(stamp_ns) is None:
             return None
-        stamps = np.array([command.stamp_ns for command in self._commands])
-        angles = np.array([command.tire_angle_rad for command in self._commands])
+        moved = [command for command in self._commands if self._moved(command.stamp_ns)]
+        stamps = np.array([command.stamp_ns for command in moved])
+        angles = np.array([command.tire_angle_rad for command in moved])
         at = stamp_ns - step_ns * np.arange(count - 1, -1, -1)
         return np.asarray(angles[np.maximum(np.searchsorted(stamps, at, side="right") - 1, 0)])
 

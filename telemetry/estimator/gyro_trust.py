@@ -37,7 +37,7 @@ class _Chord(NamedTuple):
     gyro_rad: float
 
 
-class _Stretch(NamedTuple):
+class _BegunChord(NamedTuple):
     """Where and when a chord begins, and the sum of the gyro's angles at its fixes so far."""
 
     time_s: float
@@ -54,7 +54,7 @@ class GyroTrust:
         """Whether the gyro's yaw rates are to be used."""
         self._stamp_ns: int | None = None
         self._rate_radps = self._angle_rad = 0.0
-        self._stretch: _Stretch | None = None
+        self._begun: _BegunChord | None = None
         self._chords: tuple[_Chord, ...] = ()
         self._contradicted = False
         """By the latest chord."""
@@ -80,21 +80,21 @@ class GyroTrust:
             return
         time_s = stamp_ns * 1e-9
         angle = self._angle_rad + self._rate_radps * (stamp_ns - self._stamp_ns) * 1e-9
-        stretch = self._stretch
-        if stretch is None or time_s - stretch.time_s > _LONGEST_CHORD_S:
-            self._stretch = _Stretch(time_s, xy_m, angle, 1)
+        begun = self._begun
+        if begun is None or time_s - begun.time_s > _LONGEST_CHORD_S:
+            self._begun = _BegunChord(time_s, xy_m, angle, 1)
             return
-        total, fixes = stretch.angles_rad + angle, stretch.fixes + 1
-        x_m, y_m = (xy_m - stretch.xy_m).tolist()
+        total, fixes = begun.angles_rad + angle, begun.fixes + 1
+        x_m, y_m = (xy_m - begun.xy_m).tolist()
         least_m = max(_LEAST_CHORD_M, _CHORD_DEVIATIONS * std_m)
-        if math.hypot(x_m, y_m) < least_m or time_s - stretch.time_s < _LEAST_CHORD_S:
-            self._stretch = stretch._replace(angles_rad=total, fixes=fixes)
+        if math.hypot(x_m, y_m) < least_m or time_s - begun.time_s < _LEAST_CHORD_S:
+            self._begun = begun._replace(angles_rad=total, fixes=fixes)
             return
-        self._stretch = _Stretch(time_s, xy_m, angle, 1)
-        self._compare(0.5 * (stretch.time_s + time_s), math.atan2(y_m, x_m), total / fixes)
+        self._begun = _BegunChord(time_s, xy_m, angle, 1)
+        self._compare(0.5 * (begun.time_s + time_s), math.atan2(y_m, x_m), total / fixes)
 
     def _begin(self) -> None:
-        self._stretch, self._chords = None, ()
+        self._begun, self._chords = None, ()
 
     def _compare(self, time_s: float, course_rad: float, gyro_rad: float) -> None:
         contradicted, self._contradicted = self._contradicted, False

@@ -123,7 +123,7 @@ LISTED: dict[str, dict[str, Any]] = {
     "TrafficCourse": {"on": True},
     "VehicleFile": {"scale": 1.0},
     "VehicleInfo": {"reference_point": "unknown"},
-    "VehicleState": {"yaw_valid": True},
+    "VehicleState": {"yaw_valid": True, "control_mode": "unknown"},
     "VehicleStatus": {"control_mode": "unknown", "gear": "unknown", "indicator": "unknown"},
     "ViewerSetup": {
         "live": "none", "page_port": 9090, "title": "foretwin", "attribution": OSM,

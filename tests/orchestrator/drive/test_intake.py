@@ -13,6 +13,7 @@ from foretwin.contracts.drive import (
     PlannedTrajectory,
     SignalColour,
     SignalState,
+    VehicleStatus,
 )
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
@@ -39,14 +40,19 @@ class Telemetry:
 
     def __init__(self, *, introduced: bool = True) -> None:
         self.bus, self.mailbox = MemoryBus(), Mailbox(256)
-        for channel in ("gnss", "plan", "end"):
+        for channel in ("gnss", "plan", "status", "end"):
             self.bus.subscribe(channel, self.mailbox, vehicle="ego")
         self.intake = Intake(town().vehicle)
         if introduced:
             self.intake.take_info(INFO)
 
     def send(self, *messages: object) -> list[object]:
-        names = {GnssFix: "gnss", PlannedTrajectory: "plan", DriveEnd: "end"}
+        names = {
+            GnssFix: "gnss",
+            PlannedTrajectory: "plan",
+            VehicleStatus: "status",
+            DriveEnd: "end",
+        }
         for message in messages:
             self.bus.publish(names[type(message)], message, vehicle="ego")  # type: ignore[arg-type]
         taken = []
@@ -92,6 +98,15 @@ def test_a_plan_is_kept_and_gives_no_state() -> None:
     assert telemetry.send(plan) == [None]
     assert telemetry.intake.plan is not None
     assert telemetry.intake.plan.stamp_ns == START_NS
+
+
+def test_a_state_says_who_drives() -> None:
+    telemetry = Telemetry()
+    before, *_ = telemetry.send(FIXES[0])
+    assert before.control_mode == "unknown"  # type: ignore[attr-defined]
+    telemetry.send(VehicleStatus(stamp_ns=FIXES[1].stamp_ns, control_mode="manual"))
+    after, *_ = telemetry.send(FIXES[1])
+    assert after.control_mode == "manual"  # type: ignore[attr-defined]
 
 
 def test_what_was_refused_is_summed_over_all_who_refuse() -> None:

@@ -239,21 +239,27 @@ def test_estimated_or_missing_commands_are_not_independent() -> None:
     assert not later.independent
 
 
-def test_what_a_human_does_after_the_last_command_is_no_gap_of_the_twin() -> None:
-    """Commanded to keep 8 m/s for 4 s; then a human brakes to a stop."""
+@pytest.mark.parametrize("goes_on", [False, True], ids=["silent stack", "stack goes on"])
+def test_what_a_human_does_is_no_gap_of_the_twin(goes_on: bool) -> None:
+    """Commanded to keep 8 m/s; after 4 s a human brakes to a stop, whatever the stack says."""
     mirror = Mirror(CAR, drive_frame=FRAME, commands_recorded=True, window_s=8.0)
     x, speed, gaps = 0.0, 8.0, []
     for k in range(300):
         t = k / 50.0
         speed = max(speed - 0.06, 0.0) if t > 4.0 else speed
         x += speed / 50.0
-        if t <= 4.0:
+        if t <= 4.0 or goes_on:
             push = ControlCommand(stamp_ns=round(t * 1e9), accel_mps2=0.15, tire_angle_rad=0.0)
             mirror.handle_command(push)
-        if sample := mirror.handle_state(state_at(x, 0.0, 0.0, speed, stamp_ns=round(t * 1e9))):
-            gaps.append((t, sample.independent))
-    assert all(told for t, told in gaps if t <= 4.0)
-    assert not any(told for t, told in gaps if t > 4.6)
+        mode = "manual" if t > 4.0 and goes_on else "unknown"
+        state = state_at(x, 0.0, 0.0, speed, stamp_ns=round(t * 1e9))
+        if sample := mirror.handle_state(msgspec.structs.replace(state, control_mode=mode)):
+            gaps.append((t, sample.independent, sample.gap_speed_mps))
+    assert all(told for t, told, _ in gaps if t <= 4.0)
+    assert not any(told for t, told, _ in gaps if t > 4.6)
+    drift_mps = max(faster for t, _, faster in gaps if t <= 4.0)
+    held_mps = max(abs(faster) for *_, faster in gaps) - drift_mps
+    assert held_mps < (0.1 if goes_on else 1.7)
 
 
 def test_states_without_heading_or_out_of_order_are_passed_over() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foretwin.contracts.drive import ControlCommand, ControlMode
 from foretwin.contracts.mailbox import Mailbox, Received, Request
 from foretwin.contracts.roles import CastVehicle, MirrorCast, OtherVehicle, OtherVehicles, UseRoles
 from foretwin.contracts.setup import BusSetup, WorkerSetup
@@ -25,7 +26,9 @@ TICK_NS = 100_000_000
 class Ground:
     """A mirror on a bus in memory, with what it says."""
 
-    def __init__(self, folder: Path, *, lossless: bool) -> None:
+    def __init__(
+        self, folder: Path, *, lossless: bool, others: bool = True, commands: bool = False
+    ) -> None:
         self.bus = MemoryBus()
         setup = WorkerSetup(
             run_id="r",
@@ -37,17 +40,21 @@ class Ground:
             worlds_dir=str(folder),
             vehicle=load_vehicle(),
             drive_frame=FRAME,
-            mirror_cast=MirrorCast(others=(VAN,)),
+            mirror_cast=MirrorCast(others=(VAN,) if others else ()),
+            commands_recorded=commands,
         )
         self.worker = MirrorWorker(setup, self.bus)
         self._inbox, self._said = Mailbox(256), Mailbox(256)
         self.bus.subscribe("state", self._inbox, vehicle="ego")
+        self.bus.subscribe("control", self._inbox, vehicle="ego")
         self.bus.subscribe("other_vehicles", self._inbox, run="r")
         self.bus.serve("use_roles", self._inbox, run="r", process="mirror")
         self.bus.subscribe("mirror", self._said, run="r")
 
-    def own(self, k: int) -> None:
-        self.bus.publish("state", state_at(0.8 * k, 0.0, stamp_ns=k * TICK_NS), vehicle="ego")
+    def own(self, k: int, control_mode: ControlMode = "unknown") -> None:
+        state = state_at(0.8 * k, 0.0, stamp_ns=k * TICK_NS)
+        state = msgspec.structs.replace(state, control_mode=control_mode)
+        self.bus.publish("state", state, vehicle="ego")
         self.settle()
 
     def others(self, k: int) -> None:
@@ -85,6 +92,23 @@ def test_in_lock_step_results_do_not_depend_on_who_arrives_first(
     for sample in samples:
         (van,) = sample.others
         assert van.real.x_m - sample.real.x_m == pytest.approx(30.0, abs=1e-6)
+
+
+def test_in_lock_step_no_state_waits_for_commands_while_a_human_drives(tmp_path: Path) -> None:
+    ground = Ground(tmp_path, lossless=True, others=False, commands=True)
+    for k in range(4):
+        ground.own(k, "autonomous")
+    assert ground.said() == []
+    ground.bus.publish(
+        "control", ControlCommand(stamp_ns=3 * TICK_NS, accel_mps2=0.0), vehicle="ego"
+    )
+    ground.settle()
+    assert len(ground.said()) == 4
+    for k in range(4, 8):
+        ground.own(k, "manual")
+    assert len(ground.said()) == 4
+    ground.own(8, "autonomous")
+    assert ground.said() == []
 
 
 def test_live_no_state_waits(tmp_path: Path) -> None:

@@ -44,6 +44,20 @@ def test_a_command_without_another_after_it_holds_no_longer_once_lost() -> None:
     assert memory.at(4 * HELD_NS) is not None
 
 
+def test_what_is_commanded_while_a_human_drives_moves_nothing() -> None:
+    memory = CommandMemory(CAR, keep_s=10.0)
+    memory.add(command(10, angle_rad=0.3))
+    memory.human_drives(30)
+    memory.add(command(20, angle_rad=0.3))
+    assert memory.at(20) is None
+    assert memory.at(35) is None
+    memory.add(command(40))
+    assert memory.at(40) is not None
+    assert memory.angles_before(40, count=3, step_ns=10) == pytest.approx([0.1, 0.1, 0.1])
+    memory.add(command(40 - 2 * STEP_BACK_NS))
+    assert memory.at(40 - 2 * STEP_BACK_NS) is not None, "the clock has stepped back"
+
+
 def test_a_steering_wheel_is_turned_into_tyres_and_without_either_the_last_angle_holds() -> None:
     memory = CommandMemory(CAR, keep_s=10.0)
     memory.add(ControlCommand(stamp_ns=1, accel_mps2=0.0, steering_wheel_rad=1.6, estimated=True))
