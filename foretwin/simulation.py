@@ -124,19 +124,20 @@ def run_futures(
     way: Way,
     state: VehicleState,
     *,
-    count: int = 64,
+    count: int | None = None,
     futures: Sequence[Future] = (),
     scenarios: Sequence[Scenario | Path | str] | Scenario | Path | str = (),
-    planner: str = "pure_pursuit_idm",
+    planner: str | None = None,
     vehicle: VehicleParameters | Path | str | None = None,
     horizon_s: float = 8.0,
     seed: int = 0,
 ) -> Futures:
     """Play futures of a car that drives along `way` from `state`, side by side.
 
-    `futures` as given, or a mix of `count`: the nominal one first, then others that differ in
-    speed, friction, steering delay and place in the lane, and in which `scenarios` (one or several
-    ids, files or definitions) happen. `vehicle` is a bundled one's name, a file or parameters.
+    `futures` as given, each with a planner of its own, or a mix of `count` (64) by `planner`
+    (`pure_pursuit_idm`): the nominal one first, then others that differ in speed, friction,
+    steering delay and place in the lane, and in which `scenarios` (one or several ids, files or
+    definitions) happen. `vehicle` is a bundled one's name, a file or parameters.
     Raises UserError for what cannot be played: an unknown planner or scenario, one that needs a
     drive, a number out of range, a state that is not on the way.
     """
@@ -149,10 +150,13 @@ def run_futures(
     seed = whole_number("seed", seed, 0, MAX_SEED)
     given = tuple(expect("a future", future, Future) for future in futures)
     _check_cases(given, known)
+    for name, value in {"count": count, "planner": planner}.items():
+        if given and value is not None:
+            raise UserError(f"{name} {value}: of a mix, and goes not with futures")
     mix = given or plan_futures(
-        count=whole_number("count", count, 1, MAX_FUTURES),
+        count=64 if count is None else whole_number("count", count, 1, MAX_FUTURES),
         seed=seed,
-        planners=(planner,),
+        planners=("pure_pursuit_idm" if planner is None else planner,),
         scenarios=known,
     )
     check_futures(mix)

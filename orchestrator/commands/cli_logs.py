@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.cli_across import ACROSS_RUNS, compare
 from foretwin.orchestrator.commands.cli_options import (
     DeclarationOption,
@@ -181,6 +182,10 @@ def repeat(
     from foretwin.orchestrator.commands.repeat import repeat as repeat_future
 
     if physics is not None:
+        if view:
+            raise UserError(
+                f"--view: draws what was recorded, and goes not with --physics {physics}"
+            )
         return elsewhere(folder, future, physics)
     return repeat_future(folder, future, view=view)
 

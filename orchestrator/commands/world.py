@@ -128,14 +128,14 @@ def _region(
 def _write_one(
     world: World, request: WorldRequest, format_: Format, options: ExportOptions
 ) -> CommandResult:
-    from foretwin.world_gen.report.report import note_kind
+    from foretwin.world_gen.report.report import note_counts
 
     format_.write(world, request.out, options)
     s = world.intersection
     place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
-    of_world = {"lanes": world.lanes, "buildings": world.buildings, "notes": world.notes}
-    counts = {name: len(those) for name, those in of_world.items()}
-    text = ", ".join(f"{count} {name}" for name, count in counts.items())
+    kinds = Counter({note.kind: note.count for note in note_counts(world.notes)})
+    counts = {"lanes": len(world.lanes), "buildings": len(world.buildings), "notes": kinds.total()}
+    text = ", ".join(f"{n} {name if n != 1 else name[:-1]}" for name, n in counts.items())
     words = f"{request.out}: {place}, {text}. {world.attribution}"
     body: dict[str, object] = {
         "file": request.out,
@@ -150,7 +150,6 @@ def _write_one(
         body["report"] = report
         words += f"\n{report.as_text().rstrip()}"
     else:
-        kinds = Counter(note_kind(note) for note in world.notes)
         words = "\n".join([words, *kind_lines(kinds)])
     return CommandResult(body, words)
 

@@ -62,10 +62,10 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """W,S,E,N in degrees: only junctions in there."""
     sample: int | None = None
     """So many of these junctions, drawn by the seed; None takes all."""
-    radius_m: float = 150.0
-    """How far a World reaches around its junction."""
+    radius_m: float | None = None
+    """How far a World of the map reaches around its junction; None is 150."""
     service_roads: bool = False
-    """Whether driveways and parking aisles make junctions."""
+    """Whether driveways and parking aisles of the map make junctions."""
     dem: str | None = None
     """Heights of the ground under the map (.hgt, .hgt.zip, GeoTIFF, or a folder); None is flat."""
     scenarios: tuple[str, ...] | None = None
@@ -181,10 +181,12 @@ def _checks(spec: SweepSpec) -> Iterator[tuple[bool, str]]:
     sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
     given = " and ".join(sources) or "none"
     yield len(sources) == 1, f"exactly one of map, worlds and recorded; got {given}"
-    yield spec.dem is None or spec.map is not None, f"dem {spec.dem}: goes with a map alone"
+    for name in ("dem", "radius_m", "service_roads"):
+        value = getattr(spec, name)
+        yield not value or spec.map is not None, f"{name} {value}: goes with a map alone"
     yield len(spec.junctions) > 0, 'junctions: at least one id, or "all"'
-    radius = MIN_RADIUS_M <= spec.radius_m <= MAX_RADIUS_M
-    yield radius, f"radius_m {spec.radius_m:g}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"
+    radius = spec.radius_m is None or MIN_RADIUS_M <= spec.radius_m <= MAX_RADIUS_M
+    yield radius, f"radius_m {spec.radius_m}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"
     for name in ("sample", "places", "samples"):
         number = getattr(spec, name)
         yield number is None or number >= 1, f"{name} {number}: at least 1"
@@ -207,6 +209,10 @@ def _checks(spec: SweepSpec) -> Iterator[tuple[bool, str]]:
     if spec.recorded is not None:
         yield spec.recorded.every_s > 0.0, "recorded.every_s: above 0"
         yield spec.recorded.longest_gap_s > 0.0, "recorded.longest_gap_s: above 0"
+        nobody = spec.recorded.road_users == "none"
+        for name in ("road_user_log", "leave_out"):
+            value = getattr(spec.recorded, name)
+            yield not (nobody and value), f'recorded.{name}: nobody is there by road_users = "none"'
     yield 0 <= spec.seed <= MAX_SEED, f"seed {spec.seed}: 0 to {MAX_SEED}"
 
 

@@ -23,6 +23,7 @@ from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, pars
 from foretwin.orchestrator.worlds.heights import heights_for
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.sim_worker.world_file import load_world
+from foretwin.world_gen.build import DEFAULT_RADIUS_M
 from foretwin.world_gen.elevation.read_dem import dem_digest
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.opening import NodeClip
@@ -111,7 +112,7 @@ def choose_worlds(spec: SweepSpec) -> Building:
     names = [junction.summary.id for junction in chosen]
 
     def build(folder: Path, runner: Runner, progress: Progress) -> SweepWorlds:
-        return _built(part, names, spec.radius_m, WorldStore(folder), runner, progress)
+        return _built(part, names, _radius_m(spec), WorldStore(folder), runner, progress)
 
     return build
 
@@ -205,10 +206,14 @@ def _here() -> WorldBuilder:
     return WorldBuilder()
 
 
+def _radius_m(spec: SweepSpec) -> float:
+    return DEFAULT_RADIUS_M if spec.radius_m is None else spec.radius_m
+
+
 def _clip(spec: SweepSpec) -> NodeClip | LatLonBounds | None:
     """Return what of a large map is needed."""
     if spec.junctions != "all" and len(spec.junctions) == 1:
-        return NodeClip(node_of_id(spec.junctions[0]), spec.radius_m)
+        return NodeClip(node_of_id(spec.junctions[0]), _radius_m(spec))
     return _bounds(spec)
 
 

@@ -18,6 +18,8 @@ from foretwin.world_gen.osm.map_store import MapStore
 
 
 def main() -> None:
+    if len(sys.argv) not in (3, 4):
+        raise SystemExit("usage: python -m tests.world_gen.measure_index MAP FOLDER [SHRINK]")
     if len(sys.argv) > 3:
         shrink = int(sys.argv[3])
         build_map_store.BATCH_BYTES //= shrink

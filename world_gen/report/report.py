@@ -95,7 +95,7 @@ def report_of(world: World) -> WorldReport:
         confidence=_confidence([*every, buildings]),
         junctions=junctions,
         buildings=buildings,
-        notes=_notes(world.notes),
+        notes=note_counts(world.notes),
     )
 
 
@@ -117,7 +117,8 @@ def _confidence(subjects: Sequence[SubjectReport]) -> float | None:
     return round(sum(weight * value for weight, value in known) / total, 2) if total else None
 
 
-def _notes(notes: Sequence[str]) -> tuple[NoteCount, ...]:
+def note_counts(notes: Sequence[str]) -> tuple[NoteCount, ...]:
+    """Return notes counted by kind, the commonest first: what one names as a list counts each."""
     by_kind: dict[str, list[str]] = defaultdict(list)
     number: dict[str, int] = defaultdict(int)
     for note in notes:

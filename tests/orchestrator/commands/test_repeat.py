@@ -235,6 +235,8 @@ def test_on_another_engine_it_says_how_far_apart_they_are(
     assert "mujoco and multibody end 0." in capsys.readouterr().out
     assert run(["repeat", str(swept), future_id, "--physics", "mojuco"]) == 2
     assert _said(capsys).endswith("--physics mojuco: mujoco, multibody, gazebo, carla\n")
+    assert run(["repeat", str(swept), future_id, "--physics", "multibody", "--view"]) == 2
+    assert "--view: draws what was recorded" in _said(capsys)
     assert run(["repeat", str(swept), future_id, "--physics", "carla"]) == 2
     assert "needs CARLA's Python package" in _said(capsys)
 

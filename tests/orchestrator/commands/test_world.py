@@ -5,13 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from lxml import etree
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 from foretwin.orchestrator.worlds.choice import node_of_id
@@ -252,6 +257,25 @@ def test_what_one_world_lacks_is_told_below_its_line(
     ]
     assert run([*place, "--report"]) == 0
     assert capsys.readouterr().out.count("begins beyond the World, … m") == 1
+
+
+def test_notes_are_counted_as_the_report_counts_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What one note names as a list counts each, as in the picture."""
+    written = tmp_path / "ring.svg"
+    for notes, counted in ((["left out: w1"], "1 note."), (["left out: w1, w2, w3"], "3 notes.")):
+        build = partial(_with_notes, build_world, notes)
+        monkeypatch.setattr("foretwin.orchestrator.commands.world.build_world", build)
+        assert run(["world", MAP, "--id", "n10", "--out", str(written)]) == 0
+        line, kind = capsys.readouterr().out.splitlines()
+        assert f", {counted} " in line
+        assert kind.split() == [counted[0], "left", "out"]
+        assert f"note: left out ({counted[0]})" in written.read_text(encoding="utf-8")
+
+
+def _with_notes(build: Callable[..., World], notes: list[str], *args: Any, **more: Any) -> World:
+    return msgspec.structs.replace(build(*args, **more), notes=tuple(notes))
 
 
 def test_each_of_many_worlds_has_its_report(tmp_path: Path) -> None:

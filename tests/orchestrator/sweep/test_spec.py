@@ -38,6 +38,16 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
         ('maps = "a.osm"', "line 1: unknown key 'maps'; did you mean map? one of map"),
         ("", "exactly one of map, worlds and recorded; got none"),
         ('map = "a"\nworlds = "b"', "got map and worlds"),
+        ('worlds = "b"\nradius_m = 150.0', "radius_m 150.0: goes with a map alone"),
+        ('worlds = "b"\nservice_roads = true', "service_roads True: goes with a map alone"),
+        (
+            'recorded = { run = "r", road_users = "none", leave_out = ["7"] }',
+            "recorded.leave_out: ",
+        ),
+        (
+            'recorded = { run = "r", road_users = "none", road_user_log = "log" }',
+            'recorded.road_user_log: nobody is there by road_users = "none"',
+        ),
         ('map = "a"\nsample = 0', "sample 0: at least 1"),
         ('map = "a"\nbbox = "1,2,3"', "four numbers"),
         ('map = "a"\njunctions = ["x1"]', "named n and a number"),

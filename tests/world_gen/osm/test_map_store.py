@@ -195,6 +195,12 @@ def test_two_processes_may_build_at_once(tmp_path: Path) -> None:
     assert_same(MapStore.open(path, folder).clip(EVERYWHERE), read_map(path))
 
 
+def test_who_names_no_map_to_measure_is_told_how() -> None:
+    command = [sys.executable, "-m", "tests.world_gen.measure_index"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240)
+    assert (done.returncode, done.stderr.splitlines()[0][:6]) == (1, "usage:")
+
+
 def measured(path: Path, folder: Path, *shrink: int) -> dict[str, float]:
     command = [sys.executable, "-m", "tests.world_gen.measure_index", str(path), str(folder)]
     done = subprocess.run(
