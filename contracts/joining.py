@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,7 +56,7 @@ def running_drive(folder: Path) -> RunningDrive:
         raise UserError(f"{file}: does not say where the drive listens")
     log = folder / "log.jsonl"
     if not (log.is_file() and is_held(log)):
-        how = f"`foretwin recover {folder}` makes its results readable"
+        how = f"`foretwin recover {shlex.quote(str(folder))}` makes its results readable"
         raise UserError(f"{folder}: the drive was killed; {how}")
     shown = record.get("credentials")
     credentials = Path(shown) if isinstance(shown, str) else None

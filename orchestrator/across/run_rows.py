@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -94,7 +95,8 @@ def row_of_folder(folder: Path) -> RunRow:
         row = drive_row(record, folder=str(folder), record_text=data.decode().rstrip())
         if row.state == RUNNING or any((folder / RESULTS).glob("*.arrows")):
             running = is_locked(folder / LOG)
-            how = "" if running else f"foretwin recover {folder} makes its results readable"
+            name = shlex.quote(str(folder))
+            how = "" if running else f"foretwin recover {name} makes its results readable"
             state = RUNNING if running else KILLED
             return msgspec.structs.replace(row, state=state, remark=how)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

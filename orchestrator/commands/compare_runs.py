@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -112,10 +113,10 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
     yield from _alone_lines(found["alone"], every=every)
     yield from _place_lines(found["places"])
     for name, side in (("newly failing", "second"), ("fixed", "second")):
-        cases = found[name.replace(" ", "_")]
+        cases, folder = found[name.replace(" ", "_")], shlex.quote(str(found[side]["folder"]))
         for one in cases[:_MOST_LISTED]:
             where = f"{one['scenario'] or 'nominal'} at {one['junction_id']}: {one['name']}"
-            yield f"{name}: {where}: foretwin repeat {found[side]['folder']} {one['future_id']}"
+            yield f"{name}: {where}: foretwin repeat {folder} {one['future_id']}"
         if len(cases) > _MOST_LISTED:
             yield f"{name}: {len(cases) - _MOST_LISTED} more: --json"
 

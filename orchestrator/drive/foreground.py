@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import select
+import shlex
 import shutil
 import signal
 import time
@@ -95,7 +96,8 @@ class Foreground:
             return code
         say(
             f"error: the orchestrator ended by {how}, the last of {len(self._ended_by)} times; "
-            f"`foretwin recover {self._plan.folder}` makes readable what there is",
+            f"`foretwin recover {shlex.quote(str(self._plan.folder))}` "
+            "makes readable what there is",
             error=True,
         )
         return EXIT_FAILED

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -75,7 +76,7 @@ def is_unfinished(folder: Path) -> bool:
 
 def made_by_recover(folder: Path) -> str:
     """Return how what could not be written of a run is had from what was, for a trouble's end."""
-    return f"`foretwin recover {folder}` makes it of what was written"
+    return f"`foretwin recover {shlex.quote(str(folder))}` makes it of what was written"
 
 
 def check_finished(folder: Path) -> None:
@@ -86,8 +87,8 @@ def check_finished(folder: Path) -> None:
         pass
     if is_unfinished(folder):  # else it has ended since
         raise UserError(
-            f"{folder}: the drive never came to its end: `foretwin recover {folder}` makes its "
-            "results readable"
+            f"{folder}: the drive never came to its end: "
+            f"`foretwin recover {shlex.quote(str(folder))}` makes its results readable"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -86,7 +87,8 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Chapter:
     if not found:
         text = (
             "The gap was not measured while driving; "
-            f"`foretwin gap {run.called}/{DRIVE_FILE}` measures it from the recording."
+            f"`foretwin gap {shlex.quote(f'{run.called}/{DRIVE_FILE}')}` "
+            "measures it from the recording."
         )
         return Chapter("gap", title, (Prose(text), *_people(people)))
     blocks: list[Block] = [

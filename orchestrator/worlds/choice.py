@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +29,7 @@ def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
             return junction
     raise UserError(
         f"{junction_id}: {opened.file} holds no such intersection; "
-        f"`foretwin intersections {opened.file}` lists all"
+        f"`foretwin intersections {shlex.quote(str(opened.file))}` lists all"
     )
 
 

@@ -14,10 +14,10 @@ from tests.orchestrator.across.test_changes import case, sweep_of
 
 @pytest.fixture
 def sweeps(tmp_path: Path) -> tuple[str, str]:
-    """One, and one in which seven of 28 cases newly fail, at every place."""
+    """One, and one in which seven of 28 cases newly fail, at every place; a space is in its name."""
     first = sweep_of(tmp_path / "before", [case(number) for number in range(28)])
     rows = [case(number, collided=number < 7, min_clearance_m=0.1) for number in range(28)]
-    return str(first), str(sweep_of(tmp_path / "after", rows, seed=4))
+    return str(first), str(sweep_of(tmp_path / "after it", rows, seed=4))
 
 
 def test_what_changed_is_said_with_how_sure_it_is_and_how_to_see_it(
@@ -32,7 +32,7 @@ def test_what_changed_is_said_with_how_sure_it_is_and_how_to_see_it(
     assert "change of the share: +25 [+25, +25] (7 places) %" in said
     assert "min_clearance_m (m)" in said
     assert "worse" in said
-    assert f"newly failing: scp at n0: scp 0: foretwin repeat {sweeps[1]} mine-0" in said
+    assert f"newly failing: scp at n0: scp 0: foretwin repeat '{sweeps[1]}' mine-0" in said
     assert "places where cases changed: 7 of 7" in said
     assert "seed: None → 4" in said
 
