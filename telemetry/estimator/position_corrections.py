@@ -158,10 +158,11 @@ class PositionCorrections:
         if wheels:
             self.noise.surprised(innovation.away_m, innovation.variance_m2(0.0))
         alone = not wheels and not self._measured.anything
+        unfelt = not wheels and not self._measured.fresh("accel_mps2", fix.stamp_ns)
         self._surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
         usual = 1.0 if wander or alone else self._usual
         impossible = _IMPOSSIBLE if alone else _UNBELIEVABLE * usual
-        least_m = max(_LEAST_SLIP_M, turned_m(self._gate.recent) if alone else 0.0)
+        least_m = max(_LEAST_SLIP_M, turned_m(self._gate.recent) if unfelt else 0.0)
         astray = square > impossible and innovation.away_m > least_m
         if alone and not wander and square > PLANE_95 and innovation.away_m > _LEAST_SLIP_M:
             astray = astray or self._facing.goes_sideways(white)
@@ -173,7 +174,7 @@ class PositionCorrections:
             square = innovation.square(white)
         borne_out, self._doubted = bool(self._doubted), ()
         self._usual = max(self._usual * (_UP if square > PLANE_95 * self._usual else _DOWN), 1.0)
-        self._expect(filter_, square, white, alone=alone)
+        self._expect(filter_, square, white, alone=alone, unfelt=unfelt)
         yaw_before = filter_.mean[YAW]
         if (
             abs(filter_.mean[SPEED]) < CREEPING_MPS
@@ -197,8 +198,8 @@ class PositionCorrections:
             if standing:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
-            elif alone and sparse(self._gate.recent):
-                follow_fixes(filter_, self._gate.recent, white)
+            elif unfelt and sparse(self._gate.recent):
+                follow_fixes(filter_, self._gate.recent, white, turning=alone)
         if standing:
             filter_.mean[YAW] = yaw_before
             return Corrected(standing)
@@ -215,11 +216,11 @@ class PositionCorrections:
         self._doubted = ()
 
     def _expect(
-        self, filter_: KinematicFilter, square: float, white_m: float, *, alone: bool
+        self, filter_: KinematicFilter, square: float, white_m: float, *, alone: bool, unfelt: bool
     ) -> None:
-        """Let surprises say how calmly the car is driven, where fixes alone tell of it."""
+        """Let surprises say how calmly the car is driven, where fixes alone tell of pedals."""
         filter_.steady = min(_NIMBLE, _SHOWS_TURNING_M / white_m) if alone else 1.0
-        if not alone or square > _DOUBTFUL:
+        if not unfelt or square > _DOUBTFUL:
             filter_.calm = 1.0
             return
         pace = math.exp(_CALMING * (0.5 * min(square, _DOUBTFUL) - 1.0))

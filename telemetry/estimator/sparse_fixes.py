@@ -45,8 +45,12 @@ def turned_m(fixes: Sequence[LocalFix]) -> float:
     return 0.5 * _HARD_MPS2 * step_s * step_s
 
 
-def follow_fixes(filter_: KinematicFilter, fixes: Sequence[LocalFix], std_m: float) -> None:
+def follow_fixes(
+    filter_: KinematicFilter, fixes: Sequence[LocalFix], std_m: float, *, turning: bool
+) -> None:
     """Correct the motion by what the latest three of sparse fixes, good to `std_m`, show of it.
+
+    `turning` where nothing else tells of it; with headings the speed alone is corrected.
 
     The quadratic's derivatives at its end err by a third of the jerk times the step squared, and
     by the jerk times the step (Taylor).
@@ -62,7 +66,7 @@ def follow_fixes(filter_: KinematicFilter, fixes: Sequence[LocalFix], std_m: flo
     accel_std = math.hypot(2.5 * std_m / step_s**2, _JERK_MPS3 * step_s)
     speed = float(np.hypot(*velocity))
     ahead = np.array([math.cos(filter_.mean[YAW]), math.sin(filter_.mean[YAW])])
-    if speed > max(_MOVING_MPS, 2.0 * velocity_std):
+    if turning and speed > max(_MOVING_MPS, 2.0 * velocity_std):
         way = velocity / speed
         if filter_.may_reverse and float(way @ ahead) < 0.0:
             way, speed = -way, -speed

@@ -54,7 +54,7 @@ def test_the_quadratic_tells_speed_course_and_bend() -> None:
         LocalFix(t, 20.0 * np.array([math.sin(t / 4.0), 1.0 - math.cos(t / 4.0)]))
         for t in (0.0, 1.0, 2.0, 3.0)
     ]
-    follow_fixes(filter_, fixes, 0.02)
+    follow_fixes(filter_, fixes, 0.02, turning=True)
     assert filter_.mean[SPEED] == pytest.approx(5.0, abs=0.2)
     assert filter_.mean[YAW] == pytest.approx(0.75, abs=0.1)
     assert filter_.mean[CURVATURE] == pytest.approx(0.05, abs=0.02)
@@ -88,6 +88,15 @@ def test_a_turn_or_a_stop_between_sparse_fixes_is_no_glitch() -> None:
 def test_who_backs_keeps_the_heading() -> None:
     """It faces east and rolls west at 2 m/s."""
     filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=-2.0, yaw_std_rad=0.1)
-    follow_fixes(filter_, [LocalFix(float(t), np.array([-2.0 * t, 0.0])) for t in range(4)], 0.02)
+    fixes = [LocalFix(float(t), np.array([-2.0 * t, 0.0])) for t in range(4)]
+    follow_fixes(filter_, fixes, 0.02, turning=True)
     assert filter_.mean[YAW] == pytest.approx(0.0, abs=0.02)
     assert filter_.mean[SPEED] == pytest.approx(-2.0, abs=0.1)
+
+
+def test_where_headings_are_heard_fixes_tell_of_the_speed_alone() -> None:
+    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.2, speed_mps=5.0, yaw_std_rad=0.1)
+    fixes = [LocalFix(float(t), np.array([8.0 * t, 0.0])) for t in range(4)]
+    follow_fixes(filter_, fixes, 0.02, turning=False)
+    assert filter_.mean[YAW] == 0.2
+    assert filter_.mean[SPEED] == pytest.approx(8.0 * np.cos(0.2), abs=0.6)
