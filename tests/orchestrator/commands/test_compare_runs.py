@@ -14,7 +14,7 @@ from tests.orchestrator.across.test_changes import case, sweep_of
 
 @pytest.fixture
 def sweeps(tmp_path: Path) -> tuple[str, str]:
-    """One, and one in which seven of 28 cases newly fail, at every place; a space is in its name."""
+    """One, and one (with a space in its name) in which seven of 28 newly fail, at every place."""
     first = sweep_of(tmp_path / "before", [case(number) for number in range(28)])
     rows = [case(number, collided=number < 7, min_clearance_m=0.1) for number in range(28)]
     return str(first), str(sweep_of(tmp_path / "after it", rows, seed=4))
