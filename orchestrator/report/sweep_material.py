@@ -8,6 +8,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -17,6 +18,10 @@ from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
 from foretwin.orchestrator.report.material import KeptWorlds, TableRow, most_critical
+from foretwin.orchestrator.sweep.folder import WORLDS
+from foretwin.orchestrator.sweep.manifest import listed_parts
+from foretwin.orchestrator.sweep.spec import SweepSpec
+from foretwin.orchestrator.sweep.summary import summed
 from foretwin.sim_worker.futures.checked_parquet import read_parquet
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.metrics.table import ROW_METRICS
@@ -57,6 +62,8 @@ class SweepMaterial:
             self.record: dict[str, Any] = json.loads((folder / SUMMARY).read_bytes())
         except (OSError, ValueError) as error:
             raise UserError(f"{folder}: no {SUMMARY} to be read: {error}") from error
+        if "scenarios" not in self.record:
+            self.record |= _until_now(folder, self.record)
         self._worlds = KeptWorlds(folder)
 
     @cached_property
@@ -122,3 +129,15 @@ class SweepMaterial:
     @cached_property
     def _names(self) -> dict[str, str]:
         return {one.intersection.id: one.intersection.name for one in self.worlds()}
+
+
+def _until_now(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
+    """Return what the jobs come to that are there of a sweep that has not come to its end."""
+    try:
+        spec = msgspec.convert(record.get("spec"), SweepSpec)
+        parts = listed_parts(folder)
+    except (OSError, msgspec.ValidationError):
+        return {}
+    counted = summed(spec, parts)
+    del counted["rows_sha256"]  # is of a whole sweep
+    return {**counted, "worlds": len(list((folder / WORLDS).glob("*.world")))}

@@ -32,6 +32,13 @@ class PartEntry(msgspec.Struct, frozen=True, kw_only=True):
 _decoder = msgspec.json.Decoder(PartEntry)
 
 
+def listed_parts(folder: Path) -> tuple[PartEntry, ...]:
+    """Return the last entry of each job that a folder lists, by job; raises OSError."""
+    with (folder / MANIFEST).open("rb") as lines:
+        found = {entry.job: entry for line in lines if (entry := _read(line)) is not None}
+    return tuple(found[job] for job in sorted(found))
+
+
 class Manifest:
     """Entries of the first `jobs` jobs, the last one of each counts; in memory is only where each
     of them stands.

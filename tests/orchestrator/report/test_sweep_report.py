@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,24 @@ def test_a_sweep_that_played_nothing_says_so(tmp_path: Path) -> None:
 
     assert "The sweep holds no rows: nothing was played." in page
     assert "not complete" in page
+
+
+def test_of_a_sweep_that_was_stopped_it_tells_what_is_there(swept: Path, tmp_path: Path) -> None:
+    out = tmp_path / "stopped"
+    shutil.copytree(swept, out)
+    record = json.loads((out / "sweep.json").read_text())
+    lines = (out / "manifest.jsonl").read_text().splitlines()
+    dropped = json.loads(lines[-1])
+    (out / "manifest.jsonl").write_text("\n".join([*lines[:-1], ""]))
+    (out / "rows" / f"job-{dropped['job']:06d}.parquet").unlink()
+    (out / "sweep.json").write_text(json.dumps({"complete": False, "spec": record["spec"]}))
+    gone = {name: sum(one[name] for one in dropped["counts"]) for name in ("placed", "collided")}
+
+    page = html_of(report_of_folders([out]))
+
+    placed, collided = (record[name] - gone[name] for name in gone)
+    assert f"Of {placed} cases that could be played {collided} end in a collision" in page
+    assert "jobs are missing" in page
 
 
 def test_a_sweep_whose_rows_are_damaged_is_refused(swept: Path, tmp_path: Path) -> None:
