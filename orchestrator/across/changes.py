@@ -19,6 +19,7 @@ from foretwin.orchestrator.across.paired_statistics import (
 )
 from foretwin.orchestrator.across.pairs import ComparedSide, paired
 from foretwin.orchestrator.across.run_rows import DRIVE
+from foretwin.sim_worker.metrics.table import METRICS
 
 _ALWAYS = {"min_clearance_m": ("m", "higher"), "progress_m": ("m", "higher")}
 _METRIC = "metric_"
@@ -124,6 +125,7 @@ def _measures(
                 "first": float(np.mean(before)),
                 "second": float(np.mean(after)),
                 "change": change._asdict(),
+                "relative": _is_relative(name),
                 "word": _word(change, better),
             }
         )
@@ -165,6 +167,11 @@ def _with_adjusted(
     for row, of_many in zip(rows, adjusted(p_values), strict=True):
         row["p_adjusted"] = of_many
     return rows
+
+
+def _is_relative(name: str) -> bool:
+    known = METRICS.get(name.removeprefix(_METRIC))
+    return known is not None and known.relative
 
 
 def _word(change: PairedChange, better: str) -> str:

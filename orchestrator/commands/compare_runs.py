@@ -128,13 +128,18 @@ def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
     sure = [row for row in changed if _doubt(row) < LEVEL]
     shown = changed if every else sure[:_MOST_LISTED]
     if shown:
-        yield f"{'measure':<40}{'A':>10}{'B':>10}  {'B minus A, 95 %':<40}p adjusted"
+        yield f"{'measure':<40}{'A':>10}{'B':>10}  {'B minus A, 95 %':<40} p adjusted"
     for row in shown:
         p_value = "" if row["p_adjusted"] is None else f"{row['p_adjusted']:.3g}"
         name = row["measure"] if row["unit"] == "1" else f"{row['measure']} ({row['unit']})"
         yield (
             f"{name:<40}{row['first']:>10.4g}{row['second']:>10.4g}  "
-            f"{_interval(row['change'], 1.0):<40}{p_value:<10}{row['word']}"
+            f"{_interval(row['change'], 1.0):<40} {p_value:<10}{row['word']}"
+        )
+    if relative := [row["measure"] for row in shown if row["relative"]]:
+        yield (
+            f"{', '.join(relative)}: relative to the farthest of the futures of one job: between "
+            "planners, or sweeps of other cases, no measure of progress"
         )
     if every:
         return

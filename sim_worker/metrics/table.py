@@ -16,14 +16,15 @@ Better = Literal["lower", "higher", "neither"]
 
 class Metric(NamedTuple):
     """One row: module and function here that compute it, its unit ("1" for counts, shares and
-    verdicts), which direction is better, what it needs, and whether it has a value for each instant
-    (S, N)."""
+    verdicts), which direction is better, what it needs, whether it has a value for each instant
+    (S, N), and whether it is relative to the other futures that are measured with it."""
 
     computed_by: str
     unit: str
     better: Better
     needs: tuple[Need, ...] = ()
     series: bool = False
+    relative: bool = False
 
 
 _DRIVEN: tuple[Need, ...] = ("path", "ground")
@@ -85,8 +86,8 @@ METRICS = MappingProxyType(
         "right_of_way_violations": Metric(
             "violations.right_of_way_violations", "1", "lower", ("rules",)
         ),
-        "driving_score": Metric("score.driving_score", "1", "higher", _DRIVEN),
-        "epdms": Metric("extended_score.extended_score", "1", "higher", _ROUTED),
+        "driving_score": Metric("score.driving_score", "1", "higher", _DRIVEN, relative=True),
+        "epdms": Metric("extended_score.extended_score", "1", "higher", _ROUTED, relative=True),
         "epdms_no_fault": Metric("extended_score.no_at_fault", "1", "higher", ("ground", "lanes")),
         "epdms_direction": Metric(
             "extended_score.driving_direction", "1", "higher", ("path", "lanes")

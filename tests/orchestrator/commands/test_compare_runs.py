@@ -9,7 +9,9 @@ import pytest
 
 from foretwin.orchestrator.commands.cli import run as command
 from foretwin.orchestrator.commands.compare_runs import _measure_lines
+from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from tests.orchestrator.across.test_changes import case, sweep_of
+from tests.orchestrator.lake.made_runs import TOLD, write
 
 
 @pytest.fixture
@@ -79,7 +81,7 @@ def test_what_is_surest_stands_first() -> None:
     change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
     rows = [
         {"measure": name, "unit": "m", "first": 0.0, "second": 1.0, "change": change,
-         "word": "worse", "p_adjusted": p_value}
+         "word": "worse", "relative": False, "p_adjusted": p_value}
         for name, p_value in (("a", 0.04), ("b", None), ("c", 0.001))
     ]  # fmt: skip
 
@@ -88,11 +90,28 @@ def test_what_is_surest_stands_first() -> None:
     assert [line[0] for line in lines[1:]] == ["c", "a", "b"]
 
 
+def test_a_score_that_is_relative_to_others_of_its_job_is_said_to_be(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same motion has another score where another case beside it went farther."""
+    runs = []
+    for name, score in (("before", 0.5), ("after", 0.75)):
+        out = sweep_of(tmp_path / name, [case(n, metric_driving_score=score) for n in range(28)])
+        metric = [{"name": "driving_score", "unit": "1", "better": "higher"}]
+        write(out / "metrics.parquet", metric, JOB_TABLES["metrics"], TOLD)
+        runs.append(str(out))
+
+    assert command(["compare", *runs]) == 0
+
+    said = capsys.readouterr().out
+    assert "better\nmetric_driving_score: relative to the farthest" in said
+
+
 def test_of_forty_five_measures_those_are_shown_that_are_for_the_worse_or_the_better() -> None:
     change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
     rows = [
         {"measure": f"m{place:02d}", "unit": "m", "first": 0.0, "second": 1.0, "change": change,
-         "word": word, "p_adjusted": 1e-9 / (place + 1)}
+         "word": word, "relative": False, "p_adjusted": 1e-9 / (place + 1)}
         for place, word in enumerate(["worse"] * 9 + ["changed"] * 30 + ["better"] * 6)
     ]  # fmt: skip
 
