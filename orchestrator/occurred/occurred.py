@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -11,7 +13,12 @@ from foretwin.orchestrator.occurred.model_validity import ModelGap, model_gaps
 from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.recorded_messages import CarRecorded
 from foretwin.orchestrator.record.run_state import RESULTS
-from foretwin.sim_worker.analysis.occurred.odd import OddExposure, odd_of
+from foretwin.sim_worker.analysis.occurred.odd import (
+    DrivenSpan,
+    OddExposure,
+    driven_in,
+    odd_of,
+)
 from foretwin.sim_worker.analysis.occurred.recognise import recognise
 from foretwin.sim_worker.analysis.occurred.roads import Roads
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
@@ -32,6 +39,8 @@ class Occurred(msgspec.Struct, frozen=True, kw_only=True):
     triggering: tuple[TriggeringCondition, ...] = ()
     model: tuple[ModelGap, ...] = ()
     """Of each scenario's time, in the order of `scenarios`: how far the model was from the car."""
+    by_software: DrivenSpan | None = None
+    """How much of the drive the driving software drove; None where nobody says that it did."""
     notes: tuple[str, ...] = ()
     """What could not be looked at, in words."""
 
@@ -42,11 +51,20 @@ def occurred_in(run: Path, *, recorded: CarRecorded | None = None) -> Occurred:
     Raises FileNotFoundError for a folder that is none of a run, UserError for a run that goes on
     or holds no motion.
     """
-    return occurred_of(read_run(run, recorded), gaps=kept_rows(run / RESULTS, "gaps"))
+    gaps, segments = (kept_rows(run / RESULTS, name) for name in ("gaps", "driven_segments"))
+    return occurred_of(read_run(run, recorded), gaps=gaps, segments=segments)
 
 
-def occurred_of(drive: DriveRead, *, gaps: list[dict[str, object]]) -> Occurred:
-    """Return what occurred in a drive that was read; `gaps` are rows of the run's table."""
+def occurred_of(
+    drive: DriveRead, *, gaps: list[dict[str, Any]], segments: Sequence[dict[str, Any]] = ()
+) -> Occurred:
+    """Return what occurred in a drive that was read; `gaps` and `segments` (who drove when) are
+    rows of the run's tables."""
+    by_software = [
+        (one["from_stamp_ns"], one["to_stamp_ns"])
+        for one in segments
+        if one["control_mode"] == "autonomous"
+    ]
     sees_others = bool(len(drive.told_ns))
     roads = Roads(drive.worlds, drive.frame)
     found = recognise(drive.ego, drive.detected, roads, vehicle=drive.vehicle)
@@ -69,5 +87,6 @@ def occurred_of(drive: DriveRead, *, gaps: list[dict[str, object]]) -> Occurred:
         ),
         triggering=triggering_conditions(drive.states, drive.ego, drive.told_ns),
         model=model_gaps(found, gaps),
+        by_software=driven_in(drive.ego, by_software) if by_software else None,
         notes=tuple(notes),
     )

@@ -35,12 +35,13 @@ from foretwin.orchestrator.report.material import (
     in_lock_step,
     part_of,
 )
+from foretwin.sim_worker.analysis.occurred.odd import DrivenSpan, OddExposure
 from foretwin.sim_worker.analysis.occurred.rows import THRESHOLDS
 
 ExposureUnit = Literal["km", "h", "pass", "trial"]
 """What events are held against; of trials the events are a share."""
 _STAMPED = re.compile(r"\d{8}-\d{6}-")
-_CONFLICT = "conflicts"
+_CONFLICT, _TAKEOVERS = "conflicts", "takeovers"
 _NAMES = {"ttc_s": "TTC", "pet_s": "PET", "drac_mps2": "DRAC"}
 _UNSEEN = "unknown"
 
@@ -149,15 +150,20 @@ def counted_in(
     if occurred is not None:
         span = next((one for one in occurred.odd if not one.junctions), None)
         parts = [one for one in occurred.odd if span and one.attribute == span.attribute]
-        driven: dict[ExposureUnit, float] = {
-            "km": sum(one.driven_m for one in parts) / 1e3,
-            "h": sum(one.driven_s for one in parts) / 3600.0,
-        }
+        driven = _exposures(parts)
+        by_software = _exposures([occurred.by_software] if occurred.by_software else ())
         for name, events in _happened(record, occurred, rows).items():
-            for unit, exposure in driven.items():
+            for unit, exposure in (by_software if name == _TAKEOVERS else driven).items():
                 found[IndicatorKey(name, unit)] = CountedEvents(events, exposure)
         found |= _by_junction_kind(record, occurred)
     return found | _shares(record)
+
+
+def _exposures(parts: Sequence[OddExposure | DrivenSpan]) -> dict[ExposureUnit, float]:
+    return {
+        "km": sum(one.driven_m for one in parts) / 1e3,
+        "h": sum(one.driven_s for one in parts) / 3600.0,
+    }
 
 
 def _happened(record: Mapping[str, Any], occurred: Occurred, rows: RowCounts) -> dict[str, int]:
@@ -167,7 +173,7 @@ def _happened(record: Mapping[str, Any], occurred: Occurred, rows: RowCounts) ->
         found[_CONFLICT] = sum(one.is_conflict for one in occurred.scenarios)
         found |= {f"{_CONFLICT} by {_NAMES.get(one, one)}": met[one] for one in THRESHOLDS}
     if rows.takeovers is not None:
-        found["takeovers"] = rows.takeovers
+        found[_TAKEOVERS] = rows.takeovers
     alarms = part_of(record, "tuning", "gap", "alarms")
     verdicts = part_of(record, "tuning", "verdicts")
     if alarms is not None:

@@ -71,6 +71,22 @@ class OddExposure(msgspec.Struct, frozen=True, kw_only=True):
     junctions: int = 0
 
 
+class DrivenSpan(msgspec.Struct, frozen=True, kw_only=True):
+    """How much was driven of some of a drive's time, with a known heading."""
+
+    driven_m: float
+    driven_s: float
+
+
+def driven_in(ego: DrivenMotion, spans_ns: Sequence[tuple[int, int]]) -> DrivenSpan:
+    """Return how much was driven from the first stamp of each span to before its second."""
+    known, step_m = _steps(ego)
+    within = np.zeros_like(known)
+    for begin_ns, end_ns in spans_ns:
+        within |= known & (ego.stamp_ns >= begin_ns) & (ego.stamp_ns < end_ns)
+    return DrivenSpan(driven_m=float(step_m[within].sum()), driven_s=float(within.sum()) * STEP_S)
+
+
 def odd_of(
     ego: DrivenMotion,
     courses: Sequence[OtherCourse],
@@ -85,9 +101,7 @@ def odd_of(
 
     `where` is near the drive and `utc` says whether its stamps tell the time of day.
     """
-    known = np.asarray(np.isfinite(ego.xy_m).all(axis=1))
-    moved = np.hypot(*np.diff(ego.xy_m, axis=0, append=ego.xy_m[-1:]).T)
-    step_m = np.where(known, np.nan_to_num(moved), 0.0)
+    known, step_m = _steps(ego)
     values: dict[str, list[str]] = {
         "DrivableAreaType": [],
         "LaneSpecificationLaneCount": [],
@@ -110,6 +124,13 @@ def odd_of(
         for name in NOT_TOLD
     ]
     return tuple(found)
+
+
+def _steps(ego: DrivenMotion) -> tuple[Flags, Array]:
+    """Return where the car is known to be, and how far it moves from there to the next row."""
+    known = np.asarray(np.isfinite(ego.xy_m).all(axis=1))
+    moved = np.hypot(*np.diff(ego.xy_m, axis=0, append=ego.xy_m[-1:]).T)
+    return known, np.where(known, np.nan_to_num(moved), 0.0)
 
 
 def _of_road(roads: Roads, piece: int) -> dict[str, str]:

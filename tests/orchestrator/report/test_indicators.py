@@ -20,7 +20,7 @@ from foretwin.orchestrator.report.indicators import (
     row_counts,
 )
 from foretwin.orchestrator.report.material import RunMaterial
-from foretwin.sim_worker.analysis.occurred.odd import OddExposure
+from foretwin.sim_worker.analysis.occurred.odd import DrivenSpan, OddExposure
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
 from tests.orchestrator.report.told_runs import run_of_nothing, told_run
 
@@ -33,7 +33,8 @@ def scenario(junction_id: str = "", other_id: str = "", *beyond: str) -> Occurre
 
 
 def driven(*, sees_others: bool = True) -> Occurred:
-    """7 km in half an hour: two passes of a crossing, one of a roundabout, three conflicts."""
+    """7 km in half an hour, 2 km of them by software: two passes of a crossing, one of a
+    roundabout, three conflicts."""
     odd = (
         OddExposure(attribute="Road", value="Minor", driven_m=3000.0, driven_s=600.0),
         OddExposure(attribute="Road", value="Distributor", driven_m=4000.0, driven_s=1200.0),
@@ -43,7 +44,8 @@ def driven(*, sees_others: bool = True) -> Occurred:
         scenario("x"), scenario("x"), scenario("x", "7", "ttc_s", "drac_mps2"),
         scenario("x", "8"), scenario("o"), scenario("", "9", "ttc_s"), scenario("o", "9", "pet_s"),
     )  # fmt: skip
-    return Occurred(scenarios=scenarios, sees_others=sees_others, odd=odd)
+    by_software = DrivenSpan(driven_m=2000.0, driven_s=360.0)
+    return Occurred(scenarios=scenarios, sees_others=sees_others, odd=odd, by_software=by_software)
 
 
 RECORD: dict[str, Any] = {
@@ -59,11 +61,14 @@ def test_events_are_held_against_kilometres_and_hours() -> None:
 
     events = {
         "conflicts": 3, "conflicts by TTC": 2, "conflicts by PET": 1, "conflicts by DRAC": 1,
-        "marked events": 4, "takeovers": 1, "alarms of the gap": 2, "verdicts": 1,
+        "marked events": 4, "alarms of the gap": 2, "verdicts": 1,
     }  # fmt: skip
     for name, count in events.items():
         assert found[IndicatorKey(name, "km")] == CountedEvents(count, 7.0)
         assert found[IndicatorKey(name, "h")] == CountedEvents(count, 0.5)
+    # Of what a human drives nobody takes over.
+    assert found[IndicatorKey("takeovers", "km")] == CountedEvents(1, 2.0)
+    assert found[IndicatorKey("takeovers", "h")] == CountedEvents(1, 0.1)
 
 
 def test_a_note_that_came_later_is_no_second_mark() -> None:

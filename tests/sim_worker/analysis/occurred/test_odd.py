@@ -8,9 +8,9 @@ import pytest
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint
-from foretwin.sim_worker.analysis.occurred.odd import NOT_TOLD, OddExposure, odd_of
+from foretwin.sim_worker.analysis.occurred.odd import NOT_TOLD, OddExposure, driven_in, odd_of
 from foretwin.sim_worker.analysis.occurred.roads import Roads
-from foretwin.sim_worker.analysis.occurred.scene import DrivenMotion, courses_of
+from foretwin.sim_worker.analysis.occurred.scene import STEP_S, DrivenMotion, courses_of
 from foretwin.sim_worker.analysis.occurred.triggering import triggering_conditions
 from tests.sim_worker.analysis.occurred.scenes import (
     START_NS,
@@ -52,6 +52,17 @@ def test_every_attribute_is_exposed_over_the_whole_drive() -> None:
         told = of(rows, name).values()
         assert sum(row.driven_m for row in told) == pytest.approx(16.0 * 8.0, abs=1e-6)
         assert sum(row.driven_s for row in told) == pytest.approx(16.1, abs=1e-6)
+
+
+def test_what_was_driven_in_some_of_the_time_is_told_once() -> None:
+    ego = ego_eastwards(16.1)
+    at = [int(ego.stamp_ns[row]) for row in (0, 20, 10, 50, 120, 130)]
+
+    found = driven_in(ego, [(at[0], at[1]), (at[2], at[3]), (at[4], at[5])])
+
+    assert found.driven_s == pytest.approx(60 * STEP_S)
+    assert found.driven_m == pytest.approx(60 * STEP_S * 8.0)
+    assert driven_in(ego, []).driven_m == 0.0
 
 
 def test_roads_junctions_and_others_are_told_by_map_and_detections() -> None:
