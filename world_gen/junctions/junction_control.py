@@ -40,12 +40,19 @@ def control_of(
     A light or sign counts for the nearer junction of the road it stands on, or the one that it
     faces; signs on every road in make an all-way stop, in countries of `all_way_stops` one on
     the junction's own node, too, unless it says which roads it stops. Lights on a crossing of one
-    road in alone stop cars for those on foot, and leave the junction to signs and rules.
+    road in alone, or inside where roads in have stop signs, stop cars for those on foot, and leave
+    the junction to signs and rules.
     """
     inner = [node_tags[node] for node in core if node in node_tags]
     inner += [mark.tags for chain in inside for mark in chain.marks]
+    between = [mark for chain in inside for mark in chain.marks if mark.node not in core]
+    stopped = any(_sign(chain, "stop") for chain in incoming)
     found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
-    found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
+    found.update(
+        mark.node
+        for mark in between
+        if _is_light(mark.tags, 0.0) and not (stopped and _for_walkers(mark.tags))
+    )
     found.update(
         mark.node
         for mark in _marks_on(ring_edges, node_tags)

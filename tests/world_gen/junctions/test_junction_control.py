@@ -49,3 +49,28 @@ def signed(word: str, distances_m: dict[float, float], **tags: str) -> Sketch:
 )
 def test_control(sketch: Sketch, control: str, tmp_path: Path) -> None:
     assert only(sketch.junctions(tmp_path)).summary.control == control
+
+
+@pytest.mark.parametrize(
+    ("word", "crossing", "control"),
+    [
+        ("stop", "traffic_signals", "stop"),
+        ("stop", "no", "signals"),
+        ("", "traffic_signals", "signals"),
+    ],
+)
+def test_light_for_those_on_foot_inside_leaves_a_junction_to_its_stop_signs(
+    word: str, crossing: str, control: str, tmp_path: Path
+) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in ((1, 0, 0), (2, 18, 0), (3, -150, 0), (4, 168, 0), (5, 0, 150)):
+        sketch.node(node, x_m, y_m)
+    sketch.node(6, 18.0, -150.0)
+    sketch.node(7, 9.0, 0.0, highway="traffic_signals", crossing=crossing)
+    sketch.node(8, 0.0, 8.0, highway=word)
+    sketch.node(9, 18.0, -8.0, highway=word)
+    sketch.road(101, [3, 1, 7, 2, 4], "High Street", highway="secondary")
+    sketch.road(102, [5, 8, 1], "North Lane")
+    sketch.road(103, [6, 9, 2], "South Lane")
+    summary = only(sketch.junctions(tmp_path)).summary
+    assert (summary.kind, summary.control) == ("staggered", control)
