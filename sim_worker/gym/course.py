@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,17 +39,31 @@ class Course:
         horizon_s: float = 20.0,
         control_hz: float = 10.0,
         reward: Reward = default_reward,
-        vehicle: VehicleParameters | None = None,
+        vehicle: VehicleParameters | Path | str | None = None,
         threads: int = 1,
     ) -> None:
-        """Compile the World; raises UserError for episodes that cannot be played."""
+        """Compile the World; raises UserError for settings and episodes that cannot be played.
+
+        `vehicle` is a bundled one's name, a file or parameters.
+        """
+        whole = {"num_envs": (count, 1), "nearest": (nearest, 0), "threads": (threads, 1)}
+        for name, (number, least) in whole.items():
+            if not isinstance(number, int | np.integer) or number < least:
+                raise UserError(f"{name} {number!r}: a whole number from {least}")
+        for name, seconds in (("horizon_s", horizon_s), ("control_hz", control_hz)):
+            if not 0.0 < seconds < np.inf:
+                raise UserError(f"{name} {seconds:g}: above 0")
+        if not callable(reward):
+            raise UserError(f"reward {reward!r}: a function of StepFacts")
         self.control: Control = control
         self.action_size = action_size(control)
         self.features = feature_names(nearest)
         self.count, self.control_hz = count, control_hz
         self._nearest, self._reward, self._threads = nearest, reward, threads
         self._most_ticks = max(round(horizon_s * control_hz), 1)
-        self._vehicle = vehicle or load_vehicle()
+        if not isinstance(vehicle, VehicleParameters):
+            vehicle = load_vehicle(vehicle)
+        self._vehicle = vehicle
         self._load(source)
 
     def _load(self, source: Source) -> None:
@@ -90,6 +105,8 @@ class Course:
     def step(self, actions: Array) -> tuple[Array, StepFacts]:
         """Carry out actions (S, A) and return what they were worth (S,), and what happened."""
         wanted = np.asarray(actions, dtype=np.float64).reshape(self.count, self.action_size)
+        if len(wrong := np.flatnonzero(~np.isfinite(wanted).all(axis=1))):
+            raise UserError(f"action {wanted[wrong[0]].tolist()} of row {wrong[0]}: not finite")
         facts = self.rows.step(commands(wanted, self._seen.view, control=self.control))
         return np.asarray(self._reward(facts), dtype=np.float64), facts
 

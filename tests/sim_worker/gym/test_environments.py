@@ -19,7 +19,6 @@ from tests.sim_worker.scenarios.worlds import cross, ring
 
 COVERS = (
     "foretwin.sim_worker.gym",
-    "foretwin.sim_worker.gym.course",
     "foretwin.sim_worker.gym.env",
     "foretwin.sim_worker.gym.picture",
     "foretwin.sim_worker.gym.rows",
@@ -242,6 +241,8 @@ def test_options_choose_the_scenario_its_values_and_the_case() -> None:
         ({"place": 99}, "there is no number 99"),
         ({"place": "here"}, "has no place 'here'; known: "),
         ({"case": 1000}, "there is no number 1000"),
+        ({"cases": 0}, "cases 0: at least 1"),
+        ({"early_or_late_s": -1.0}, "early_or_late_s -1: from 0"),
     ],
 )
 def test_options_that_do_not_fit_say_so(options: dict[str, Any], says: str) -> None:

@@ -1,0 +1,42 @@
+"""Settings and actions of the environments that do not fit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.errors import UserError
+from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
+from tests.sim_worker.scenarios.worlds import ring
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"nearest": -1}, "nearest -1: a whole number from 0"),
+        ({"threads": 0}, "threads 0: a whole number from 1"),
+        ({"horizon_s": 0.0}, "horizon_s 0: above 0"),
+        ({"horizon_s": float("nan")}, "horizon_s nan: above 0"),
+        ({"control_hz": 0.0}, "control_hz 0: above 0"),
+        ({"reward": 3}, "reward 3: a function of StepFacts"),
+        ({"vehicle": "tank"}, "tank"),
+    ],
+)
+def test_settings_that_do_not_fit_say_so(settings: dict[str, Any], says: str) -> None:
+    with pytest.raises((UserError, FileNotFoundError), match=says):
+        JunctionEnv(ring(), cases=4, **settings)
+
+
+def test_a_vector_of_no_cars_is_refused() -> None:
+    for count in (0, 2.5):
+        with pytest.raises(UserError, match=f"num_envs {count}: a whole number from 1"):
+            JunctionVectorEnv(count, world=ring())
+
+
+def test_an_action_that_is_no_number_is_told_and_no_accident() -> None:
+    env = JunctionEnv(ring(), cases=4)
+    env.reset(seed=1)
+    with pytest.raises(UserError, match="of row 0: not finite"):
+        env.step(np.array([0.0, np.nan], dtype=np.float32))
