@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from pathlib import Path
 
 from foretwin.contracts.frames import LocalFrame
 from foretwin.world_gen.countries.outlines import place_at
 from tests.data.junctions.draw import drawings
 from tests.data.junctions.drawing import BREMEN, LEEDS, Drawing
+from tests.world_gen.transformed_maps import OTHER, SIDES, mirrored_tags
 from tests.world_gen.truth_sheet import TrueJunction, TrueMap
-
-OTHER = {
-    "left": "right",
-    "right": "left",
-    "clockwise": "counter-clockwise",
-    "counter-clockwise": "clockwise",
-    "anticlockwise": "clockwise",
-}
-SIDES = re.compile(r"left|right|(?:anti|counter-)?clockwise")
-PLACEMENT = re.compile(r"(left|right)_of:(\d+)")
 
 STEM_WAITS = {
     "16_dead_end_nearby",
@@ -83,24 +73,9 @@ def _mirrored(drawing: Drawing) -> Drawing:
     image = Drawing(BREMEN if keeps_left else LEEDS)
     assert image.frame != LocalFrame(origin)
     image.nodes = {
-        (-x_m, y_m): (number, _mirrored_tags(tags))
+        (-x_m, y_m): (number, mirrored_tags(tags))
         for (x_m, y_m), (number, tags) in drawing.nodes.items()
     }
-    image.ways = [(number, refs, _mirrored_tags(tags)) for number, refs, tags in drawing.ways]
+    image.ways = [(number, refs, mirrored_tags(tags)) for number, refs, tags in drawing.ways]
     image.relations = [SIDES.sub(lambda m: OTHER[m[0]], text) for text in drawing.relations]
-    return image
-
-
-def _mirrored_tags(tags: dict[str, str]) -> dict[str, str]:
-    """Swap the sides in keys and values, the order of lanes, and what is counted from the left."""
-    image = {}
-    for key, value in tags.items():
-        new = value
-        if key.startswith("placement"):
-            lanes = int(tags[key.replace("placement", "lanes")])
-            side, number = PLACEMENT.fullmatch(value).groups()  # type: ignore[union-attr]
-            new = f"{side}_of:{lanes + 1 - int(number)}"
-        if key != "name":
-            new = "|".join(reversed(SIDES.sub(lambda m: OTHER[m[0]], new).split("|")))
-        image[SIDES.sub(lambda m: OTHER[m[0]], key)] = new
     return image

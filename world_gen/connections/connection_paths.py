@@ -153,7 +153,9 @@ def _along_path(
     points = [begin, begin + 2.0 * heading]
     for part in connection.movement.inside:
         lanes = around.lanes_along(part).driven
-        middle = lanes[len(lanes) // 2].left_m if lanes else 0.0
+        # Of two lanes the one at the kerb.
+        from_left = (len(lanes) - (around.driving_side == "left")) // 2
+        middle = lanes[from_left].left_m if lanes else 0.0
         line = offset(without_repeats(part.xy_m), -middle if part.reverse else middle)
         keep = line[1:-1] if len(line) > 3 else (line[:1] + line[-1:]) / 2.0
         points.extend(

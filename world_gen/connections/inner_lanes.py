@@ -85,7 +85,7 @@ def _poses_inside(
         plans = around.lanes_along(part).driven
         if part.edge.length_m < _LONG_EDGE_M or not plans:
             continue
-        left_m = _driver_left_m(plans, _lane_inside(c, starts, len(plans)))
+        left_m = _driver_left_m(plans, _lane_inside(c, starts, len(plans), around))
         key = (part.edge.index, part.reverse, left_m)
         if key not in known:
             known[key] = _poses_along(part.xy_m, left_m)
@@ -93,15 +93,24 @@ def _poses_inside(
     return found
 
 
-def _lane_inside(c: ConnectionDraft, starts: list[int], room: int) -> float:
+def _lane_inside(c: ConnectionDraft, starts: list[int], room: int, around: Surroundings) -> float:
     """Return which of `room` lanes inside a connection takes, from the left; each of its movement
     another, those that the map has no lane for beside the rest, away from what they turn across.
+    Who goes straight on keeps the place from the middle of the road, where there is one.
     """
     number = c.start.plan.number
     rank, spare = starts.index(number), room - len(starts)
-    if c.turn == "straight":
-        return min(number, rank + spare) if spare >= 0 else rank + spare / 2
-    return rank + spare if c.turn == "right" else rank
+    keeps_right = around.driving_side == "right"
+    if c.turn == "right" or (c.turn == "u_turn" and not keeps_right):
+        return rank + spare
+    if c.turn != "straight":
+        return rank
+    if spare < 0:
+        return rank + spare / 2
+    if keeps_right:
+        return min(number, rank + spare)
+    abreast = len(around.lanes_along(c.movement.toward).driven)
+    return max(room - abreast + number, rank)
 
 
 def _driver_left_m(plans: tuple[LanePlan, ...], number: float) -> float:

@@ -32,7 +32,8 @@ def lanes_chosen(
     """
     if len(starts) == 1 and not middle and not _tagged(starts[0]):
         return [starts for _ in ways]
-    order = {lane.id: i for i, lane in enumerate((*middle, *starts))}
+    abreast = (*middle, *starts) if driving_side == "right" else (*starts, *middle)
+    order = {lane.id: i for i, lane in enumerate(abreast)}
     found: list[list[LaneDraft]] = []
     for way, its_room in zip(ways, room, strict=True):
         turning = [lane for lane in middle if way.turn in lane.turns]
@@ -48,10 +49,10 @@ def lanes_chosen(
     # A movement that the arrows leave no lane is none, even where lanes are left over.
     open_ways = [i for i, lanes in enumerate(found) if lanes and room[i]]
     taken = {lane.id for lanes in found for lane in lanes}
-    for lane in (*middle, *starts):
+    for lane in abreast:
         if open_ways and lane.id not in taken:
             found[_nearest(lane, order, ways, found, open_ways)].append(lane)
-    known = {lane.id: lane for lane in (*middle, *starts)}
+    known = {lane.id: lane for lane in abreast}
     ids = [sorted({lane.id for lane in lanes}, key=order.__getitem__) for lanes in found]
     return [[known[name] for name in mine] for mine in ids]
 

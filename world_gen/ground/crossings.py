@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from foretwin.world_gen.lanes.stopping import CROSSING_WIDTH_M
 from foretwin.world_gen.roads.beside_roads import BesideRoads
 from foretwin.world_gen.roads.road_tags import is_crossed
 
+_GOES_ON_COS = math.cos(math.radians(120.0))
+"""A road goes on into another one that bends from it by less than 60°."""
 _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
 
 
@@ -25,7 +29,8 @@ def crossings(
 
     A node is one by its own tags, or since a way tagged as a crossing (`beside`) meets the road.
     """
-    places: dict[int, tuple[int, int, Mapping[str, str]]] = {}
+    places: dict[int, list[tuple[int, int]]] = {}
+    tagged: dict[int, Mapping[str, str]] = {}
     drawn = beside.crossed_at
     amid = {n for c in around.clusters if len(c.legs) > 2 for n in c.nodes} if drawn else set()
     for index, edge in sorted(around.edges.items()):
@@ -37,37 +42,78 @@ def crossings(
                     continue
                 tags = {**way.tags, **(tags or {})}
             if tags.get("crossing") != "no":
-                places.setdefault(node, (index, i, tags))
+                places.setdefault(node, []).append((index, i))
+                tagged[node] = tags
     if not places:
         return ()
     nodes = sorted(places)
-    on = [(around.edges[index].xy_m, i) for index, i, _ in map(places.__getitem__, nodes)]
-    sections = [around.sections[places[node][0]] for node in nodes]
-    at = np.array([xy[i] for xy, i in on])
-    left = left_of(np.array([_ahead(xy, i) for xy, i in on]))
-    kerbs_m = np.array([(section.left_m, section.right_m) for section in sections])
+    across = [_across(places[node], around) for node in nodes]
+    at = np.array([found.at for found in across])
+    left = left_of(np.array([found.along for found in across]))
+    kerbs_m = np.array([found.kerbs_m for found in across])
     lines = np.round(at[:, None] + left[:, None] * kerbs_m[:, :, None], 3)
     return tuple(
         Crossing(
             id=f"n{node}",
             line=line,
             width_m=Quantity(CROSSING_WIDTH_M, "default"),
-            kind=_kind(places[node][2]),
+            kind=_kind(tagged[node]),
             osm_node=node,
-            island=places[node][2].get("crossing:island") == "yes",
+            island=tagged[node].get("crossing:island") == "yes",
         )
         for node, line, within in zip(nodes, lines, around.extent.holds(at).tolist(), strict=True)
         if within
     )
 
 
-def _ahead(xy_m: Array, i: int) -> Array:
-    """Return the unit direction (2,) in which a way (N, 2) leaves its point `i`."""
-    last = len(xy_m) - 2
-    i = min(i, last)
-    while i < last and (xy_m[i + 1] == xy_m[i]).all():
-        i += 1
-    return unit(xy_m[i + 1] - xy_m[i])
+class _Crossed(NamedTuple):
+    """A road where it is crossed: the place and its direction there, both (2,), and how far to
+    the left its kerbs lie."""
+
+    at: Array
+    along: Array
+    kerbs_m: tuple[float, float]
+
+
+def _across(ends: list[tuple[int, int]], around: Surroundings) -> _Crossed:
+    """Return the road at a node by the edges that pass it, each with its point there.
+
+    Of several it is the widest. It runs as the middle of the two pieces that meet at the node:
+    how the map cuts a road into ways, and how these run, changes nothing.
+    """
+
+    def widest(end: tuple[int, int]) -> tuple[float, int, int]:
+        section = around.sections[end[0]]
+        return (round(section.right_m - section.left_m, 3), around.edges[end[0]].way_id, end[0])
+
+    index, i = min(ends, key=widest)
+    line, section = around.edges[index].xy_m, around.sections[index]
+    behind, ahead = _step(line, i, -1), _step(line, i, 1)
+    if behind is None and ahead is not None:
+        behind = _going_on(ahead, ends, around)
+    elif ahead is None and behind is not None:
+        ahead = _going_on(behind, ends, around)
+    along = np.zeros(2) if ahead is None else ahead
+    along = along if behind is None else along - behind
+    return _Crossed(line[i], unit(along), (section.left_m, section.right_m))
+
+
+def _going_on(step: Array, ends: list[tuple[int, int]], around: Surroundings) -> Array | None:
+    """Return the direction in which a road that leaves a node by `step` goes on behind it."""
+    lines = [(around.edges[index].xy_m, i) for index, i in ends]
+    steps = [_step(line, i, way) for line, i in lines for way in (-1, 1)]
+    on = [other for other in steps if other is not None and other @ step < _GOES_ON_COS]
+    return min(on, key=lambda other: float(other @ step), default=None)
+
+
+def _step(xy_m: Array, i: int, way: int) -> Array | None:
+    """Return the unit direction (2,) in which a line (N, 2) leaves its point `i`, ahead or back."""
+    k = i + way
+    while 0 <= k < len(xy_m):
+        if (xy_m[k] != xy_m[i]).any():
+            return unit(xy_m[k] - xy_m[i])
+        k += way
+    return None
 
 
 def _kind(tags: Mapping[str, str]) -> Choice:

@@ -63,7 +63,7 @@ def lateral_positions(
     flip = leg.reverse == outward
     side = -1.0 if flip else 1.0
     found = [
-        (round(side * (lane.left_m + shift_m), 2) + 0.0, lane.reverse == flip)
+        (round(side * (lane.left_m + shift_m), 3) + 0.0, lane.reverse == flip)
         for lane in section.lanes
         if lane.kind in ("driving", "bus")
     ]

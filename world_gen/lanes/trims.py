@@ -27,6 +27,8 @@ _OWN_START_M = 15.0
 """What overlaps a leg farther out belongs to another place, unless it goes on from here."""
 TAPER_M = 6.0
 """Lanes end so far before, and begin so far behind, a place where their number changes."""
+SAME_PLACE_M = 0.01
+"""Lanes whose middles part less run on into each other: it is what widths add up to."""
 TAPER_PER_SHIFT = 7.0
 """So many times as long as lanes shift to the side is what lies between their ends, where roads
 have room for it: paths then turn from their lanes by 15°, a smoothest shift by 15/8 of its mean
@@ -133,7 +135,7 @@ def _plain_trims(
     """Lanes of one road run on where they fit (None); where lanes change there is a taper."""
     first, second = cluster.legs
     before, behind = _positions(cluster, sections, shifts_m)
-    fits = before == behind
+    fits = len(before) == len(behind) and np.allclose(before, behind, rtol=0.0, atol=SAME_PLACE_M)
     if fits and -dot(heads[first.key], heads[second.key]) > SHARPEST_BEND_COS:
         return None
     room = (0.0 if fits else min(TAPER_M, TAPER_SHARE * leg.edge.length_m) for leg in cluster.legs)

@@ -94,7 +94,12 @@ def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection]) -> _
     into = [sections[leg.edge.index].along(reverse=not leg.reverse) for leg in legs]
     out = [sections[leg.edge.index].along(reverse=leg.reverse) for leg in legs]
     shape = (len(clusters), len(clusters[0].legs))
-    width = [(a.driven or b.driven)[-1:] for a, b in zip(into, out, strict=True)]
+    width = [
+        (a.driven or b.driven)[-1:]
+        if leg.edge.driving_side == "right"
+        else (a.driven or b.driven)[:1]
+        for leg, a, b in zip(legs, into, out, strict=True)
+    ]
     lit = [c.junction is not None and c.junction.summary.control == "signals" for c in clusters]
     importance = np.array([_importance(leg.edge.road_class) for leg in legs]).reshape(shape)
     mixed_m = [rules_of(c.legs[0].edge.country).mixed_corner_m for c in clusters]

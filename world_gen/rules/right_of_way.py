@@ -20,7 +20,8 @@ Rules stand in the order in which they apply:
    keeps right (§8 (1); Code de la route R415-5; UVC 11-401, also at all-way stops), mirrored
    where it keeps left. British law knows no such rule (Highway Code 146): it is a default there.
    Some that keep left let the right go first (`countries.rules.first_from`).
-8. Roads that run together: who goes straighter (§18 (3)), then who has the shorter way.
+8. Roads that run together: who goes straighter (§18 (3)), then who has the shorter way; of two
+   lanes of one road that are alike in that, the one at the kerb waits.
 """
 
 from __future__ import annotations
@@ -230,7 +231,7 @@ def _answer(
         if past_a != _passes(a, b, driving_side):
             return Yielding(past_a, "roundabout", "tagged")
     if a.road == b.road or (a.on_ring and b.on_ring):
-        return _beside(a, b)
+        return _beside(a, b, driving_side)
     oncoming = a.opposite == b.road and b.opposite == a.road
     if oncoming and a.turn_weight == b.turn_weight == 0 and crossing:
         oncoming = False  # two bent roads that cross at a sharp angle
@@ -255,7 +256,7 @@ def _answer(
         # Who is seen to the right comes with a heading turned to the left.
         rule: YieldRule = "near_side" if first_from == driving_side else "far_side"
         return Yielding((angle > 0.0) == (first_from == "right"), rule, "default")
-    return _beside(a, b)
+    return _beside(a, b, driving_side)
 
 
 def _standing_at(way: ConnectionFacts, area: Array, point: Array, merging: bool) -> Standing:
@@ -285,11 +286,15 @@ def _across(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
     return Yielding(a.draft.id > b.draft.id, "turn_across" if a.turn_weight else "order", "default")
 
 
-def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
+def _beside(a: ConnectionFacts, b: ConnectionFacts, driving_side: DrivingSide) -> Yielding:
     if a.turn_weight != b.turn_weight:
         return Yielding(a.turn_weight > b.turn_weight, "merge_order", "inferred")
     if abs(a.bend_rad - b.bend_rad) > math.radians(1.0):
         return Yielding(a.bend_rad > b.bend_rad, "merge_order", "inferred")
     if abs(a.length_m - b.length_m) > 0.05:
         return Yielding(a.length_m > b.length_m, "merge_order", "default")
+    if a.road == b.road and a.draft.start is not b.draft.start:
+        gap_m = a.draft.start.plan.left_m - b.draft.start.plan.left_m
+        to_right = (gap_m < 0.0) != a.road[1]
+        return Yielding(to_right == (driving_side == "right"), "merge_order", "default")
     return Yielding(a.draft.id > b.draft.id, "merge_order", "default")

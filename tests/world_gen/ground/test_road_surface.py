@@ -13,12 +13,12 @@ from tests.world_gen.sketch import MANCHESTER, Sketch
 
 
 def folded(folder: Path) -> World:
-    """Return a street that goes 34 m south and turns to the east, and a wider one that lies on it
-    as far as the bend."""
+    """Return a street that goes 34 m south and turns to the east, and a wider one, of wider lanes,
+    that lies on it as far as the bend."""
     sketch = Sketch(MANCHESTER)
     for node, place_m in {1: (0.0, 0.0), 2: (0.0, -34.0), 3: (0.0, 0.0), 4: (85.0, 0.0)}.items():
         sketch.node(node, *place_m)
-    sketch.way(101, [3, 2, 4], highway="residential")
+    sketch.way(101, [3, 2, 4], highway="residential", width="5.4")
     sketch.way(102, [3, 2, 1], highway="residential", cycleway="lane")
     path = folder / "drawn.osm"
     path.write_text(sketch.xml(), encoding="utf-8")
