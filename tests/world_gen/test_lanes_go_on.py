@@ -12,7 +12,6 @@ from tests.world_gen.drawn_maps import STREET, drawn_map, world_of
 
 COVERS = (
     "foretwin.world_gen.lanes.lane_curves",
-    "foretwin.world_gen.lanes.places",
     "foretwin.world_gen.lanes.reference_lines",
     "foretwin.world_gen.lanes.transitions",
 )

@@ -23,6 +23,7 @@ from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.cross_section import cross_section, widened
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.places import whole_where_led_through
 from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
@@ -110,13 +111,14 @@ def surroundings(
     sections = _sections(index, edges)
     sections |= {i: widened(sections[i], factor) for i, factor in widths.items()}
     clusters = _clusters(index, made_for, edges, extent)
+    shifts = transition_shifts(clusters, edges, sections)
+    heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
+    cut_m = trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags)
+    clusters = whole_where_led_through(clusters, made_for, cut_m, extent)
     whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
     inner = {i for junction in whole.values() for i in junction.inner}
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
-    shifts = transition_shifts(clusters, edges, sections)
-    heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
     side = made_for[0].summary.driving_side if made_for else side_of(edges.values())
-    cut_m = trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags)
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts.world import Road
+from foretwin.geometry.polyline import points_at
+from foretwin.world_gen.extent import MIN_PIECE_M, Extent
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.legs import opposed
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
@@ -47,3 +52,40 @@ def without_dead_places(roads: Iterable[Road], led_through: frozenset[str]) -> I
             yield road
         else:
             yield msgspec.structs.replace(road, from_place=ends[0], to_place=ends[1])
+
+
+def whole_where_led_through(
+    clusters: tuple[Cluster, ...],
+    made_for: tuple[Junction, ...],
+    trims_m: Mapping[tuple[int, bool], float],
+    extent: Extent,
+) -> tuple[Cluster, ...]:
+    """Return the clusters, none whole of junctions that no road leads through before the edge."""
+    named = {junction.summary.id for junction in made_for}
+    places = {
+        leg.key: (c.junction.summary.id, leg)
+        for c in clusters
+        if c.whole and c.junction is not None and c.junction.summary.id not in named
+        for leg in c.legs
+    }
+    if not places:
+        return clusters
+    ends_inside = extent.holds(np.array([leg.xy_m[-1] for _, leg in places.values()])).tolist()
+    near = [
+        leg
+        for (_, leg), inside in zip(places.values(), ends_inside, strict=True)
+        if inside
+        or extent.holds(points_at(leg.xy_m, np.array([trims_m[leg.key] + MIN_PIECE_M]))).all()
+    ]
+    through = places_led_through(
+        places,
+        [leg.key for leg in near if leg.allowed],
+        [leg.back.key for leg in near if leg.back.allowed],
+    )
+    dead = {place for place, _ in places.values()} - through
+    return tuple(
+        msgspec.structs.replace(c, whole=False)
+        if c.junction is not None and c.junction.summary.id in dead
+        else c
+        for c in clusters
+    )
