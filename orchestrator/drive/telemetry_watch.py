@@ -12,6 +12,13 @@ from foretwin.telemetry.estimator.reported_state import StateConsistency
 REARM_NS = 5_000_000_000
 """A channel that was overdue must have come for this long before it is named once more."""
 
+_LIKELY = {
+    "imu": "is its z axis up, are its yaw rates in rad/s, to the left positive?",
+    "steering": "is its angle in rad, to the left positive?",
+    "speed": "is it in m/s, forwards positive?",
+    "heading": "is it in rad, counter-clockwise from east?",
+}
+
 
 class TelemetryWatch:
     """Turns overdue channels, steps of the clock and samples of a wrong type into warnings.
@@ -26,7 +33,7 @@ class TelemetryWatch:
         self._silent: tuple[str, ...] = ()
         self._steps = 0
         self._wrong: set[str] = set()
-        self._gyro_told = False
+        self._left_out: set[str] = set()
 
     def overdue(self, channels: tuple[str, ...], now_ns: int) -> list[str]:
         """Take which channels are overdue now; return a warning of those that are so newly."""
@@ -45,8 +52,8 @@ class TelemetryWatch:
         return [f"telemetry overdue: {', '.join(newly)}; states go on without"]
 
     def estimator(self, estimator: StateEstimator) -> list[str]:
-        """Return a warning for each new step of the clock, each channel of a wrong type, and a
-        gyro that does not turn as the car does."""
+        """Return a warning for each new step of the clock, each channel of a wrong type, and each
+        that tells of another motion than positions."""
         steps = estimator.clock.steps if estimator.clock_steps > self._steps else ()
         warnings = [
             f"telemetry: the vehicle's clock stepped by {step.step_ns * 1e-9:+z.3f} s "
@@ -59,11 +66,11 @@ class TelemetryWatch:
                 self._wrong.add(reason)
                 channel = reason.removesuffix("_wrong_type")
                 warnings.append(f"telemetry: {channel} carries messages of another type; refused")
-        if estimator.gyro_refused and not self._gyro_told:
-            self._gyro_told = True
+        for channel in sorted(estimator.left_out - self._left_out):
+            self._left_out.add(channel)
             warnings.append(
-                "telemetry: the gyro does not turn as positions do: left out until it does; its z "
-                "axis should point up, its yaw rates be in rad/s, to the left positive"
+                f"telemetry: {channel} does not go with positions: left out until it does; "
+                f"{_LIKELY[channel]}"
             )
         return warnings
 

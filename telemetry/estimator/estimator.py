@@ -17,7 +17,6 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
 from foretwin.telemetry.estimator.map_aid import RoadLine
-from foretwin.telemetry.estimator.motion_corrections import TURNS_OTHERWISE
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import Reordering
 from foretwin.telemetry.estimator.reported_state import StateConsistency
@@ -130,9 +129,9 @@ class StateEstimator:
         return self._track.consistency
 
     @property
-    def gyro_refused(self) -> bool:
-        """Whether the gyro was ever found not to turn as positions do."""
-        return self._track.skipped[TURNS_OTHERWISE] > 0
+    def left_out(self) -> frozenset[str]:
+        """The channels whose samples do not go with positions, as far as these tell."""
+        return self._track.left_out
 
     def handle(
         self, channel: str, message: Any, *, received_ns: int | None = None

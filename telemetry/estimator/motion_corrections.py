@@ -9,15 +9,13 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.filter_state import ACCEL, ACCEL_BIAS, GYRO_BIAS, SPEED, YAW
 from foretwin.telemetry.estimator.gyro import Gyro
-from foretwin.telemetry.estimator.gyro_trust import GyroTrust
 from foretwin.telemetry.estimator.innovations import LINE_95, SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
 from foretwin.telemetry.estimator.mounting import MountingLearner
+from foretwin.telemetry.estimator.sensor_trust import LEFT_OUT, SensorTrust
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
-TURNS_OTHERWISE = "imu_turns_otherwise"
-"""Why a gyro's yaw rate is not used: it does not turn as positions do."""
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
 _STOPPING_MPS, _STOPPING_S, _STOPPING_MPS2 = 1.0, 0.5, 4.0
@@ -47,7 +45,7 @@ class MotionCorrections:
         self._gyro_doubt = Doubt(0.0)
         self._accel_doubt = Doubt(0.5)
         self._gyro = Gyro()
-        self._trust = GyroTrust()
+        self.trust = SensorTrust()
         self._stands = False
         self._nought_ns: int | None = None
         self.gyro_bias_radps = 0.0
@@ -65,22 +63,31 @@ class MotionCorrections:
         other._gyro_doubt = shallow_copy(self._gyro_doubt)
         other._accel_doubt = shallow_copy(self._accel_doubt)
         other._gyro = shallow_copy(self._gyro)
-        other._trust = self._trust.copy()
+        other.trust = self.trust.copy()
         other._surprises = surprises
         other.mounting = self.mounting.copy()
         return other
 
-    def watch(self, message: Any, *, standing: bool) -> None:
-        """Let the gyro show its noise, and its bias while measured speed says the car stands."""
-        if isinstance(message, ImuSample):
-            standing = standing and self._measured.fresh("speed_mps", message.stamp_ns)
-            self._gyro.take(message.stamp_ns, message.rate_radps[2], standing=standing)
-            self._trust.turn(message.stamp_ns, message.rate_radps[2] - self._gyro.bias_radps)
-            if not self._trust.believed:
-                self._measured.disbelieve("yaw_rate_radps", TURNS_OTHERWISE)
-            elif self._measured.fresh("speed_mps", message.stamp_ns):
-                rate = message.rate_radps[2] - self.gyro_bias_radps
-                self.mounting.turn(message.stamp_ns, rate, self._measured.speed_mps)
+    def watch(self, channel: str, message: Any, *, standing: bool) -> bool:
+        """Let a sample show what its sensor is worth; returns whether it is to be used.
+
+        The gyro shows its noise, and its bias while measured speed says that the car stands.
+        """
+        stamp_ns, angle = message.stamp_ns, self._measured.tire_angle_rad
+        curvature = None if angle is None else math.tan(angle) / self._wheelbase_m
+        bias = self._gyro.bias_radps
+        self.trust.take(message, gyro_bias_radps=bias, curvature_pm=curvature)
+        believed = channel not in self.trust.left_out
+        if not believed:
+            self._measured.disbelieve(*LEFT_OUT[channel])
+        if not isinstance(message, ImuSample):
+            return believed
+        moving = self._measured.fresh("speed_mps", stamp_ns)
+        self._gyro.take(stamp_ns, message.rate_radps[2], standing=standing and moving)
+        if believed and moving:
+            rate = message.rate_radps[2] - self.gyro_bias_radps
+            self.mounting.turn(stamp_ns, rate, self._measured.speed_mps)
+        return True  # its forces are
 
     def stands(self, sample: SpeedSample, filter_: KinematicFilter | None) -> bool:
         """Whether the wheels say, believably, that the car stands; takes each of their samples."""
@@ -95,16 +102,29 @@ class MotionCorrections:
         self._stands = faster_mps < _STOPPING_MPS or braked
         return self._stands
 
-    def watch_fix(self, stamp_ns: int, xy_m: Array, std_m: float) -> bool:
+    def known_speed_mps(self, stamp_ns: int, filter_: KinematicFilter | None) -> float:
+        """Return the car's speed without a fix of now: the wheels', inf if any, or the filter's."""
+        if self._measured.fresh("speed_mps", stamp_ns):
+            return math.inf if abs(self._measured.speed_mps) > 0.5 else 0.0
+        return 0.0 if filter_ is None else abs(filter_.mean.item(SPEED))
+
+    def watch_fix(
+        self, stamp_ns: int, xy_m: Array, std_m: float, *, convergence_rad: float
+    ) -> bool:
         """Let a believed fix show where the antenna is, as far as wheels and gyro are heard.
 
-        Returns whether it shows as well that the gyro has led the filter astray.
+        Returns whether it shows as well that a sensor has led the filter astray.
         """
-        believed = self._trust.believed
-        self._trust.take(stamp_ns, xy_m, std_m)
+        before = self.trust.left_out
+        self.trust.take_fix(stamp_ns, xy_m, std_m, convergence_rad=convergence_rad)
         if self._measured.fresh("speed_mps", stamp_ns):
             self.mounting.take(stamp_ns, xy_m, std_m, self._measured.speed_mps)
-        return believed and not self._trust.believed
+        newly = self.trust.left_out - before
+        for channel in newly:
+            self._measured.disbelieve(*LEFT_OUT[channel])
+        if "speed" in newly:
+            self._gyro = Gyro()  # its bias was learnt while wheels said that the car stood
+        return bool(newly)
 
     def begin(self, filter_: KinematicFilter) -> None:
         """Give a new filter what is known of the sensors already."""
@@ -119,7 +139,7 @@ class MotionCorrections:
             case SpeedSample(speed_mps=speed):
                 self._correct_speed(filter_, speed)
             case ImuSample(accel_mps2=accel, rate_radps=rate):
-                if self._trust.believed:
+                if "imu" not in self.trust.left_out:
                     self._correct_turning(filter_, rate[2])
                 expected = filter_.mean.item(ACCEL) + filter_.mean.item(ACCEL_BIAS)
                 filter_.correct_accel(accel[0], self._accel_doubt.std(abs(accel[0] - expected)))

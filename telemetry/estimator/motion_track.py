@@ -36,8 +36,7 @@ class MotionTrack:
     """Takes samples one by one and says where base_link is, and how it moves.
 
     Positions whose source states no standard deviation, or only positions of at most 5 cm, are
-    passed through unchanged at their own stamp; rougher ones, and those with other sensors beside
-    them, are fused. `skipped` counts refused input by reason.
+    passed through unchanged at their own stamp; rougher ones, and those with other sensors, fused.
     """
 
     def __init__(
@@ -98,7 +97,7 @@ class MotionTrack:
             return self._road(message)
         if not self._measured.take(channel, message):
             return False
-        self._motion(message)
+        self._motion(channel, message)
         return True
 
     @property
@@ -113,11 +112,12 @@ class MotionTrack:
 
     # Samples beside positions.
 
-    def _motion(self, message: Any) -> None:
+    def _motion(self, channel: str, message: Any) -> None:
         filter_ = self._advance(message.stamp_ns)
+        if not self._corrections.watch(channel, message, standing=self._standing):
+            return
         if isinstance(message, SpeedSample):
             self._standing = self._corrections.stands(message, filter_)
-        self._corrections.watch(message, standing=self._standing)
         if filter_ is not None:
             self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
             self._give_up_unsound(filter_)
@@ -144,7 +144,8 @@ class MotionTrack:
         time_s = (fix.stamp_ns - self._start_ns) * 1e-9
         recent = self._gate.recent
         filter_ = self._advance(fix.stamp_ns)
-        if self._gate.frozen(time_s, xy, speed_mps=self._known_speed_mps(fix.stamp_ns)):
+        speed_mps = self._corrections.known_speed_mps(fix.stamp_ns, filter_)
+        if self._gate.frozen(time_s, xy, speed_mps=speed_mps):
             self.skipped["gnss_repeated"] += 1  # a receiver's last answer, sent once more
             return False
         lever = self._lever[:2]
@@ -166,8 +167,9 @@ class MotionTrack:
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
         self._positions.noise.take(time_s, xy)
-        if self._corrections.watch_fix(fix.stamp_ns, xy, self._positions.noise.white_std_m(fix)):
-            filter_ = self._filter = None  # all that it knows of turning came from the gyro
+        white_m, turned_rad = self._positions.noise.white_std_m(fix), self._convergence_rad
+        if self._corrections.watch_fix(fix.stamp_ns, xy, white_m, convergence_rad=turned_rad):
+            filter_, self._filter, self._standing = None, None, False  # a sensor led it astray
         if filter_ is None:
             self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
         else:
@@ -176,12 +178,6 @@ class MotionTrack:
         if self._filter is not None:
             self._positions.check_told(self._filter, fix, time_s, xy)
         return True
-
-    def _known_speed_mps(self, stamp_ns: int) -> float:
-        """Return the car's speed without the fix of now: the wheels', else the filter's."""
-        if self._measured.fresh("speed_mps", stamp_ns):
-            return math.inf if abs(self._measured.speed_mps) > 0.5 else 0.0
-        return 0.0 if self._filter is None else abs(float(self._filter.mean[SPEED]))
 
     def _correct(self, filter_: KinematicFilter, xy: Array, fix: GnssFix, verdict: Verdict) -> None:
         if verdict == "relocate":
@@ -259,8 +255,7 @@ class MotionTrack:
     def state(self, stamp_ns: int, *, fix: GnssFix | None = None) -> VehicleState:
         """Return the state at `stamp_ns`, at or after all samples taken.
 
-        `fix` is the believed position of this very stamp, None between positions. Raises
-        ValueError before there is any position.
+        `fix` is the position of this very stamp, if any. Raises ValueError before the first one.
         """
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
@@ -283,6 +278,11 @@ class MotionTrack:
     def gyro_bias_radps(self) -> float:
         """The gyro's bias as learnt so far; 0 before the heading is known."""
         return 0.0 if self._filter is None else float(self._filter.mean[GYRO_BIAS])
+
+    @property
+    def left_out(self) -> frozenset[str]:
+        """See `StateEstimator.left_out`."""
+        return self._corrections.trust.left_out
 
     @property
     def consistency(self) -> StateConsistency:

@@ -1,15 +1,31 @@
-"""Two minutes of turns to both sides, measured by a gyro that may be wrong."""
+"""Two minutes of turns to both sides, and what sensors say of them that may be wrong."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, VehicleState
+import numpy as np
+
+from foretwin.contracts.drive import (
+    HeadingSample,
+    ImuSample,
+    SpeedSample,
+    SteeringSample,
+    VehicleState,
+)
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import fix, info
 
 TICK_S = 0.02
 TICKS = 6000
+WHEELBASE_M = 2.7
+Told = Callable[[float], float]
+"""What a sensor makes of the truth."""
+
+
+def truly(value: float) -> float:
+    return value
 
 
 def winding() -> list[tuple[float, float, float, float, float]]:
@@ -28,23 +44,47 @@ WINDING = winding()
 
 
 def driven(
-    gain: float, *, right_from_s: float = math.inf, **sensors: bool
+    *,
+    gyro: Told | None = truly,
+    wheels: Told | None = None,
+    heading: Told | None = None,
+    steering: Told | None = None,
+    right_from_s: float = math.inf,
+    fix_std_m: float = 0.02,
+    fix_every: int = 5,
 ) -> tuple[StateEstimator, list[tuple[int, VehicleState]]]:
-    """Drive with a gyro that shows `gain` times the turning until it is mended."""
+    """Drive with sensors as told, none where None, which are right from a time on.
+
+    Fixes err by `fix_std_m`: by white noise, from half a metre on slowly wandering for the most
+    part. Returns the estimator, and the tick and the state of each fix.
+    """
     estimator, states = StateEstimator(info()), []
-    for tick, (speed, rate, heading, x, y) in enumerate(WINDING):
+    noise, wander = np.random.default_rng(3).normal(0.0, 1.0, (2, TICKS, 2)), np.zeros(2)
+    stays = math.exp(-fix_every * TICK_S / 30.0) if fix_std_m >= 0.5 else 0.0
+    for tick, (speed, rate, yaw, x, y) in enumerate(WINDING):
         time_s = tick * TICK_S
         stamp_ns = round(time_s * 1e9)
-        told = rate if time_s >= right_from_s else gain * rate
-        imu = ImuSample(stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.8), rate_radps=(0.0, 0.0, told))
-        estimator.handle("imu", imu)
-        if sensors.get("headings"):
-            yaw_rad = math.remainder(heading, math.tau)
-            estimator.handle("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw_rad))
-        if sensors.get("wheels"):
-            estimator.handle("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=speed))
-        if tick % 5 == 0:
-            state = estimator.handle(*fix(time_s, x, y, 0.02))
+        if time_s >= right_from_s:
+            gyro, wheels, heading, steering = (
+                one and truly for one in (gyro, wheels, heading, steering)
+            )
+        if gyro is not None:
+            rates = 0.0, 0.0, gyro(rate)
+            estimator.handle(
+                "imu", ImuSample(stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.8), rate_radps=rates)
+            )
+        if heading is not None:
+            told = math.remainder(heading(yaw), math.tau)
+            estimator.handle("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=told))
+        if wheels is not None:
+            estimator.handle("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=wheels(speed)))
+        if steering is not None:
+            angle = steering(math.atan(WHEELBASE_M * rate / speed))
+            estimator.handle("steering", SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=angle))
+        if tick % fix_every == 0:
+            wander = stays * wander + math.sqrt(1.0 - stays**2) * noise[0, tick]
+            off = fix_std_m * (wander + 0.1 * noise[1, tick] if stays else noise[1, tick])
+            state = estimator.handle(*fix(time_s, x + off[0], y + off[1], fix_std_m))
             if state is not None:
                 states.append((tick, state))
     return estimator, states

@@ -240,10 +240,11 @@ def test_a_run_says_how_far_its_states_can_be_trusted() -> None:
     assert 0.0 < record["yaw_std_rad"] < 1.0
 
 
-def test_a_gyro_that_turns_the_other_way_is_told_once() -> None:
-    estimator, _ = driven(-1.0)
+def test_a_sensor_that_does_not_go_with_positions_is_told_once() -> None:
+    estimator, _ = driven(gyro=lambda rate: -rate, wheels=lambda speed: 3.6 * speed)
     watch = TelemetryWatch()
-    (warning,) = watch.estimator(estimator)
-    assert warning.startswith("telemetry: the gyro does not turn as positions do")
+    imu, speed = watch.estimator(estimator)
+    assert imu.startswith("telemetry: imu does not go with positions")
+    assert "is it in m/s" in speed
     assert watch.estimator(estimator) == []
-    assert TelemetryWatch().estimator(driven(1.0)[0]) == []
+    assert TelemetryWatch().estimator(driven()[0]) == []

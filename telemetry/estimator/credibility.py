@@ -1,0 +1,157 @@
+"""Whether a sensor beside positions tells what the car does: its turning, its way, its heading.
+
+The filter cannot tell: a gyro that is upside down or wheels in km/h lead it along, so that they
+surprise nobody. The courses of fixes know nothing of them, but are rough and may come late, so that
+whole turns and tens of metres are compared.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from foretwin.telemetry.estimator.chords import Chord
+
+LATE_S = (0.0, 1.0, 2.0, 3.0)
+"""So late may courses be: in Dresden one receiver's are by 2 s."""
+_TIMES = 3
+"""So many more times must a sensor be contradicted than borne out before it is left out; of one
+that nothing has borne out yet the first will do. Chosen."""
+_LEAST_TURN_RAD, _LONGEST_TURN_S = 1.0, 10.0
+_ASTRAY = 0.75
+"""Of the larger of two turns: courses of an antenna far ahead part less from a true gyro; one that
+is stuck, upside down or in degrees parts by all of it. Chosen."""
+_LARGEST_BEND_RAD = 1.5
+"""Between chords one after the other: more is a fix that jumped, or a car that backs."""
+_LEAST_WAY_M, _LEAST_CHORDS, _LARGEST_SHARE = 30.0, 3, 0.6
+"""A way is no single jump of the receiver's. Chosen."""
+_MOST_TIMES = 1.9
+"""Knots are 1.94 times metres per second, miles per hour 2.2. Fixes that a receiver smooths on
+setting out make 1.8 (Dresden, 14 February), slip and tight turns less."""
+_OFF_RAD = math.radians(45.0)
+"""An antenna far ahead of the axle goes so far beside the heading in no but the tightest turn."""
+_FASTEST_REVERSE_MPS = 3.0
+
+
+class Credibility:
+    """Counts what contradicts a sensor, and what bears it out."""
+
+    def __init__(self) -> None:
+        self.holds = True
+        self._against = _TIMES - 1
+
+    def weigh(self, fits: list[bool]) -> None:
+        """Take whether the sensor fits by each lateness; one that fits if late alone says nothing.
+
+        What was lost comes back once as much has borne it out.
+        """
+        if not fits[0] and any(fits):
+            return
+        contradicted = not fits[0]
+        self._against += 1 if contradicted else -1
+        self._against = min(max(self._against, 0), _TIMES)
+        self.holds = self._against < (_TIMES if self.holds else 1)
+
+
+class _CourseTold(NamedTuple):
+    """A chord's course, summed without wrapping, and a sensor's angle by each lateness."""
+
+    time_s: float
+    course_rad: float
+    angles_rad: tuple[float, ...]
+
+
+class TurningCredibility(Credibility):
+    """Of a sensor that tells how the car turns."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._courses: tuple[_CourseTold, ...] = ()
+        self._contradicted = False
+        """By the latest chord."""
+
+    def take(self, chord: Chord, angles_rad: tuple[float, ...] | None) -> None:
+        """Compare a chord with the angle told in its middle, by each lateness; None if unknown."""
+        contradicted, self._contradicted = self._contradicted, False
+        if angles_rad is None:
+            self._courses = ()
+            return
+        course_rad = chord.course_rad
+        if self._courses:
+            last_rad = self._courses[-1].course_rad
+            bend = math.remainder(course_rad - last_rad, math.tau)
+            if abs(bend) > _LARGEST_BEND_RAD:
+                self._courses = ()
+                return
+            course_rad = last_rad + bend
+        now = _CourseTold(chord.middle_s, course_rad, angles_rad)
+        since_s = now.time_s - _LONGEST_TURN_S
+        self._courses = (*(one for one in self._courses if one.time_s >= since_s), now)
+        first = self._courses[0]
+        by_course = course_rad - first.course_rad
+        told = [b - a for a, b in zip(first.angles_rad, angles_rad, strict=False)]
+        if max(abs(by_course), min(map(abs, told))) < _LEAST_TURN_RAD:
+            return
+        fits = [abs(by_course - by) <= _ASTRAY * max(abs(by_course), abs(by)) for by in told]
+        if not any(fits) and not contradicted:
+            # A receiver that jumps turns one chord, a car all that follow.
+            self._contradicted = True
+            return
+        self._courses = (now,)
+        self.weigh(fits)
+
+
+class WayCredibility(Credibility):
+    """Of wheels."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._chords: tuple[Chord, ...] = ()
+        self._ways_m: tuple[float, ...] = ()
+
+    def take(self, chord: Chord, ways_m: tuple[float, ...] | None) -> None:
+        """Compare a chord with the wheels' way along it, by each lateness; None if unknown."""
+        if ways_m is None or (self._chords and chord.from_s != self._chords[-1].to_s):
+            self._chords = ()
+        if ways_m is None:
+            return
+        before = self._ways_m if self._chords else (0.0,) * len(ways_m)
+        self._ways_m = tuple(a + b for a, b in zip(before, ways_m, strict=False))
+        self._chords = (*self._chords, chord)
+        lengths = [one.length_m for one in self._chords]
+        length_m, lasts_s = sum(lengths), chord.to_s - self._chords[0].from_s
+        if len(lengths) < _LEAST_CHORDS or length_m < _LEAST_WAY_M:
+            return
+        self._chords = ()
+        if max(lengths) > _LARGEST_SHARE * length_m:
+            return
+        fast = length_m > _FASTEST_REVERSE_MPS * lasts_s
+        times = [(way if fast else abs(way)) / length_m for way in self._ways_m]
+        self.weigh([1.0 / _MOST_TIMES < one < _MOST_TIMES for one in times])
+
+
+class HeadingCredibility(Credibility):
+    """Of a sensor that tells where the car points."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._fits = True
+        self._lengths_m: tuple[float, ...] = ()
+
+    def take(self, chord: Chord, yaws_rad: tuple[float, ...] | None, *, backs: bool) -> None:
+        """Compare a chord with the heading in its middle, by each lateness; None if unknown.
+
+        `backs` where wheels say that the car goes backwards.
+        """
+        if yaws_rad is None:
+            self._lengths_m = ()
+            return
+        course = chord.course_rad + (math.pi if backs else 0.0)
+        fits = [abs(math.remainder(yaw - course, math.tau)) < _OFF_RAD for yaw in yaws_rad]
+        if any(fits) != self._fits:
+            self._lengths_m = ()
+        self._fits, self._lengths_m = any(fits), (*self._lengths_m, chord.length_m)
+        if len(self._lengths_m) < _LEAST_CHORDS or sum(self._lengths_m) < _LEAST_WAY_M:
+            return
+        self._lengths_m = ()
+        self.weigh(fits)

@@ -1,0 +1,111 @@
+"""Holds what a car's sensors say against where its positions go, and says which to leave out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
+from foretwin.telemetry.estimator.chords import Chord, Chords, Trail
+from foretwin.telemetry.estimator.credibility import (
+    LATE_S,
+    HeadingCredibility,
+    TurningCredibility,
+    WayCredibility,
+)
+from foretwin.telemetry.estimator.shallow_copy import shallow_copy
+
+LEFT_OUT = {
+    "imu": ("yaw_rate_radps", "imu_turns_otherwise"),
+    "steering": ("tire_angle_rad", "steering_turns_otherwise"),
+    "speed": ("speed_mps", "speed_goes_otherwise"),
+    "heading": ("yaw_rad", "heading_points_otherwise"),
+}
+"""By channel: the field that is not believed, and as what its samples are counted."""
+
+
+class SensorTrust:
+    """Takes samples and believed fixes in the order of their stamps."""
+
+    def __init__(self) -> None:
+        self._chords = Chords()
+        self._turned, self._driven, self._pointed, self._bent = Trail(), Trail(), Trail(), Trail()
+        self._gyro, self._steering = TurningCredibility(), TurningCredibility()
+        self._wheels, self._headings = WayCredibility(), HeadingCredibility()
+        self._steered_rad = 0.0
+
+    def copy(self) -> SensorTrust:
+        """Return another one that goes on from here by itself."""
+        other = shallow_copy(self)
+        other._chords = shallow_copy(self._chords)
+        other._turned, other._driven = self._turned.copy(), self._driven.copy()
+        other._pointed, other._bent = self._pointed.copy(), self._bent.copy()
+        other._gyro, other._steering = shallow_copy(self._gyro), shallow_copy(self._steering)
+        other._wheels, other._headings = shallow_copy(self._wheels), shallow_copy(self._headings)
+        return other
+
+    @property
+    def left_out(self) -> frozenset[str]:
+        """The channels whose samples do not go with positions, as far as these tell."""
+        beliefs = {
+            "imu": self._gyro,
+            "steering": self._steering,
+            "speed": self._wheels,
+            "heading": self._headings,
+        }
+        return frozenset(name for name, one in beliefs.items() if not one.holds)
+
+    def take(self, message: Any, *, gyro_bias_radps: float, curvature_pm: float | None) -> None:
+        """Take a sample; `curvature_pm` is what the latest measured steering implies."""
+        time_s = message.stamp_ns * 1e-9
+        match message:
+            case ImuSample(rate_radps=rate):
+                self._turned.go_on(time_s, rate[2] - gyro_bias_radps)
+            case SpeedSample(speed_mps=speed):
+                self._driven.go_on(time_s, speed)
+            case HeadingSample(yaw_rad=yaw):
+                self._pointed.turn_to(time_s, yaw)
+            case SteeringSample() if curvature_pm is not None:
+                self._bent.go_on(time_s, curvature_pm)
+
+    def take_fix(self, stamp_ns: int, xy_m: Array, std_m: float, *, convergence_rad: float) -> None:
+        """Take a believed fix at `xy_m` (2,) with white noise of `std_m`.
+
+        `convergence_rad` is the angle of the fixes' frame against east.
+        """
+        chord = self._chords.take(stamp_ns * 1e-9, xy_m, std_m)
+        if chord is None:
+            return
+        ways_m = _between(self._driven, chord)
+        self._gyro.take(chord, _around(self._turned, chord.middle_s))
+        self._steering.take(chord, self._steered(chord))
+        self._wheels.take(chord, ways_m)
+        yaws_rad = _around(self._pointed, chord.middle_s)
+        if yaws_rad is not None:
+            yaws_rad = tuple(yaw + convergence_rad for yaw in yaws_rad)
+        backs = self._wheels.holds and ways_m is not None and ways_m[0] < 0.0
+        self._headings.take(chord, yaws_rad, backs=backs)
+
+    def _steered(self, chord: Chord) -> tuple[float, ...] | None:
+        """Return the angle that the steering gives along all chords up to this one's middle."""
+        bends = _between(self._bent, chord)
+        if bends is None:
+            return None
+        half_rad = 0.5 * bends[0] / (chord.to_s - chord.from_s) * chord.length_m
+        self._steered_rad += 2.0 * half_rad
+        return (self._steered_rad - half_rad,)
+
+
+def _around(trail: Trail, time_s: float) -> tuple[float, ...] | None:
+    """Return a trail's values at `time_s` and before, by how late it may be; None if unknown."""
+    known = [trail.at(time_s - late_s) for late_s in LATE_S]
+    found = tuple(value for value in known if value is not None)
+    return None if known[0] is None else found
+
+
+def _between(trail: Trail, chord: Chord) -> tuple[float, ...] | None:
+    """Return by how much a trail went on along a chord, by each lateness; None if unknown."""
+    ends, begins = _around(trail, chord.to_s), _around(trail, chord.from_s)
+    if ends is None or begins is None:
+        return None
+    return tuple(end - begin for begin, end in zip(begins, ends, strict=False))

@@ -1,0 +1,101 @@
+"""What counts against a sensor, and what says nothing of it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from foretwin.telemetry.estimator.chords import Chord
+from foretwin.telemetry.estimator.credibility import (
+    Credibility,
+    HeadingCredibility,
+    TurningCredibility,
+    WayCredibility,
+)
+
+
+def chord(number: int, *, course_rad: float = 0.0, length_m: float = 10.0) -> Chord:
+    return Chord(float(number), number + 1.0, length_m, course_rad)
+
+
+def test_the_first_contradiction_ends_the_belief_in_what_nothing_bore_out() -> None:
+    credibility = Credibility()
+    credibility.weigh([False, False])
+    assert not credibility.holds
+    for _ in range(2):
+        credibility.weigh([True, True])
+        assert not credibility.holds
+    credibility.weigh([True])
+    assert credibility.holds
+
+
+def test_what_was_borne_out_must_be_contradicted_three_times_more() -> None:
+    credibility = Credibility()
+    for fits in (True, True, True, False, True, False, False):
+        credibility.weigh([fits])
+        assert credibility.holds
+    credibility.weigh([False])
+    assert not credibility.holds
+
+
+def test_what_fits_if_positions_are_late_says_nothing() -> None:
+    credibility = Credibility()
+    for _ in range(9):
+        credibility.weigh([False, True])
+    assert credibility.holds
+
+
+def test_a_receiver_that_jumps_turns_one_chord_and_a_car_all_that_follow() -> None:
+    jumps, turns = TurningCredibility(), TurningCredibility()
+    for number in range(30):
+        jumps.take(chord(number, course_rad=1.2 * (number % 7 == 3)), (0.0,))
+        turns.take(chord(number, course_rad=1.2 * (number >= 3)), (0.0,))
+    assert (jumps.holds, turns.holds) == (True, False)
+
+
+def test_a_car_that_goes_to_and_fro_says_nothing_of_its_gyro() -> None:
+    credibility = TurningCredibility()
+    for number in range(30):
+        credibility.take(chord(number, course_rad=math.pi * (number // 5 % 2)), (0.0,))
+    assert credibility.holds
+
+
+@pytest.mark.parametrize(("times", "holds"), [(0.0, False), (0.9, True), (1.8, True), (3.6, False)])
+def test_wheels_go_as_far_as_positions(times: float, holds: bool) -> None:
+    credibility = WayCredibility()
+    for number in range(9):
+        credibility.take(chord(number), (10.0 * times,))
+    assert credibility.holds == holds
+
+
+def test_a_single_jump_of_the_receiver_is_no_way() -> None:
+    credibility = WayCredibility()
+    for number in range(30):
+        credibility.take(chord(number, length_m=50.0 if number % 3 == 1 else 3.0), (0.0,))
+    assert credibility.holds
+
+
+@pytest.mark.parametrize(("length_m", "holds"), [(2.0, True), (10.0, False)])
+def test_a_car_backs_slowly(length_m: float, holds: bool) -> None:
+    credibility = WayCredibility()
+    for number in range(40):
+        credibility.take(chord(number, length_m=length_m), (-length_m,))
+    assert credibility.holds == holds
+
+
+@pytest.mark.parametrize("backs", [True, False])
+def test_a_car_that_backs_points_the_other_way(backs: bool) -> None:
+    credibility = HeadingCredibility()
+    for number in range(9):
+        credibility.take(chord(number), (math.pi,), backs=backs)
+    assert credibility.holds == backs
+
+
+def test_out_of_a_parking_space_a_car_backs_for_some_metres() -> None:
+    credibility = HeadingCredibility()
+    for number in range(9):
+        credibility.take(
+            chord(number, length_m=5.0), (math.pi if number < 4 else 0.0,), backs=False
+        )
+    assert credibility.holds

@@ -1,0 +1,148 @@
+"""A sensor that tells of another motion than positions is left out, whatever it is wrong in."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
+from foretwin.telemetry.estimator.sensor_trust import LEFT_OUT, SensorTrust
+from tests.telemetry.position_track import yaw
+from tests.telemetry.winding_drive import (
+    TICK_S,
+    TICKS,
+    WHEELBASE_M,
+    WINDING,
+    Told,
+    driven,
+    truly,
+)
+
+PRECISE: dict[str, Any] = {}
+ROUGH: dict[str, Any] = {"fix_std_m": 3.0, "fix_every": 50}
+WRONG: dict[str, tuple[str, Any]] = {
+    "a gyro stuck": ("gyro", lambda _: 0.0),
+    "a gyro upside down": ("gyro", lambda rate: -rate),
+    "a gyro in degrees": ("gyro", math.degrees),
+    "wheels in km/h": ("wheels", lambda speed: 3.6 * speed),
+    "wheels in mph": ("wheels", lambda speed: 2.237 * speed),
+    "wheels that say nought": ("wheels", lambda _: 0.0),
+    "wheels backwards": ("wheels", lambda speed: -speed),
+    "headings by a compass": ("heading", lambda yaw: math.pi / 2.0 - yaw),
+    "headings to the left": ("heading", lambda yaw: yaw + math.pi / 2.0),
+    "headings to the rear": ("heading", lambda yaw: yaw + math.pi),
+    "steering to the right": ("steering", lambda angle: -angle),
+    "steering of the wheel": ("steering", lambda angle: max(-1.4, min(1.4, 15.0 * angle))),
+}
+NOISE = np.random.default_rng(7).normal(0.0, 1.0, (TICKS, 2))
+CHANNEL = {"gyro": "imu", "wheels": "speed", "heading": "heading", "steering": "steering"}
+
+
+def errors(states: Any, *, from_s: float) -> tuple[float, float]:
+    """Return the largest errors of speed (m/s) and yaw (rad) from a time on."""
+    after = [(WINDING[tick], state) for tick, state in states if tick * TICK_S > from_s]
+    assert len(after) * TICK_S > 1.0
+    return (
+        max(abs(state.speed_mps - speed) for (speed, *_), state in after),
+        max(abs(math.remainder(yaw(state) - at, math.tau)) for (_, _, at, *_), state in after),
+    )
+
+
+@pytest.mark.parametrize("fixes", [PRECISE, ROUGH], ids=["precise", "rough"])
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_wrong_sensor_does_not_lead_the_car(wrong: str, fixes: dict[str, Any]) -> None:
+    name, told = WRONG[wrong]
+    sensors = {"gyro": truly, "wheels": truly, "heading": truly} | {name: told}
+    estimator, states = driven(**sensors, **fixes)
+    field, reason = LEFT_OUT[CHANNEL[name]]
+    assert estimator.skipped[reason] > 0.8 * TICKS
+    assert field in states[-1][1].estimated
+    speed_mps, yaw_rad = errors(states, from_s=30.0)
+    assert speed_mps < (1.7 if name == "wheels" else 0.2)
+    assert yaw_rad < math.radians(10.0)
+
+
+@pytest.mark.parametrize("fixes", [PRECISE, ROUGH], ids=["precise", "rough"])
+def test_what_goes_with_positions_is_used(fixes: dict[str, Any]) -> None:
+    every = {"gyro": truly, "wheels": truly, "heading": truly, "steering": truly}
+    estimator, states = driven(**every, **fixes)
+    assert estimator.left_out == frozenset()
+    assert not any(estimator.skipped[reason] for _, reason in LEFT_OUT.values())
+    assert errors(states, from_s=10.0) < (0.2, math.radians(1.0))
+
+
+@pytest.mark.parametrize("wrong", ["a gyro upside down", "wheels in km/h", "headings to the rear"])
+def test_a_sensor_that_has_come_right_is_believed_again(wrong: str) -> None:
+    name, told = WRONG[wrong]
+    estimator, states = driven(**{"wheels": truly} | {name: told}, right_from_s=40.0)
+    assert estimator.left_out == frozenset()
+    field, reason = LEFT_OUT[CHANNEL[name]]
+    assert estimator.skipped[reason] > 0.2 * TICKS
+    assert field not in states[-1][1].estimated
+
+
+def fed(trust: SensorTrust, *, wheels: Told, ticks: range = range(TICKS), **fixes: float) -> None:
+    """Let fixes come `late_s`, of an antenna `ahead_m` of the axle, with white noise `noise_m`."""
+    late, ahead_m = round(fixes.get("late_s", 0.0) / TICK_S), fixes.get("ahead_m", 0.0)
+    for tick in ticks:
+        speed, rate, heading, _, _ = WINDING[tick]
+        stamp_ns = round(tick * TICK_S * 1e9)
+        angle = math.atan(WHEELBASE_M * rate / speed)
+        for message in (
+            ImuSample(
+                stamp_ns=stamp_ns,
+                accel_mps2=(0.0, 0.0, 9.8),
+                rate_radps=(0.0, 0.0, fixes.get("gain", 1.0) * rate + fixes.get("bias_radps", 0.0)),
+            ),
+            SpeedSample(stamp_ns=stamp_ns, speed_mps=wheels(speed)),
+            HeadingSample(stamp_ns=stamp_ns, yaw_rad=math.remainder(heading, math.tau)),
+            SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=angle),
+        ):
+            trust.take(message, gyro_bias_radps=0.0, curvature_pm=math.tan(angle) / WHEELBASE_M)
+        if tick % 10 == 0 and tick >= late:
+            _, _, yaw_rad, x, y = WINDING[tick - late]
+            there = np.array([x + ahead_m * math.cos(yaw_rad), y + ahead_m * math.sin(yaw_rad)])
+            std_m = max(fixes.get("noise_m", 0.0), 0.02)
+            trust.take_fix(stamp_ns, there + std_m * NOISE[tick], std_m, convergence_rad=0.0)
+
+
+@given(
+    gain=st.floats(0.7, 1.3),
+    bias_radps=st.floats(-0.02, 0.02),
+    late_s=st.floats(0.0, 2.0),
+    ahead_m=st.floats(-1.0, 4.0),
+    noise_m=st.floats(0.0, 1.0),
+)
+@settings(max_examples=25)
+def test_honest_sensors_are_believed_whatever_fixes_are_like(**fixes: float) -> None:
+    trust = SensorTrust()
+    fed(trust, wheels=lambda speed: 1.1 * speed, **fixes)
+    assert trust.left_out == frozenset()
+
+
+def test_a_copy_goes_on_by_itself() -> None:
+    trust = SensorTrust()
+    fed(trust, wheels=truly, ticks=range(100))
+    other = trust.copy()
+    for tick in range(100, TICKS // 4):
+        ticks = range(tick, tick + 1)
+        fed(other, wheels=lambda speed: 3.6 * speed, ticks=ticks)
+        fed(trust, wheels=truly, ticks=ticks)
+    assert (trust.left_out, other.left_out) == (frozenset(), {"speed"})
+
+
+@pytest.mark.parametrize("convergence_rad", [1.0, -1.0])
+def test_headings_are_from_east_and_fixes_in_a_frame_of_their_own(convergence_rad: float) -> None:
+    trust = SensorTrust()
+    for k in range(100):
+        stamp_ns = k * 100_000_000
+        told = HeadingSample(stamp_ns=stamp_ns, yaw_rad=-1.0)
+        trust.take(told, gyro_bias_radps=0.0, curvature_pm=None)
+        place = np.array([1.0 * k, 0.0])
+        trust.take_fix(stamp_ns, place, 0.02, convergence_rad=convergence_rad)
+    assert ("heading" in trust.left_out) == (convergence_rad < 0.0)
