@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.world import World
-from tests.world_gen.drawn_maps import STREET, drawn_map, world_of
+from tests.world_gen.drawn_maps import STREET, crossing, drawn_map, world_of
 
 COVERS = (
     "foretwin.world_gen.lanes.lane_curves",
@@ -154,3 +154,24 @@ def test_a_taper_leaves_lanes_to_a_light_and_to_a_crossing(tags, end_m):
     world = world_of(drawn_map(nodes, ways, node_tags={9: tags}))
     ends = [lane.centerline[-1, 0] for lane in world.lanes if lane.id.startswith("w11.")]
     assert max(ends) == pytest.approx(end_m, abs=0.1)
+
+
+@pytest.mark.parametrize(("width_m", "runs_on"), [("2.8", True), ("4", False)])
+def test_a_lane_that_widens_in_the_middle_of_its_road_does_so_over_a_way(
+    width_m: str, runs_on: bool
+) -> None:
+    one_way = STREET | {"oneway": "yes"}
+    world = world_of(
+        crossing(
+            extra_nodes={5: (140.0, 20.0)},
+            extra_ways=[(15, [1, 5], one_way | {"width": width_m})],
+            street=one_way,
+        )
+    )
+    widening = next(lane for lane in world.lanes if lane.osm_way == 15)
+    before = next(lane for lane in world.lanes if lane.osm_way == 11)
+    assert (widening.id in before.successor_ids) == runs_on
+    if not runs_on:
+        (way,) = (c for c in world.connections if c.to_lane_id == widening.id)
+        assert way.from_lane_id == before.id
+        assert np.hypot(*(way.centerline[-1] - way.centerline[0])) > 3.0

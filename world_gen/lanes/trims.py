@@ -133,10 +133,10 @@ def _plain_trims(
     heads: Heads,
 ) -> Array | None:
     """Lanes of one road run on where they fit (None); where lanes change there is a taper."""
-    first, second = cluster.legs
     before, behind = _positions(cluster, sections, shifts_m)
     fits = len(before) == len(behind) and np.allclose(before, behind, rtol=0.0, atol=SAME_PLACE_M)
-    if fits and -dot(heads[first.key], heads[second.key]) > SHARPEST_BEND_COS:
+    fits = fits and cluster.keeps_widths(sections)
+    if fits and -dot(*(heads[leg.key] for leg in cluster.legs)) > SHARPEST_BEND_COS:
         return None
     room = (0.0 if fits else min(TAPER_M, TAPER_SHARE * leg.edge.length_m) for leg in cluster.legs)
     return np.array(list(room))
