@@ -80,7 +80,7 @@ def side_of(folder: Path, planner: str | None) -> ComparedSide:
 
 
 def paired(first: ComparedSide, second: ComparedSide) -> Paired:
-    """Return the futures of both sides that are the same case.
+    """Return the futures of both sides that are the same case, ordered by it.
 
     By planner and, of sweeps, vehicle too, unless each side has a single one.
     """
@@ -89,7 +89,9 @@ def paired(first: ComparedSide, second: ComparedSide) -> Paired:
     names = (*_CASE[kind], *apart)
     others = _by_case(second.futures, names)
     mine = _by_case(first.futures, names)
-    pairs = [(row, others[case]) for case, row in mine.items() if case in others]
+    # In one order, whatever that of the rows: what is drawn by chance then says the same again.
+    cases = sorted(mine.keys() & others.keys(), key=lambda case: [(v is not None, v) for v in case])
+    pairs = [(mine[case], others[case]) for case in cases]
     return Paired(pairs, len(mine) - len(pairs), len(others) - len(pairs))
 
 

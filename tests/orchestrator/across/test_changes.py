@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from foretwin.contracts.errors import UserError
@@ -60,7 +61,7 @@ def test_newly_failing_and_fixed_cases_are_named_place_by_place(tmp_path: Path) 
 
     found = compared(sweep_of(tmp_path / "a", before), sweep_of(tmp_path / "b", after, seed=2))
 
-    assert [one["case"] for one in found["newly_failing"]] == [7, 8, 14]
+    assert [one["case"] for one in found["newly_failing"]] == [7, 14, 8]
     assert [one["case"] for one in found["fixed"]] == [0]
     failing = found["failing"]
     assert (failing["first"], failing["second"], failing["newly"], failing["fixed"]) == (1, 3, 3, 1)
@@ -79,6 +80,26 @@ def test_worse_is_what_mcnemar_calls_significant(tmp_path: Path) -> None:
 
         assert is_worse(found) is worse  # p is 2 · 0.5^newly
         assert not is_worse(compared(tmp_path / f"{newly}", good))
+
+
+def test_rows_in_another_order_and_sides_in_the_other_one_say_the_same(tmp_path: Path) -> None:
+    # At three places pairs are drawn by chance, not places: which ones must not hang on the order.
+    rng = np.random.default_rng(3)
+    more = [{"junction_id": f"n{n % 3}", "metric_ttc": float(rng.normal(2.0))} for n in range(20)]
+    before = [case(n, **one) for n, one in enumerate(more)]
+    after = [row | {"metric_ttc": row["metric_ttc"] + rng.normal(0.5)} for row in before]
+    a, b = sweep_of(tmp_path / "a", before), sweep_of(tmp_path / "b", after)
+    shuffled = sweep_of(tmp_path / "c", [before[i] for i in rng.permutation(20)])
+
+    found = compared(a, b)
+    turned = compared(b, a)["measures"]
+
+    assert compared(shuffled, b)["measures"] == found["measures"]
+    for mine, its in zip(found["measures"], turned, strict=True):
+        change, back = mine["change"], its["change"]
+        assert change["p_value"] == back["p_value"]
+        signs = [change["mean"], change["low"], change["high"]]
+        assert signs == pytest.approx([-back["mean"], -back["high"], -back["low"]])
 
 
 def test_two_planners_of_one_sweep_are_paired_case_by_case(tmp_path: Path) -> None:
