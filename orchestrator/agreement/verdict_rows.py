@@ -80,8 +80,8 @@ def _turned(flip: dict[str, Any], direction: str, intersections: Sequence[dict[s
     fails, factor = " and ".join(flip["smallest_factor_fails"]), flip["smallest_factor"]
     becomes = f"a fail by {fails.replace('_', ' ')}" if fails else "a pass"
     when = instant(flip["smallest_factor_at_s"], intersections)
-    gap_m = flip["smallest_factor_gap_m"]
-    measured_m, where = gap_m / factor, _ALONG[direction]
+    gap_m, measured_m = flip["smallest_factor_gap_m"], flip["smallest_factor_measured_m"]
+    where = _ALONG[direction]
     if factor < 1.0:  # the whole of it need not turn the verdict: the way between is another one
         return (
             f"  least room {when}: with {gap_m:.2f} of the {measured_m:.2f} m of gap that were "

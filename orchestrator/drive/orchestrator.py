@@ -32,7 +32,7 @@ from foretwin.orchestrator.drive.router_start import join_bus
 from foretwin.orchestrator.drive.run_record import lost_lines, reserve_record
 from foretwin.orchestrator.drive.standing import go_on, read_standing
 from foretwin.orchestrator.drive.start_worlds import prepare_start
-from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.drive.summary import summed_up
 from foretwin.orchestrator.drive.supervision import CRASH, DriveError, DriveProcesses, Life
 from foretwin.orchestrator.drive.watcher_setups import COPILOT, addresses
 from foretwin.orchestrator.instructions import Notice
@@ -112,9 +112,7 @@ class Orchestrator:
                     self._end(bus, conductor, line, exit_word)
                     raise
                 whole = self._end(bus, conductor, line, exit_word)
-        if self._failed_at_end:
-            return EXIT_FAILED
-        return exit_code(exit_word, whole=whole)
+        return EXIT_FAILED if self._failed_at_end else exit_code(exit_word, whole=whole)
 
     def _may_be_followed(self, error: Exception) -> bool:
         """Whether another orchestrator may do better; what is true for each ends the drive."""
@@ -291,10 +289,11 @@ class Orchestrator:
         self._keep_junctions(conductor, now_s)
         conductor.tables.close()
         record = self._keeper(conductor).write(exit_word)
+        lost, summary = lost_lines(record), summed_up(record)
+        self._failed_at_end |= summary.failed
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / LOG)
-        lost = lost_lines(record)
         if not self._refused:
-            line.say("\n".join([summary_text(record), *lost]))
+            line.say("\n".join([summary.text, *lost]))
         return not lost

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from foretwin.contracts.running import with_others
 from foretwin.contracts.terminal import plain
@@ -12,6 +13,8 @@ from foretwin.orchestrator.record.sibling_count import sibling_lines
 from foretwin.orchestrator.record.whereabouts import junction_name
 from foretwin.orchestrator.rounds.siblings import SIBLING
 from foretwin.orchestrator.tuning.words import summary_lines
+
+log = logging.getLogger("orchestrator")
 
 DISAGREEMENTS_SHOWN = 12
 REASONS_SHOWN = 3
@@ -54,6 +57,23 @@ def side_by_side_lines(found: Any, junctions: Sequence[dict[str, Any]] = ()) -> 
     ]
     more = len(found["disagreements"]) - DISAGREEMENTS_SHOWN
     return [*lines, f"  and {more} more in results/disagreements.parquet"] if more > 0 else lines
+
+
+class LastWords(NamedTuple):
+    """What is told at the end of a drive; `failed` where an error of ours was in the way."""
+
+    text: str
+    failed: bool = False
+
+
+def summed_up(record: dict[str, object]) -> LastWords:
+    """Return what is told of a drive that is over and kept, whatever stands in its record."""
+    try:
+        return LastWords(summary_text(record))
+    except Exception:
+        log.exception("a drive that is kept could not be summed up")
+        text = f"{record['exit']}: run.json says how it went, log.jsonl why no more"
+        return LastWords(text, failed=True)
 
 
 def summary_text(record: dict[str, object]) -> str:

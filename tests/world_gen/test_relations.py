@@ -26,8 +26,6 @@ from tests.world_gen.sketch import Sketch
 from tests.world_gen.transformed_maps import mirrored_map, reversed_map
 
 COVERS = (
-    "foretwin.world_gen.connections.inner_lanes",
-    "foretwin.world_gen.connections.lane_choice",
     "foretwin.world_gen.ground.crossings",
     "foretwin.world_gen.lanes.trims",
 )

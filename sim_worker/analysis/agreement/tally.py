@@ -106,6 +106,7 @@ def _flip_record(windows: Sequence[Judged], place: int, start_stamp_ns: int) -> 
         "flipped": len(found),
         "smallest_factor": round(factor, 3),
         "smallest_factor_gap_m": round(gap_m, 3),
+        "smallest_factor_measured_m": round(gap_m / factor, 3),
         "smallest_factor_at_s": round((window.stamp_ns - start_stamp_ns) / 1e9, 2),
         "smallest_factor_fails": list(fails),
         "smallest_gap_m": round(min(one[1] for one in found), 3),

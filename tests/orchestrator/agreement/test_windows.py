@@ -78,10 +78,10 @@ def test_every_second_is_judged_and_recorded() -> None:
     assert agreement_lines(None) == []
 
 
-def turned(factor: float, gap_m: float, at_s: float, *fails: str) -> dict[str, Any]:
-    least = {"gap_m": gap_m, "at_s": at_s, "fails": list(fails)}
+def turned(gap_m: float, measured_m: float, at_s: float, *fails: str) -> dict[str, Any]:
+    least = {"gap_m": gap_m, "measured_m": measured_m, "at_s": at_s, "fails": list(fails)}
     told = {f"smallest_factor_{name}": value for name, value in least.items()}
-    return {"flipped": 3, "smallest_factor": factor, **told}
+    return {"flipped": 3, "smallest_factor": round(gap_m / measured_m, 3), **told}
 
 
 def test_the_least_gap_that_would_turn_a_verdict_is_told_with_its_place() -> None:
@@ -95,9 +95,9 @@ def test_the_least_gap_that_would_turn_a_verdict_is_told_with_its_place() -> Non
             "not_observable": 11,
         },
         "flips": {
-            "along": turned(1.25, 5.0, 13.62, "drivable_area"),
+            "along": turned(5.0, 4.0, 13.62, "drivable_area"),
             "across": {"flipped": 0},
-            "both": turned(2.0, 6.0, 50.0),
+            "both": turned(6.0, 3.0, 50.0),
         },
     }
     reached = {"id": "n4", "name": "Mill Lane \u00d7 High Street", "arrived_at_s": 20.0}
@@ -112,7 +112,7 @@ def test_the_least_gap_that_would_turn_a_verdict_is_told_with_its_place() -> Non
         "  least room at 50.0 s, after Mill Lane \u00d7 High Street: with a gap of 6.00 m along "
         "and across together the verdict would be a pass; 3.00 m"
     )
-    record["flips"] = {"across": turned(0.25, 1.5, 50.0, "comfort")}
+    record["flips"] = {"across": turned(1.5, 6.0, 50.0, "comfort")}
     assert agreement_lines(record, [reached])[-1].endswith(
         "with 1.50 of the 6.00 m of gap that were measured across the road the verdict would "
         "be a fail by comfort"
@@ -231,3 +231,13 @@ def test_east_and_north_count_alike_for_who_is_nearest() -> None:
     away_m = np.hypot(*(np.array(xy_m) - here_m).T)
 
     assert {int(user.user_id) for user in kept} == set(np.argsort(away_m)[:MOST_KEPT].tolist())
+
+
+def test_a_gap_that_is_next_to_none_of_what_was_measured_is_told() -> None:
+    counts = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic", "not_observable")
+    nearest = turned(0.016, 40.0, 1.48, "comfort")
+    record = {"windows": 0, "overall": dict.fromkeys(counts, 0), "flips": {"both": nearest}}
+    assert agreement_lines(record)[-1] == (
+        "  least room at 1.5 s: with 0.02 of the 40.00 m of gap that were measured along and "
+        "across together the verdict would be a fail by comfort"
+    )

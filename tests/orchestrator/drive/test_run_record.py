@@ -11,7 +11,7 @@ import pytest
 
 from foretwin.contracts.tally import Tally, tally_file, write_tally
 from foretwin.orchestrator.drive.run_record import lost_lines, run_record, versions
-from foretwin.orchestrator.drive.summary import summary_text
+from foretwin.orchestrator.drive.summary import summary_text, summed_up
 from foretwin.orchestrator.record.run_state import write_record
 from tests.orchestrator.house import House
 
@@ -163,6 +163,17 @@ def test_the_summary_names_every_junction_and_the_maps_source(ended: House) -> N
     assert text.splitlines()[0].startswith("completed: 1 junction passed, ")
     assert "Mill Lane" in text
     assert text.splitlines()[-1] == ended.plan.osm.attribution
+
+
+def test_a_drive_that_cannot_be_summed_up_is_over_and_kept(
+    ended: House, caplog: pytest.LogCaptureFixture
+) -> None:
+    record = record_of(ended)
+    assert summed_up(record) == (summary_text(record), False)
+    text, failed = summed_up(record | {"agreement": {"windows": "many"}})
+    assert text.startswith("completed: run.json says")
+    assert failed
+    assert "Traceback" in caplog.text
 
 
 def test_the_summary_says_how_often_the_free_twin_was_beyond_a_limit(house: House) -> None:
