@@ -66,39 +66,50 @@ class TurningCredibility(Credibility):
 
     def __init__(self) -> None:
         super().__init__()
+        self._latest: tuple[_CourseTold, ...] = ()
+        """Of the last two chords."""
         self._courses: tuple[_CourseTold, ...] = ()
-        self._contradicted = False
-        """By the latest chord."""
 
     def take(self, chord: Chord, angles_rad: tuple[float, ...] | None) -> None:
         """Compare a chord with the angle told in its middle, by each lateness; None if unknown."""
-        contradicted, self._contradicted = self._contradicted, False
         if angles_rad is None:
-            self._courses = ()
+            self._latest = self._courses = ()
             return
         course_rad = chord.course_rad
-        if self._courses:
-            last_rad = self._courses[-1].course_rad
+        if self._latest:
+            last_rad = self._latest[-1].course_rad
             bend = math.remainder(course_rad - last_rad, math.tau)
             if abs(bend) > _LARGEST_BEND_RAD:
-                self._courses = ()
+                self._latest = self._courses = ()
                 return
             course_rad = last_rad + bend
-        now = _CourseTold(chord.middle_s, course_rad, angles_rad)
+        latest = (*self._latest, _CourseTold(chord.middle_s, course_rad, angles_rad))
+        self._latest = latest[-2:]
+        if len(latest) == 3:
+            # A receiver that jumps turns one chord, a car all that follow.
+            self._compare(
+                latest[1]._replace(course_rad=sorted(one.course_rad for one in latest)[1])
+            )
+
+    def _compare(self, now: _CourseTold) -> None:
         since_s = now.time_s - _LONGEST_TURN_S
         self._courses = (*(one for one in self._courses if one.time_s >= since_s), now)
-        first = self._courses[0]
-        by_course = course_rad - first.course_rad
-        told = [b - a for a, b in zip(first.angles_rad, angles_rad, strict=False)]
-        if max(abs(by_course), min(map(abs, told))) < _LEAST_TURN_RAD:
-            return
+        most = max(self._courses, key=lambda one: abs(now.course_rad - one.course_rad))
+        by_course, told = _turn(most, now)
+        if abs(by_course) < _LEAST_TURN_RAD:
+            by_course, told = _turn(self._courses[0], now)
+            if min(map(abs, told)) < _LEAST_TURN_RAD:
+                return
         fits = [abs(by_course - by) <= _ASTRAY * max(abs(by_course), abs(by)) for by in told]
-        if not any(fits) and not contradicted:
-            # A receiver that jumps turns one chord, a car all that follow.
-            self._contradicted = True
-            return
-        self._courses = (now,)
-        self.weigh(fits)
+        if fits[0] or not any(fits):  # else let it turn on
+            self._courses = (now,)
+            self.weigh(fits)
+
+
+def _turn(first: _CourseTold, last: _CourseTold) -> tuple[float, list[float]]:
+    """Return by how much the course turned, and the sensor's angle by each lateness."""
+    told = [b - a for a, b in zip(first.angles_rad, last.angles_rad, strict=False)]
+    return last.course_rad - first.course_rad, told
 
 
 class WayCredibility(Credibility):

@@ -54,6 +54,18 @@ def test_a_receiver_that_jumps_turns_one_chord_and_a_car_all_that_follow() -> No
     assert (jumps.holds, turns.holds) == (True, False)
 
 
+def test_a_bend_one_way_and_then_the_other_is_a_turn_of_both() -> None:
+    """As out of a roundabout: a reversed gyro that may be late by seconds fits none of it."""
+    courses = [0.0] * 10 + [-0.35, -0.7, -0.7, -0.35, 0.0, 0.35, 0.7, 0.7] + [0.2] * 5
+    reversed_, late = TurningCredibility(), TurningCredibility()
+    for number, course_rad in enumerate(courses):
+        lags = tuple(courses[max(number - lag, 0)] for lag in range(4))
+        ahead = tuple(courses[min(max(number + 2 - lag, 0), 22)] for lag in range(4))
+        reversed_.take(chord(number, course_rad=course_rad), tuple(-one for one in lags))
+        late.take(chord(number, course_rad=course_rad), ahead)
+    assert (reversed_.holds, late.holds) == (False, True)
+
+
 def test_a_car_that_goes_to_and_fro_says_nothing_of_its_gyro() -> None:
     credibility = TurningCredibility()
     for number in range(30):
