@@ -33,6 +33,8 @@ class SensorTrust:
         self._gyro, self._steering = TurningCredibility(), TurningCredibility()
         self._wheels, self._headings = WayCredibility(), HeadingCredibility()
         self._steered_rad = 0.0
+        self.left_out: frozenset[str] = frozenset()
+        """The channels whose samples do not go with positions, as far as these tell."""
 
     def copy(self) -> SensorTrust:
         """Return another one that goes on from here by itself."""
@@ -43,17 +45,6 @@ class SensorTrust:
         other._gyro, other._steering = shallow_copy(self._gyro), shallow_copy(self._steering)
         other._wheels, other._headings = shallow_copy(self._wheels), shallow_copy(self._headings)
         return other
-
-    @property
-    def left_out(self) -> frozenset[str]:
-        """The channels whose samples do not go with positions, as far as these tell."""
-        beliefs = {
-            "imu": self._gyro,
-            "steering": self._steering,
-            "speed": self._wheels,
-            "heading": self._headings,
-        }
-        return frozenset(name for name, one in beliefs.items() if not one.holds)
 
     def take(self, message: Any, *, gyro_bias_radps: float, curvature_pm: float | None) -> None:
         """Take a sample; `curvature_pm` is what the latest measured steering implies."""
@@ -78,20 +69,25 @@ class SensorTrust:
             return
         ways_m = _between(self._driven, chord)
         self._gyro.take(chord, _around(self._turned, chord.middle_s))
-        self._steering.take(chord, self._steered(chord))
         self._wheels.take(chord, ways_m)
+        backs = self._wheels.holds and ways_m is not None and ways_m[0] < 0.0
+        self._steering.take(chord, self._steered(chord, backs=backs))
         yaws_rad = _around(self._pointed, chord.middle_s)
         if yaws_rad is not None:
             yaws_rad = tuple(yaw + convergence_rad for yaw in yaws_rad)
-        backs = self._wheels.holds and ways_m is not None and ways_m[0] < 0.0
         self._headings.take(chord, yaws_rad, backs=backs)
+        held = zip(
+            LEFT_OUT, (self._gyro, self._steering, self._wheels, self._headings), strict=True
+        )
+        self.left_out = frozenset(channel for channel, one in held if not one.holds)
 
-    def _steered(self, chord: Chord) -> tuple[float, ...] | None:
+    def _steered(self, chord: Chord, *, backs: bool) -> tuple[float, ...] | None:
         """Return the angle that the steering gives along all chords up to this one's middle."""
         bends = _between(self._bent, chord)
         if bends is None:
             return None
-        half_rad = 0.5 * bends[0] / (chord.to_s - chord.from_s) * chord.length_m
+        way_m = -chord.length_m if backs else chord.length_m
+        half_rad = 0.5 * bends[0] / (chord.to_s - chord.from_s) * way_m
         self._steered_rad += 2.0 * half_rad
         return (self._steered_rad - half_rad,)
 

@@ -146,3 +146,20 @@ def test_headings_are_from_east_and_fixes_in_a_frame_of_their_own(convergence_ra
         place = np.array([1.0 * k, 0.0])
         trust.take_fix(stamp_ns, place, 0.02, convergence_rad=convergence_rad)
     assert ("heading" in trust.left_out) == (convergence_rad < 0.0)
+
+
+@pytest.mark.parametrize("backs", [True, False])
+def test_backwards_a_car_turns_the_other_way_than_it_steers(backs: bool) -> None:
+    """A circle of 10 m to the left at 2 m/s, or backwards with the wheels turned to the left."""
+    trust, way = SensorTrust(), -1.0 if backs else 1.0
+    for k in range(400):
+        stamp_ns, angle = k * 100_000_000, way * 0.02 * k
+        for message in (
+            SpeedSample(stamp_ns=stamp_ns, speed_mps=2.0 * way),
+            SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=0.3),
+            HeadingSample(stamp_ns=stamp_ns, yaw_rad=math.remainder(angle, math.tau)),
+        ):
+            trust.take(message, gyro_bias_radps=0.0, curvature_pm=0.1)
+        place = 10.0 * np.array([math.sin(angle), 1.0 - math.cos(angle)])
+        trust.take_fix(stamp_ns, place, 0.02, convergence_rad=0.0)
+    assert trust.left_out == frozenset()
