@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections import deque
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
-from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
-_LEAST_M, _DEVIATIONS, _LEAST_S, _LONGEST_S = 3.0, 15.0, 0.5, 6.0
+_LEAST_M, _DEVIATIONS, _LEAST_S, LONGEST_S = 3.0, 15.0, 0.5, 6.0
 """A chord as long as 15 standard deviations of its ends has a course good to a tenth of a radian;
 of one that takes longer to drive nobody knows the way between."""
 _KEPT_S, _MARK_S, _GAP_S = 20.0, 0.1, 1.5
@@ -31,66 +29,58 @@ class Chord(NamedTuple):
         return 0.5 * (self.from_s + self.to_s)
 
 
-class Chords:
-    """Takes believed fixes in the order of their stamps."""
+class ChordBegun(NamedTuple):
+    """The fix that the next chord begins with."""
 
-    def __init__(self) -> None:
-        self._from: tuple[float, Array] | None = None
+    time_s: float
+    xy_m: Array
 
-    def take(self, time_s: float, xy_m: Array, std_m: float) -> Chord | None:
-        """Take a fix at `xy_m` (2,) with white noise of `std_m`; return the chord that it ends."""
-        if self._from is None or time_s - self._from[0] > _LONGEST_S:
-            self._from = time_s, xy_m
+    def to(self, time_s: float, xy_m: Array, std_m: float) -> Chord | None:
+        """Return the chord to a fix at `xy_m` (2,) with white noise of `std_m`, if it is one."""
+        x_m, y_m = (xy_m - self.xy_m).tolist()
+        length_m, lasts_s = math.hypot(x_m, y_m), time_s - self.time_s
+        if length_m < max(_LEAST_M, _DEVIATIONS * std_m) or not _LEAST_S <= lasts_s <= LONGEST_S:
             return None
-        from_s, from_m = self._from
-        x_m, y_m = (xy_m - from_m).tolist()
-        length_m = math.hypot(x_m, y_m)
-        if length_m < max(_LEAST_M, _DEVIATIONS * std_m) or time_s - from_s < _LEAST_S:
-            return None
-        self._from = time_s, xy_m
-        return Chord(from_s, time_s, length_m, math.atan2(y_m, x_m))
+        return Chord(self.time_s, time_s, length_m, math.atan2(y_m, x_m))
 
 
-class Trail:
+class Trail(NamedTuple):
     """A sensor's value, or the integral of its rate, at any instant of the last seconds."""
 
-    def __init__(self) -> None:
-        self._marks: deque[tuple[float, float]] = deque()
-        self._time_s, self._rate, self._value = -math.inf, 0.0, 0.0
+    marks: tuple[tuple[float, float], ...] = ()
+    """Time and value, some of all."""
+    time_s: float = -math.inf
+    rate: float = 0.0
+    value: float = 0.0
 
-    def copy(self) -> Trail:
-        """Return another one that goes on from here by itself."""
-        other = shallow_copy(self)
-        other._marks = self._marks.copy()
-        return other
-
-    def go_on(self, time_s: float, rate: float) -> None:
-        """Go on by a rate, evenly from the one before."""
-        step_s = time_s - self._time_s
+    def gone_on(self, time_s: float, rate: float) -> Trail:
+        """Return the trail gone on by a rate, evenly from the one before."""
+        step_s, value = time_s - self.time_s, self.value
         if 0.0 <= step_s <= _GAP_S:
-            self._value += 0.5 * (self._rate + rate) * step_s
-        self._put(time_s, rate)
+            value += 0.5 * (self.rate + rate) * step_s
+        return Trail(self._marked(time_s, value), time_s, rate, value)
 
-    def turn_to(self, time_s: float, angle_rad: float) -> None:
-        """Go on by an angle, the short way round."""
-        self._value += math.remainder(angle_rad - self._value, math.tau)
-        self._put(time_s, 0.0)
+    def turned_to(self, time_s: float, angle_rad: float) -> Trail:
+        """Return the trail gone on by an angle, the short way round."""
+        value = self.value + math.remainder(angle_rad - self.value, math.tau)
+        return Trail(self._marked(time_s, value), time_s, 0.0, value)
 
-    def _put(self, time_s: float, rate: float) -> None:
-        if not 0.0 <= time_s - self._time_s <= _GAP_S:
-            self._marks.clear()
-        self._time_s, self._rate = time_s, rate
-        if not self._marks or time_s - self._marks[-1][0] >= _MARK_S:
-            self._marks.append((time_s, self._value))
-        while time_s - self._marks[0][0] > _KEPT_S:
-            self._marks.popleft()
+    def _marked(self, time_s: float, value: float) -> tuple[tuple[float, float], ...]:
+        marks = self.marks
+        if not 0.0 <= time_s - self.time_s <= _GAP_S:
+            return ((time_s, value),)
+        if time_s - marks[-1][0] < _MARK_S:
+            return marks
+        kept = marks[1:] if time_s - marks[0][0] > _KEPT_S else marks
+        return (*kept, (time_s, value))
 
     def at(self, time_s: float) -> float | None:
         """Return the value at `time_s`; None where no samples are around it."""
-        if not self._marks or not self._marks[0][0] <= time_s <= self._time_s + _GAP_S:
+        marks = self.marks
+        if not marks or not marks[0][0] <= time_s <= self.time_s + _GAP_S:
             return None
-        after = bisect.bisect_right(self._marks, (time_s, math.inf))
-        if after == len(self._marks):
-            return self._value + self._rate * (time_s - self._time_s)
-        (from_s, before), (to_s, value) = self._marks[after - 1], self._marks[after]
+        after = bisect.bisect_right(marks, (time_s, math.inf))
+        if after == len(marks):
+            return self.value + self.rate * (time_s - self.time_s)
+        (from_s, before), (to_s, value) = marks[after - 1], marks[after]
         return before + (value - before) * (time_s - from_s) / (to_s - from_s)

@@ -130,6 +130,11 @@ class MotionSamples:
         wheel = self._steering.steering_wheel_rad
         return None if wheel is None else self._column.tire_rad(wheel)
 
+    def curvature_pm(self, wheelbase_m: float) -> float | None:
+        """Return the path's curvature that the tyres' angle implies, None without one."""
+        angle = self.tire_angle_rad
+        return None if angle is None else math.tan(angle) / wheelbase_m
+
 
 class Doubt:
     """What standard deviation to give a sensor that states none: its recent surprises, bounded.

@@ -73,10 +73,11 @@ class MotionCorrections:
 
         The gyro shows its noise, and its bias while measured speed says that the car stands.
         """
-        stamp_ns, angle = message.stamp_ns, self._measured.tire_angle_rad
-        curvature = None if angle is None else math.tan(angle) / self._wheelbase_m
+        stamp_ns, curvature_pm = message.stamp_ns, None
+        if isinstance(message, SteeringSample):
+            curvature_pm = self._measured.curvature_pm(self._wheelbase_m)
         bias = self._gyro.bias_radps
-        self.trust.take(message, gyro_bias_radps=bias, curvature_pm=curvature)
+        self.trust.take(message, gyro_bias_radps=bias, curvature_pm=curvature_pm)
         believed = channel not in self.trust.left_out
         if not believed:
             self._measured.disbelieve(*LEFT_OUT[channel])
@@ -152,10 +153,10 @@ class MotionCorrections:
                     std = self._yaw_rate_doubt.std(abs(yaw_rate - filter_.yaw_rate_radps))
                     filter_.correct_yaw_rate(yaw_rate, std, biased=False)
             case SteeringSample():
-                angle = self._measured.tire_angle_rad
-                if angle is not None:
+                curvature_pm = self._measured.curvature_pm(self._wheelbase_m)
+                if curvature_pm is not None:
                     # Understeer and an unknown offset make steering a rough witness of the path.
-                    filter_.correct_curvature(math.tan(angle) / self._wheelbase_m, 0.03)
+                    filter_.correct_curvature(curvature_pm, 0.03)
 
     def _correct_turning(self, filter_: KinematicFilter, rate_radps: float) -> None:
         off = abs(rate_radps - filter_.yaw_rate_radps - filter_.mean.item(GYRO_BIAS))

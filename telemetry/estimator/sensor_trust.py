@@ -6,7 +6,7 @@ from typing import Any
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
-from foretwin.telemetry.estimator.chords import Chord, Chords, Trail
+from foretwin.telemetry.estimator.chords import LONGEST_S, Chord, ChordBegun, Trail
 from foretwin.telemetry.estimator.credibility import (
     LATE_S,
     HeadingCredibility,
@@ -28,7 +28,7 @@ class SensorTrust:
     """Takes samples and believed fixes in the order of their stamps."""
 
     def __init__(self) -> None:
-        self._chords = Chords()
+        self._begun: ChordBegun | None = None
         self._turned, self._driven, self._pointed, self._bent = Trail(), Trail(), Trail(), Trail()
         self._gyro, self._steering = TurningCredibility(), TurningCredibility()
         self._wheels, self._headings = WayCredibility(), HeadingCredibility()
@@ -37,36 +37,35 @@ class SensorTrust:
         """The channels whose samples do not go with positions, as far as these tell."""
 
     def copy(self) -> SensorTrust:
-        """Return another one that goes on from here by itself."""
-        other = shallow_copy(self)
-        other._chords = shallow_copy(self._chords)
-        other._turned, other._driven = self._turned.copy(), self._driven.copy()
-        other._pointed, other._bent = self._pointed.copy(), self._bent.copy()
-        other._gyro, other._steering = shallow_copy(self._gyro), shallow_copy(self._steering)
-        other._wheels, other._headings = shallow_copy(self._wheels), shallow_copy(self._headings)
-        return other
+        """Return another one that goes on from here by itself: what is in it is never changed."""
+        return shallow_copy(self)
 
     def take(self, message: Any, *, gyro_bias_radps: float, curvature_pm: float | None) -> None:
         """Take a sample; `curvature_pm` is what the latest measured steering implies."""
         time_s = message.stamp_ns * 1e-9
         match message:
             case ImuSample(rate_radps=rate):
-                self._turned.go_on(time_s, rate[2] - gyro_bias_radps)
+                self._turned = self._turned.gone_on(time_s, rate[2] - gyro_bias_radps)
             case SpeedSample(speed_mps=speed):
-                self._driven.go_on(time_s, speed)
+                self._driven = self._driven.gone_on(time_s, speed)
             case HeadingSample(yaw_rad=yaw):
-                self._pointed.turn_to(time_s, yaw)
+                self._pointed = self._pointed.turned_to(time_s, yaw)
             case SteeringSample() if curvature_pm is not None:
-                self._bent.go_on(time_s, curvature_pm)
+                self._bent = self._bent.gone_on(time_s, curvature_pm)
 
     def take_fix(self, stamp_ns: int, xy_m: Array, std_m: float, *, convergence_rad: float) -> None:
         """Take a believed fix at `xy_m` (2,) with white noise of `std_m`.
 
         `convergence_rad` is the angle of the fixes' frame against east.
         """
-        chord = self._chords.take(stamp_ns * 1e-9, xy_m, std_m)
+        begun, now = self._begun, ChordBegun(stamp_ns * 1e-9, xy_m)
+        chord = None if begun is None else begun.to(now.time_s, xy_m, std_m)
+        if begun is None or chord is not None or now.time_s - begun.time_s > LONGEST_S:
+            self._begun = now
         if chord is None:
             return
+        self._gyro, self._steering = shallow_copy(self._gyro), shallow_copy(self._steering)
+        self._wheels, self._headings = shallow_copy(self._wheels), shallow_copy(self._headings)
         ways_m = _between(self._driven, chord)
         self._gyro.take(chord, _around(self._turned, chord.middle_s))
         self._wheels.take(chord, ways_m)
