@@ -11,6 +11,8 @@ from foretwin.contracts.arrays import Array
 _LEAST_M, _DEVIATIONS, _LEAST_S, LONGEST_S = 3.0, 15.0, 0.5, 6.0
 """A chord as long as 15 standard deviations of its ends has a course good to a tenth of a radian;
 of one that takes longer to drive nobody knows the way between."""
+_LEAST_MPS = 1.5
+"""The fixes of a car that stands wander more slowly. Chosen."""
 _KEPT_S, _MARK_S, _GAP_S = 20.0, 0.1, 1.5
 """Samples further apart than the last leave a gap: what was between is not known."""
 
@@ -39,7 +41,9 @@ class ChordBegun(NamedTuple):
         """Return the chord to a fix at `xy_m` (2,) with white noise of `std_m`, if it is one."""
         x_m, y_m = (xy_m - self.xy_m).tolist()
         length_m, lasts_s = math.hypot(x_m, y_m), time_s - self.time_s
-        if length_m < max(_LEAST_M, _DEVIATIONS * std_m) or not _LEAST_S <= lasts_s <= LONGEST_S:
+        if length_m < max(_LEAST_M, _DEVIATIONS * std_m, _LEAST_MPS * lasts_s):
+            return None
+        if not _LEAST_S <= lasts_s <= LONGEST_S:
             return None
         return Chord(self.time_s, time_s, length_m, math.atan2(y_m, x_m))
 

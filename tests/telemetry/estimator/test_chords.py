@@ -15,6 +15,9 @@ from foretwin.telemetry.estimator.chords import Chord, ChordBegun, Trail
 def test_a_chord_is_as_long_as_noise_asks() -> None:
     begun = ChordBegun(1.0, np.zeros(2))
     assert begun.to(2.0, np.array([0.0, 7.0]), std_m=0.5) is None
+    assert begun.to(6.5, np.array([0.0, 8.0]), std_m=0.5) is None, (
+        "fixes of a car that stands wander"
+    )
     chord = begun.to(2.0, np.array([0.0, 8.0]), std_m=0.5)
     assert chord == Chord(1.0, 2.0, 8.0, pytest.approx(math.pi / 2.0))
     assert chord.middle_s == 1.5

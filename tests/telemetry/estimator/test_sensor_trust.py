@@ -163,3 +163,23 @@ def test_backwards_a_car_turns_the_other_way_than_it_steers(backs: bool) -> None
         place = 10.0 * np.array([math.sin(angle), 1.0 - math.cos(angle)])
         trust.take_fix(stamp_ns, place, 0.02, convergence_rad=0.0)
     assert trust.left_out == frozenset()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_fixes_that_wander_while_the_car_stands_say_nothing_of_its_sensors(seed: int) -> None:
+    """Three minutes at a metre a second, whatever they say of themselves."""
+    trust, random = SensorTrust(), np.random.default_rng(seed)
+    place, course_rad = np.zeros(2), 0.0
+    for k in range(1800):
+        stamp_ns = k * 100_000_000
+        at_rest = {"accel_mps2": (0.0, 0.0, 9.8), "rate_radps": (0.0, 0.0, 0.0)}
+        for message in (
+            ImuSample(stamp_ns=stamp_ns, **at_rest),
+            SpeedSample(stamp_ns=stamp_ns, speed_mps=0.0),
+            HeadingSample(stamp_ns=stamp_ns, yaw_rad=1.0),
+        ):
+            trust.take(message, gyro_bias_radps=0.0, curvature_pm=None)
+        course_rad += random.normal(0.0, 0.1)
+        place = place + 0.1 * np.array([math.cos(course_rad), math.sin(course_rad)])
+        trust.take_fix(stamp_ns, place, 0.02, convergence_rad=0.0)
+        assert trust.left_out == frozenset()
