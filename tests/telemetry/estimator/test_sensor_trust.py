@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.sensor_trust import LEFT_OUT, SensorTrust
-from tests.telemetry.position_track import yaw
 from tests.telemetry.winding_drive import (
     TICK_S,
     TICKS,
@@ -22,35 +21,9 @@ from tests.telemetry.winding_drive import (
     driven,
     truly,
 )
+from tests.telemetry.wrong_sensor_figures import CHANNEL, PRECISE, ROUGH, WRONG, errors
 
-PRECISE: dict[str, Any] = {}
-ROUGH: dict[str, Any] = {"fix_std_m": 3.0, "fix_every": 50}
-WRONG: dict[str, tuple[str, Any]] = {
-    "a gyro stuck": ("gyro", lambda _: 0.0),
-    "a gyro upside down": ("gyro", lambda rate: -rate),
-    "a gyro in degrees": ("gyro", math.degrees),
-    "wheels in km/h": ("wheels", lambda speed: 3.6 * speed),
-    "wheels in mph": ("wheels", lambda speed: 2.237 * speed),
-    "wheels that say nought": ("wheels", lambda _: 0.0),
-    "wheels backwards": ("wheels", lambda speed: -speed),
-    "headings by a compass": ("heading", lambda yaw: math.pi / 2.0 - yaw),
-    "headings to the left": ("heading", lambda yaw: yaw + math.pi / 2.0),
-    "headings to the rear": ("heading", lambda yaw: yaw + math.pi),
-    "steering to the right": ("steering", lambda angle: -angle),
-    "steering of the wheel": ("steering", lambda angle: max(-1.4, min(1.4, 15.0 * angle))),
-}
 NOISE = np.random.default_rng(7).normal(0.0, 1.0, (TICKS, 2))
-CHANNEL = {"gyro": "imu", "wheels": "speed", "heading": "heading", "steering": "steering"}
-
-
-def errors(states: Any, *, from_s: float) -> tuple[float, float]:
-    """Return the largest errors of speed (m/s) and yaw (rad) from a time on."""
-    after = [(WINDING[tick], state) for tick, state in states if tick * TICK_S > from_s]
-    assert len(after) * TICK_S > 1.0
-    return (
-        max(abs(state.speed_mps - speed) for (speed, *_), state in after),
-        max(abs(math.remainder(yaw(state) - at, math.tau)) for (_, _, at, *_), state in after),
-    )
 
 
 @pytest.mark.parametrize("fixes", [PRECISE, ROUGH], ids=["precise", "rough"])
