@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ from foretwin.contracts.credentials import credentials_file
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.process import is_held
 from foretwin.contracts.process_setup import BusSetup
+from foretwin.contracts.terminal import command_line
 
 
 class RunningDrive(NamedTuple):
@@ -56,7 +56,7 @@ def running_drive(folder: Path) -> RunningDrive:
         raise UserError(f"{file}: does not say where the drive listens")
     log = folder / "log.jsonl"
     if not (log.is_file() and is_held(log)):
-        how = f"`foretwin recover {shlex.quote(str(folder))}` makes its results readable"
+        how = f"`{command_line('recover', folder)}` makes its results readable"
         raise UserError(f"{folder}: the drive was killed; {how}")
     shown = record.get("credentials")
     credentials = Path(shown) if isinstance(shown, str) else None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import sys
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,11 @@ def visible(text: str) -> str:
 def plain(text: str) -> str:
     """Return a text as one line in which nothing commands a terminal."""
     return visible(text).replace("\n", "\\n").replace("\t", " ")
+
+
+def command_line(*words: object) -> str:
+    """Return a command of foretwin as one types it: folders with spaces in them are quoted."""
+    return shlex.join(["foretwin", *map(str, words)])
 
 
 def say(text: object, *, error: bool = False) -> None:

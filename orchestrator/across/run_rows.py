@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import re
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import msgspec
 
 from foretwin.contracts.errors import one_line
+from foretwin.contracts.terminal import command_line
 from foretwin.orchestrator.record.run_folder import SUMMARY
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS, RUNNING, is_locked
 from foretwin.orchestrator.record.whereabouts import driven_s
@@ -95,8 +95,8 @@ def row_of_folder(folder: Path) -> RunRow:
         row = drive_row(record, folder=str(folder), record_text=data.decode().rstrip())
         if row.state == RUNNING or any((folder / RESULTS).glob("*.arrows")):
             running = is_locked(folder / LOG)
-            name = shlex.quote(str(folder))
-            how = "" if running else f"foretwin recover {name} makes its results readable"
+            again = command_line("recover", folder)
+            how = "" if running else f"{again} makes its results readable"
             state = RUNNING if running else KILLED
             return msgspec.structs.replace(row, state=state, remark=how)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.terminal import plain
+from foretwin.contracts.terminal import command_line, plain
 from foretwin.orchestrator.across.changes import changes_between, is_worse
 from foretwin.orchestrator.across.paired_statistics import LEVEL
 from foretwin.orchestrator.across.pairs import side_of
@@ -113,10 +112,10 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
     yield from _alone_lines(found["alone"], every=every)
     yield from _place_lines(found["places"])
     for name, side in (("newly failing", "second"), ("fixed", "second")):
-        cases, folder = found[name.replace(" ", "_")], shlex.quote(str(found[side]["folder"]))
+        cases, folder = found[name.replace(" ", "_")], found[side]["folder"]
         for one in cases[:_MOST_LISTED]:
             where = f"{one['scenario'] or 'nominal'} at {one['junction_id']}: {one['name']}"
-            yield f"{name}: {where}: foretwin repeat {folder} {one['future_id']}"
+            yield f"{name}: {where}: {command_line('repeat', folder, one['future_id'])}"
         if len(cases) > _MOST_LISTED:
             yield f"{name}: {len(cases) - _MOST_LISTED} more: --json"
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import select
-import shlex
 import shutil
 import signal
 import time
@@ -20,7 +19,7 @@ from collections.abc import Callable
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.one_heap import share_one_heap
-from foretwin.contracts.terminal import say
+from foretwin.contracts.terminal import command_line, say
 from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.drive.orchestrator_link import OrchestratorLink, linked
@@ -96,8 +95,7 @@ class Foreground:
             return code
         say(
             f"error: the orchestrator ended by {how}, the last of {len(self._ended_by)} times; "
-            f"`foretwin recover {shlex.quote(str(self._plan.folder))}` "
-            "makes readable what there is",
+            f"`{command_line('recover', self._plan.folder)}` makes readable what there is",
             error=True,
         )
         return EXIT_FAILED

@@ -5,13 +5,13 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.terminal import command_line
 from foretwin.orchestrator.record.derive import streams_in
 from foretwin.orchestrator.record.durable import sync_folder, whole_file
 
@@ -76,7 +76,7 @@ def is_unfinished(folder: Path) -> bool:
 
 def made_by_recover(folder: Path) -> str:
     """Return how what could not be written of a run is had from what was, for a trouble's end."""
-    return f"`foretwin recover {shlex.quote(str(folder))}` makes it of what was written"
+    return f"`{command_line('recover', folder)}` makes it of what was written"
 
 
 def check_finished(folder: Path) -> None:
@@ -88,7 +88,7 @@ def check_finished(folder: Path) -> None:
     if is_unfinished(folder):  # else it has ended since
         raise UserError(
             f"{folder}: the drive never came to its end: "
-            f"`foretwin recover {shlex.quote(str(folder))}` makes its results readable"
+            f"`{command_line('recover', folder)}` makes its results readable"
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ import pyarrow.compute as pc
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.segments import MONITOR_FILE
+from foretwin.contracts.terminal import command_line
 from foretwin.contracts.world import World
 from foretwin.orchestrator.report.blocks import (
     UNKNOWN,
@@ -183,7 +183,7 @@ def scenario_of(future: Mapping[str, Any]) -> str:
 
 def repeat_command(run: RunMaterial, future_id: str) -> str:
     """Return the command that plays a future again."""
-    return f"foretwin repeat {shlex.quote(run.called)} {future_id}"
+    return command_line("repeat", run.called, future_id)
 
 
 def _futures(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from typing import Any
 
 from foretwin.contracts.segments import DRIVE_FILE
+from foretwin.contracts.terminal import command_line
 from foretwin.orchestrator.report.blocks import (
     Block,
     Chapter,
@@ -87,8 +87,7 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Chapter:
     if not found:
         text = (
             "The gap was not measured while driving; "
-            f"`foretwin gap {shlex.quote(f'{run.called}/{DRIVE_FILE}')}` "
-            "measures it from the recording."
+            f"`{command_line('gap', f'{run.called}/{DRIVE_FILE}')}` measures it from the recording."
         )
         return Chapter("gap", title, (Prose(text), *_people(people)))
     blocks: list[Block] = [

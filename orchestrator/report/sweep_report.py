@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pyarrow.compute as pc
 
+from foretwin.contracts.terminal import command_line
 from foretwin.orchestrator.progress import Progress, untold
 from foretwin.orchestrator.report.blocks import (
     Block,
@@ -245,7 +245,7 @@ def _worst(sweep: SweepMaterial, *, pictures: bool, advance: Callable[..., None]
 
 def repeat_of(sweep: SweepMaterial, future_id: str) -> str:
     """Return the command that plays a case again."""
-    return f"foretwin repeat {shlex.quote(sweep.called)} {future_id}"
+    return command_line("repeat", sweep.called, future_id)
 
 
 def _hit(one: Mapping[str, Any]) -> str:

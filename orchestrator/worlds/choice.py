@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, local_from_geo
+from foretwin.contracts.terminal import command_line
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.opening import Clip, NodeClip, OpenMap
@@ -29,7 +29,7 @@ def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
             return junction
     raise UserError(
         f"{junction_id}: {opened.file} holds no such intersection; "
-        f"`foretwin intersections {shlex.quote(str(opened.file))}` lists all"
+        f"`{command_line('intersections', opened.file)}` lists all"
     )
 
 

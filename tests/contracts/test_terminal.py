@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import json
+import shlex
 import unicodedata
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.progress import Progress
 
-from foretwin.contracts.terminal import console, described, plain, say, visible, words
+from foretwin.contracts.terminal import command_line, console, described, plain, say, visible, words
 from tests.test_layout import ROOT, tracked_files
 from tests.test_mirrored import ROOMS
 
@@ -74,6 +75,13 @@ def test_rich_takes_nothing_for_markup() -> None:
     with Progress(described(), console=Console(file=bar_shown, width=200)) as bar:
         bar.add_task(plain(HOSTILE))
     assert SHOWN in bar_shown.getvalue()
+
+
+def test_a_command_is_told_as_one_types_it() -> None:
+    told = command_line("recover", Path("my runs/first"))
+    assert told == "foretwin recover 'my runs/first'"
+    assert shlex.split(told) == ["foretwin", "recover", "my runs/first"]
+    assert command_line("repeat", "runs/x", "0a-8") == "foretwin repeat runs/x 0a-8"
 
 
 def test_nobody_else_writes_to_a_terminal() -> None:
