@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from foretwin.telemetry.estimator.chords import Chord
+from foretwin.telemetry.estimator.facing import FASTEST_REVERSE_MPS
 
 LATE_S = (0.0, 1.0, 2.0, 3.0)
 """So late may courses be: in Dresden one receiver's are by 2 s."""
@@ -30,7 +31,6 @@ _MOST_TIMES = 1.9
 setting out make 1.8 (Dresden, 14 February), slip and tight turns less."""
 _OFF_RAD = math.radians(45.0)
 """An antenna far ahead of the axle goes so far beside the heading in no but the tightest turn."""
-_FASTEST_REVERSE_MPS = 3.0
 
 
 class Credibility:
@@ -136,7 +136,7 @@ class WayCredibility(Credibility):
         self._chords = ()
         if max(lengths) > _LARGEST_SHARE * length_m:
             return
-        fast = length_m > _FASTEST_REVERSE_MPS * lasts_s
+        fast = length_m > FASTEST_REVERSE_MPS * lasts_s
         times = [(way if fast else abs(way)) / length_m for way in self._ways_m]
         self.weigh([1.0 / _MOST_TIMES < one < _MOST_TIMES for one in times])
 

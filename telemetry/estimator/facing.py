@@ -16,7 +16,7 @@ _WITHIN_S = 3.0
 _TURNED_RAD, _BACKWARDS_RAD = 1.75, 2.5
 """No car turns by the first within a metre: its heading was wrong; from the second on it backs."""
 _KNOWN_YAW_STD = 0.15
-_FASTEST_REVERSE_MPS, _LONGEST_REVERSE_M = 3.0, 15.0
+FASTEST_REVERSE_MPS, _LONGEST_REVERSE_M = 3.0, 15.0
 """A car that positions show going faster or farther backwards was facing that way. Chosen."""
 
 
@@ -65,7 +65,7 @@ class Facing:
             self._reversed_m += self._gate.last_step_m
             if speed_mps > 0.5 * CREEPING_MPS:
                 filter_.may_reverse = False
-            elif speed_mps < -_FASTEST_REVERSE_MPS or self._reversed_m > _LONGEST_REVERSE_M:
+            elif speed_mps < -FASTEST_REVERSE_MPS or self._reversed_m > _LONGEST_REVERSE_M:
                 return self._long_course(std_m)
             return None
         known = filter_.covariance.item(YAW, YAW) < _KNOWN_YAW_STD**2

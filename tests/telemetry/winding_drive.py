@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from foretwin.contracts.drive import (
     VehicleState,
 )
 from foretwin.telemetry.estimator.estimator import StateEstimator
-from tests.telemetry.position_track import fix, info
+from tests.telemetry.position_track import Sample, fix, info
 
 TICK_S = 0.02
 TICKS = 6000
@@ -43,6 +43,30 @@ def winding() -> list[tuple[float, float, float, float, float]]:
 WINDING = winding()
 
 
+def measured(
+    tick: int,
+    *,
+    gyro: Told | None = None,
+    wheels: Told | None = None,
+    heading: Told | None = None,
+    steering: Told | None = None,
+) -> Iterator[Sample]:
+    """Yield what sensors say at a tick, none of those that are None."""
+    speed, rate, yaw, _, _ = WINDING[tick]
+    stamp_ns = round(tick * TICK_S * 1e9)
+    if gyro is not None:
+        felt = {"accel_mps2": (0.0, 0.0, 9.8), "rate_radps": (0.0, 0.0, gyro(rate))}
+        yield "imu", ImuSample(stamp_ns=stamp_ns, **felt)
+    if heading is not None:
+        told = math.remainder(heading(yaw), math.tau)
+        yield "heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=told)
+    if wheels is not None:
+        yield "speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=wheels(speed))
+    if steering is not None:
+        angle = steering(math.atan(WHEELBASE_M * rate / speed))
+        yield "steering", SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=angle)
+
+
 def driven(
     *,
     gyro: Told | None = truly,
@@ -61,26 +85,13 @@ def driven(
     estimator, states = StateEstimator(info()), []
     noise, wander = np.random.default_rng(3).normal(0.0, 1.0, (2, TICKS, 2)), np.zeros(2)
     stays = math.exp(-fix_every * TICK_S / 30.0) if fix_std_m >= 0.5 else 0.0
-    for tick, (speed, rate, yaw, x, y) in enumerate(WINDING):
+    sensors = {"gyro": gyro, "wheels": wheels, "heading": heading, "steering": steering}
+    for tick, (_, _, _, x, y) in enumerate(WINDING):
         time_s = tick * TICK_S
-        stamp_ns = round(time_s * 1e9)
         if time_s >= right_from_s:
-            gyro, wheels, heading, steering = (
-                one and truly for one in (gyro, wheels, heading, steering)
-            )
-        if gyro is not None:
-            rates = 0.0, 0.0, gyro(rate)
-            estimator.handle(
-                "imu", ImuSample(stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.8), rate_radps=rates)
-            )
-        if heading is not None:
-            told = math.remainder(heading(yaw), math.tau)
-            estimator.handle("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=told))
-        if wheels is not None:
-            estimator.handle("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=wheels(speed)))
-        if steering is not None:
-            angle = steering(math.atan(WHEELBASE_M * rate / speed))
-            estimator.handle("steering", SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=angle))
+            sensors = {name: one and truly for name, one in sensors.items()}
+        for sample in measured(tick, **sensors):
+            estimator.handle(*sample)
         if tick % fix_every == 0:
             wander = stays * wander + math.sqrt(1.0 - stays**2) * noise[0, tick]
             off = fix_std_m * (wander + 0.1 * noise[1, tick] if stays else noise[1, tick])

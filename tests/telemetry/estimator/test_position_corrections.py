@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from foretwin.contracts.drive import HeadingSample, SpeedSample
+from foretwin.contracts.drive import SpeedSample
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import Sample, along, circle, fix, info, states_of, xy, yaw
-from tests.telemetry.winding_drive import TICK_S, TICKS, WINDING
+from tests.telemetry.winding_drive import WINDING, driven, truly
 
 COVERS = ("foretwin.telemetry.estimator.slow_motion",)
 DRIVEN_S = 20.0
@@ -114,20 +114,10 @@ def test_noise_that_is_stated_a_hundred_times_too_small_widens_what_the_state_sa
 @pytest.mark.parametrize("fix_std_m", [0.02, 0.1])
 def test_headings_do_not_make_the_speed_worse(fix_std_m: float) -> None:
     """Headings at 50 Hz beside fixes at 10 Hz: neither tells of pedals, as wheels would."""
-    noise = np.random.default_rng(5).normal(0.0, fix_std_m, (TICKS, 2))
     rms_mps = []
-    for headings in (False, True):
-        estimator, off_mps = StateEstimator(info()), []
-        for tick, (speed, _, heading, x, y) in enumerate(WINDING):
-            if headings:
-                yaw_rad = math.remainder(heading, math.tau)
-                stamp_ns = round(tick * TICK_S * 1e9)
-                estimator.handle("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw_rad))
-            if tick % 5 == 0:
-                at = x + noise[tick, 0], y + noise[tick, 1]
-                state = estimator.handle(*fix(tick * TICK_S, *at, std_m=fix_std_m))
-                if state is not None and tick > 500:
-                    off_mps.append(state.speed_mps - speed)
+    for heading in (None, truly):
+        _, states = driven(gyro=None, heading=heading, fix_std_m=fix_std_m)
+        off_mps = [state.speed_mps - WINDING[tick][0] for tick, state in states if tick > 500]
         rms_mps.append(float(np.sqrt(np.mean(np.square(off_mps)))))
     alone, with_headings = rms_mps
     assert with_headings < 1.25 * alone
