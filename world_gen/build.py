@@ -38,7 +38,7 @@ from foretwin.world_gen.rules.junction_rules import junction_rules
 if TYPE_CHECKING:
     from foretwin.world_gen.driven.correction import Driven
 
-GENERATOR_VERSION = 27
+GENERATOR_VERSION = 28
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
@@ -272,7 +272,7 @@ def _arms(junction: Junction, around: Surroundings) -> tuple[Arm, ...]:
             Arm(
                 id=f"a{i}",
                 name=arm.name,
-                osm_ways=tuple(dict.fromkeys(leg.edge.way_id for leg in arm.outward)),
+                osm_ways=tuple(dict.fromkeys(leg.ways[0] for leg in arm.outward)),
                 bearing_rad=float(arm.bearing_rad),
                 lanes_in=lanes_in,
                 lanes_out=lanes_out,

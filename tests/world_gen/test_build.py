@@ -185,7 +185,7 @@ def test_lanes_go_on_where_a_street_changes_its_tags():
         {0: (0.0, 0.0), 1: (40.0, 0.0), 5: (90.0, 5.0), 2: (0.0, 90.0), 3: (-90.0, 0.0)},
         [
             (11, [0, 1], STREET),
-            (15, [1, 5], STREET | {"surface": "sett"}),
+            (15, [1, 5], STREET | {"maxspeed": "30"}),
             (12, [0, 2], AVENUE),
             (13, [3, 0], STREET),
         ],

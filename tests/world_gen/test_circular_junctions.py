@@ -33,8 +33,8 @@ def test_a_roundabout_is_one_junction_with_the_parting_of_its_arms(tmp_path: Pat
     found = only(sketch.junctions(tmp_path))
     assert (found.summary.kind, found.summary.arms) == ("roundabout", 3)
     assert found.summary.control == "roundabout"
-    assert found.nodes == {1, 2, 3, 5, 8, 20}
-    assert found.summary.id == "n1"
+    assert found.nodes == {2, 3, 5, 8, 20}
+    assert found.summary.id == "n2", "where its ways are parted says nothing"
     assert off_centre_m(sketch, found) < 0.1
     assert [arm.name for arm in found.arms] == ["Ost", "Nord", "West"]
 

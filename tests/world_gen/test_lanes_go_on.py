@@ -101,7 +101,7 @@ def test_a_transition_around_a_bend_leaves_along_the_next_lanes(bend_m):
 
 
 def test_lanes_meet_in_a_bend_between_two_short_pieces():
-    world = _world(ONE_WAY, ONE_WAY, at=(25.0, -1.0), far=(25.4, 20.0))
+    world = _world(ONE_WAY, ONE_WAY | {"maxspeed": "30"}, at=(25.0, -1.0), far=(25.4, 20.0))
     assert _leading_on(world) == {"w11.f0": {"w12.f0"}, "w11.f1": {"w12.f1"}}
 
 

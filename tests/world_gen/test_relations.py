@@ -1,5 +1,6 @@
-"""A map mirrored east for west, or whose ways run the other way, gives the same World, mirrored
-or not: no drawing and no truth of ours is needed to see where a rule knows one side alone."""
+"""A map mirrored east for west, or whose ways run the other way or are parted elsewhere, gives the
+same World, mirrored or not: no drawing and no truth of ours is needed to see where a rule knows one
+side alone, or what a mapper did and no driver sees."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ from tests.data.junctions.draw import draw_all
 from tests.world_gen.data_maps import MAPS
 from tests.world_gen.mirror import OTHER
 from tests.world_gen.sketch import Sketch
-from tests.world_gen.transformed_maps import mirrored_map, reversed_map
+from tests.world_gen.transformed_maps import mirrored_map, reversed_map, split_map
 
 COVERS = (
     "foretwin.world_gen.ground.crossings",
@@ -152,3 +153,15 @@ def test_a_crossing_at_a_bend_lies_across_both_pieces_of_the_road(tmp_path: Path
 @pytest.mark.parametrize("name", ["kingsway", "leeds", "austin", "berlin-mitte"])
 def test_real_junctions_are_built_alike_from_either_side(name: str, data_dir: Path) -> None:
     _checked(read_map(data_dir / MAPS[name]), every=4)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("name", ["kingsway", "leeds", "berlin-mitte"])
+def test_where_ways_are_parted_moves_nothing(name: str, share: float, data_dir: Path) -> None:
+    osm = read_map(data_dir / MAPS[name])
+    parted = split_map(osm, share)
+    assert len(parted.ways) > 1.15 * len(osm.ways)
+    found = _differences(osm, parted, mirrored=False, every=2)
+    # Far from junctions a road has as many more lanes as it has ways more.
+    assert [line for line in found if not line.endswith(" lanes")] == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 
 import msgspec
@@ -104,3 +105,19 @@ def _reversed_tags(tags: Mapping[str, str]) -> dict[str, str]:
     for key in [key for key in image if key.endswith(":lanes") or key == "placement"]:
         image[f"{key}:{along}"] = image.pop(key)
     return image
+
+
+def split_map(osm: OsmMap, share: float) -> OsmMap:
+    """Return a map that says the same, each of whose ways is parted at a node of its own, so far
+    along its nodes; what relations name stays whole."""
+    roads = {key: way for key, way in osm.ways.items() if "highway" in way.tags}
+    uses = Counter(node for way in roads.values() for node in set(way.nodes))
+    named = {way for relation in osm.relations.values() for way in relation.way_ids}
+    ways = dict(osm.ways)
+    for new, (key, way) in enumerate(roads.items(), start=max(osm.ways) + 1):
+        own = [i for i in range(1, len(way.nodes) - 1) if uses[way.nodes[i]] == 1]
+        if own and key not in named and way.nodes[0] != way.nodes[-1]:
+            at = own[round(share * (len(own) - 1))]
+            ways[key] = OsmWay(key, way.nodes[: at + 1], way.tags)
+            ways[new] = OsmWay(new, way.nodes[at:], way.tags)
+    return msgspec.structs.replace(osm, ways=ways)

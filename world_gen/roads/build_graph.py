@@ -18,6 +18,7 @@ from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.countries.outlines import CountryPlace, places_of
 from foretwin.world_gen.osm.driving_side import driving_sides
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
+from foretwin.world_gen.roads.joined_edges import joined, read_tags
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph, side_of
 from foretwin.world_gen.roads.road_tags import (
     Directions,
@@ -31,8 +32,6 @@ from foretwin.world_gen.roads.road_tags import (
 )
 from foretwin.world_gen.roads.speed_limits import speed_limit
 
-_UNUSED = ("name:", "ref", "wiki", "note", "description", "addr:", "alt_name")
-"""Keys that begin so have no meaning for how a road is driven."""
 _NAMED = ("name", "named")
 """Stands for any name: that a road has one tells towns from the country."""
 
@@ -40,9 +39,10 @@ _NAMED = ("name", "named")
 def build_road_graph(osm: OsmMap) -> RoadGraph:
     """Return the graph of everything a car's wheels might follow, in the map's frame.
 
-    Ways are cut where they share a node with themselves or another kept way, and at their ends.
-    Ways are taken in the order of their ids, so that edges, and with them all that follows, are
-    the same for the same map. Raises `MapError` where the map holds no road for cars.
+    Ways are cut where they share a node with themselves or another kept way, and at their ends,
+    and short pieces joined where that parts nothing (`joined_edges`). Ways are taken in the order
+    of their ids, so that edges, and with them all that follows, are the same for the same map.
+    Raises `MapError` where the map holds no road for cars.
     """
     ways = [way for way in osm.ways.values() if is_kept_road(way.tags)]
     if not any(is_car_road(way.tags) for way in ways):
@@ -56,7 +56,8 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     begin = np.cumsum([0, *(len(path) for _, path in kept)])[:-1]
     places = places_of(lat_lon[row[begin]])
     sides = _sides(kept, places, lat_lon[row], xy_m[row])
-    edges = _edges(kept, places, sides, flat.tolist(), xy_m[row], uses[row] > 1)
+    as_mapped = _edges(kept, places, sides, flat.tolist(), xy_m[row], uses[row] > 1)
+    edges = joined(as_mapped, _kept_nodes(osm))
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
     nodes = {node for edge in edges for node in (edge.start_node, edge.end_node)}
     leaving: dict[int, list[DirectedEdge]] = {node: [] for node in sorted(nodes)}
@@ -69,6 +70,13 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
         edges=tuple(edges),
         node_xy_m={node: (at[node][0], at[node][1]) for node in leaving},
         leaving={node: tuple(directed) for node, directed in leaving.items()},
+    )
+
+
+def _kept_nodes(osm: OsmMap) -> frozenset[int]:
+    """Return the nodes that are junctions by themselves."""
+    return frozenset(
+        node for node, tags in osm.node_tags.items() if tags.get("highway") == "mini_roundabout"
     )
 
 
@@ -134,9 +142,8 @@ def _edges(
     meaning = cache(_meaning)  # most ways of a town have the same tags but for their names
     for i, (way, _) in enumerate(ways):
         tags = way.tags
-        used = [kv for kv in tags.items() if not kv[0].startswith(_UNUSED) and kv[0] != "name"]
         named = [_NAMED] if "name" in tags else []
-        means = meaning(frozenset((*used, *named)), places[i].code)
+        means = meaning(frozenset((*read_tags(tags).items(), *named)), places[i].code)
         name = tags.get("name") or tags.get("ref", "")
         for k in range(of_way[i], of_way[i + 1] - 1):
             begin, end = at[k], at[k + 1]

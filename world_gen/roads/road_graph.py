@@ -14,7 +14,9 @@ from foretwin.contracts.world import DrivingSide
 
 
 class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
-    """A stretch of one way between two graph nodes; `xy_m` (N, 2) in the map's frame.
+    """A stretch of road between two graph nodes; `xy_m` (N, 2) in the map's frame.
+
+    It is of one way, or of several that are driven alike, the longest of which is `way_id`.
 
     `forward` and `backward` are whether cars may drive along and against the node order.
     `car` is true for public car roads; pedestrian streets, service roads, tracks and the like
@@ -41,6 +43,13 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     tags: Mapping[str, str]
     country: str = ""
     """Code of the country where its way begins; empty where there is none."""
+    part_ways: tuple[int, ...] = ()
+    """Ids of the ways that it runs along, in their order, where they are several."""
+
+    @property
+    def ways(self) -> tuple[int, ...]:
+        """Ids of the ways that it runs along, in their order."""
+        return self.part_ways or (self.way_id,)
 
     @property
     def one_way(self) -> bool:
@@ -78,6 +87,11 @@ class DirectedEdge(NamedTuple):
     def end_node(self) -> int:
         """OSM id of the node where driving ends."""
         return self.edge.start_node if self.reverse else self.edge.end_node
+
+    @property
+    def ways(self) -> tuple[int, ...]:
+        """Ids of the ways that it runs along, in driving order."""
+        return self.edge.ways[::-1] if self.reverse else self.edge.ways
 
     @property
     def xy_m(self) -> Array:

@@ -48,10 +48,10 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
         turns_back = before.edge.index == after.edge.index and before.reverse != after.reverse
         only: list[bool] = []
         for rule in rules:
-            if rule.from_way != before.edge.way_id:
+            if rule.from_way != before.ways[-1]:
                 continue
-            meant = after.edge.way_id in rule.to_ways
-            if meant and rule.from_way == after.edge.way_id:
+            meant = after.ways[0] in rule.to_ways
+            if meant and rule.from_way == after.ways[0]:
                 # A way that goes on beyond the node: only the word parts straight on from back.
                 meant = meant and turns_back == rule.u_turn
             if rule.only:
@@ -65,7 +65,7 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
         """Return whether no restriction over via ways forbids this sequence of edges."""
         if len(path) < 3:
             return True
-        ways = [way for way, _ in groupby(part.edge.way_id for part in path)]
+        ways = [way for way, _ in groupby(way for part in path for way in part.ways)]
         for rule in self.over_ways:
             start = (rule.from_way, *rule.via_ways)
             n = len(start)
@@ -104,7 +104,7 @@ def read_turn_restrictions(osm: OsmMap, graph: RoadGraph) -> TurnRestrictions:
                 over_ways.append(rule)
             for node in via_nodes:
                 leaving = graph.leaving.get(node, ())
-                if only and ends.isdisjoint(edge.edge.way_id for edge in leaving if edge.allowed):
+                if only and ends.isdisjoint(edge.ways[0] for edge in leaving if edge.allowed):
                     impossible.append(rule)
                 else:
                     at_node.setdefault(node, []).append(rule)
@@ -131,7 +131,8 @@ def restriction_notes(
         return ()
     of_way: dict[int, set[int]] = {}
     for index, edge in edges.items():
-        of_way.setdefault(edge.way_id, set()).add(index)
+        for way in edge.ways:
+            of_way.setdefault(way, set()).add(index)
     notes = [
         f"relation {rule.relation}: from way {rule.from_way} it allows only way "
         f"{', '.join(map(str, sorted(rule.to_ways)))}, which cannot be driven from there; left out"

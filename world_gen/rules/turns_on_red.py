@@ -32,5 +32,5 @@ def allow_on_red(
         tags = [node_tags.get(node, {}) for node in approach.signal_nodes]
         keys = (f"red_turn:{near_side}", "red_turn")
         said = next((tag[key] for tag in tags for key in keys if key in tag), None)
-        ways = c.movement.toward.edge.way_id, c.movement.away.edge.way_id
+        ways = c.movement.toward.ways[-1], c.movement.away.ways[0]
         c.red_after_stop = (usual if said is None else said == "yes") and ways not in forbidden

@@ -40,13 +40,17 @@ def _ring(*, ring: Tags, entry: Tags, left_hand: bool = False, exit_there: bool 
     return world_of(drawn_map(nodes, ways, origin=IRELAND if left_hand else GERMANY))
 
 
-def _leads(world: World, way: int) -> dict[str, set[tuple[int, str]]]:
-    """Return to which (way, lane) each lane of a way leads, its lanes by their labels."""
+def _leads(world: World, way: int, node: int | None = None) -> dict[str, set[tuple[int, str]]]:
+    """Return to which (way, lane) each lane of a way leads, its lanes by their labels.
+
+    Of a way that is cut at junctions, the piece that begins at a node.
+    """
+    begin = f"w{way}." if node is None else f"w{way}.{node}."
     lanes = {lane.id: lane for lane in world.lanes}
     found: dict[str, set[tuple[int, str]]] = {}
     for c in world.connections:
         start, end = lanes[c.from_lane_id], lanes[c.to_lane_id]
-        if start.osm_way == way:
+        if start.id.startswith(begin):
             label = start.id.rpartition(".")[2]
             found.setdefault(label, set()).add((end.osm_way, end.id.rpartition(".")[2]))
     return found
@@ -157,8 +161,8 @@ def test_a_lane_whose_road_lies_beyond_the_edge_is_led_nowhere_else(data_dir: Pa
     (here,) = [j for j in junctions if j.summary.id == "n152456636"]
     index = index_map(osm, graph, junctions)
     wide, narrow = (
-        _leads(build_world(osm, graph, here, index=index, radius_m=radius_m), 655283348)
-        for radius_m in (150.0, 60.0)
+        _leads(build_world(osm, graph, here, index=index, radius_m=radius_m), 124953136, 4344958694)
+        for radius_m in (80.0, 60.0)
     )
     assert wide["f2"] == {(366244289, "b1")}
     assert narrow == {lane: to for lane, to in wide.items() if lane != "f2"}

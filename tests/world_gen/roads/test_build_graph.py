@@ -111,7 +111,7 @@ def test_edges_join_to_the_ways_they_were_cut_from(
     for node in range(1, 13):
         sketch.node(node, 37.0 * (node % 5), 23.0 * node)
     for way, nodes in enumerate(paths, start=100):
-        sketch.road(way, nodes)
+        sketch.road(way, nodes, f"Way {way}")
     sketch.road(99, [1, 12])
     graph = sketch.graph(tmp_path_factory.mktemp("sketch"))
     for way, nodes in enumerate(paths, start=100):

@@ -26,7 +26,7 @@ def _from_west(
     """
     west = [3, *sorted(nodes, key=lambda node: nodes[node][0]), 0]
     at = len(west) - 1 if parted_at is None else west.index(parted_at)
-    ways = [(13, west[: at + 1], STREET), (15, west[at:], STREET)]
+    ways = [(13, west[: at + 1], STREET), (15, west[at:], STREET | {"maxspeed": "30"})]
     osm = drawn_map(
         CROSS | {node: (x, 0.0) for node, (x, _) in nodes.items()},
         [
