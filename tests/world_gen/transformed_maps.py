@@ -121,3 +121,34 @@ def split_map(osm: OsmMap, share: float) -> OsmMap:
             ways[key] = OsmWay(key, way.nodes[: at + 1], way.tags)
             ways[new] = OsmWay(new, way.nodes[at:], way.tags)
     return msgspec.structs.replace(osm, ways=ways)
+
+
+def renumbered_map(osm: OsmMap, seed: int) -> OsmMap:
+    """Return a map that says the same, whose nodes and ways have each other's ids."""
+    rng = np.random.default_rng(seed)
+    ids = osm.locations.ids
+    new_ids = rng.permutation(ids)
+    order = np.argsort(new_ids)
+    nodes = dict(zip(ids.tolist(), new_ids.tolist(), strict=True))
+    ways = dict(zip(osm.ways, rng.permutation(list(osm.ways)).tolist(), strict=True))
+    new_of = {"n": nodes, "w": ways, "r": {}}
+    renumbered = {
+        ways[key]: OsmWay(ways[key], tuple(nodes[n] for n in way.nodes), way.tags)
+        for key, way in osm.ways.items()
+    }
+    return msgspec.structs.replace(
+        osm,
+        locations=NodeLocations(new_ids[order], osm.locations.lat_lon_deg[order]),
+        ways=dict(sorted(renumbered.items())),
+        node_tags={nodes.get(node, node): tags for node, tags in osm.node_tags.items()},
+        relations={
+            key: msgspec.structs.replace(
+                one,
+                members=tuple(
+                    msgspec.structs.replace(m, ref=new_of[m.kind].get(m.ref, m.ref))
+                    for m in one.members
+                ),
+            )
+            for key, one in osm.relations.items()
+        },
+    )

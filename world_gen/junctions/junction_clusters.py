@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
 
 from foretwin.world_gen.junctions.chains import CarRoads, Chain, Tags
@@ -163,20 +163,32 @@ def _side_road(chain: Chain, roads: CarRoads, node: int) -> float:
 
 
 def _add_flares(grouping: Grouping, roads: CarRoads) -> None:
-    """Give each ring the nodes where its arms part into entry and exit."""
-    for node, chains in roads.chains_from.items():
-        own = grouping.of.get(node)
-        if own is None or own.ring:
-            continue
-        to_ring = [
-            (chain, target)
-            for chain in chains
-            if chain.one_way
-            and chain.length_m <= FLARE_M
-            and (target := grouping.of.get(chain.end)) is not None
-            and target.ring
-        ]
-        for (a, target), (b, other) in combinations(to_ring, 2):
-            parting = other is target and a.outward != b.outward
-            if parting and grouping.attach(target, own, (a.key, b.key)):
-                break
+    """Give each ring the nodes where its arms part into entry and exit.
+
+    What a flare leads to is no part of the ring for others: all are found before one is added.
+    """
+    flares = [
+        (node, keys, target)
+        for node, chains in roads.chains_from.items()
+        if (own := grouping.of.get(node)) is not None and not own.ring
+        for keys, target in _parting(chains, grouping)
+    ]
+    for node, keys, target in flares:
+        grouping.attach(target, grouping.of[node], keys)  # refused where it is of a ring by now
+
+
+def _parting(
+    chains: Sequence[Chain], grouping: Grouping
+) -> Iterator[tuple[tuple[tuple[int, int], tuple[int, int]], JunctionCluster]]:
+    """Yield the pairs of one-way chains that lead to and from one ring, by their keys."""
+    to_ring = [
+        (chain, target)
+        for chain in chains
+        if chain.one_way
+        and chain.length_m <= FLARE_M
+        and (target := grouping.of.get(chain.end)) is not None
+        and target.ring
+    ]
+    for (a, target), (b, other) in combinations(to_ring, 2):
+        if other is target and a.outward != b.outward:
+            yield (a.key, b.key), target

@@ -54,7 +54,10 @@ def fork_trims(
 
 
 def _branches(cluster: Cluster, heads: Heads) -> Iterator[tuple[DirectedEdge, DirectedEdge]]:
-    """Yield legs that part or merge at one node: the one that bends more, and the other."""
+    """Yield legs that part or merge at one node: the one that bends more, and the other.
+
+    Where no road lies before them, the one of fewer lanes is the branch, or the shorter one.
+    """
     one_way = [leg for leg in cluster.legs if leg.edge.one_way and not is_ring_edge(leg.edge)]
     for pair in itertools.combinations(one_way, 2):
         if pair[0].start_node != pair[1].start_node or _leaves(pair[0]) != _leaves(pair[1]):
@@ -63,10 +66,15 @@ def _branches(cluster: Cluster, heads: Heads) -> Iterator[tuple[DirectedEdge, Di
         if dot(first, second) < FLAT_COS:
             continue
         others = [heads[leg.key] for leg in cluster.legs if leg not in pair]
-        bend = [
-            min((dot(head, other) for other in others), default=0.0) for head in (first, second)
-        ]
-        yield pair if bend[0] > bend[1] else pair[::-1]
+        road, branch = sorted(
+            pair,
+            key=lambda leg: (
+                min((dot(heads[leg.key], other) for other in others), default=0.0),
+                -leg.lanes.value - leg.back.lanes.value,
+                -leg.edge.length_m,
+            ),
+        )
+        yield branch, road
 
 
 def _leaves(leg: DirectedEdge) -> bool:
