@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.drive import ControlCommand, ControlMode, VehicleState, VehicleStatus
 from foretwin.contracts.roles import OtherVehicle
 
 if TYPE_CHECKING:  # its arithmetic is compiled, and who makes the estimator loads the compiler
@@ -43,6 +43,7 @@ class OtherVehicleStates:
         self._id, self._estimator = vehicle_id, estimator
         self._commands: deque[ControlCommand] = deque(maxlen=MOST_HEARD)
         self._last_ns: int | None = None
+        self._mode: ControlMode = "unknown"
 
     @property
     def clock_offset_ns(self) -> int | None:
@@ -68,6 +69,8 @@ class OtherVehicleStates:
         if isinstance(message, ControlCommand):
             stamp_ns = message.stamp_ns + later_ns
             self._commands.append(msgspec.structs.replace(message, stamp_ns=stamp_ns))
+        elif isinstance(message, VehicleStatus):
+            self._mode = message.control_mode
         state = self._estimator.handle(channel, message, received_ns=received_ns)
         if state is None or not state.yaw_valid:
             return None
@@ -77,5 +80,7 @@ class OtherVehicleStates:
         commands = tuple(self._commands)
         self._commands.clear()
         self._last_ns = stamp_ns
-        moved = msgspec.structs.replace(state, stamp_ns=stamp_ns, vehicle_id=self._id)
+        moved = msgspec.structs.replace(
+            state, stamp_ns=stamp_ns, vehicle_id=self._id, control_mode=self._mode
+        )
         return OtherVehicle(state=moved, commands=commands)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import ControlCommand
+from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.frames import LocalFrame, wrap_angle
 from foretwin.contracts.roles import FollowLimits, Role
 from foretwin.contracts.vehicle import VehicleParameters
@@ -66,6 +66,12 @@ class Member:
     def plain(self) -> bool:
         """Whether it is nowhere else than a vehicle that never changed its role."""
         return self.drawn.at_rest and self.settling.at_rest and not self.offset.any()
+
+    def take_state(self, state: VehicleState) -> None:
+        """Take where it was measured; while a human drives, its commands move nothing."""
+        self.track.take(state)
+        if state.control_mode == "manual":
+            self.commands.human_drives(state.stamp_ns)
 
     def take_command(self, command: ControlCommand) -> None:
         """Take a command of the vehicle; ignored where none are expected."""

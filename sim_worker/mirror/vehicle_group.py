@@ -88,7 +88,7 @@ class VehicleGroup:
 
     def take_state(self, vehicle_id: str, state: VehicleState) -> None:
         """Take where a vehicle was measured. Raises ValueError where that is not finite."""
-        self.members[vehicle_id].track.take(state)
+        self.members[vehicle_id].take_state(state)
 
     def take_command(self, vehicle_id: str, command: ControlCommand) -> None:
         """Take a command of a vehicle."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.drive import ControlCommand, ControlMode, VehicleState
 from foretwin.contracts.roles import FollowLimits, Role
 from foretwin.sim_worker.mirror.member import GroupMember, Member
 from foretwin.sim_worker.mirror.track import MeasuredPose
@@ -89,6 +90,21 @@ def meet_on(group: VehicleGroup, from_s: float, until_s: float) -> VehicleGroup:
         group.take_state("car", state_at(8.0 * k / 50.0, 0.0, stamp_ns=k * TICK_NS))
         group.advance(k * TICK_NS)
     return group
+
+
+@pytest.mark.parametrize("mode", ["autonomous", "manual"])
+def test_commands_that_a_human_drives_over_move_no_twin(mode: ControlMode) -> None:
+    group = VehicleGroup(None, FRAME, (GroupMember("van", VAN, commanded=True),), limits=LIMITS)
+    group.set_roles({"van": "twin"})
+    for k in range(150):
+        ns = k * TICK_NS
+        brake = ControlCommand(stamp_ns=ns, accel_mps2=-3.0, tire_angle_rad=0.0)
+        group.take_command("van", brake)
+        state = state_at(8.0 * k / 50.0, 0.0, stamp_ns=ns)
+        group.take_state("van", msgspec.structs.replace(state, control_mode=mode))
+        group.advance(ns)
+    stood_back_m = 8.0 * 149 / 50.0 - x_of(group, "van")
+    assert stood_back_m > 5.0 if mode == "autonomous" else abs(stood_back_m) < 0.3
 
 
 def test_a_wall_stops_a_twin_and_is_named() -> None:
