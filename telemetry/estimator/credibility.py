@@ -69,11 +69,15 @@ class TurningCredibility(Credibility):
         self._latest: tuple[_CourseTold, ...] = ()
         """Of the last two chords."""
         self._courses: tuple[_CourseTold, ...] = ()
+        self._to_s = -math.inf
 
     def take(self, chord: Chord, angles_rad: tuple[float, ...] | None) -> None:
         """Compare a chord with the angle told in its middle, by each lateness; None if unknown."""
-        if angles_rad is None:
+        if angles_rad is None or chord.from_s != self._to_s:
+            # In between nobody knows which way round it turned, nor whether it backed.
             self._latest = self._courses = ()
+        self._to_s = chord.to_s
+        if angles_rad is None:
             return
         course_rad = chord.course_rad
         if self._latest:

@@ -73,6 +73,16 @@ def test_a_car_that_goes_to_and_fro_says_nothing_of_its_gyro() -> None:
     assert credibility.holds
 
 
+def test_how_a_car_turned_round_where_no_chord_tells_says_nothing_of_its_gyro() -> None:
+    """As in a car park: it turned by 4.5 rad at walking pace, the short way round -1.8 rad."""
+    credibility = TurningCredibility()
+    for number in range(5):
+        credibility.take(chord(number), (0.0,))
+    for number in range(9, 14):
+        credibility.take(chord(number, course_rad=4.5 - math.tau + 0.4), (4.9,))
+    assert credibility.holds
+
+
 @pytest.mark.parametrize(("times", "holds"), [(0.0, False), (0.9, True), (1.8, True), (3.6, False)])
 def test_wheels_go_as_far_as_positions(times: float, holds: bool) -> None:
     credibility = WayCredibility()
