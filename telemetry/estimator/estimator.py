@@ -16,6 +16,7 @@ from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
+from foretwin.telemetry.estimator.fix_rhythm import FixRhythm
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import Reordering
@@ -23,7 +24,8 @@ from foretwin.telemetry.estimator.reported_state import StateConsistency
 from foretwin.telemetry.estimator.staleness import Staleness
 
 STATE_PERIOD_NS = 20_000_000
-"""The next sample after so long gives a new state; a position gives one at once."""
+"""The next sample after so long gives a new state; a position gives one at once, and where one
+follows at the very stamp it alone does."""
 _MOTION = ("gnss", "imu", "speed", "heading", "steering")
 """Channels that say how the car moves."""
 _KINDS: dict[str, type] = {name: CHANNELS[name].kind for name in _MOTION}
@@ -72,6 +74,7 @@ class StateEstimator:
         self._staleness = Staleness(info.sends)
         self._refused: Counter[str] = Counter()
         self._state_ns: int | None = None
+        self._fixes = FixRhythm()
         self._newest_ns: int | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -160,6 +163,7 @@ class StateEstimator:
         if placed_ns != stamp_ns:
             message = msgspec.structs.replace(message, stamp_ns=placed_ns)
         self._watch(channel, placed_ns, received_ns)
+        self._fixes = self._fixes.after(channel, placed_ns)
         if received_ns is None:
             state = self._in_order(channel, message)
         else:
@@ -206,7 +210,7 @@ class StateEstimator:
             return self._leave(self._track.state(stamp_ns, fix=message), stamp_ns)
         if not self._track.started or self._state_ns is None:
             return None
-        if stamp_ns - self._state_ns < STATE_PERIOD_NS:
+        if stamp_ns - self._state_ns < STATE_PERIOD_NS or self._fixes.due:
             return None
         return self._leave(self._track.state(stamp_ns), stamp_ns)
 
@@ -222,6 +226,7 @@ class StateEstimator:
         assert newest is not None
         is_newest = newest.message is message
         due = self._state_ns is None or newest.stamp_ns - self._state_ns >= STATE_PERIOD_NS
+        due = due and not self._fixes.due
         if not due and not (is_newest and channel == "gnss"):
             return None
         self._track = reordering.track()

@@ -81,9 +81,12 @@ class Log:
     """Samples refused by reason, as far as the latest `samples()` has come."""
 
     def samples(self) -> Iterator[Sample]:
-        """Yield every valid telemetry sample in stamp order; the rest is counted in `skipped`."""
+        """Yield every valid telemetry sample in stamp order, the positions of an instant last.
+
+        The rest is counted in `skipped`.
+        """
         self.skipped.clear()
-        yield from screened(self.read(self.skipped), self.skipped)
+        yield from _positions_last(screened(self.read(self.skipped), self.skipped))
 
 
 def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample]:
@@ -116,6 +119,24 @@ def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sampl
             continue
         latest[stream] = newest_ns = stamp_ns
         yield channel, message
+
+
+def _positions_last(samples: Iterator[Sample]) -> Iterator[Sample]:
+    """Let positions follow all else of their instant, as the estimator has them of a live car.
+
+    A state leaves with each position: what stands beside one in a row of a table counts in it.
+    """
+    fixes: list[Sample] = []
+    for sample in samples:
+        message = sample[1]
+        if fixes and message.stamp_ns != fixes[0][1].stamp_ns:  # type: ignore[attr-defined]
+            yield from fixes
+            fixes = []
+        if isinstance(message, drive.GnssFix):
+            fixes.append(sample)
+        else:
+            yield sample
+    yield from fixes
 
 
 def fault_of(message: msgspec.Struct) -> str | None:

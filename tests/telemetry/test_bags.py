@@ -134,10 +134,10 @@ def test_a_ros1_bag_is_read(tmp_path: Path) -> None:
     log = open_log(path)
     found = list(log.samples())
     assert len(found) == 10
-    assert found[0][1] == drive.GnssFix(
+    assert found[0][1] == drive.SpeedSample(stamp_ns=START_NS + 5, speed_mps=7.0)
+    assert found[1][1] == drive.GnssFix(
         stamp_ns=START_NS + 5, position=GeoPoint(52.5, 13.4, 30.0), std_m=0.5
     )
-    assert found[1][1] == drive.SpeedSample(stamp_ns=START_NS + 5, speed_mps=7.0)
 
 
 def changing() -> Iterator[tuple[str, str, Any, int]]:

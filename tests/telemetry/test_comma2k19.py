@@ -33,8 +33,8 @@ def test_bad_values_are_counted(segment: Path) -> None:
     log = open_log(segment)
     found = [(channel, message.stamp_ns) for channel, message in log.samples()]  # type: ignore[attr-defined]
     assert found == [
-        ("gnss", 10_000_000_000),
         ("speed", 10_000_000_000),
+        ("gnss", 10_000_000_000),
         ("gnss", 10_200_000_000),
     ]
     assert log.skipped == {

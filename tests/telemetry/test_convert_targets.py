@@ -145,7 +145,7 @@ def test_nmea_becomes_a_bag(tmp_path: Path) -> None:
     source.write_text("$GPRMC,120000.00,A,5230.6,N,01323.4,E,10.0,0.0,010326,,,A\n")
     convert(source, tmp_path / "bag")
     assert_same_samples(samples_of(source), samples_of(tmp_path / "bag"))
-    heading = samples_of(tmp_path / "bag")[2][1]
+    heading = dict(samples_of(tmp_path / "bag"))["heading"]
     assert heading.yaw_rad == pytest.approx(0.5 * math.pi)  # type: ignore[attr-defined]
 
 

@@ -8,9 +8,16 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SignalState, SpeedSample
+from foretwin.contracts.drive import (
+    GnssFix,
+    RoadUser,
+    RoadUsers,
+    SignalState,
+    SpeedSample,
+    VehicleInfo,
+)
 from foretwin.contracts.frames import GeoPoint
-from foretwin.telemetry.logs.log import ROAD_USER_ODD, Sample, screened
+from foretwin.telemetry.logs.log import ROAD_USER_ODD, Log, Sample, screened
 from foretwin.telemetry.logs.merge import merged, reordered, stamp_ns_of
 
 COVERS = (
@@ -42,6 +49,14 @@ def test_order_is_kept_and_every_loss_counted(samples: list[Sample]) -> None:
     assert stamps == sorted(stamps)
     assert len({(channel, message.stamp_ns) for channel, message in kept}) == len(kept)  # type: ignore[attr-defined]
     assert len(kept) + skipped.total() == len(samples)
+
+
+@given(dirty)
+def test_positions_follow_what_else_is_of_their_instant(samples: list[Sample]) -> None:
+    info = VehicleInfo(vehicle_id="car", time_base="log", start_stamp_ns=0)
+    given_out = list(Log(info=info, read=lambda skipped: iter(samples)).samples())
+    kept = list(screened(iter(samples), Counter()))
+    assert given_out == sorted(kept, key=lambda one: (stamp_ns_of(one), one[0] == "gnss"))
 
 
 @given(st.lists(st.integers(0, 1000), max_size=40), st.lists(st.integers(0, 1000), max_size=40))
