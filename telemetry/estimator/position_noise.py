@@ -36,6 +36,9 @@ _LIES = 2.0
 """So many times what was stated may what is seen be before it is believed instead."""
 _LINE_MEDIAN, _PLANE_MEDIAN = 0.4549, 1.3863
 """Medians of chi-square with one and two degrees of freedom."""
+_MEDIAN_SCATTERS = 2.0 / _PLANE_MEDIAN
+"""Of itself: one standard deviation of the median of N such squares, times the root of N (1 over
+twice the density there, which is a quarter)."""
 
 
 class _TimedPlace(NamedTuple):
@@ -52,6 +55,9 @@ class PositionNoise:
         self._rough: tuple[float, ...] = ()
         self._jerked_m = 0.0
         self._surprises: tuple[float, ...] = ()
+        self._expected: tuple[float, ...] = ()
+        self._untold_m = 0.0
+        """Less than this surprises cannot tell: where the filter knows little, none is one."""
         self._still: tuple[float, ...] = ()
         self.seen_m: float | None = None
         """The white noise that was seen; None before there is enough of it."""
@@ -91,6 +97,7 @@ class PositionNoise:
         """Take how far a fix lay off where wheels led, and the variance expected there per axis."""
         square = away_m * away_m - _PLANE_MEDIAN * expected_m2
         self._surprises = (*self._surprises[1 - _REMEMBERED :], square)
+        self._expected = (*self._expected[1 - _REMEMBERED :], expected_m2)
 
     def _learn(self) -> None:
         if len(self._rough) < _LEAST_SEEN:
@@ -103,12 +110,16 @@ class PositionNoise:
             square = bound - self._jerked_m * self._jerked_m
         else:
             square = min(bound, _middle(self._surprises) / _PLANE_MEDIAN)
+            scatter = _MEDIAN_SCATTERS / math.sqrt(len(self._expected))
+            self._untold_m = math.sqrt(min(bound, scatter * _middle(self._expected)))
         self.seen_m = math.sqrt(max(square, 0.0))
 
     def std_m(self, fix: GnssFix) -> float:
         """Return one standard deviation of a fix on each axis, all that is known together."""
         if fix.std_m is None or not math.isfinite(fix.std_m):
-            return UNKNOWN_STD_M if self.seen_m is None else max(self.seen_m, LEAST_STD_M)
+            if self.seen_m is None:
+                return UNKNOWN_STD_M
+            return max(self.seen_m, self._untold_m, LEAST_STD_M)
         stated = min(max(fix.std_m, 1e-3), 1e4)
         return max(stated, self._seen_beyond(stated))
 

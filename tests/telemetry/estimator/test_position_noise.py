@@ -82,3 +82,20 @@ def test_a_car_that_stands_shows_the_jitter_of_fixes_that_were_rough_on_the_move
         noise.take(12.0 + 0.2 * k, np.array([9.0, 0.0]) + random.normal(0.0, 0.02, 2))
     assert noise.still_std_m(fix()) == pytest.approx(0.03, abs=0.02)
     assert noise.white_std_m(fix()) > 0.2, "on the move it is as rough as it was"
+
+
+def test_where_the_filter_knows_little_no_surprise_shows_that_fixes_are_good() -> None:
+    seldom, random = driven(0.3, rate_hz=1.0), np.random.default_rng(5)
+    for away_m in np.hypot(*random.normal(0.0, 1.0, (2, 24))):
+        seldom.surprised(float(away_m), 1.5**2)
+    seldom.take(60.0, np.zeros(2))
+    assert seldom.seen_m == 0.0
+    assert 0.3 < seldom.std_m(fix()) < 1.0
+    assert seldom.std_m(fix(0.02)) == 0.02  # what is stated is not disproved by it
+
+
+def test_where_the_filter_knows_well_surprises_show_good_fixes() -> None:
+    noise, random = driven(0.0), np.random.default_rng(6)
+    for away_m in np.hypot(*random.normal(0.0, 0.02, (2, 24))):
+        noise.surprised(float(away_m), 0.02**2)
+    assert noise.std_m(fix()) == LEAST_STD_M
