@@ -190,27 +190,27 @@ class MotionTrack:
 
     def _start_from_course(self, stamp_ns: int, std: float) -> None:
         course = self._gate.course(max(1.0, 5.0 * std))
-        if course is None or (
-            self._measured.fresh("speed_mps", stamp_ns) and abs(self._measured.speed_mps) < 0.3
-        ):
+        measured = self._measured.fresh("speed_mps", stamp_ns)
+        speed_mps = self._measured.speed_mps if measured else math.inf
+        if course is None or abs(speed_mps) < 0.3:
             return
-        if self._measured.fresh("speed_mps", stamp_ns) and self._measured.speed_mps < -0.1:
-            course += math.pi
-        self._start(stamp_ns, course, yaw_std_rad=0.15)
+        self._start(stamp_ns, course if speed_mps > 0.0 else course + math.pi, yaw_std_rad=0.15)
 
     def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
         if not self._gate.recent:
             return
-        measured, at = self._measured.fresh("speed_mps", stamp_ns), self._gate.recent[-1].xy_m
-        xy = base_from_sensor(at, yaw_rad, self._lever)
+        measured = self._measured.fresh("speed_mps", stamp_ns)
         speed_mps = self._measured.speed_mps if measured else self._gate.speed_mps()
         if self._filter is not None and not measured:
             # Lost or not: no car has become so much faster since it was known.
             before_mps = abs(float(self._filter.mean[SPEED]))
             speed_mps = min(speed_mps, before_mps + _MOST_FASTER_MPS)
+        since_s, at = self._gate.gone_on((stamp_ns - self._start_ns) * 1e-9, yaw_rad, speed_mps)
+        xy = base_from_sensor(at, yaw_rad, self._lever)
         self._filter = KinematicFilter(
             xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad, speed_mps=speed_mps
         )
+        self._filter.doubt_motion(min(since_s, 1.0), 0.0, since_s)
         self._corrections.begin(self._filter)
         self._filter_stamp_ns = stamp_ns
         noise, fix = self._positions.noise, self._fix

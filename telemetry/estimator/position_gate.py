@@ -6,6 +6,8 @@ import math
 from collections import Counter, deque
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix
 from foretwin.telemetry.estimator.measured import CLOCK_LEAP_NS
@@ -191,6 +193,13 @@ class PositionGate:
                 dx, dy = now.xy_m - fix.xy_m
                 return math.atan2(dy, dx)
         return None
+
+    def gone_on(self, time_s: float, yaw_rad: float, speed_mps: float) -> tuple[float, Array]:
+        """Return how old the latest fix is by then, and where (2,) it lies for a car going so."""
+        last = self.recent[-1]
+        since_s = max(time_s - last.time_s, 0.0)
+        ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
+        return since_s, last.xy_m + since_s * speed_mps * ahead
 
     @property
     def last_step_m(self) -> float:
