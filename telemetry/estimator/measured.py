@@ -20,6 +20,7 @@ CLOCK_LEAP_NS = 10_000_000_000
 """One stamp that is this far ahead must not make all later ones look late."""
 MOTION_FIELDS = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
 """Fields of VehicleState that are either measured or estimated."""
+_TURNING = ("yaw_rate_radps", "tire_angle_rad")
 _CHANNEL_FIELDS = {
     "imu": ("yaw_rate_radps", "accel_mps2"),
     "speed": ("speed_mps",),
@@ -110,6 +111,11 @@ class MotionSamples:
         """Return whether field `name` was measured within a second before `stamp_ns`."""
         measured_ns = self._field_ns.get(name)
         return measured_ns is not None and stamp_ns - measured_ns <= FRESH_NS
+
+    def tells_turning(self, stamp_ns: int) -> bool:
+        """Return whether anything beside positions told how the car turns: no heading does, which
+        says where it points now and then."""
+        return any(self.fresh(name, stamp_ns) for name in _TURNING)
 
     def estimated(self, stamp_ns: int) -> tuple[str, ...]:
         """Return the names of the motion fields that are not fresh."""

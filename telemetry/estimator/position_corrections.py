@@ -159,10 +159,11 @@ class PositionCorrections:
             self.noise.surprised(innovation.away_m, innovation.variance_m2(0.0))
         alone = not wheels and not self._measured.anything
         unfelt = not wheels and not self._measured.fresh("accel_mps2", fix.stamp_ns)
+        unturned = not self._measured.tells_turning(fix.stamp_ns)
         self._surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
         usual = 1.0 if wander or alone else self._usual
         impossible = _IMPOSSIBLE if alone else _UNBELIEVABLE * usual
-        least_m = max(_LEAST_SLIP_M, turned_m(self._gate.recent) if unfelt else 0.0)
+        least_m = max(_LEAST_SLIP_M, turned_m(self._gate.recent) if unfelt or unturned else 0.0)
         astray = square > impossible and innovation.away_m > least_m
         if alone and not wander and square > PLANE_95 and innovation.away_m > _LEAST_SLIP_M:
             astray = astray or self._facing.goes_sideways(white)
@@ -198,14 +199,14 @@ class PositionCorrections:
             if standing:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
-            elif unfelt and sparse(self._gate.recent):
-                follow_fixes(filter_, self._gate.recent, white, turning=alone)
+        if not standing and (unfelt or (wheels and unturned)) and sparse(self._gate.recent):
+            fixes = self._gate.recent
+            follow_fixes(filter_, fixes, white, turning=unturned, going=not wheels)
         if standing:
             filter_.mean[YAW] = yaw_before
             return Corrected(standing)
-        if not self._alone(fix):
-            return Corrected(standing)
-        return Corrected(standing, self._facing.turned(filter_, yaw_before, std))
+        course = self._facing.turned(filter_, yaw_before, std) if self._alone(fix) else None
+        return Corrected(standing, course)
 
     def move(self, filter_: KinematicFilter, fix: GnssFix, xy_m: Array) -> None:
         """Put the place where the fix says, and leave the motion: the receiver has jumped."""

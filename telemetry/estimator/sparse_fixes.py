@@ -46,11 +46,16 @@ def turned_m(fixes: Sequence[LocalFix]) -> float:
 
 
 def follow_fixes(
-    filter_: KinematicFilter, fixes: Sequence[LocalFix], std_m: float, *, turning: bool
+    filter_: KinematicFilter,
+    fixes: Sequence[LocalFix],
+    std_m: float,
+    *,
+    turning: bool,
+    going: bool = True,
 ) -> None:
     """Correct the motion by what the latest three of sparse fixes, good to `std_m`, show of it.
 
-    `turning` where nothing else tells of it; with headings the speed alone is corrected.
+    `turning` where nothing else tells of it, `going` where nothing does of the speed.
 
     The quadratic's derivatives at its end err by a third of the jerk times the step squared, and
     by the jerk times the step (Taylor).
@@ -74,6 +79,8 @@ def follow_fixes(
         bend = float(way[0] * accel[1] - way[1] * accel[0]) / speed**2
         filter_.correct_curvature(bend, accel_std / speed**2)
         ahead = way
+    if not going:
+        return
     row = np.zeros(len(filter_.mean))
     row[SPEED] = 1.0
     filter_.correct(row, float(velocity @ ahead) - filter_.mean[SPEED], velocity_std)
