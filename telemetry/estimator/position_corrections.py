@@ -200,12 +200,12 @@ class PositionCorrections:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
         if not standing and (unfelt or (wheels and unturned)) and sparse(self._gate.recent):
-            fixes = self._gate.recent
-            follow_fixes(filter_, fixes, white, turning=unturned, going=not wheels)
+            follow_fixes(filter_, self._gate.recent, white, turning=unturned, going=not wheels)
         if standing:
             filter_.mean[YAW] = yaw_before
             return Corrected(standing)
-        course = self._facing.turned(filter_, yaw_before, std) if self._alone(fix) else None
+        faces = self._alone(fix) or (filter_.may_reverse and not wheels)
+        course = self._facing.turned(filter_, yaw_before, std) if faces else None
         return Corrected(standing, course)
 
     def move(self, filter_: KinematicFilter, fix: GnssFix, xy_m: Array) -> None:

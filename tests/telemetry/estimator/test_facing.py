@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.contracts.drive import HeadingSample
 from foretwin.geometry.steering import MAX_CURVATURE_PM
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.estimator.facing import Facing
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.position_gate import PositionGate
-from tests.telemetry.position_track import along, circle, states_of, xy, yaw
+from tests.telemetry.position_track import along, circle, fix, info, states_of, xy, yaw
 
 
 def stepped(
@@ -102,3 +104,20 @@ def test_a_car_that_turns_is_followed() -> None:
     for state in states_of(along(circle, 20.0))[20:]:
         expected = 0.4 * state.stamp_ns * 1e-9
         assert abs(math.remainder(yaw(state) - expected, math.tau)) < 0.1
+
+
+def test_headings_beside_positions_end_a_reverse_that_no_car_drives() -> None:
+    """It turned round unseen, and crept away before courses were told: that looks like backing."""
+    estimator, x_m, speed_mps = StateEstimator(info()), 0.0, 8.0
+    for second in range(45):
+        yaw_rad = 0.0 if second < 20 else math.pi
+        speed_mps = max(0.0, speed_mps - 2.0) if 10 <= second < 20 else speed_mps
+        speed_mps = speed_mps if second < 20 else 0.4 * (second - 19)
+        x_m += speed_mps * math.cos(yaw_rad)
+        if speed_mps > 2.0:
+            heading = HeadingSample(stamp_ns=second * 10**9, yaw_rad=yaw_rad)
+            estimator.handle("heading", heading)
+        state = estimator.handle(*fix(float(second), x_m, 0.0))
+    assert state is not None
+    assert state.speed_mps == pytest.approx(speed_mps, abs=0.5)
+    assert abs(math.remainder(yaw(state) - math.pi, math.tau)) < 0.1
