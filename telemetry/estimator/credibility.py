@@ -24,6 +24,9 @@ _ASTRAY = 0.75
 is stuck, upside down or in degrees parts by all of it. Chosen."""
 _LARGEST_BEND_RAD = 1.5
 """Between chords one after the other: more is a fix that jumped, or a car that backs."""
+_SWING_RAD = 0.5
+"""Chords that bend by more one way and at once the other are a rough receiver's. Chosen: five times
+what a chord's course is good to."""
 _LEAST_WAY_M, _LEAST_CHORDS, _LARGEST_SHARE = 30.0, 3, 0.6
 """A way is no single jump of the receiver's. Chosen."""
 _MOST_TIMES = 1.9
@@ -70,12 +73,13 @@ class TurningCredibility(Credibility):
         """Of the last two chords."""
         self._courses: tuple[_CourseTold, ...] = ()
         self._to_s = -math.inf
+        self._bend_rad = 0.0
 
     def take(self, chord: Chord, angles_rad: tuple[float, ...] | None) -> None:
         """Compare a chord with the angle told in its middle, by each lateness; None if unknown."""
         if angles_rad is None or chord.from_s != self._to_s:
             # In between nobody knows which way round it turned, nor whether it backed.
-            self._latest = self._courses = ()
+            self._latest, self._courses, self._bend_rad = (), (), 0.0
         self._to_s = chord.to_s
         if angles_rad is None:
             return
@@ -83,7 +87,9 @@ class TurningCredibility(Credibility):
         if self._latest:
             last_rad = self._latest[-1].course_rad
             bend = math.remainder(course_rad - last_rad, math.tau)
-            if abs(bend) > _LARGEST_BEND_RAD:
+            before, self._bend_rad = self._bend_rad, bend
+            swings = bend * before < 0.0 and min(abs(bend), abs(before)) > _SWING_RAD
+            if swings or abs(bend) > _LARGEST_BEND_RAD:
                 self._latest = self._courses = ()
                 return
             course_rad = last_rad + bend

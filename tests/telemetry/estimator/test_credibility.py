@@ -73,6 +73,14 @@ def test_a_car_that_goes_to_and_fro_says_nothing_of_its_gyro() -> None:
     assert credibility.holds
 
 
+def test_courses_that_swing_to_and_fro_are_a_rough_receivers_and_say_nothing() -> None:
+    """As between houses, where reflected signals put fixes 30 m off."""
+    credibility = TurningCredibility()
+    for number, degrees in enumerate((160, 192, 257, 183, 259, 200, 270, 190, 280, 275, 265)):
+        credibility.take(chord(number, course_rad=math.radians(degrees)), (0.0,))
+    assert credibility.holds
+
+
 def test_how_a_car_turned_round_where_no_chord_tells_says_nothing_of_its_gyro() -> None:
     """As in a car park: it turned by 4.5 rad at walking pace, the short way round -1.8 rad."""
     credibility = TurningCredibility()
