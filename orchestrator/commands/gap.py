@@ -34,7 +34,7 @@ from foretwin.orchestrator.record.run_state import check_finished
 from foretwin.sim_worker.analysis.gap.clock_offsets import on_one_clock
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.analysis.gap.measured_motion import LONGEST_GAP_S, motion_on_grid
 from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap, turning_gap
 from foretwin.sim_worker.analysis.gap.verdict import FaultDetector, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
@@ -84,6 +84,18 @@ def gap_of(log: Log, vehicle: VehicleParameters, *, name: str, progress: bool = 
         return _measured(log, messages, vehicle, LocalFrame(first.position), name, advance)
 
 
+def _why_no_run(states: list[VehicleState]) -> str:
+    """Return why no run of the model can begin at any of a drive's states."""
+    stamps = [state.stamp_ns for state in states if state.yaw_valid]
+    apart_s = float(np.median(np.diff(stamps))) * 1e-9 if len(stamps) > 1 else 0.0
+    if apart_s > LONGEST_GAP_S:
+        return (
+            f"its samples come {apart_s:.1f} s apart, and the motion between is known for"
+            f" {LONGEST_GAP_S:g} s"
+        )
+    return "the heading is never known for a second"
+
+
 def _measured(
     log: Log,
     messages: list[Sample],
@@ -123,7 +135,7 @@ def _measured(
     meter = GapMeter(FreeRunner(vehicle), vehicle_id=log.info.vehicle_id)
     samples = meter.samples(record, motion, measured=None if turning is None else turning.drive)
     if not samples:
-        raise UserError(f"{name}: the heading is never known for a second, so no run can begin")
+        raise UserError(f"{name}: {_why_no_run(states)}, so no run can begin")
     limits = GapLimits()
     alarms = [alarm for sample in samples for alarm in limits.handle(sample)]
     refused = {reason: count for reason, count in log.skipped.items() if count}

@@ -16,7 +16,8 @@ from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo
 from foretwin.contracts.gap import Manoeuvre
 from foretwin.sim_worker.analysis.motion_record import between_samples
 
-_LONGEST_GAP_S = 0.5
+LONGEST_GAP_S = 0.5
+"""Between states farther apart the motion is not known. Chosen."""
 
 
 class MeasuredMotion(NamedTuple):
@@ -80,7 +81,7 @@ def motion_on_grid(
     yaw = np.unwrap(local_from_geo_yaw(frame, table[:, 3], table[:, 1], table[:, 2]))
     columns = (xy[:, 0], xy[:, 1], yaw, *table[:, 4:10].T)
     return MeasuredMotion(
-        *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
+        *(between_samples(table[:, 0], column, at, gap_s=LONGEST_GAP_S) for column in columns)
     )
 
 

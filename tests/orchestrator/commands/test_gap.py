@@ -191,3 +191,15 @@ def test_what_is_no_drive_is_said_in_one_line(
         assert run(["gap", *words]) == 2
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert named in line
+
+
+def test_a_logger_of_a_row_a_second_is_told_that_its_rows_are_too_far_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [
+        ("gnss", GnssFix(stamp_ns=k * 10**9, position=GeoPoint(52.5 + 1e-4 * k, 13.4)))
+        for k in range(40)
+    ]
+    info = VehicleInfo(vehicle_id="car", time_base="log", start_stamp_ns=0, end_stamp_ns=39 * 10**9)
+    assert run(["gap", str(written(tmp_path / "rows.mcap", info, rows))]) == 2
+    assert "its samples come 1.0 s apart" in capsys.readouterr().err
