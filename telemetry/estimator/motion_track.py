@@ -142,16 +142,14 @@ class MotionTrack:
             self._start_ns = fix.stamp_ns
         xy = self._place.xy_m(fix.position)
         time_s = (fix.stamp_ns - self._start_ns) * 1e-9
-        recent = self._gate.recent
         filter_ = self._advance(fix.stamp_ns)
         speed_mps = self._corrections.known_speed_mps(fix.stamp_ns, filter_)
         if self._gate.frozen(time_s, xy, speed_mps=speed_mps):
             self.skipped["gnss_repeated"] += 1  # a receiver's last answer, sent once more
             return False
-        lever = self._lever[:2]
-        expected = recent[-1].xy_m if recent else None
+        expected = self._gate.recent[-1].xy_m if self._gate.recent else None
         if filter_ is not None:
-            expected = filter_.sensor_xy(lever)
+            expected = filter_.sensor_xy(self._lever[:2])
             late_ns = self._filter_stamp_ns - fix.stamp_ns
             if late_ns > 0:
                 way_m, course = filter_.mean[SPEED] * late_ns * 1e-9, filter_.mean[YAW]
@@ -197,9 +195,9 @@ class MotionTrack:
         self._start(stamp_ns, course if speed_mps > 0.0 else course + math.pi, yaw_std_rad=0.15)
 
     def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
-        if not self._gate.recent:
-            return
         measured = self._measured.fresh("speed_mps", stamp_ns)
+        if len(self._gate.recent) < (1 if measured else 2):
+            return  # a heading alone does not tell how fast the car goes
         speed_mps = self._measured.speed_mps if measured else self._gate.speed_mps()
         if self._filter is not None and not measured:
             # Lost or not: no car has become so much faster since it was known.
