@@ -69,7 +69,7 @@ class Paces:
         square = np.square(np.maximum(speed_mps, _LEAST_MPS))
         self._begin, self._last = np.zeros((2, len(path_of)), np.intp)
         self._first_arc, self._since = np.zeros((2, len(path_of)))
-        arcs, speeds, times = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
+        arcs, speeds, times, searched = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
         begin = motions = 0
         for place in np.unique(path_of):
             rows, path = np.flatnonzero(path_of == place), paths[place]
@@ -82,16 +82,18 @@ class Paces:
             took = 2.0 * np.diff(arc) / (speed[:, 1:] + speed[:, :-1])
             time = np.pad(np.cumsum(took, axis=1), ((0, 0), (1, 0)))
             number = np.arange(len(rows))
-            # Times of all motions rise together, so that one search finds any of them.
             self._since[rows] = _APART_S * (motions + number)
             self._begin[rows], self._last[rows] = begin + len(arc) * number, len(arc) - 2
             self._first_arc[rows] = path.arc_m[0]
             arcs.append(np.tile(arc, len(rows)))
             speeds.append(speed.ravel())
-            times.append((time + self._since[rows, None]).ravel())
+            times.append(time.ravel())
+            searched.append((time + self._since[rows, None]).ravel())
             begin += len(arc) * len(rows)
             motions += len(rows)
         self._arc, self._speed, self._time = map(np.concatenate, (arcs, speeds, times))
+        self._searched = np.concatenate(searched)
+        """Times of all motions, one after the other, so that one search finds any of them."""
         step = np.diff(self._arc, append=np.inf)
         self._accel = np.diff(np.square(self._speed), append=0.0) / (2.0 * step)
 
@@ -108,9 +110,11 @@ class Paces:
 
     def at(self, motion: Indices | int, time_s: Array) -> WayMade:
         """Return where motions (…) are at times (…) of their own clocks."""
-        node = np.searchsorted(self._time, time_s, side="right") - 1
+        found = np.searchsorted(self._searched, time_s + self._since[motion], side="right") - 1
         first = self._begin[motion]
-        node = np.clip(node, first, first + self._last[motion])
+        node = np.clip(found, first, first + self._last[motion])
+        # The search rounds, the more the more motions there are; what is found must not.
+        node = np.maximum(node - (time_s < self._time[node]), first)
         on_s, speed, accel = time_s - self._time[node], self._speed[node], self._accel[node]
         arc = self._arc[node] + on_s * (speed + 0.5 * accel * on_s)
         return WayMade(arc, speed + accel * on_s)
