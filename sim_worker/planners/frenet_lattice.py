@@ -81,7 +81,7 @@ class LatticeDriver:
             due = self._due(chosen, view, passed_s, changing)
             if due.any():
                 chosen = self._renewed(chosen, view, np.flatnonzero(due), passed_s, changing)
-        if due.all():
+        if self._chosen is None or view.time_s > self._next_s - 1e-6:
             self._next_s = view.time_s + REPLAN_S
         self._note(view, due, changing)
         self._chosen = chosen
