@@ -60,7 +60,7 @@ def _actor(number: int, user: SeenRoadUser, path: FrenetPath | None) -> Player:
         on_path = path.locate(place)
         arc, offset = float(on_path.arc_m[0]), float(on_path.offset_m[0])
     return Player(
-        name=f"seen {number}",
+        name=f"seen {user.user_id or number}",  # how it drives is drawn by its name
         kind=user.kind,
         path=path,
         start_arc_m=arc,
