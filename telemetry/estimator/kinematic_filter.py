@@ -211,6 +211,14 @@ class KinematicFilter:
         self._begin_anew(SPEED, speed_mps, 1.0)
         self._begin_anew(ACCEL, 0.0, 1.0)
 
+    def turn_anew(
+        self, yaw_rad: float, yaw_std_rad: float, curvature_pm: float, curvature_std_pm: float
+    ) -> None:
+        """Face and turn so from now on, whatever was known of it."""
+        self._begin_anew(YAW, yaw_rad, yaw_std_rad)
+        self._begin_anew(CURVATURE, curvature_pm, curvature_std_pm)
+        self._limit()
+
     def _begin_anew(self, index: int, value: float, std: float) -> None:
         """Forget what is known of one component and of what it hangs together with."""
         self.mean[index] = value

@@ -8,7 +8,6 @@ moves while the motion stays; farther off still, the motion was misjudged, and b
 from __future__ import annotations
 
 import math
-from collections import Counter
 from typing import NamedTuple
 
 from foretwin.contracts.arrays import Array
@@ -28,7 +27,7 @@ from foretwin.telemetry.estimator.position_gate import LocalFix, PositionGate
 from foretwin.telemetry.estimator.position_noise import PositionNoise
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 from foretwin.telemetry.estimator.slow_motion import drift_sideways, limit_turn
-from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse, turned_m
+from foretwin.telemetry.estimator.sparse_fixes import bear_anew, follow_fixes, sparse, turned_m
 from foretwin.telemetry.estimator.told_spreads import Stretched, ToldSpreads
 
 _DOUBTFUL, _UNBELIEVABLE = 9.0, 25.0
@@ -77,7 +76,7 @@ class _Doubted(NamedTuple):
 
 
 class PositionCorrections:
-    """Gives each fix its weight. `skipped` counts refused input by reason."""
+    """Gives each fix its weight; what is refused is counted by the gate."""
 
     def __init__(
         self,
@@ -115,11 +114,6 @@ class PositionCorrections:
         return math.sqrt(max(self._usual / _BY_CHANCE, 1.0))
 
     @property
-    def skipped(self) -> Counter[str]:
-        """How many samples were refused, by reason."""
-        return self._gate.skipped
-
-    @property
     def stretched(self) -> Stretched:
         """How large errors were found to be of what states told."""
         return self._spreads.stretched
@@ -153,13 +147,18 @@ class PositionCorrections:
         if wander:
             filter_.expect_wander(std)
         wheels = self._measured.fresh("speed_mps", fix.stamp_ns)
+        unturned = not self._measured.tells_turning(fix.stamp_ns)
+        unseen = wheels and unturned and not self._measured.fresh("yaw_rad", fix.stamp_ns)
+        sharp = unseen and not (standing or wander or self._doubted)
+        if sharp and bear_anew(filter_, self._gate.recent, std, white, self._lever):
+            self._facing.take(filter_)
+            return Corrected(standing)
         innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
         square = innovation.square(white)
         if wheels:
             self.noise.surprised(innovation.away_m, innovation.variance_m2(0.0))
         alone = not wheels and not self._measured.anything
         unfelt = not wheels and not self._measured.fresh("accel_mps2", fix.stamp_ns)
-        unturned = not self._measured.tells_turning(fix.stamp_ns)
         self._surprises.take("gnss", square, PLANE_95 * self.overconfidence**2)
         usual = 1.0 if wander or alone else self._usual
         impossible = _IMPOSSIBLE if alone else _UNBELIEVABLE * usual
@@ -200,7 +199,7 @@ class PositionCorrections:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
         if not standing and (unfelt or (wheels and unturned)) and sparse(self._gate.recent):
-            follow_fixes(filter_, self._gate.recent, white, turning=unturned, going=not wheels)
+            follow_fixes(filter_, self._gate.recent, white, turning=unturned, pace=not wheels)
         if standing:
             filter_.mean[YAW] = yaw_before
             return Corrected(standing)
@@ -280,7 +279,7 @@ class PositionCorrections:
                 return None
         lasts_s = now.fix.time_s - self._doubted[0].fix.time_s
         if len(self._doubted) < _ASTRAY or (lasts_s < _LOST_S and self._erratic(fix)):
-            self.skipped["gnss_outlier"] += 1
+            self._gate.skipped["gnss_outlier"] += 1
             return Corrected(standing)
         self._gate.begin_anew(tuple(one.fix for one in self._doubted), after_s=_SHORTLY_S)
         self.move(filter_, fix, xy_m)

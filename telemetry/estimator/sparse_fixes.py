@@ -1,5 +1,7 @@
 """Speed, course and bend from fixes that come once a second, where nothing else tells of them.
 
+Wheels tell of the speed alone: how a car turns it is left to its fixes.
+
 A filter that predicts a second ahead leads a bending car far from where its linearisation holds:
 it swings about the truth. The quadratic through the last three fixes needs no prediction.
 """
@@ -9,9 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.telemetry.estimator.filter_state import ACCEL, SPEED, YAW
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.position_gate import LocalFix
@@ -26,6 +30,21 @@ _HARD_MPS2 = 4.0
 """A hard turn or stop of a driver in traffic. Chosen."""
 _MOVING_MPS = 1.0
 """Whoever is slower has no course that fixes would tell."""
+_LOST_RAD = 0.35
+"""A heading less sure than this at the next fix is none that a prediction may rest on. Chosen."""
+_SHOWN_BY = 10.0
+"""A way so many times as long as its ends are good to has a course of its own. Chosen."""
+_SHORTEST_CHORD = 0.5
+"""Of the way driven, where it bends as hard as a car can turn between two fixes. Chosen."""
+
+
+class _Shown(NamedTuple):
+    """Velocity and acceleration (2,) at the newest fix, and their standard deviations."""
+
+    velocity_mps: Array
+    accel_mps2: Array
+    velocity_std_mps: float
+    accel_std_mps2: float
 
 
 def sparse(fixes: Sequence[LocalFix]) -> bool:
@@ -45,41 +64,101 @@ def turned_m(fixes: Sequence[LocalFix]) -> float:
     return 0.5 * _HARD_MPS2 * step_s * step_s
 
 
+def _shown(fixes: Sequence[LocalFix], std_m: float) -> _Shown:
+    """Return what the latest three fixes, good to `std_m`, show of the motion, or the latest two.
+
+    The quadratic's derivatives at its end err by a third of the jerk times the step squared, and
+    by the jerk times the step (Taylor); a chord's by how hard one may turn meanwhile.
+    """
+    middle, last = fixes[-2], fixes[-1]
+    after_s = last.time_s - middle.time_s
+    slope = (last.xy_m - middle.xy_m) / after_s
+    if len(fixes) < 3 or middle.time_s - fixes[-3].time_s > _LONGEST_S:
+        off_mps = math.hypot(1.5 * std_m / after_s, 0.5 * after_s * _HARD_MPS2)
+        return _Shown(slope, np.zeros(2), off_mps, _HARD_MPS2)
+    first = fixes[-3]
+    before_s = middle.time_s - first.time_s
+    slope_before = (middle.xy_m - first.xy_m) / before_s
+    accel = 2.0 * (slope - slope_before) / (before_s + after_s)
+    velocity = slope + 0.5 * after_s * accel
+    step_s = 0.5 * (before_s + after_s)
+    velocity_std = math.hypot(2.5 * std_m / step_s, _JERK_MPS3 * step_s * step_s / 3.0)
+    accel_std = math.hypot(2.5 * std_m / step_s**2, _JERK_MPS3 * step_s)
+    return _Shown(velocity, accel, velocity_std, accel_std)
+
+
+def _bend_pm(way: Array, accel_mps2: Array, speed_mps: float) -> float:
+    """Return the curvature of who accelerates so while heading along `way` (2,)."""
+    return float(way[0] * accel_mps2[1] - way[1] * accel_mps2[0]) / speed_mps**2
+
+
+def _bearing_lost(filter_: KinematicFilter, fixes: Sequence[LocalFix], std_m: float) -> bool:
+    """Whether a filter that knows its speed no longer knows its heading at the newest fix, good to
+    `std_m`, which lies as far from the one before as the car has driven."""
+    if len(fixes) < 2 or filter_.covariance.item(YAW, YAW) < _LOST_RAD**2:
+        return False
+    step_s = fixes[-1].time_s - fixes[-2].time_s
+    if not _SPARSE_S <= step_s <= _LONGEST_S:
+        return False
+    moved_m = math.dist(fixes[-1].xy_m, fixes[-2].xy_m)
+    way_m, slack_m = abs(filter_.mean.item(SPEED)) * step_s, 0.5 * _HARD_MPS2 * step_s**2
+    driven = _SHORTEST_CHORD * way_m - slack_m < moved_m < way_m + slack_m + 4.0 * std_m
+    least_m = max(_SHOWN_BY * std_m, _MOVING_MPS * step_s)
+    return driven and min(moved_m, way_m) > least_m
+
+
+def bear_anew(
+    filter_: KinematicFilter,
+    fixes: Sequence[LocalFix],
+    std_m: float,
+    white_m: float,
+    lever_m: tuple[float, float],
+) -> bool:
+    """Put a car that has lost its heading where the newest fix is, facing as the latest ones show.
+
+    They are good to `std_m`, and to `white_m` each by itself. Returns whether it had lost it; what
+    is known of its speed stays.
+    """
+    if not _bearing_lost(filter_, fixes, white_m):
+        return False
+    shown = _shown(fixes, white_m)
+    speed = max(float(np.hypot(*shown.velocity_mps)), _MOVING_MPS)
+    way = shown.velocity_mps / math.copysign(speed, filter_.mean.item(SPEED))
+    filter_.turn_anew(
+        math.atan2(way[1], way[0]),
+        shown.velocity_std_mps / speed,
+        _bend_pm(way, shown.accel_mps2, speed),
+        shown.accel_std_mps2 / speed**2,
+    )
+    filter_.move_position(fixes[-1].xy_m, std_m, lever_m)
+    return True
+
+
 def follow_fixes(
     filter_: KinematicFilter,
     fixes: Sequence[LocalFix],
     std_m: float,
     *,
     turning: bool,
-    going: bool = True,
+    pace: bool = True,
 ) -> None:
     """Correct the motion by what the latest three of sparse fixes, good to `std_m`, show of it.
 
-    `turning` where nothing else tells of it, `going` where nothing does of the speed.
-
-    The quadratic's derivatives at its end err by a third of the jerk times the step squared, and
-    by the jerk times the step (Taylor).
+    `turning` where nothing else tells of it, `pace` where nothing else tells of that.
     """
-    first, middle, last = fixes[-3], fixes[-2], fixes[-1]
-    before_s, after_s = middle.time_s - first.time_s, last.time_s - middle.time_s
-    slope_before = (middle.xy_m - first.xy_m) / before_s
-    slope = (last.xy_m - middle.xy_m) / after_s
-    accel = 2.0 * (slope - slope_before) / (before_s + after_s)
-    velocity = slope + 0.5 * after_s * accel
-    step_s = 0.5 * (before_s + after_s)
-    velocity_std = math.hypot(2.5 * std_m / step_s, _JERK_MPS3 * step_s * step_s / 3.0)
-    accel_std = math.hypot(2.5 * std_m / step_s**2, _JERK_MPS3 * step_s)
+    velocity, accel, velocity_std, accel_std = _shown(fixes, std_m)
     speed = float(np.hypot(*velocity))
+    if not pace and abs(filter_.mean.item(SPEED)) < max(_MOVING_MPS, 2.0 * velocity_std):
+        return  # the curve through fixes of a car that stops leads back
     ahead = np.array([math.cos(filter_.mean[YAW]), math.sin(filter_.mean[YAW])])
     if turning and speed > max(_MOVING_MPS, 2.0 * velocity_std):
         way = velocity / speed
         if filter_.may_reverse and float(way @ ahead) < 0.0:
             way, speed = -way, -speed
         filter_.correct_yaw(math.atan2(way[1], way[0]), velocity_std / abs(speed))
-        bend = float(way[0] * accel[1] - way[1] * accel[0]) / speed**2
-        filter_.correct_curvature(bend, accel_std / speed**2)
+        filter_.correct_curvature(_bend_pm(way, accel, speed), accel_std / speed**2)
         ahead = way
-    if not going:
+    if not pace:
         return
     row = np.zeros(len(filter_.mean))
     row[SPEED] = 1.0

@@ -12,8 +12,9 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.telemetry.estimator.filter_state import ACCEL, CURVATURE, SPEED, YAW
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.position_gate import LocalFix
-from foretwin.telemetry.estimator.sparse_fixes import follow_fixes, sparse, turned_m
+from foretwin.telemetry.estimator.sparse_fixes import bear_anew, follow_fixes, sparse, turned_m
 from tests.telemetry.position_track import along, circle, states_of, xy, yaw
+from tests.telemetry.winding_drive import TICK_S, WINDING, driven, truly
 
 
 def once_a_second(
@@ -44,6 +45,36 @@ def test_who_pulls_away_and_turns_soon_is_not_held_back() -> None:
         assert xy(state) == pytest.approx(place(state.stamp_ns * 1e-9), abs=0.02)
     faster = [state for state in states if state.stamp_ns >= 20_900_000_000]
     assert all(state.speed_mps == pytest.approx(6.0, abs=1.2) for state in faster)
+
+
+@pytest.mark.parametrize(("every_s", "off_m", "turned_rad"), [(1.0, 0.1, 0.1), (2.0, 0.1, 0.35)])
+def test_wheels_beside_them_tell_of_no_turn(
+    every_s: float, off_m: float, turned_rad: float
+) -> None:
+    """A filter that knows its speed well swung about the truth, by 30 m and the wrong way round."""
+    _, states = driven(gyro=None, wheels=truly, fix_every=round(every_s / TICK_S))
+    assert len(states) == 120.0 / every_s
+    for tick, state in states[4:]:
+        speed, _, heading, *place = WINDING[tick]
+        assert xy(state) == pytest.approx(place, abs=off_m)
+        assert state.speed_mps == pytest.approx(speed, abs=0.1)
+        assert abs(math.remainder(yaw(state) - heading, math.tau)) < turned_rad
+
+
+@pytest.mark.parametrize("speed_mps", [5.0, -5.0])
+def test_a_heading_that_was_lost_is_found_in_the_fixes(speed_mps: float) -> None:
+    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=speed_mps, yaw_std_rad=1.0)
+    fixes = [
+        LocalFix(t, 20.0 * np.array([math.sin(t / 4.0), 1.0 - math.cos(t / 4.0)]))
+        for t in (0.0, 1.0, 2.0)
+    ]
+    assert bear_anew(filter_, fixes, 0.02, 0.02, (0.0, 0.0))
+    facing = 0.5 if speed_mps > 0.0 else 0.5 - math.pi
+    assert filter_.mean[:2] == pytest.approx(fixes[-1].xy_m)
+    assert math.remainder(filter_.mean[YAW] - facing, math.tau) == pytest.approx(0.0, abs=0.05)
+    assert filter_.mean[CURVATURE] == pytest.approx(math.copysign(0.05, speed_mps), abs=0.01)
+    assert filter_.mean[SPEED] == speed_mps
+    assert not bear_anew(filter_, fixes, 0.02, 0.02, (0.0, 0.0)), "it is known now"
 
 
 def test_the_quadratic_tells_speed_course_and_bend() -> None:
