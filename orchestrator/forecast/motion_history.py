@@ -77,7 +77,7 @@ class MotionHistory:
     def recent_mps(self, within_s: float) -> Array:
         """Return the kept speeds of the last seconds."""
         assert self.now is not None
-        oldest = self.now.stamp_ns - within_s * 1e9
+        oldest = self.now.stamp_ns - round(within_s * 1e9)  # whole, as it may be from 1970
         return np.array([speed for stamp, speed in self._kept if stamp >= oldest] or [0.0])
 
     @property

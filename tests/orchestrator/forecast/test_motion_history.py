@@ -76,3 +76,17 @@ def test_a_copy_goes_on_alike() -> None:
         history.take(3 * S, 4.0)
 
     assert one.now == other.now
+
+
+@pytest.mark.parametrize("began_ns", [1_262_304_000_123_456_700, 4 * 10**18 - 1])
+@given(within_ticks=st.integers(1, 20))
+def test_it_is_the_same_whenever_the_drive_began(began_ns: int, within_ticks: int) -> None:
+    """Stamps of today are not told apart to the microsecond by a float."""
+    early, late = MotionHistory(), MotionHistory()
+    for k in range(60):
+        early.take(k * S // 5, float(k))
+        late.take(began_ns + k * S // 5, float(k))
+    ago_s = np.arange(1, 20) / 5.0
+    assert np.array_equal(early.recent_mps(within_ticks / 5), late.recent_mps(within_ticks / 5))
+    assert len(late.recent_mps(within_ticks / 5)) == within_ticks + 1
+    assert np.array_equal(early.speeds_mps(ago_s), late.speeds_mps(ago_s))
