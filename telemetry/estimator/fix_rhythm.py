@@ -23,14 +23,15 @@ class FixRhythm(NamedTuple):
     each: bool = False
 
     def after(self, channel: str, stamp_ns: int) -> FixRhythm:
-        """Return the rhythm with one sample more."""
+        """Return the rhythm with one sample more; one that is late or came before changes none."""
+        newest_ns = self.fix_ns if channel == "gnss" else self.newest_ns
+        if newest_ns is not None and stamp_ns <= newest_ns:
+            return self
         if channel == "gnss":
             step_ns = 0 if self.fix_ns is None else stamp_ns - self.fix_ns
             beside = stamp_ns == self.newest_ns
             each = self.before_ns is not None and self.before_ns == self.fix_ns
             return self._replace(fix_ns=stamp_ns, step_ns=step_ns, beside=beside, each=each)
-        if stamp_ns == self.newest_ns:
-            return self
         return self._replace(newest_ns=stamp_ns, before_ns=self.newest_ns)
 
     @property
