@@ -67,8 +67,12 @@ def _to_wire(value: Any) -> Any:
 
 def _from_wire(kind: type, value: Any) -> Any:
     if getattr(kind, "__origin__", kind) is np.ndarray:
-        dtype, shape, data = value
-        return array_from_wire(dtype, tuple(shape), data)
+        try:
+            dtype, shape, data = value
+            shape = tuple(shape)
+        except (TypeError, ValueError):
+            raise ValueError("an array of numpy is wanted, such as np.array(...) makes") from None
+        return array_from_wire(dtype, shape, data)
     raise TypeError(f"no decoding known for {kind}")
 
 

@@ -119,6 +119,8 @@ class RemoteDriver:
         if self._motions.due(view.time_s):
             self._motions.asked(view.time_s)
             self._ask(view, self._connection)
+        for row, why in self._motions.drop_ended(view.time_s).items():
+            self._fall_back([row], view.time_s, why)
         known = self._motions.known
         if known.all():
             return self._motions.track(view, self._rows)
@@ -147,7 +149,9 @@ class RemoteDriver:
             return
         self._misses, self._planner.gone = 0, False
         try:
-            missing = self._motions.take(answer, self._rows, view.time_s)
+            if isinstance(answer, ValueError):
+                raise answer
+            missing = self._motions.take(answer, self._rows, view.time_s, view.states)
         except (TypeError, ValueError) as error:
             self._motions.forget()
             self._fall_back(self._rows, view.time_s, f"no use: {error}")
@@ -157,8 +161,8 @@ class RemoteDriver:
 
     def _answer(
         self, scene: PlannerScene, link: _Connection, within_s: float, *, repeats: bool
-    ) -> PlannedMotions | None:
-        """Return the answer to this very question, or None at the deadline."""
+    ) -> PlannedMotions | ValueError | None:
+        """Return the answer to this very question, why it is none, or None at the deadline."""
         end = time.monotonic() + within_s
         again = -np.inf
         while True:
@@ -171,8 +175,9 @@ class RemoteDriver:
             if isinstance(item, Received):
                 try:
                     message = item.message()
-                except ValueError:
-                    message = None
+                except ValueError as error:
+                    # To which question nobody can tell; who says such a thing says it of each.
+                    return error
                 asked = (scene.job, scene.question)
                 if isinstance(message, PlannedMotions) and (message.job, message.question) == asked:
                     return message

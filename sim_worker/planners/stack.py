@@ -117,6 +117,7 @@ class StackDriver:
             self._ask(due, view)
         accel, angle = np.full((2, len(view.arc_m)), np.nan)
         for share in self._shares:
+            self._fail(share, share.motions.drop_ended(view.time_s))
             rows = share.rows
             if len(rows) == len(accel):
                 accel, angle = share.motions.track(view, rows)
@@ -146,7 +147,7 @@ class StackDriver:
                 self._take_trouble(share, outcome)
                 continue
             try:
-                why = share.motions.take(outcome, asked, view.time_s)
+                why = share.motions.take(outcome, asked, view.time_s, view.states)
             except (TypeError, ValueError) as error:
                 why = dict.fromkeys(map(int, asked), str(error))
             self._fail(share, why)

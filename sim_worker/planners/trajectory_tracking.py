@@ -38,8 +38,9 @@ def check_trajectories(trajectories: Trajectories) -> None:
     if time.ndim != 2 or time.shape[1] < 2:
         raise ValueError(f"a trajectory needs two or more instants, not shape {time.shape}")
     for name, values in zip(trajectories._fields, trajectories, strict=True):
-        if values.shape[:2] != time.shape or (name == "xy_m") != (values.ndim == 3):
-            raise ValueError(f"{name} of shape {values.shape} for times of shape {time.shape}")
+        wanted = (*time.shape, 2) if name == "xy_m" else time.shape
+        if values.shape != wanted:
+            raise ValueError(f"{name} of shape {values.shape}, not {wanted}")
         if not np.isfinite(values).all():
             raise ValueError(f"{name} holds what is no number")
     if not (np.diff(time, axis=1) > 0.0).all():

@@ -117,6 +117,14 @@ def test_arrays_of_anything_but_plain_numbers_are_refused() -> None:
         decode(encode(plan), PlannedTrajectory)
 
 
+@pytest.mark.parametrize("given", [[0.5, 1.0], [0.5, 1.0, 2.0], 1.0])
+def test_lists_and_numbers_in_place_of_an_array_are_named(given: object) -> None:
+    plan = msgspec.structs.replace(PLAN, yaw_rad=given)
+
+    with pytest.raises(SchemaMismatch, match=r"an array of numpy is wanted.*`\$.yaw_rad`"):
+        decode(encode(plan), PlannedTrajectory)
+
+
 def test_another_schema_version_is_refused_with_both_versions_named() -> None:
     data = bytearray(encode(SpeedSample(stamp_ns=1, speed_mps=2.0)))
     struct.pack_into("<H", data, 4, SCHEMA_VERSION + 1)

@@ -167,6 +167,9 @@ def test_futures_that_an_answer_leaves_out_are_driven_by_the_fallback() -> None:
         ({"futures": (3,)}, "no use: futures (3,) of 1 that were asked for"),
         ({"time_s": np.zeros(31)}, "no use: time_s does not rise"),
         ({"yaw_rad": np.zeros((1, 7))}, "no use: yaw_rad of shape (1, 7)"),
+        ({"xy_m": np.zeros((1, 31, 3))}, "no use: xy_m of shape (1, 31, 3), not (1, 31, 2)"),
+        ({"time_s": np.linspace(-9.0, -6.0, 31)}, "no use: time_s ends at -6 s"),
+        ({"time_s": [0.0, 0.1]}, "an array of numpy is wanted, such as np.array(...) makes"),
         ({"link": 1}, "no use: it speaks version 1 of the planner link, this foretwin version 2"),
         ({"took_s": -1.0}, "no use: took_s -1: 0 to 10 s"),
         ({"failure": "lost its way"}, "no use: lost its way"),
@@ -180,6 +183,22 @@ def test_an_answer_of_no_use_is_named(spoil: dict[str, object], words: str) -> N
         answer = driver.plan(view)
     assert words in driver.remarks[0]
     assert answer.accel_mps2.tobytes() == PurePursuitIdm().plan(view).accel_mps2.tobytes()
+
+
+def test_past_the_end_of_a_motion_the_fallback_drives_until_the_next_one() -> None:
+    bus, path = MemoryBus(), straight()
+
+    def short(scene: PlannerScene) -> PlannedMotions:
+        return msgspec.structs.replace(eastwards(scene), time_s=np.linspace(0.0, 0.03, 31))
+
+    with stack(bus, short):
+        driver = connected(bus).begin(1)
+        view = view_of(path, at_rest_on(path, 5.0, 4.0), VEHICLE)
+        driver.plan(view)
+        assert driver.remarks == {}
+        later = driver.plan(view._replace(time_s=0.05))
+    assert "acted from 0.05 s on: its motion ended at 0.03 s" in driver.remarks[0]
+    assert later.accel_mps2.tobytes() == PurePursuitIdm().plan(view).accel_mps2.tobytes()
 
 
 def test_an_answer_to_an_older_question_does_not_count() -> None:

@@ -184,6 +184,13 @@ def test_an_answer_of_no_use_fails_its_futures_with_one_line(
         assert "\n" not in outcome.failures[row]
 
 
+def test_where_a_car_would_be_after_its_motion_is_not_made_up(tmp_path: Path) -> None:
+    with stack(tmp_path, "ends") as planner:
+        outcome = played(planner).outcome
+    why = "its motion ended at 0.43 s, not at rest, before another one counted"
+    assert outcome.failures[:2] == (f"planner 'mine' at 0.45 s: {why}",) * 2
+
+
 @pytest.mark.parametrize(
     ("how", "setup", "words"),
     [
