@@ -14,6 +14,7 @@ from foretwin.contracts.sensor_turns import read_turns
 from foretwin.contracts.tally import read_tally, tally_file
 from foretwin.contracts.versions import versions
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.summary import failed_line
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.durable import sync_folder, whole_file
@@ -169,11 +170,13 @@ def restart_troubles(plan: DrivePlan, ended_by: Sequence[str]) -> list[str]:
 
 
 def lost_lines(record: dict[str, Any]) -> list[str]:
-    """Return what a run says last where something of it is lost."""
+    """Return what a run says last where something of it is lost or failed."""
     lost = lost_telemetry_line(record["ledger"]["telemetry"]), lost_rounds_line(record)
+    failed = failed_line(record)
     return [
         *(f"error: {trouble}" for trouble in record["troubles"]),
         *(f"lost: {line}" for line in lost if line is not None),
+        *([] if failed is None else [f"failed: {failed}"]),
     ]
 
 

@@ -53,6 +53,8 @@ class RoundsStanding:
     failed_jobs: int
     off_lanes_rounds: int
     not_placed: Counter[str]
+    failed: Counter[str]
+    remarked: Counter[str]
     siblings_dropped: Counter[str]
 
 
@@ -145,6 +147,8 @@ def standing_of(
                 failed_jobs=rounds.failed_jobs,
                 off_lanes_rounds=rounds.futures.off_lanes_rounds,
                 not_placed=rounds.futures.not_placed,
+                failed=rounds.futures.failed,
+                remarked=rounds.futures.remarked,
                 siblings_dropped=rounds.siblings.count.dropped,
             ),
             heard=heard,
@@ -234,6 +238,7 @@ def _go_on_with_rounds(conductor: Conductor, standing: RoundsStanding, results: 
     rounds.siblings.count.dropped = standing.siblings_dropped
     rounds.futures.off_lanes_rounds = standing.off_lanes_rounds
     rounds.futures.not_placed = standing.not_placed
+    rounds.futures.failed, rounds.futures.remarked = standing.failed, standing.remarked
     rounds.windows.go_on(kept_windows(results).windows, conductor.worlds.world)
     rounds.next_round_id = max(standing.next_round_id, counts.last_round_id + 1)
     rounds.failed_jobs = standing.failed_jobs

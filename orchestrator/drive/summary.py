@@ -94,7 +94,12 @@ def summary_text(record: dict[str, object]) -> str:
             f"  the machine was too slow for {futures['wanted_per_round']} futures in every round: "
             f"{', '.join(sizes)}, {futures['spared_rounds']} were left out"
         )
-    lines += _not_placed_lines(futures.get("not_placed"))
+    lines += _reasons_lines(
+        futures.get("not_placed"), "in {} of the futures the scenario was not placed"
+    )
+    lines += _reasons_lines(
+        futures.get("remarked"), "of {} of the futures their planner has to say"
+    )
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction_name(junction)} ({junction['kind']}): "
         f"{_readiness(junction, config)}"
@@ -111,14 +116,25 @@ def summary_text(record: dict[str, object]) -> str:
     return "\n".join(plain(line) for line in (*lines, attribution))
 
 
-def _not_placed_lines(reasons: dict[str, int] | None) -> list[str]:
-    """Say in how many futures the scenario had no place, and the commonest reasons."""
-    if not reasons:
-        return []
+def _reasons_lines(reasons: dict[str, int] | None, of_how_many: str) -> list[str]:
+    """Say of how many futures something is to be said, and what of most."""
+    return [f"  {counted_reasons(reasons, of_how_many)}"] if reasons else []
+
+
+def failed_line(record: dict[str, Any]) -> str | None:
+    """Return what the engineer reads of futures that failed, from run.json; None where none did."""
+    futures = record["futures"]
+    reasons = futures.get("failed")
+    of_how_many = f"{{}} of {futures['count']} futures"
+    return counted_reasons(reasons, of_how_many) if reasons else None
+
+
+def counted_reasons(reasons: dict[str, int], of_how_many: str) -> str:
+    """Return how many there are, in the place of {}, and the commonest reasons."""
     total = sum(reasons.values())
     told = with_others(dict(list(reasons.items())[:REASONS_SHOWN]), total)
     why = "; ".join(f"{reason} ({count})" for reason, count in told.items())
-    return [f"  in {total} of the futures the scenario was not placed: {why}"]
+    return f"{of_how_many.format(total)}: {why}"
 
 
 def _pace(latency_ms: Any, *, lock_step: bool) -> str:

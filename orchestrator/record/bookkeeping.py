@@ -85,6 +85,10 @@ class FuturesCount:
     """Rounds whose paths are driven in part where their World has no lane that way."""
     not_placed: Counter[str] = field(default_factory=Counter)
     """Futures whose scenario had no place, by the reason; of these, the first so many."""
+    failed: Counter[str] = field(default_factory=Counter)
+    """Likewise, those that were not played to their end."""
+    remarked: Counter[str] = field(default_factory=Counter)
+    """Likewise, those of which their planner has something to say."""
     _hash: Any = field(default_factory=hashlib.sha256)
 
     def take(self, done: RoundDone, *, distinct: int) -> str:
@@ -96,9 +100,15 @@ class FuturesCount:
             own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
-            for reason in filter(None, result.left_out):
-                if reason in self.not_placed or len(self.not_placed) < MOST_LISTED:
-                    self.not_placed[reason] += 1
+            outcome = result.outcome
+            for counted, words in (
+                (self.not_placed, result.left_out),
+                (self.failed, outcome.failures),
+                (self.remarked, outcome.remarks),
+            ):
+                for reason in filter(None, words):
+                    if reason in counted or len(counted) < MOST_LISTED:
+                        counted[reason] += 1
         self.late_rounds += done.late
         futures = sum(len(result.future_indices) for result in done.results)
         self._add(own.digest(), futures, distinct, done.latency_ms)
@@ -129,7 +139,9 @@ class FuturesCount:
         not begun, `unseeded_rounds` had nothing to start from. Since the
         machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
         were not run. In `off_lanes_rounds` the path leaves the lanes of the World. `not_placed`
-        counts by the reason the futures whose scenario had no place: the car drives alone in them.
+        counts by the reason the futures whose scenario had no place: the car drives alone in them;
+        `failed` those that were not played to their end, `remarked` those of which their planner
+        has something to say, such as that another one drove.
         """
         return {
             "count": self.count,
@@ -143,6 +155,8 @@ class FuturesCount:
             "unseeded_rounds": unseeded,
             "off_lanes_rounds": self.off_lanes_rounds,
             "not_placed": dict(self.not_placed.most_common()),
+            "failed": dict(self.failed.most_common()),
+            "remarked": dict(self.remarked.most_common()),
             "rounds": self.rounds,
             "late_rounds": self.late_rounds,
             "sim_seconds": round(self.sim_seconds, 3),

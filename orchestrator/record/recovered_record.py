@@ -43,7 +43,7 @@ _TOLD_WHILE_DRIVING = (
 )
 _OF_FUTURES = (
     *("missed_rounds", "spared_rounds", "unseeded_rounds", "off_lanes_rounds"),
-    "not_placed",
+    *("not_placed", "failed", "remarked"),
 )
 """What no table tells: of the run, and of its futures."""
 
@@ -123,7 +123,7 @@ def recovered_record(
     can_be_none |= set() if windows else {"agreement"}
     unknown = [n for n in _TOLD_WHILE_DRIVING if told[n] is None and n not in can_be_none]
     unknown += [f"ledger.{name}" for name, of in told["ledger"].items() if of is None]
-    unknown += [f"futures.{name}" for name in _OF_FUTURES if told["futures"][name] is None]
+    unknown += [f"futures.{name}" for name in _OF_FUTURES if told["futures"].get(name) is None]
     return RecoveredRecord(told, tuple(unknown), said.get("drive_time_s"))
 
 

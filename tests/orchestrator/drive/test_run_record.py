@@ -246,6 +246,19 @@ def test_the_summary_says_in_how_many_futures_a_scenario_was_not_placed(house: H
     assert said in summary_text(record)
 
 
+def test_it_is_said_of_how_many_futures_another_planner_drove_and_how_many_failed(
+    house: House,
+) -> None:
+    record = record_of(house)
+    assert (record["futures"]["failed"], record["futures"]["remarked"]) == ({}, {})
+    assert "planner" not in summary_text(record)
+
+    record["futures"] |= {"count": 20, "remarked": {"the fallback acted": 14}, "failed": {"NaN": 3}}
+    said = "\n  of 14 of the futures their planner has to say: the fallback acted (14)\n"
+    assert said in summary_text(record)
+    assert lost_lines(record) == ["failed: 3 of 20 futures: NaN (3)"]
+
+
 def test_the_summary_owns_up_to_what_a_slow_machine_left_out(ended: House) -> None:
     record = record_of(ended)
     assert "too slow" not in summary_text(record)

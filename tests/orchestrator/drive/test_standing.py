@@ -54,6 +54,8 @@ def killed(folder: Path, *, open_round: bool = True, crashed: bool = False) -> T
     watched.given_up.add("w1")
     first.conductor.rounds.siblings.count.dropped["late"] += 2
     first.conductor.rounds.futures.not_placed["behind the car"] += 2
+    first.conductor.rounds.futures.failed["diverged"] += 3
+    first.conductor.rounds.futures.remarked["the fallback acted"] += 4
     left = standing_of(first.conductor, watched, grid=GRID, heard=heard_of(first.conductor))
     first.tables.leave()
     second = House(folder, at_once=True, plan=first.plan)
@@ -155,6 +157,9 @@ def test_what_else_was_known_is_known_again(twice: Twice) -> None:
     assert twice.watch.troubles == ["w1 ended"]
     assert twice.watch.given_up == {"w1"}
     assert second.rounds.siblings.count.dropped == {"late": 2}
+    futures = second.rounds.futures
+    assert futures.not_placed["behind the car"] == 2
+    assert (futures.failed, futures.remarked) == ({"diverged": 3}, {"the fallback acted": 4})
     assert twice.standing.grid == GRID
     assert second.intake.counts.received == twice.first.conductor.intake.counts.received > 0
     assert second.mission.way.place.s_m == twice.first.mission.way.place.s_m > 0.0

@@ -144,6 +144,22 @@ def test_futures_whose_scenario_has_no_place_are_counted_by_the_reason() -> None
     assert (record["count"], record["not_placed"]) == (6, {"behind": 2, "beyond": 1})
 
 
+def test_futures_that_failed_or_were_driven_by_another_planner_are_counted_by_the_reason() -> None:
+    count, done = FuturesCount(), round_done(straight(), straight((0.0, 1.0)))
+    for failures, remarks in ((("", "NaN"), ()), ((), ("the fallback acted", ""))):
+        said = {"failures": failures, "remarks": remarks}
+        results = tuple(
+            msgspec.structs.replace(result, outcome=msgspec.structs.replace(result.outcome, **said))
+            for result in done.results
+        )
+        count.take(replace(done, results=results), distinct=2)
+    record = count.record(wanted=64, missed=0, spared=0, unseeded=0)
+
+    each = len(done.results)
+    assert record["failed"] == {"NaN": each}
+    assert record["remarked"] == {"the fallback acted": each}
+
+
 def error(ade_m: float) -> HorizonError:
     return HorizonError(ade_m=ade_m, fde_m=0.0, lateral_m=0.0, longitudinal_m=0.0, heading_rad=0.0)
 

@@ -39,7 +39,8 @@ SAID = {
     "changes": [], "troubles": ["w1 ended"], "side_by_side": None, "off_road": [],
     "agreement": None, "plan_comparison": None, "telemetry": {"received": 3}, "dropped": {},
     "futures": {"missed_rounds": 1, "spared_rounds": 0, "unseeded_rounds": 0,
-                "off_lanes_rounds": 2, "not_placed": {"behind": 3}, "count": 12},
+                "off_lanes_rounds": 2, "not_placed": {"behind": 3}, "failed": {"NaN": 1},
+                "remarked": {}, "count": 12},
     "comparison": {}, "orchestrator": {"restarts": 0}, "workers": {}, "refused": {},
     "memory": {}, "left_out": {}, "wall_s": 1.0, "config": {"futures": 12, "keep": None},
 }  # fmt: skip
@@ -83,6 +84,7 @@ def test_what_it_said_last_counts_and_tables_go_on_from_there(tmp_path: Path) ->
     assert (futures["count"], futures["wanted_per_round"], futures["smaller_rounds"]) == (36, 12, 0)
     assert (futures["missed_rounds"], futures["off_lanes_rounds"]) == (1, 2)
     assert futures["not_placed"] == {"behind": 3}
+    assert (futures["failed"], futures["remarked"]) == ({"NaN": 1}, {})
     assert record["drive_time_s"] == 1.0  # of the last round
     assert record["recovered"] == {
         "lost": [], "unknown": ["ledger.telemetry"], "told_until_s": 0.6,

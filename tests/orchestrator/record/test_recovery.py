@@ -75,7 +75,8 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
     assert words == {"lost": [], "told_until_s": None}
     assert {name for name, value in record.items() if value is None} | {
         "futures.missed_rounds", "futures.spared_rounds", "futures.unseeded_rounds",
-        "futures.off_lanes_rounds", "futures.not_placed",
+        "futures.off_lanes_rounds", "futures.not_placed", "futures.failed",
+        "futures.remarked",
         "ledger.telemetry", "ledger.rounds", "ledger.jobs",
     } == unknown | {"agreement", "siblings"}  # fmt: skip
     assert {n: value for n, value in record.items() if value is not None} == {
@@ -87,6 +88,7 @@ def test_the_record_says_what_the_tables_tell_and_no_more(tmp_path: Path) -> Non
             "rounds_by_futures": {"12": 3}, "distinct": 33,
             "distinct_min_per_round": 10, "missed_rounds": None, "spared_rounds": None,
             "unseeded_rounds": None, "off_lanes_rounds": None, "not_placed": None,
+            "failed": None, "remarked": None,
             "rounds": 3, "late_rounds": 0, "sim_seconds": 288.0, "cpu_seconds": 0.75,
             "sha256": digest.hexdigest(),
         },
