@@ -34,6 +34,7 @@ from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.world_places import places_in
 from foretwin.sim_worker.message_loop import passed_over_where_unfit
 from foretwin.sim_worker.planner_interface import PlayAgain
+from foretwin.sim_worker.planners.hosted import HostedPlanner
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.planners.stack import StackPlanner
@@ -249,7 +250,10 @@ def warm_up(stage: BatchSimulation) -> None:
 
 
 def connect_planners(setup: WorkerSetup, bus: Bus) -> None:
-    """Load the planners of a worker before its first job; one that cannot be refuses that job."""
+    """Load the planners of a worker before its first job; one that cannot be refuses that job.
+
+    In a live drive they have rounds to keep; in lock step, and in sweeps, no clock runs.
+    """
     if "remote" in setup.planners:
         remote = load_planner("remote")
         assert isinstance(remote, RemotePlanner)
@@ -257,7 +261,9 @@ def connect_planners(setup: WorkerSetup, bus: Bus) -> None:
         remote.connect(bus, run=setup.run_id, process=setup.process_id, lock_step=lock_step)
     for name in setup.planners:
         try:
-            load_planner(name)
+            planner = load_planner(name)
+            if isinstance(planner, HostedPlanner) and not setup.bus.lossless:
+                planner.keep_pace()
         except ValueError as error:
             log.warning("%s", error)
 

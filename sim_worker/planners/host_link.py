@@ -97,8 +97,11 @@ def read_question(body: bytes) -> Question:
 
 def pack_answer(answer: PlannerOutput, remarks: dict[int, str]) -> bytes:
     """Return an answer's bytes; raises ValueError for what is no row of numbers."""
-    accel = np.asarray(answer[0], dtype=np.float64)
-    angle = np.asarray(answer[1], dtype=np.float64)
+    try:
+        accel, angle = (np.asarray(one, dtype=np.float64) for one in answer)
+    except (TypeError, ValueError):
+        wanted = "a PlannerOutput of accel_mps2 and tire_angle_rad"
+        raise ValueError(f"answers {type(answer).__name__}, not {wanted}") from None
     if accel.ndim != 1 or accel.shape != angle.shape:
         raise ValueError(f"answers of shapes {accel.shape} and {angle.shape}")
     words = {int(row): str(said) for row, said in remarks.items()}

@@ -89,6 +89,9 @@ def _answer(link: socket.socket, planner: Any) -> None:
 def _driver(planner: Any, count: int) -> Planner:
     if isinstance(planner, RemembersWithinJob):
         planner = planner.begin(count)
+        if not any(callable(getattr(planner, method, None)) for method in ("plan", "plan_one")):
+            kind = type(planner).__name__
+            raise TypeError(f"begin(count) returned {kind}: no method plan(view) or plan_one(view)")
     if isinstance(planner, AnswersOne) and not hasattr(planner, "plan"):
         return OneAtATime(planner)
     return planner  # type: ignore[no-any-return]

@@ -1,7 +1,8 @@
 """Planners that are not foretwin's own: each lives in a process of its own and answers in time.
 
 One that blocks, exits or crashes fails its own futures of the present job; its
-process is ended and a new one is ready for the next job.
+process is ended and a new one is ready for the next job. Only a live drive has rounds to keep:
+elsewhere each answer is waited for, so that no result depends on how fast the machine is.
 """
 
 from __future__ import annotations
@@ -32,7 +33,12 @@ from foretwin.sim_worker.planners.host_link import (
 START_S = 60.0
 """To import its package and say so: many times what that takes, for a machine that is busy."""
 FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5
-"""Of a planner in another process, or on another machine. Chosen."""
+"""Of a planner in another process, or on another machine, in a live drive. Chosen."""
+ALIVE_S = 30.0
+"""Where no clock runs, who has not answered by then hangs or is not there. Chosen: a stack of 50 ms
+does on a machine with six hundred times the work that it can do."""
+MOST_HUNG_JOBS = 5
+"""One that hung in so many jobs in a row is asked no more: each costs the whole limit."""
 _BUFFER_BYTES = 1 << 20
 _PROCESS = "foretwin.sim_worker.planners.host_process"
 
@@ -41,6 +47,10 @@ log = logging.getLogger("foretwin.sim_worker.planners")
 
 class PlannerFailed(RuntimeError):  # noqa: N818
     """What a foreign planner did, in words for the engineer."""
+
+
+class PlannerLost(PlannerFailed):
+    """Its process hung or died: that says nothing of what it would have answered."""
 
 
 class _Host(NamedTuple):
@@ -56,12 +66,15 @@ class HostedPlanner:
         name: str,
         value: str,
         *,
-        first_answer_s: float = FIRST_ANSWER_S,
-        answer_s: float = ANSWER_S,
+        first_answer_s: float = ALIVE_S,
+        answer_s: float = ALIVE_S,
     ) -> None:
         """Start its process; raises UserError where its package does not load."""
         self._name, self._value = name, value
         self.first_answer_s, self.answer_s = first_answer_s, answer_s
+        self._live, self._hung_jobs = False, 0
+        """Whether rounds are kept; in a row."""
+        self._last: HostedDriver | None = None
         self._host: _Host | None = self._start()
         self._ready = False
         atexit.register(self.close)
@@ -76,9 +89,17 @@ class HostedPlanner:
         """The process it lives in now."""
         return None if self._host is None else self._host.process.pid
 
+    def keep_pace(self) -> None:
+        """Have it answer by the deadlines of a live drive."""
+        self._live = True
+        self.first_answer_s, self.answer_s = FIRST_ANSWER_S, ANSWER_S
+
     def begin(self, count: int) -> HostedDriver:
         """Return what drives one job's cars, in a new process if the last one was ended."""
-        return HostedDriver(self, count)
+        if self._last is not None and not self._last.lost:
+            self._hung_jobs = 0
+        self._last = HostedDriver(self, count)
+        return self._last
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick as the first of a job."""
@@ -91,6 +112,8 @@ class HostedPlanner:
 
     def ask(self, body: bytes, *, begins: bool) -> tuple[PlannerOutput, dict[int, str]]:
         """Return the answer to a question; raises PlannerFailed, after which it starts anew."""
+        if self._hung_jobs >= MOST_HUNG_JOBS and not self._live:
+            raise PlannerLost(f"hung in {MOST_HUNG_JOBS} jobs in a row and is asked no more")
         if self._host is None:
             self._host = self._start()
         if not self._ready:
@@ -103,14 +126,17 @@ class HostedPlanner:
             if frame.kind == ANSWER:
                 return read_answer(frame.body)
         except TimeoutError:
-            raise self._restarted(f"gave no answer within {within_s:g} s and was ended") from None
+            self._hung_jobs += 1
+            words = f"gave no answer within {within_s:g} s and was ended"
+            raise PlannerLost(self._restarted(words)) from None
         except (LinkLost, ConnectionError):
-            raise self._restarted(f"is gone: its process {self._ending()}") from None
+            words = f"is gone: its process {self._ending()}"
+            raise PlannerLost(self._restarted(words)) from None
         except ValueError as error:
-            raise self._restarted(f"{error}; it was ended") from None
+            raise PlannerFailed(self._restarted(f"{error}; it was ended")) from None
         if frame.kind == FAILURE:
             raise PlannerFailed(frame.body.decode(errors="replace"))
-        raise self._restarted("answered nonsense and was ended")
+        raise PlannerFailed(self._restarted("answered nonsense and was ended"))
 
     def _start(self) -> _Host:
         ours, theirs = socket.socketpair()
@@ -147,11 +173,11 @@ class HostedPlanner:
             raise PlannerFailed(f"fails to load: {frame.body.decode(errors='replace')}")
         self._ready = True
 
-    def _restarted(self, words: str) -> PlannerFailed:
+    def _restarted(self, words: str) -> str:
         log.warning("planner %r %s", self._name, words)
         self._end()
         self._host = self._start()
-        return PlannerFailed(words)
+        return words
 
     def _ending(self) -> str:
         assert self._host is not None
@@ -169,10 +195,12 @@ class HostedPlanner:
 
 
 class HostedDriver:
-    """Drives one job's cars by asking the planner's process tick by tick."""
+    """Drives one job's cars by asking the planner's process tick by tick; `lost` are those of
+    which its failure says nothing."""
 
     def __init__(self, planner: HostedPlanner, count: int) -> None:
-        self._planner, self._begins = planner, count
+        self._planner, self._count, self._begins = planner, count, count
+        self.lost: range = range(0)
         self._shared: list[object] = [self] * len(SHARED)
         self.remarks: dict[int, str] = {}
 
@@ -181,7 +209,11 @@ class HostedDriver:
         shared = [getattr(view, name) for name in SHARED]
         fresh = any(new is not old for new, old in zip(shared, self._shared, strict=True))
         body = pack_question(view, begins=self._begins, with_shared=fresh)
-        answer, remarks = self._planner.ask(body, begins=self._begins > 0)
+        try:
+            answer, remarks = self._planner.ask(body, begins=self._begins > 0)
+        except PlannerLost:
+            self.lost = range(self._count)
+            raise
         self._begins, self._shared = 0, shared
         self.remarks.update(remarks)
         return answer

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -90,12 +90,21 @@ class OneAtATime:
             if row in self.remarks:
                 continue
             try:
-                accel, angle = self._planner.plan_one(car_view(view, row))
-                answers[row] = float(accel), float(angle)
+                answers[row] = _two_numbers(self._planner.plan_one(car_view(view, row)))
             except Exception as error:
                 # One car's failure is not the others'.
                 self.remarks[row] = f"{type(error).__name__}: {error}"
         return PlannerOutput(answers[:, 0], answers[:, 1])
+
+
+def _two_numbers(answer: Any) -> tuple[float, float]:
+    """Return an acceleration and a tyre angle; raises TypeError in words for anything else."""
+    try:
+        accel, angle = answer
+        return float(accel), float(angle)
+    except (TypeError, ValueError):
+        kind = type(answer).__name__
+        raise TypeError(f"plan_one returned {kind}, not an acceleration and an angle") from None
 
 
 def car_view(view: PlannerView, row: int) -> CarView:

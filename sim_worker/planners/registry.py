@@ -65,10 +65,24 @@ def _hosted(name: str) -> HostedPlanner:
 
 
 def _entry_point(name: str) -> EntryPoint:
-    for point in entry_points(group=GROUP):
-        if point.name == name:
-            return point
-    raise UserError(f"unknown planner {name!r}; {one_of(name, planner_names())}")
+    """Return who offers a planner; raises UserError where nobody, or more than one does."""
+    points = _offering(name)
+    if len(points) > 1:
+        who = " and ".join(sorted(_package(point) for point in points))
+        raise UserError(f"planner {name!r}: {who} offer one; uninstall one, or rename its entry")
+    if not points:
+        raise UserError(f"unknown planner {name!r}; {one_of(name, planner_names())}")
+    return points[0]
+
+
+def _offering(name: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of that name, but for foretwin's own."""
+    points = entry_points(group=GROUP, name=name)
+    return tuple(point for point in points if not point.value.startswith("foretwin."))
+
+
+def _package(point: EntryPoint) -> str:
+    return point.value if point.dist is None else point.dist.name
 
 
 def check_planner(name: str, *, in_drive: bool = True) -> None:
@@ -80,6 +94,9 @@ def check_planner(name: str, *, in_drive: bool = True) -> None:
         raise UserError(f"planner {name} {_IN_DRIVES[name]}; there is none here")
     if name not in _OWN:
         _hosted(name).close()
+    elif also := _offering(name):
+        who = _package(also[0])
+        raise UserError(f"planner {name!r} is one of foretwin; rename the entry of {who}")
 
 
 def in_another_process(name: str) -> bool:

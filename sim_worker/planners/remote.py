@@ -26,13 +26,10 @@ from foretwin.sim_worker.planner_interface import (
     rows_of,
 )
 from foretwin.sim_worker.planners.answered_motions import AnsweredMotions
-from foretwin.sim_worker.planners.hosted import ANSWER_S, FIRST_ANSWER_S
+from foretwin.sim_worker.planners.hosted import ALIVE_S, ANSWER_S, FIRST_ANSWER_S
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.scene_message import Asked, scene_message
 
-ALIVE_S = 30.0
-"""In lock step, who has not answered by then hangs or is not there. Chosen: a stack of 50 ms does
-on a machine with six hundred times the work that it can do."""
 REPEAT_S = 0.25
 """The first question of a job is repeated: the stack may be joining the bus."""
 _PATIENCE = 3

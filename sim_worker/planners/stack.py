@@ -25,13 +25,12 @@ from foretwin.sim_worker.planner_interface import (
     rows_of,
 )
 from foretwin.sim_worker.planners.answered_motions import AnsweredMotions
+from foretwin.sim_worker.planners.hosted import MOST_HUNG_JOBS
 from foretwin.sim_worker.planners.scene_message import Asked, scene_message
 from foretwin.sim_worker.planners.stack_processes import RUN, StackProcesses, Trouble
 
 ATTEMPTS = 3
 """A job of which so many processes died is played on without them."""
-MOST_HUNG_JOBS = 5
-"""A stack that hung in so many jobs in a row is asked no more: each costs the whole limit."""
 
 log = logging.getLogger("foretwin.sim_worker.planners")
 

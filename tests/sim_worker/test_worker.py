@@ -38,6 +38,7 @@ from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.result_digest import result_digest
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
+from foretwin.sim_worker.planners.hosted import ALIVE_S, ANSWER_S, HostedPlanner
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -48,6 +49,7 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.sim_worker.futures.cells import cells_for
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
+from tests.sim_worker.planners.installed import install
 from tests.starvation import unhindered_wait_s
 from tests.system.foretwin_command import REPOSITORY, is_running, wait_for
 
@@ -113,19 +115,26 @@ def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
 
 
 @pytest.mark.parametrize("lossless", [True, False])
-def test_in_lock_step_a_driving_stack_is_waited_for(folder: Path, lossless: bool) -> None:
+def test_in_lock_step_planners_of_others_are_waited_for(
+    folder: Path, lossless: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(folder, "waited_for", "class Mine:\n    def plan(self, view): ...\n", mine="Mine")
+    monkeypatch.syspath_prepend(folder)
     bus, setup = MemoryBus(), _setup(folder)
     setup = msgspec.structs.replace(
         setup,
-        planners=("remote",),
+        planners=("remote", "mine"),
         bus=msgspec.structs.replace(setup.bus, lossless=lossless),
     )
     life = ProcessLife(setup, bus)
     bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
     load_planner.cache_clear()
     serve_futures(setup, bus, life)
-    remote = load_planner("remote")
+    remote, mine = load_planner("remote"), load_planner("mine")
     load_planner.cache_clear()
+    assert isinstance(mine, HostedPlanner)
+    mine.close()
+    assert mine.answer_s == (ALIVE_S if lossless else ANSWER_S)
     assert isinstance(remote, RemotePlanner)
     assert remote.lock_step == lossless
 

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -13,7 +14,14 @@ from foretwin.contracts.futures import Future
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import Planner, RemembersWithinJob
-from foretwin.sim_worker.planners.hosted import ANSWER_S, HostedDriver, HostedPlanner, PlannerFailed
+from foretwin.sim_worker.planners.hosted import (
+    ANSWER_S,
+    MOST_HUNG_JOBS,
+    HostedDriver,
+    HostedPlanner,
+    PlannerFailed,
+    PlannerLost,
+)
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.registry import check_planner, load_planner, planner_names
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -21,6 +29,7 @@ from tests.contracts.bus_sides import DEADLINE_S
 from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.planners.driven import Other, at_rest_on, see, straight, view_of
 from tests.sim_worker.planners.installed import install
+from tests.sim_worker.planners.their_planners import CODE, NAMES
 from tests.starvation import kept_waiting
 
 COVERS = (
@@ -30,82 +39,6 @@ COVERS = (
 )
 
 VEHICLE = load_vehicle()
-
-CODE = """
-import os, time
-import numpy as np
-from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-
-class Steady(PurePursuitIdm):
-    pass
-
-class Counting:
-    def begin(self, count):
-        return Counted(count)
-
-class Counted:
-    def __init__(self, count):
-        self.count, self.asked, self.remarks = count, 0, {}
-    def plan(self, view):
-        self.asked += 1
-        self.remarks[0] = f"asked {self.asked} times for {self.count} cars"
-        return np.full(len(view.arc_m), float(self.asked)), np.zeros(len(view.arc_m))
-
-class One:
-    def plan_one(self, view):
-        if view.arc_m > 15.0:
-            raise KeyError("no lane here")
-        ahead = min((user.arc_m for user in view.users), default=0.0)
-        return view.target_speed_mps - view.vx_mps, ahead / 1000.0
-
-class Blocks(Steady):
-    def plan(self, view):
-        if view.time_s >= 0.5:
-            time.sleep(600.0)
-        return super().plan(view)
-
-class Exits(Steady):
-    def plan(self, view):
-        if view.time_s >= 0.5:
-            os._exit(7)
-        return super().plan(view)
-
-class Crashes(Steady):
-    def plan(self, view):
-        if view.time_s >= 0.5:
-            os.abort()
-        return super().plan(view)
-
-class Raises(Steady):
-    def plan(self, view):
-        if view.time_s >= 0.5:
-            raise RuntimeError("lost\\nmy way")
-        return super().plan(view)
-
-class NoNumber(Steady):
-    def plan(self, view):
-        answer = super().plan(view)
-        if view.time_s >= 0.5:
-            answer.accel_mps2[0] = np.nan
-        return answer
-
-class Scalar:
-    def plan(self, view):
-        return 1.0, 0.0
-
-class NoPlanner:
-    pass
-
-class FailsToLoad:
-    def __init__(self):
-        raise OSError("no weights")
-"""
-
-NAMES = {
-    "steady": "Steady", "counting": "Counting", "one": "One", "blocks": "Blocks",
-    "exits": "Exits", "crashes": "Crashes", "raises": "Raises", "no_number": "NoNumber",
-    "scalar": "Scalar", "no_planner": "NoPlanner", "fails_to_load": "FailsToLoad",
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -187,6 +120,16 @@ def test_one_for_a_single_car_is_asked_for_each_and_fails_for_each() -> None:
         ("crashes", "is gone: its process ended with code -6", False),
         ("raises", "RuntimeError: lost my way", True),
         ("scalar", "ValueError: answers of shapes () and ()", True),
+        (
+            "nothing",
+            "ValueError: answers NoneType, not a PlannerOutput of accel_mps2 and tire_angle_rad",
+            True,
+        ),
+        (
+            "begins_nothing",
+            "TypeError: begin(count) returned int: no method plan(view) or plan_one(view)",
+            True,
+        ),
     ],
 )
 def test_what_it_does_is_said_in_time_and_the_next_job_finds_it_well(
@@ -195,7 +138,8 @@ def test_what_it_does_is_said_in_time_and_the_next_job_finds_it_well(
     planner = theirs(name)
     driver = planner.begin(1)
     view = view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE)
-    if name != "scalar":
+    answers = name not in ("scalar", "nothing", "begins_nothing")
+    if answers:
         driver.plan(view)
     before, begun = planner.pid, time.monotonic()
     assert before is not None
@@ -204,8 +148,42 @@ def test_what_it_does_is_said_in_time_and_the_next_job_finds_it_well(
     assert str(failure.value) == words
     assert time.monotonic() - begun - kept.seconds < 2.5
     assert (planner.pid == before) == lives
-    if name != "scalar":
+    if answers:
         assert np.isfinite(planner.begin(1).plan(view).accel_mps2).all()
+
+
+def test_one_for_a_single_car_that_answers_nothing_is_told_what_it_should() -> None:
+    driver = theirs("one_nothing").begin(1)
+    assert np.isnan(driver.plan(view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE))[0])
+    words = "plan_one returned NoneType, not an acceleration and an angle"
+    assert driver.remarks == {0: f"TypeError: {words}"}
+
+
+def test_where_no_clock_runs_a_slow_one_is_waited_for_and_in_a_live_drive_it_is_late() -> None:
+    planner = load_planner("late")
+    _used.add("late")
+    assert isinstance(planner, HostedPlanner)
+    view = view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE)
+    assert np.isfinite(planner.begin(1).plan(view).accel_mps2).all()
+    planner.keep_pace()
+    late = planner.begin(1)
+    with pytest.raises(PlannerFailed, match="gave no answer within 1 s and was ended"):
+        late.plan(view)
+    assert list(late.lost) == [0], "of what it would have answered nothing is known"
+
+
+def test_who_hangs_in_every_job_is_asked_no_more_but_for_a_live_drive() -> None:
+    planner = theirs("raises")
+    view = view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE)
+    driver = planner.begin(2)
+    planner._hung_jobs = MOST_HUNG_JOBS
+    with pytest.raises(PlannerLost, match="hung in 5 jobs in a row and is asked no more"):
+        driver.plan(view)
+    planner.keep_pace()
+    planner.first_answer_s = DEADLINE_S
+    planner.begin(1).plan(view)
+    planner.begin(1)
+    assert planner._hung_jobs == 0
 
 
 def test_a_blocked_process_is_really_gone() -> None:
@@ -254,6 +232,7 @@ def test_in_a_job_only_its_own_futures_fail(stage: BatchSimulation, name: str) -
     assert time.monotonic() - begun - kept.seconds < 9.0
     assert together.outcome.valid.tolist() == [True, False, True]
     assert f"planner {name!r} at 0.5 s: " in together.outcome.failures[1]
+    assert together.outcome.lost == (msgspec.UNSET if name == "no_number" else (1,))
     assert together.outcome.failures[0] == together.outcome.failures[2] == ""
     alone = run_job(job((futures[0], futures[2]), horizon_s=2.0), stage)
     assert np.array_equal(together.trajectory.states[[0, 2]], alone.trajectory.states)

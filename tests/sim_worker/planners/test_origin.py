@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.planners.origin import PlannerOrigin, files_digest
-from foretwin.sim_worker.planners.registry import planner_names, planner_origin
+from foretwin.sim_worker.planners.registry import check_planner, planner_names, planner_origin
 from tests.sim_worker.planners.installed import install
 
 CODE = """
@@ -22,6 +23,17 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     install(tmp_path, "planners_of_origin", CODE, mine="Mine")
     monkeypatch.syspath_prepend(tmp_path)
     return tmp_path
+
+
+def test_two_of_one_name_are_refused_rather_than_one_of_them_taken(installed: Path) -> None:
+    install(installed, "other_planners", CODE, mine="Mine", constant_speed="Mine")
+    words = "planner 'mine': other_planners and planners_of_origin offer one; uninstall one, or"
+    with pytest.raises(UserError, match=words):
+        check_planner("mine")
+    check_planner("pure_pursuit_idm")
+    words = "planner 'constant_speed' is one of foretwin; rename the entry of other_planners"
+    with pytest.raises(UserError, match=words):
+        check_planner("constant_speed")
 
 
 def test_a_package_tells_its_name_and_version_and_is_not_run(installed: Path) -> None:

@@ -18,7 +18,8 @@ from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.result_digest import result_digest
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import PlayAgain
-from foretwin.sim_worker.planners.stack import ATTEMPTS, MOST_HUNG_JOBS, StackPlanner
+from foretwin.sim_worker.planners.hosted import MOST_HUNG_JOBS
+from foretwin.sim_worker.planners.stack import ATTEMPTS, StackPlanner
 from foretwin.sim_worker.planners.stack_processes import MOST_FAILED_STARTS
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
