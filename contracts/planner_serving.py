@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -32,6 +33,7 @@ LINK_GIVEN = "FORETWIN_PLANNER_LINK"
 JOIN_S = 30.0
 """So long a stack that nobody started waits for a drive to begin."""
 _LOOK_S = 0.5
+_JOIN_AGAIN_S = 0.2
 _DEPTH = 8
 
 Plan = Callable[[PlannerScene], PlannedMotions]
@@ -57,7 +59,8 @@ def serve_planner(
     endpoint: str | None = None,
 ) -> int:
     """Let `plan` answer every scene: of the sweep that has started this process, or else of the
-    drives below the folder `out`, or at an `endpoint` that asks nobody who it is.
+    drives below the folder `out`, one after the other, or at an `endpoint` that asks nobody who
+    it is.
 
     `name` and `version` stand in the sweep's record; rows of another version are never mixed with
     those of this one. `reset` is called with the first scene of futures, before `plan`. What either
@@ -83,17 +86,32 @@ def serve_planner(
 
 
 def _serve_drives(plan: Plan, reset: Reset | None, out: Path, endpoint: str | None) -> None:
-    """Join a drive and answer for ever; UserError or BusUnreachable where there is none in time."""
-    end = time.monotonic() + JOIN_S
+    """Answer one drive after the other; UserError or BusUnreachable where none begins in time."""
+    end_s = time.monotonic() + JOIN_S
+    while True:
+        with _joined(out, endpoint, end_s=end_s) as bus:
+            Answering(bus, plan, reset, run="*", process="*").serve_drive()
+        say("the drive is over; ready for the next one")
+        end_s = math.inf
+
+
+def _joined(out: Path, endpoint: str | None, *, end_s: float) -> ZenohBus:
+    """Return the bus of a drive; UserError or BusUnreachable where there is none until then."""
     while True:
         try:
-            joins = BusSetup(endpoint=endpoint) if endpoint else newest_running(out).bus("planner")
-            with ZenohBus(joins) as bus:
-                Answering(bus, plan, reset, run="*", process="*").serve_for_ever()
+            return ZenohBus(BusSetup(endpoint=endpoint) if endpoint else _bus_of(out))
         except (BusUnreachable, UserError):
-            if time.monotonic() > end:
+            if time.monotonic() > end_s:
                 raise
-            time.sleep(0.2)
+            time.sleep(_JOIN_AGAIN_S)
+
+
+def _bus_of(out: Path) -> BusSetup:
+    try:
+        return newest_running(out).bus("planner")
+    except UserError:
+        where = f"{out}: no drive is running there"
+        raise UserError(f"{where}; start one, or name the folder of its runs as `out`") from None
 
 
 class Answering:
@@ -117,12 +135,12 @@ class Answering:
                 self._bus.publish("planner_joined", who, **self._ids)
             asked = self.take(_LOOK_S) or asked
 
-    def serve_for_ever(self) -> None:
-        """Answer whoever asks."""
+    def serve_drive(self) -> None:
+        """Answer whoever asks until the drive's bus is gone."""
         say("ready")
         sys.stdout.flush()
-        while True:
-            self.take(1.0)
+        while self._bus.connected:
+            self.take(_LOOK_S)
 
     def take(self, timeout_s: float) -> bool:
         """Answer one scene; returns whether one came in time.

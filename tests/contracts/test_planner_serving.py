@@ -96,7 +96,43 @@ def test_with_nobody_to_join_it_says_so_in_one_line(
     monkeypatch.setattr(planner_serving, "JOIN_S", 0.0)
     assert serve_planner(straight_on, name="mine", version="1", out=tmp_path) == 2
     said = capsys.readouterr().err
-    assert said == f"mine: {tmp_path}: no drive is running there; --run names one elsewhere\n"
+    how = "start one, or name the folder of its runs as `out`"
+    assert said == f"mine: {tmp_path}: no drive is running there; {how}\n"
+
+
+def test_it_drives_one_drive_after_the_other(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answered: list[int] = []
+
+    class Drive(MemoryBus):
+        """Asks once and is gone; the third of them never begins."""
+
+        begun = 0
+
+        def __init__(self, setup: object) -> None:
+            Drive.begun += 1
+            if Drive.begun == 3:
+                raise KeyboardInterrupt
+            super().__init__()
+
+        def __enter__(self) -> Drive:
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+        @property
+        def connected(self) -> bool:
+            if Drive.begun in answered:
+                return False
+            self.publish("planner_scene", scene(), **IDS)
+            answered.append(Drive.begun)
+            return True
+
+    monkeypatch.setattr(planner_serving, "ZenohBus", Drive)
+    assert serve_planner(straight_on, name="mine", version="1", endpoint="tcp/HOST:1") == 0
+    assert answered == [1, 2]
+    assert capsys.readouterr().out == "ready\nthe drive is over; ready for the next one\n" * 2
 
 
 @pytest.mark.parametrize("given", ["rubbish", msgspec.json.encode({"bus": 1}).decode()])
