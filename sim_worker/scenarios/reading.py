@@ -108,8 +108,11 @@ def check_scenario(scenario: Scenario) -> None:
     if not 0 <= scenario.seed <= MAX_SEED:
         raise ValueError(f"seed is {scenario.seed}; it must be from 0 to {MAX_SEED}")
     _check_actors(scenario)
+    # By their place in the file, not by the actor's name: only so does the error tell the line.
+    places = {actor.name: f"actors[{index}]" for index, actor in enumerate(scenario.actors)}
     for number in numbers(scenario):
-        _check_number(number.name, number.value)
+        owner, field = number.name.split(".")
+        _check_number(f"{places.get(owner, owner)}.{field}", number.value)
 
 
 _MEANING = {
