@@ -105,6 +105,8 @@ class RemoteDriver:
         self._briefing = briefing
         self.remarks: dict[int, str] = {}
         self._question, self._misses = 0, 0
+        self._stack = 0
+        """Who answered last, by its number on the bus."""
         timing = PlannerTiming()
         self._motions = AnsweredMotions(count, rate_hz=timing.rate_hz, latency_s=timing.latency_s)
         self._rows = np.arange(count)
@@ -175,9 +177,14 @@ class RemoteDriver:
                 except ValueError as error:
                     # To which question nobody can tell; who says such a thing says it of each.
                     return error
-                asked = (scene.job, scene.question)
-                if isinstance(message, PlannedMotions) and (message.job, message.question) == asked:
+                if not isinstance(message, PlannedMotions) or message.job != scene.job:
+                    continue
+                if message.question == scene.question:
+                    self._stack = item.sender
                     return message
+                if message.question < scene.question and item.sender != self._stack:
+                    # Whose answers counted was chance.
+                    return ValueError("two stacks answer at once; end one of them")
             elif left <= 0.0:
                 return None
 

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.bus import Mailbox, Received
+from foretwin.contracts.codec import encode
+from foretwin.contracts.keys import key as channel_key
 from foretwin.contracts.planner_link import LINK_VERSION, PlannedMotions, PlannerScene
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.remote import RemoteDriver, RemotePlanner
@@ -211,6 +213,26 @@ def test_an_answer_to_an_older_question_does_not_count() -> None:
         driver = connected(bus, first_s=0.3).begin(1)
         driver.plan(view_of(straight(), at_rest_on(straight(), 5.0, 4.0), VEHICLE))
     assert "no answer within 0.3 s" in driver.remarks[0]
+
+
+def test_of_two_stacks_that_answer_at_once_neither_drives() -> None:
+    bus = MemoryBus()
+    view = view_of(straight(), at_rest_on(straight(), 5.0, 4.0), VEHICLE)
+
+    def twice(scene: PlannerScene) -> None:
+        (answers,) = bus.mailboxes("planned_motions")
+        key, kind = channel_key("planned_motions", **IDS), PlannedMotions
+        for sender in (1, 2):
+            data = encode(eastwards(scene), sender=sender)
+            answers.put(Received("planned_motions", key, data, kind))
+
+    with stack(bus, twice):
+        driver = connected(bus).begin(1)
+        driver.plan(view)
+        assert driver.remarks == {}
+        driver.plan(view._replace(time_s=0.1))
+    words = "acted from 0.1 s on: no use: two stacks answer at once; end one of them"
+    assert driver.remarks[0].endswith(words)
 
 
 def test_in_lock_step_an_answer_is_waited_for_however_long_it_takes() -> None:
