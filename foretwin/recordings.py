@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from foretwin.checks import path_of
+from foretwin.checks import expect, path_of
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.errors import UserError
@@ -94,7 +94,8 @@ class Recording:
             raise UserError(f"{self.folder}: no World {world_id!r} to be read: {known}") from error
 
     def futures_of(self, future_id: str) -> Futures:
-        """Play the job of a future again, to the same bits; returns all of its futures.
+        """Play the job of a future again, to the same bits; returns all of its futures that were
+        played, `rows` in the order of `states`.
 
         Tables hold what came of futures, not their motion. `states` has (S, N, 8) of base_link in
         the frame of `world(world_id)`. Raises UserError where it cannot be repeated as
@@ -105,14 +106,15 @@ class Recording:
         from foretwin.sim_worker.futures.future_rows import future_rows
 
         try:
-            recorded = recorded_future(self.folder, future_id)
+            recorded = recorded_future(self.folder, expect("future_id", future_id, str))
         except FileNotFoundError as error:
             raise UserError(str(error)) from error
         result, sha256 = play_again(recorded)
         if sha256.get(recorded.row.index) != recorded.row.trajectory_sha256:
             raise UserError(f"{self.folder}: {future_id} comes to something else now")
         rows = future_rows(recorded.job, result, job_sha256=recorded.row.job_sha256)
-        return Futures(recorded.job, result, rows)
+        by_index = {row["index"]: row for row in rows}
+        return Futures(recorded.job, result, [by_index[index] for index in result.future_indices])
 
     def driven(self) -> MotionArrays:
         """Return where the car of a run drove, estimated from its recording as it was then.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -189,7 +189,10 @@ def run_futures(
 def _scenarios(
     given: Sequence[Scenario | Path | str] | Scenario | Path | str,
 ) -> tuple[Scenario, ...]:
-    several = (given,) if isinstance(given, Scenario | Path | str) else given
+    several: Any = (given,) if isinstance(given, Scenario | Path | str) else given
+    if not isinstance(several, Iterable):
+        kind = type(several).__name__
+        raise UserError(f"scenarios must be ids, files or definitions, not {kind}")
     return tuple(
         one if isinstance(one, Scenario) else find_scenario(path_of("a scenario", one))
         for one in several

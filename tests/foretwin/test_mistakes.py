@@ -48,6 +48,7 @@ def future(**other: Any) -> list[foretwin.Future]:
         ({"scenarios": "nosuch"}, "no scenario 'nosuch'"),
         ({"scenarios": ["scp.toml"]}, "no scenario file scp.toml"),
         ({"scenarios": [5]}, "a scenario must be a path"),
+        ({"scenarios": 5}, "scenarios must be ids, files or definitions, not int"),
         ({"futures": ["a"]}, "a future must be a Future, not str"),
         ({"futures": 2 * future()}, "two of index 0"),
         ({"futures": future(planner="nosuch")}, "unknown planner 'nosuch'"),

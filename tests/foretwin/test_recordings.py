@@ -14,6 +14,7 @@ from matplotlib import pyplot as plt
 import foretwin
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.sweep.spec import load_spec
+from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.lake.made_runs import made_run
 from tests.orchestrator.recorded_runs import write_run
 from tests.orchestrator.sweeps import alone, small_sweep
@@ -63,8 +64,28 @@ def test_a_future_is_played_again_as_arrays(sweep: foretwin.Recording) -> None:
     assert again["trajectory_sha256"] == row["trajectory_sha256"]
     place = futures.result.future_indices.index(row["index"])
     assert futures.states[place].shape == (len(futures.time_s), 8)
+    with pytest.raises(foretwin.UserError, match="future_id must be a str, not int"):
+        sweep.futures_of(5)  # type: ignore[arg-type]
     with pytest.raises(foretwin.UserError, match="no future_id 'nobody'"):
         sweep.futures_of("nobody")
+
+
+def test_each_row_is_of_the_motion_at_its_place(tmp_path: Path) -> None:
+    # One of the cases there is that the car is not met by the point of its front that is meant.
+    text = 'worlds = "{worlds}"\njunctions = ["n44"]\nscenarios = ["scp"]\n'
+    spec = small_sweep(tmp_path, text)
+    WorldStore(tmp_path / "drawn").save(foretwin.drawn_town().world("n44"))
+    loaded = load_spec(spec)
+    run_sweep(loaded, tmp_path / "out", alone(loaded))
+    sweep = foretwin.open_sweep(tmp_path / "out")
+    rows = sweep.table("futures").to_pylist()
+    without_place = {row["job_sha256"] for row in rows if row["left_out"]}
+    row = next(row for row in rows if row["valid"] and row["job_sha256"] in without_place)
+
+    futures = sweep.futures_of(row["future_id"])
+
+    for states, one in zip(futures.states, futures.rows, strict=True):
+        assert states[-1, 0] == pytest.approx(one["end_x_m"])
 
 
 def test_libraries_that_are_not_there_are_named(
