@@ -15,7 +15,7 @@ from foretwin.sim_worker.gym.actions import Control, action_size, commands
 from foretwin.sim_worker.gym.episodes import Source
 from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
 from foretwin.sim_worker.gym.reward import Reward, default_reward
-from foretwin.sim_worker.gym.rows import EpisodeRows, StepFacts
+from foretwin.sim_worker.gym.rows import EpisodeRows, Sighting, StepFacts
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 
@@ -64,6 +64,8 @@ class Course:
         if not isinstance(vehicle, VehicleParameters):
             vehicle = load_vehicle(vehicle)
         self._vehicle = vehicle
+        self._seen: Sighting | None = None
+        """None until episodes begin."""
         self._load(source)
 
     def _load(self, source: Source) -> None:
@@ -99,16 +101,26 @@ class Course:
 
     def look(self) -> Observation:
         """Return what all see now (S, D)."""
-        self._seen = self.rows.look()
-        return observe(self._seen, nearest=self._nearest)
+        seen = self._seen = self.rows.look()
+        return observe(seen, nearest=self._nearest)
 
     def step(self, actions: Array) -> tuple[Array, StepFacts]:
         """Carry out actions (S, A) and return what they were worth (S,), and what happened."""
-        wanted = np.asarray(actions, dtype=np.float64).reshape(self.count, self.action_size)
+        if self._seen is None:
+            raise UserError("no episode has begun: reset comes before step")
+        wanted = np.asarray(actions, dtype=np.float64)
+        if wanted.shape == (self.count,) and self.action_size == 1:
+            wanted = wanted[:, None]
+        if wanted.shape != (self.count, self.action_size):
+            wants = f"{self.count} of {self.action_size} numbers"
+            raise UserError(f"actions of shape {wanted.shape}: {wants} are wanted")
         if len(wrong := np.flatnonzero(~np.isfinite(wanted).all(axis=1))):
             raise UserError(f"action {wanted[wrong[0]].tolist()} of row {wrong[0]}: not finite")
         facts = self.rows.step(commands(wanted, self._seen.view, control=self.control))
-        return np.asarray(self._reward(facts), dtype=np.float64), facts
+        worth = np.asarray(self._reward(facts), dtype=np.float64)
+        if worth.shape != (self.count,):
+            raise UserError(f"reward of shape {worth.shape}: one number for each row of StepFacts")
+        return worth, facts
 
     def over_time(self) -> Flags:
         """(S,) bool: whether an episode has lasted as long as it may."""

@@ -40,3 +40,22 @@ def test_an_action_that_is_no_number_is_told_and_no_accident() -> None:
     env.reset(seed=1)
     with pytest.raises(UserError, match="of row 0: not finite"):
         env.step(np.array([0.0, np.nan], dtype=np.float32))
+
+
+def test_actions_and_rewards_of_another_shape_are_told() -> None:
+    envs = JunctionVectorEnv(3, world=ring(), cases=4, reward=lambda facts: 1.0)
+    with pytest.raises(UserError, match="no episode has begun: reset comes before step"):
+        envs.step(np.zeros((3, 2)))
+    envs.reset(seed=1)
+    # As many numbers in another order are other cars' actions.
+    for shape in ((2, 3), (3,), (3, 3)):
+        with pytest.raises(UserError, match=r"actions of shape .*: 3 of 2 numbers are wanted"):
+            envs.step(np.zeros(shape))
+    with pytest.raises(UserError, match=r"reward of shape \(\): one number for each row"):
+        envs.step(np.zeros((3, 2)))
+
+
+def test_one_number_for_each_car_is_an_action_along_the_path() -> None:
+    envs = JunctionVectorEnv(2, world=ring(), cases=4, control="along_path")
+    envs.reset(seed=1)
+    assert envs.step(np.zeros(2))[1].shape == (2,)
