@@ -53,7 +53,7 @@ def round_futures(done: RoundDone, *, vehicle: str = "") -> FutureRows:
         np.concatenate([r.outcome.min_clearance_m for r in done.results]),
         np.concatenate([r.outcome.valid for r in done.results]).astype(bool),
         np.array([row["likelihood"] for row in rows]),
-        np.array([row["criticality"] for row in rows]),
+        np.array([row["criticality"] for row in rows], dtype=np.float64),
     )
     away_m = np.hypot(
         joined.states[:, :, 0] - joined.states[0, :, 0],

@@ -78,14 +78,17 @@ def most_critical(
     futures: pa.Table, most: int, *, of: Callable[[TableRow], Hashable]
 ) -> tuple[TableRow, ...]:
     """Return the worst futures, the most critical first, one of each that `of` holds for the same;
-    those in which nothing happens are none of them."""
+    those in which nothing happens are none of them, and collisions of which nobody knows how grave
+    they are come before all."""
     order = [
         ("criticality", "descending"),
         ("likelihood", "descending"),
         ("future_id", "ascending"),
     ]
     found: dict[Hashable, TableRow] = {}
-    for row in futures.filter(pc.field("criticality") > 0.0).sort_by(order).to_pylist():
+    unknown = pc.field("collided") & pc.field("criticality").is_null()
+    sorts = (futures.filter(one) for one in (unknown, pc.field("criticality") > 0.0))
+    for row in itertools.chain(*(one.sort_by(order).to_pylist() for one in sorts)):
         found.setdefault(of(row), row)
         if len(found) == most:
             break

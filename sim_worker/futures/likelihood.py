@@ -31,7 +31,10 @@ _KMH = 3.6
 
 
 class FutureRisk(NamedTuple):
-    """Of S played futures: likelihood, severity and their product; all (S,) from 0 to 1."""
+    """Of S played futures: likelihood, severity and their product; all (S,) from 0 to 1.
+
+    NaN is the severity of a collision with a road user in a job that runs no accidents on.
+    """
 
     likelihood: Array
     severity: Array
@@ -55,7 +58,7 @@ def risks(job: Job, result: FuturesResult) -> FutureRisk:
     valid = np.asarray(result.outcome.valid, dtype=bool)
     return FutureRisk(
         np.where(valid, priors * _progress_part(job, result), 0.0),
-        np.where(valid, _severity(result), 0.0),
+        np.where(valid, _severity(job, result), 0.0),
     )
 
 
@@ -114,7 +117,7 @@ def relative_density(forecast: ProgressForecast, distance_m: Array, instants: li
     return np.asarray(np.clip(within[:, own:] / most, LEAST_DENSITY, 1.0))
 
 
-def _severity(result: FuturesResult) -> Array:
+def _severity(job: Job, result: FuturesResult) -> Array:
     """Return (S,) the risk that somebody dies."""
     outcome, states = result.outcome, result.trajectory.states
     clearance = np.where(np.isfinite(outcome.min_clearance_m), outcome.min_clearance_m, np.inf)
@@ -140,8 +143,9 @@ def _severity(result: FuturesResult) -> Array:
             most = max(accident.ego_delta_v_mps, accident.user_delta_v_mps)
             risk = occupant_risk(most)
         found[accident.future] = max(found[accident.future], risk)
-    # Any collision is graver than any near miss.
-    return np.where(outcome.collided, np.maximum(found, NEAR_MISS), found)
+    # Any collision is graver than any near miss; how much graver, accidents alone tell.
+    found = np.where(outcome.collided, np.maximum(found, NEAR_MISS), found)
+    return np.where(outcome.collided & ~static & (not job.accidents), np.nan, found)
 
 
 def pedestrian_risk(impact_mps: float) -> float:

@@ -93,7 +93,7 @@ def round_done(
                 state=states_along(town_world("n4").frame, np.array([[0.0, 0.0], [5.0, 0.0]]))[0],
                 path=PathAhead(xy_m=np.zeros((2, 2)), speed_limit_mps=np.ones(2)),
                 futures=futures(first + count, scenario_id)[first:], horizon_s=8.0, step_s=0.1,
-                seed=0, cruise_speed_mps=10.0,
+                seed=0, accidents=True, cruise_speed_mps=10.0,
             )
         )  # fmt: skip
         first += count

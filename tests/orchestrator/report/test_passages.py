@@ -74,6 +74,7 @@ def future(future_id: str, scenario: str, criticality: float) -> dict[str, objec
         "future_id": future_id,
         "scenario": scenario,
         "name": scenario or "nominal",
+        "collided": False,
         "criticality": criticality,
         "likelihood": 0.1,
     }

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+from operator import itemgetter
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.repeat import repeat
+from foretwin.orchestrator.report.material import most_critical
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.write_report import report_of_folders
 from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
@@ -90,3 +93,13 @@ def test_a_sweep_whose_rows_are_damaged_is_refused(swept: Path, tmp_path: Path) 
 
     with pytest.raises(UserError, match=r"rows: cannot be read"):
         report_of_folders([tmp_path])
+
+
+def test_collisions_that_nobody_knows_the_gravity_of_come_first_of_the_worst() -> None:
+    rows = [
+        {"future_id": "near", "collided": False, "criticality": 1e-5, "likelihood": 0.1},
+        {"future_id": "hit", "collided": True, "criticality": None, "likelihood": 0.1},
+        {"future_id": "nothing", "collided": False, "criticality": 0.0, "likelihood": 1.0},
+    ]
+    worst = most_critical(pa.Table.from_pylist(rows), 3, of=itemgetter("future_id"))
+    assert [row["future_id"] for row in worst] == ["hit", "near"]

@@ -36,7 +36,7 @@ def played(
     done = round_done(
         np.concatenate([straight(speed_mps=speed) for speed in speeds_mps]), outcome=outcome
     )
-    job = done.order.jobs[0]
+    job = msgspec.structs.replace(done.order.jobs[0], accidents=True)
     if forecast is not None:
         job = msgspec.structs.replace(job, progress=forecast)
     return job, done.results[0]
@@ -143,6 +143,16 @@ def test_a_near_miss_is_less_than_any_collision_and_far_away_is_nothing() -> Non
 
     assert far == 0.0
     assert 0.9 * NEAR_MISS < near < hit
+
+
+def test_how_grave_a_collision_is_that_was_not_run_on_nobody_knows() -> None:
+    job, result = played(
+        10.0, 10.0, 10.0, collided=np.array([True, True, False]),
+        collision_with=np.array([1, 2, 0]), collision_time_s=np.array([2.0, 2.0, np.nan]),
+    )  # fmt: skip
+    found = risks(msgspec.structs.replace(job, accidents=False), result).criticality
+
+    assert np.isnan(found).tolist() == [True, False, False], "a wall is hit by how fast one drives"
 
 
 def test_a_future_that_is_not_valid_is_neither_likely_nor_grave() -> None:
