@@ -38,7 +38,7 @@ _SHORTEST_CHORD = 0.5
 """Of the way driven, where it bends as hard as a car can turn between two fixes. Chosen."""
 
 
-class _Shown(NamedTuple):
+class _MotionShown(NamedTuple):
     """Velocity and acceleration (2,) at the newest fix, and their standard deviations."""
 
     velocity_mps: Array
@@ -64,7 +64,7 @@ def turned_m(fixes: Sequence[LocalFix]) -> float:
     return 0.5 * _HARD_MPS2 * step_s * step_s
 
 
-def _shown(fixes: Sequence[LocalFix], std_m: float) -> _Shown:
+def _shown(fixes: Sequence[LocalFix], std_m: float) -> _MotionShown:
     """Return what the latest three fixes, good to `std_m`, show of the motion, or the latest two.
 
     The quadratic's derivatives at its end err by a third of the jerk times the step squared, and
@@ -75,7 +75,7 @@ def _shown(fixes: Sequence[LocalFix], std_m: float) -> _Shown:
     slope = (last.xy_m - middle.xy_m) / after_s
     if len(fixes) < 3 or middle.time_s - fixes[-3].time_s > _LONGEST_S:
         off_mps = math.hypot(1.5 * std_m / after_s, 0.5 * after_s * _HARD_MPS2)
-        return _Shown(slope, np.zeros(2), off_mps, _HARD_MPS2)
+        return _MotionShown(slope, np.zeros(2), off_mps, _HARD_MPS2)
     first = fixes[-3]
     before_s = middle.time_s - first.time_s
     slope_before = (middle.xy_m - first.xy_m) / before_s
@@ -84,7 +84,7 @@ def _shown(fixes: Sequence[LocalFix], std_m: float) -> _Shown:
     step_s = 0.5 * (before_s + after_s)
     velocity_std = math.hypot(2.5 * std_m / step_s, _JERK_MPS3 * step_s * step_s / 3.0)
     accel_std = math.hypot(2.5 * std_m / step_s**2, _JERK_MPS3 * step_s)
-    return _Shown(velocity, accel, velocity_std, accel_std)
+    return _MotionShown(velocity, accel, velocity_std, accel_std)
 
 
 def _bend_pm(way: Array, accel_mps2: Array, speed_mps: float) -> float:

@@ -13,7 +13,6 @@ import pytest
 
 from foretwin.contracts.drive import (
     ControlCommand,
-    ControlMode,
     GnssFix,
     OthersAround,
     RoadUser,
@@ -21,7 +20,6 @@ from foretwin.contracts.drive import (
     SpeedSample,
     VehicleInfo,
     VehicleState,
-    VehicleStatus,
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.mailbox import Mailbox
@@ -38,10 +36,7 @@ from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 
-COVERS = (
-    "foretwin.orchestrator.other_vehicles.detected",
-    "foretwin.orchestrator.other_vehicles.measured",
-)
+COVERS = ("foretwin.orchestrator.other_vehicles.detected",)
 
 VAN = load_vehicle("vw_vanagon")
 INFO = VehicleInfo(vehicle_id="ego", time_base="utc", start_stamp_ns=START_NS)
@@ -174,20 +169,12 @@ def test_who_is_on_the_bus_is_estimated_from_what_it_sends(tmp_path: Path) -> No
 
 
 def on_the_bus(
-    beside: OtherVehicleFeed,
-    *,
-    from_s: float,
-    to_s: float,
-    later_s: float = 0.0,
-    mode: ControlMode | None = None,
+    beside: OtherVehicleFeed, *, from_s: float, to_s: float, later_s: float = 0.0
 ) -> None:
     """Let the van drive east at 10 m/s; its antenna is where its position is measured."""
     bus, box = MemoryBus(), Mailbox(64)
-    for channel in ("status", "gnss", "speed"):
+    for channel in ("gnss", "speed"):
         bus.subscribe(channel, box, vehicle="van")
-    if mode is not None:
-        status = VehicleStatus(stamp_ns=own(from_s).stamp_ns, control_mode=mode)
-        bus.publish("status", status, vehicle="van")
     for k in range(round(from_s * 10), round(to_s * 10)):
         ns = START_NS + k * 100_000_000 + round(later_s * 1e9)
         bus.publish("gnss", GnssFix(stamp_ns=ns, position=at(k)), vehicle="van")
@@ -207,16 +194,6 @@ def test_who_is_on_the_bus_is_placed_by_its_antenna_once_it_says_where_that_sits
     beside.keep_up_with(own(4.9), None, ROLES)
     assert x_of(heard[-1].heard[-1].state) == pytest.approx(49.0 - 1.5, abs=0.5)
     assert ASKED == ["van"]
-
-
-def test_who_drives_it_is_in_its_states(tmp_path: Path) -> None:
-    beside, heard = crew(tmp_path, OtherVehicleConfig(id="van", live=True, same_clock=True))
-    said: tuple[ControlMode | None, ...] = (None, "manual", "autonomous")
-    for second, mode in enumerate(said):
-        on_the_bus(beside, from_s=second, to_s=second + 1.0, mode=mode)
-        beside.keep_up_with(own(second + 0.95), None, ROLES)
-        modes = {one.state.control_mode for one in heard[-1].heard}
-        assert modes == {mode or "unknown"}
 
 
 def test_stamps_of_another_clock_are_told_once(tmp_path: Path) -> None:
