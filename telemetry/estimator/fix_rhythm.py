@@ -23,9 +23,9 @@ class FixRhythm(NamedTuple):
     each: bool = False
 
     def after(self, channel: str, stamp_ns: int) -> FixRhythm:
-        """Return the rhythm with one sample more; one that is late or came before changes none."""
-        newest_ns = self.fix_ns if channel == "gnss" else self.newest_ns
-        if newest_ns is not None and stamp_ns <= newest_ns:
+        """Return the rhythm with one sample more; what comes again changes none."""
+        known = (self.fix_ns,) if channel == "gnss" else (self.newest_ns, self.before_ns)
+        if stamp_ns in known:
             return self
         if channel == "gnss":
             step_ns = 0 if self.fix_ns is None else stamp_ns - self.fix_ns

@@ -23,7 +23,7 @@ from tests.documents.blocks import ROOT
 
 SHORT = {"--end": "6", "--futures": "4", "--rate": "0.5", "--tuning": "off"}
 """Added to every `foretwin drive` that says nothing of these."""
-CROSSING, RING = "n44", "n10"
+CROSSING, RING = "n44", "n11"
 """Two junctions of the drawn town, one with lights."""
 SHIM = """#!{python}
 import os, sys

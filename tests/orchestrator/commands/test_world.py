@@ -248,7 +248,7 @@ def test_what_one_world_lacks_is_told_below_its_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Roads leave the town's roundabout farther out than its World reaches."""
-    place = ["world", MAP, "--id", "n10", "--radius", "20", "--out", str(tmp_path / "ring.svg")]
+    place = ["world", MAP, "--id", "n11", "--radius", "20", "--out", str(tmp_path / "ring.svg")]
     assert run(place) == 0
     line, *kinds = capsys.readouterr().out.splitlines()
     assert ", 4 notes. " in line
@@ -267,7 +267,7 @@ def test_notes_are_counted_as_the_report_counts_them(
     for notes, counted in ((["left out: w1"], "1 note."), (["left out: w1, w2, w3"], "3 notes.")):
         build = partial(_with_notes, build_world, notes)
         monkeypatch.setattr("foretwin.orchestrator.commands.world.build_world", build)
-        assert run(["world", MAP, "--id", "n10", "--out", str(written)]) == 0
+        assert run(["world", MAP, "--id", "n11", "--out", str(written)]) == 0
         line, kind = capsys.readouterr().out.splitlines()
         assert f", {counted} " in line
         assert kind.split() == [counted[0], "left", "out"]

@@ -119,8 +119,8 @@ def test_a_question_for_a_world_that_found_nobody_is_asked_again(house: House) -
     house.builder.answer()
     house.settle()
     worlds = house.conductor.worlds
-    worlds.want("n10", load=False, workers=())
-    lost = Reply("build", "n10", None, NO_ANSWER, 0)
+    worlds.want("n11", load=False, workers=())
+    lost = Reply("build", "n11", None, NO_ANSWER, 0)
     for _ in range(MOST_UNANSWERED):
         house.builder.take()
         house.conductor.handle(lost)
@@ -129,9 +129,9 @@ def test_a_question_for_a_world_that_found_nobody_is_asked_again(house: House) -
         worlds.ask_again(time.monotonic() + 2.0 * ASKS_AGAIN_AFTER_S)
         worlds.ask_again(time.monotonic() + 4.0 * ASKS_AGAIN_AFTER_S)
         assert len(house.builder.take()) == 1
-        assert "n10" in worlds.building
+        assert "n11" in worlds.building
     house.conductor.handle(lost)
-    assert "n10" not in worlds.building, "given up in the end"
+    assert "n11" not in worlds.building, "given up in the end"
 
 
 def test_a_world_that_was_built_is_not_built_again(house: House) -> None:
@@ -191,7 +191,7 @@ def test_a_whole_drive_leaves_its_rounds_in_the_tables(house: House) -> None:
     assert {r["worker_id"] for r in rows["futures"]} == {"w0", "w1"}
     assert {r["horizon_s"] for r in rows["comparisons"]} == {1.0, 2.0, 4.0, 8.0}
     records = [visit.record(mono_s=0.0) for visit in house.mission.arrived]
-    assert [r["id"] for r in records] == ["n4", "n10"]
+    assert [r["id"] for r in records] == ["n4", "n11"]
     counted = {r["id"]: r["rounds"] for r in records}
     told = [r["intersection_id"] for r in rows["rounds"]]
     assert counted == {name: told.count(name) for name in counted}

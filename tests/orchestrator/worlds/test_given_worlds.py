@@ -123,7 +123,7 @@ class UntilAnswered:
         return self._answered()
 
 
-@pytest.mark.parametrize("junction_id", ["n4", "n10"])
+@pytest.mark.parametrize("junction_id", ["n4", "n11"])
 def test_the_builder_gives_out_what_was_given_and_builds_the_rest(
     tmp_path: Path, junction_id: str
 ) -> None:

@@ -31,7 +31,7 @@ FAR_M = 5000.0
 @pytest.fixture(scope="module")
 def worlds() -> tuple[World, ...]:
     town = ft.drawn_town()
-    return tuple(town.world(name, radius_m=80.0) for name in ("n10", "n57"))
+    return tuple(town.world(name, radius_m=80.0) for name in ("n11", "n57"))
 
 
 def job_in(world: World, planner: str, *, way: int = 0) -> Job:
