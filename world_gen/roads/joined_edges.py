@@ -18,11 +18,11 @@ SHORT_M = 45.0
 """What is shorter may hold less than a junction needs of an approach: 30 m that lanes give way, and
 the 15 m beside other roads that still belong to it (`lanes.trims`)."""
 UNREAD = (
-    *("name", "alt_name", "ref:", "wiki", "note", "description", "addr:", "source", "fixme"),
-    *("surface", "smoothness", "lit", "tracktype", "destination", "check_date", "survey:date"),
+    *("name", "alt_name", "ref:", "wiki", "note", "description", "addr:", "fixme"),
+    *("surface", "smoothness", "tracktype", "destination", "check_date", "survey:date"),
 )
-"""Keys that begin so have no meaning for how a road is driven; who compares roads by their tags
-compares names apart."""
+"""Keys that begin so have no meaning for how a road is driven; that it has a name does, and who
+compares roads compares names apart."""
 
 
 def joined(edges: Sequence[RoadEdge], kept_nodes: frozenset[int]) -> list[RoadEdge]:

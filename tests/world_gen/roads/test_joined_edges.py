@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.world_gen.lanes.cross_section import cross_section
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.joined_edges import UNREAD
+from foretwin.world_gen.roads.road_tags import (
+    directions,
+    is_car_road,
+    lane_counts,
+    open_to_cars,
+    road_layer,
+)
+from foretwin.world_gen.roads.speed_limits import speed_limit
 from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
+from tests.data.junctions.draw import draw_all
+from tests.world_gen.data_maps import MAPS
 from tests.world_gen.sketch import Sketch
 
 AT_M = (0.0, 7.0, 20.0, 60.0, 200.0)
@@ -137,3 +152,60 @@ def test_pieces_near_a_crossing_are_the_same_road(
     edges = [edge for edge in build_road_graph(read_map(path)).edges if edge.way_id < 90]
     assert [edge.node_ids for edge in edges] == [(1, 2, 3, 4, 5)]
     assert edges[0].ways == tuple(way for way, *_ in parts)
+
+
+class Asked(dict[str, str]):
+    """Tags that remember which keys somebody looked for."""
+
+    def __init__(self, tags: Mapping[str, str], keys: set[str]) -> None:
+        super().__init__(tags)
+        self.keys_asked = keys
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self.keys_asked.add(key)
+        return super().get(key, default)
+
+    def __getitem__(self, key: str) -> str:
+        self.keys_asked.add(key)
+        return super().__getitem__(key)
+
+    def __contains__(self, key: object) -> bool:
+        self.keys_asked.add(str(key))
+        return super().__contains__(key)
+
+
+def test_nobody_who_tells_how_a_road_is_driven_looks_at_what_is_left_out(tmp_path: Path) -> None:
+    draw_all(tmp_path)
+    asked: set[str] = set()
+    for path in sorted(tmp_path.glob("*.osm")):
+        for edge in build_road_graph(read_map(path)).edges:
+            tags = Asked(edge.tags, asked)
+            lane_counts(tags, directions(tags))
+            assert is_car_road(tags) == edge.car or not open_to_cars(tags)
+            road_layer(tags)
+            for country in ("DE", "GB", "US", ""):
+                speed_limit(tags, country)
+                speed_limit(Asked({"highway": edge.road_class}, asked), country)
+            if edge.car:
+                cross_section(msgspec.structs.replace(edge, tags=tags), centre_reverse=False)
+    assert {"lit", "source:maxspeed", "lanes", "oneway"} <= asked
+    assert {key for key in asked if key.startswith(UNREAD)} <= {"name"}
+
+
+@pytest.mark.parametrize(
+    ("tags", "kmph"),
+    [({}, 100.0), ({"source:maxspeed": "DE:urban"}, 50.0), ({"lit": "yes"}, 50.0)],
+)
+def test_a_road_has_the_limit_of_all_of_its_tags(
+    tags: dict[str, str], kmph: float, tmp_path: Path
+) -> None:
+    sketch = crossing((20, [1, 2, 3, 4, 5], {"highway": "secondary", "name": "", **tags}))
+    (edge,) = [edge for edge in sketch.graph(tmp_path).edges if edge.way_id == 20]
+    assert edge.speed_limit_mps.value == pytest.approx(kmph / 3.6)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("name", ["leeds", "liechtenstein"])
+def test_real_roads_have_the_limits_of_all_of_their_tags(name: str, data_dir: Path) -> None:
+    edges = build_road_graph(read_map(data_dir / MAPS[name])).edges
+    assert all(edge.speed_limit_mps == speed_limit(edge.tags, edge.country) for edge in edges)
