@@ -27,6 +27,7 @@ from foretwin.world_gen.lanes.places import whole_where_led_through
 from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
+from foretwin.world_gen.roads.joined_edges import read_tags
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, country_of, side_of
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
@@ -166,9 +167,8 @@ def _beyond_notes(
                 )
 
 
-_WITHOUT_EFFECT_ON_LANES = frozenset(
-    {"name", "ref", "maxspeed", "surface", "lit", "smoothness", "source", "wikidata", "note"}
-)
+_WITHOUT_EFFECT_ON_LANES = frozenset({"ref", "maxspeed", "lit", "source"})
+"""Beside what nobody reads: what is told of a road's limit, and its number."""
 
 
 def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
@@ -186,7 +186,8 @@ def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, Cross
         driven = (edge.forward, edge.backward, *of_place, centre_reverse)
         way = (edge.way_id, *driven)
         if way not in known:
-            tags = (kv for kv in edge.tags.items() if kv[0] not in _WITHOUT_EFFECT_ON_LANES)
+            read = read_tags(edge.tags).items()
+            tags = (kv for kv in read if kv[0] not in _WITHOUT_EFFECT_ON_LANES)
             lanes = (edge.lanes_forward, edge.lanes_backward)
             alike = (edge.road_class, *driven, *lanes, frozenset(tags))
             known[way] = known.get(alike) or cross_section(edge, centre_reverse=centre_reverse)

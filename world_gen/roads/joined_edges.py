@@ -7,7 +7,7 @@ is must not say how much room its turns have, or where its stop lines may lie.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
+from itertools import chain, groupby
 
 import msgspec
 import numpy as np
@@ -87,10 +87,11 @@ def _one(parts: Sequence[RoadEdge], index: int) -> RoadEdge:
     main = max(parts, key=lambda part: (part.length_m, -part.way_id))
     xy_m = np.concatenate([parts[0].xy_m, *(part.xy_m[1:] for part in parts[1:])])
     xy_m.setflags(write=False)
+    ways = tuple(way for way, _ in groupby(part.way_id for part in parts))
     return msgspec.structs.replace(
         main,
         index=index,
-        part_ways=tuple(part.way_id for part in parts),
+        part_ways=ways if len(ways) > 1 else (),
         start_node=parts[0].start_node,
         end_node=parts[-1].end_node,
         node_ids=(*parts[0].node_ids, *chain.from_iterable(p.node_ids[1:] for p in parts[1:])),

@@ -104,6 +104,15 @@ def test_a_loop_stays_parted_at_its_middle(tmp_path: Path) -> None:
     assert ways_of(sketch, tmp_path) == [(20, 21), (22, 23)]
 
 
+def test_a_way_that_ends_where_it_begins_is_one(tmp_path: Path) -> None:
+    sketch = crossing((20, [6, 7, 1, 8, 6], {"junction": "roundabout", "name": "Ring"}))
+    for node, x_m, y_m in ((6, 20.0, 0.0), (7, 10.0, 10.0), (8, 10.0, -10.0)):
+        sketch.node(node, x_m, y_m)
+    sketch.road(92, [8, 11], "Side")
+    ring = [edge for edge in sketch.graph(tmp_path).edges if edge.way_id == 20]
+    assert [(edge.ways, edge.node_ids) for edge in ring] == [((20,), (1, 8)), ((20,), (8, 6, 7, 1))]
+
+
 def test_a_restriction_names_the_way_that_reaches_its_node(tmp_path: Path) -> None:
     sketch = crossing((20, [5, 4, 3], {}), (21, [3, 2, 1], {}))
     sketch.relations.append(
