@@ -6,13 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.geometry.shifted_fit import shifted_fit
 from foretwin.telemetry.logs.declare.motion import GRID_S, GridMotion
 
 _LATEST_S = 1.2
 """A column is sought so late, or early: telephones and adapters send up to 0.6 s late."""
 _STEP = 2
+_LEAST_VARIANCE = 1e-18
+"""A column that changes by less is constant."""
 SURE = 25.0
 """Square of five standard deviations: by chance once in a million columns."""
 _MUCH, _LITTLE, _RULED_OUT = 0.3, 0.2, 16.0
@@ -54,33 +56,54 @@ def likeness(column: Array, signals: Array) -> Likeness | None:
     most = round(_LATEST_S / GRID_S)
     every = max(len(column) // 3000, 2)
     inner = np.arange(most, len(column) - most, every)
-    best: tuple[float, int, Array] | None = None
     design = np.column_stack([signals[inner], np.ones(len(inner))])
-    for late in range(-most, most + 1, _STEP):
-        # Later in the column: what the motion did before.
-        y = column[inner + late]
-        used = np.isfinite(y) & np.isfinite(design).all(axis=1)
-        if used.sum() * every * GRID_S < 8.0:
-            continue
-        rows, wanted = design[used], y[used]
-        total = float(np.var(wanted))
-        if total <= 1e-18:
-            return None
-        sizes, *_ = np.linalg.lstsq(rows, wanted, rcond=None)
-        left = float(np.mean((wanted - rows @ sizes) ** 2)) / total
-        if best is None or left < best[0]:
-            best = (left, late, np.asarray(sizes, dtype=np.float64))
-            together = float(used.sum() * every * GRID_S)
-            without, *_ = np.linalg.lstsq(rows[:, 1:], wanted, rcond=None)
-            alone = float(np.mean((wanted - rows[:, 1:] @ without) ** 2)) / total
-    if best is None:
+    known = np.isfinite(design).all(axis=1)
+    lates = np.arange(-most, most + 1, _STEP)
+    # Later in the column: what the motion did before.
+    by_late = column[inner[:, None] + lates]
+    used = np.isfinite(by_late) & known[:, None]
+    enough = used.sum(axis=0) * every * GRID_S >= 8.0
+    if not enough.any():
         return None
-    left, late, sizes = best
+    share = _left(by_late, np.where(known[:, None], design, 0.0), used)
+    at = int(np.argmin(np.where(enough, share, np.inf)))
+    late = int(lates[at])
+    rows, wanted = design[used[:, at]], by_late[used[:, at], at]
+    total = float(np.var(wanted))
+    if total <= _LEAST_VARIANCE:
+        return None
+    sizes, *_ = np.linalg.lstsq(rows, wanted, rcond=None)
+    left = float(np.mean((wanted - rows @ sizes) ** 2)) / total
+    without, *_ = np.linalg.lstsq(rows[:, 1:], wanted, rcond=None)
+    alone = float(np.mean((wanted - rows[:, 1:] @ without) ** 2)) / total
+    together = float(len(wanted) * every * GRID_S)
     # What it leaves errs alike for so long: only what is farther apart counts anew.
-    alike_s = _lasts(column[inner + late] - design @ sizes) * every * GRID_S
+    alike_s = _lasts(by_late[:, at] - design @ sizes) * every * GRID_S
     independent = together / max(2.0 * alike_s, 1.0)
     chance = (alone - left) / max(left, 1e-12) * max(independent - len(sizes), 0.0)
     return Likeness(sizes, left, chance, late * GRID_S, together, independent)
+
+
+def _left(by_late: Array, design: Array, used: Flags) -> Array:
+    """Return the share (L,) of the variance of each of (N, L) that a design (N, K) leaves in it.
+
+    By the normal equations, which are the same sums for all: where a column has no variance the
+    share is infinite. The design's last column is a level.
+    """
+    weight = used.astype(np.float64)
+    count = np.maximum(weight.sum(axis=0), 1.0)
+    y = np.where(used, by_late, 0.0)
+    y = np.where(used, y - y.sum(axis=0) / count, 0.0)
+    scale = np.std(design, axis=0)
+    even = (design - design.mean(axis=0)) / np.where(scale > 0.0, scale, 1.0)
+    even[:, -1] = 1.0
+    products = (even[:, :, None] * even[:, None, :]).reshape(len(even), -1)
+    normal = (weight.T @ products).reshape(len(count), even.shape[1], even.shape[1])
+    onto = y.T @ even
+    sizes = (np.linalg.pinv(normal, hermitian=True) @ onto[:, :, None])[:, :, 0]
+    total = np.einsum("nl,nl->l", y, y)
+    share = (total - np.einsum("lk,lk->l", onto, sizes)) / np.maximum(total, 1e-300)
+    return np.where(total <= _LEAST_VARIANCE * count, np.inf, share)
 
 
 def _lasts(values: Array) -> int:

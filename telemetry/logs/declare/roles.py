@@ -144,8 +144,7 @@ def fits_of(
 ) -> list[RoleFit]:
     """Return the roles that a column (G,) on the grid can have, the likeliest first."""
     found = []
-    steering = [likeness(values, _steering(motion, one)) for one in UNDERSTEER_S2PM2]
-    steered = min(filter(None, steering), key=lambda like: like.left, default=None)
+    steered = _steered(motion, values) if any(one.section == "steering" for one in roles) else None
     for role in roles:
         if role.field == "forward":
             like = likeness(without_reverse(values), role.signals(motion))
@@ -169,6 +168,12 @@ def fits_of(
             continue
         found.append(RoleFit(role, column, unit, size < 0.0, like))
     return sorted(found, key=lambda fit: fit.like.left)
+
+
+def _steered(motion: GridMotion, values: Array) -> Likeness | None:
+    """Return the likeness to the steering of the car whose understeer leaves least."""
+    each = [likeness(values, _steering(motion, one)) for one in UNDERSTEER_S2PM2]
+    return min(filter(None, each), key=lambda like: like.left, default=None)
 
 
 def without_reverse(speed: Array) -> Array:
