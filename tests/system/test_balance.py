@@ -66,6 +66,7 @@ def frozen(pid: int) -> Iterator[None]:
         os.kill(pid, signal.SIGCONT)
 
 
+@pytest.mark.judge
 def test_a_sick_worker_takes_no_round_down_and_is_tried_again(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     with started(out, *LIVE, *TWO) as process:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from foretwin.contracts.frames import geo_from_local, local_from_geo
 from foretwin.geometry.polyline import points_at
@@ -50,6 +51,7 @@ def dirty_gpx(path: Path) -> Path:
     return path
 
 
+@pytest.mark.judge
 def test_dirty_positions_are_counted_and_the_drive_goes_on(tmp_path: Path) -> None:
     log = dirty_gpx(tmp_path / "dirty.gpx")
     run = foretwin(

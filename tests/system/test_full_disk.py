@@ -48,6 +48,7 @@ def says(run: Path, text: str) -> bool:
     return any(text in line["text"] for line in log_lines(run))
 
 
+@pytest.mark.judge
 def test_a_disk_that_is_full_for_a_while_costs_nothing(tmp_path: Path) -> None:
     done = drive(tmp_path, to_the_end=False)
     assert done.code == 0, done.screen

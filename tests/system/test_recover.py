@@ -186,6 +186,7 @@ sys.exit(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
 """A terminal with a drive on it; SIGHUP closes it."""
 
 
+@pytest.mark.judge
 def test_sigterm_and_a_closed_terminal_end_a_drive_alike(tmp_path: Path) -> None:
     left: dict[str, Any] = {}
     for name, number, entry in (

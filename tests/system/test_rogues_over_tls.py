@@ -85,6 +85,7 @@ def router_of(campaigns: Path, endpoint: str) -> BusSetup:
     return BusSetup(endpoint=endpoint, tls=tls, admits=admission("r"))
 
 
+@pytest.mark.judge
 def test_a_link_closes_when_its_certificate_expires(tmp_path: Path, campaigns: Path) -> None:
     endpoint, short = f"tls/localhost:{free_port()}", tmp_path / "short"
     shutil.copytree(campaigns / "ours", short)

@@ -52,6 +52,7 @@ def assert_balanced(run: Path) -> None:
     assert jobs["results"] > 0
 
 
+@pytest.mark.judge
 def test_a_killed_router_is_there_again_within_a_second_and_nobody_else_is_started_again(
     tmp_path: Path,
 ) -> None:

@@ -73,6 +73,7 @@ def sweeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sweeps:
     return Sweeps(tmp_path)
 
 
+@pytest.mark.judge
 def test_one_that_remembers_gives_the_same_rows_with_one_and_two_workers(sweeps: Sweeps) -> None:
     table = "stateful = true\ninstances = 2\nlatency_s = 0.1"
     one = sweeps.swept("remembers", name="one", table=table)
@@ -85,6 +86,7 @@ def test_one_that_remembers_gives_the_same_rows_with_one_and_two_workers(sweeps:
     wait_for(lambda: not commands_running(f"{MODULE} remembers"), "the end of the stacks")
 
 
+@pytest.mark.judge
 def test_who_dies_is_started_again_and_the_rows_are_the_same(
     sweeps: Sweeps, plain: dict[str, Any]
 ) -> None:

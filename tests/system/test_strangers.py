@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 import zenoh
 
 from foretwin.contracts.bus import zenoh_config
@@ -128,6 +129,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.judge
 def test_an_error_of_ours_in_the_last_mail_costs_no_table(tmp_path: Path) -> None:
     out = tmp_path / "runs"
     small = ("--speed", "max", "--futures", "6", "--rate", "0.5", "--end", "6")

@@ -19,6 +19,7 @@ FRAME = LocalFrame(GeoPoint(50.83, 12.92))
 
 
 @pytest.mark.real_data
+@pytest.mark.judge
 def test_the_nominal_future_is_best_at_every_horizon(tmp_path: Path) -> None:
     first, *_ = passes(["gendarmenmarkt"], [], tmp_path)
     found = errors_m(first._replace(rounds=first.rounds[::4]))

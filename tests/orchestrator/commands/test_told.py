@@ -108,7 +108,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> ShortDrive:
     out = folder / "runs"
     foretwin = [sys.executable, "-P", "-m", "foretwin"]
     few = ["--futures", "8", "--workers", "1", "--tuning", "off", "--view", "none"]
-    words = ["drive", *few, "--speed", "max", "--end", "14", "--out", str(out), "--json"]
+    words = ["drive", *few, "--speed", "max", "--end", "12", "--out", str(out), "--json"]
     around = environment(folder / "cache")
     with subprocess.Popen(
         [*foretwin, *words], env=around, text=True,

@@ -180,7 +180,13 @@ def accused(samples: Iterable[tuple[str, Any]], roads: Slopes | None) -> list[st
     return [one.cause for one in verdicts if any(word in one.cause for word in along)]
 
 
-@pytest.mark.parametrize("measured", [True, False], ids=["altitude", "map alone"])
+@pytest.mark.parametrize(
+    "measured",
+    [
+        pytest.param(True, id="altitude"),
+        pytest.param(False, id="map alone", marks=pytest.mark.judge),
+    ],
+)
 def test_a_slope_is_not_taken_for_a_fault_of_the_car(measured: bool) -> None:
     samples = driven(climbs=True)
     told = samples if measured else without_altitude(samples)

@@ -54,6 +54,7 @@ def judged(
     return ended + watch.finish()
 
 
+@pytest.mark.judge
 def test_a_hundred_encounters_are_judged_as_if_both_were_at_one_place() -> None:
     random = np.random.default_rng(19)
     touched = 0

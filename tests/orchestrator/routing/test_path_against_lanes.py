@@ -12,7 +12,7 @@ from foretwin.orchestrator.routing.rounding import MAX_CURVATURE_PM, curvature_p
 from tests.orchestrator.in_process_drive import LockStep, Round
 from tests.orchestrator.routing.path_against_lanes import DRIVES, FAR_M, config_of, shares
 
-pytestmark = pytest.mark.real_data
+pytestmark = [pytest.mark.real_data, pytest.mark.judge]
 
 
 @pytest.fixture(scope="module")

@@ -208,6 +208,7 @@ def test_a_folder_is_of_one_shard(
         merge(shards(folder), folder / "0")
 
 
+@pytest.mark.judge
 def test_shards_by_the_command_come_to_the_same(
     swept: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

@@ -17,8 +17,9 @@ from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, load_spec
 from foretwin.orchestrator.sweep.stacks import RemoteStack
 from foretwin.orchestrator.sweep.workers import task_timeout_s, worker_setup
-from tests.orchestrator.sweeps import alone, places_of, small_sweep
+from tests.orchestrator.sweeps import SMALL, alone, places_of, small_sweep
 from tests.sim_worker.planners.a_stack import spec_of
+from tests.sim_worker.planners.installed import install
 from tests.system.foretwin_command import REPOSITORY
 
 COVERS = ("foretwin.orchestrator.sweep.workers",)
@@ -89,6 +90,19 @@ def test_who_joins_is_known_by_name_and_version(
     assert planner_origins(first)["mine"] == told
     assert planner_origins(second)["mine"] == told | {"version": "2"}
     assert fingerprint_of(first, "map") != fingerprint_of(second, "map")
+
+
+def test_a_planner_of_a_package_is_known_by_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = "class Rolling:\n    def plan(self, view): ...\n"
+    install(tmp_path, "changed_planner", code, rolling="Rolling")
+    monkeypatch.syspath_prepend(tmp_path)
+    loaded = load_spec(small_sweep(tmp_path, SMALL.replace("constant_speed", "rolling")))
+    known = fingerprint_of(loaded, "map")
+    assert fingerprint_of(loaded, "map") == known
+    (tmp_path / "changed_planner.py").write_text(code + "# of another kind\n")
+    assert fingerprint_of(loaded, "map") != known
 
 
 def test_what_decides_on_rows_decides_on_the_sweep(loaded: Loaded) -> None:

@@ -32,5 +32,6 @@ def test_drivers_are_nearer_to_those_that_they_were_not_fitted_to_than_before() 
 
 
 @pytest.mark.real_data
+@pytest.mark.judge
 def test_what_is_stated_is_what_is_measured(data_dir: Path) -> None:
     assert tuple(likeness_rows(crossings(data_dir))) == likenesses()

@@ -126,10 +126,10 @@ def test_what_is_beside_the_view_too_near_or_too_far_is_not_listed() -> None:
     assert listed(NO_BODIES).returns.shape == (0, 5)
 
 
-def test_in_100_drawn_scenes_houses_and_others_hide_what_they_hide_in_a_plan() -> None:
+def test_in_drawn_scenes_houses_and_others_hide_what_they_hide_in_a_plan() -> None:
     random = np.random.default_rng(11)
     origin, kinds = shapely.Point(0.0, 0.0), {"free": 0, "hidden": 0, "in part": 0}
-    for case in range(100):
+    for case in range(40):
         house = box(*random.uniform([8.0, -20.0, 1.0, 1.0], [40.0, 20.0, 5.0, 5.0]).tolist())
         rays = RayWorld(crossroads(buildings=(house,)))
         count = int(random.integers(2, 10))
@@ -168,7 +168,7 @@ def test_in_100_drawn_scenes_houses_and_others_hide_what_they_hide_in_a_plan() -
                 assert seen[0, 0] >= plan.distance(origin) - 5e-3
                 amplitude_db = 10.0 * math.log10(10.0 * share)
                 assert seen[0, 4] == pytest.approx(amplitude_db, abs=3.0), case
-    assert min(kinds.values()) > 60, kinds
+    assert min(kinds.values()) > 20, kinds
 
 
 def plan_of(who: MovingBoxes, k: int) -> shapely.Polygon:
