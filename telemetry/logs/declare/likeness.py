@@ -57,7 +57,7 @@ def likeness(column: Array, signals: Array) -> Likeness | None:
     every = max(len(column) // 3000, 2)
     inner = np.arange(most, len(column) - most, every)
     design = np.column_stack([signals[inner], np.ones(len(inner))])
-    known = np.isfinite(design).all(axis=1)
+    known = np.asarray(np.isfinite(design).all(axis=1))
     lates = np.arange(-most, most + 1, _STEP)
     # Later in the column: what the motion did before.
     by_late = column[inner[:, None] + lates]
