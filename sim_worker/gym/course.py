@@ -120,6 +120,8 @@ class Course:
         worth = np.asarray(self._reward(facts), dtype=np.float64)
         if worth.shape != (self.count,):
             raise UserError(f"reward of shape {worth.shape}: one number for each row of StepFacts")
+        if len(wrong := np.flatnonzero(~np.isfinite(worth))):
+            raise UserError(f"reward {worth[wrong[0]]:g} of row {wrong[0]}: not finite")
         return worth, facts
 
     def over_time(self) -> Flags:

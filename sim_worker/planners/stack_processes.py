@@ -172,6 +172,7 @@ class StackProcesses:
         end = time.monotonic() + within_s
         again = time.monotonic() + _REPEAT_S
         outcomes: dict[int, PlannedMotions | Trouble] = {}
+        beside: dict[int, PlannedMotions] = {}
         while waits := questions.keys() - outcomes.keys():
             self._stay()
             heard = self._hear(_LOOK_S)
@@ -180,6 +181,8 @@ class StackProcesses:
                 if number in waits and _answers(said, questions[number]):
                     self._instances[number].asked = True
                     outcomes[number] = said
+                elif isinstance(said, PlannedMotions):
+                    beside[number] = said
             now = time.monotonic()
             if heard is not None and now <= end:
                 continue  # Who talks on and on has no more time than who says nothing.
@@ -190,6 +193,7 @@ class StackProcesses:
                     outcomes[one.number] = Trouble("died", one.process.ending())
                 elif now > end:
                     words = f"gave no answer within {within_s:g} s of wall time and was ended"
+                    words += _said_beside(beside.get(one.number), questions[one.number])
                     outcomes[one.number] = Trouble("hung", words)
                 elif now > again and not one.asked:
                     self._publish(questions[one.number])
@@ -271,3 +275,13 @@ def _answers(said: PlannedMotions | Trouble, question: PlannerScene) -> bool:
     if isinstance(said, Trouble):
         return True
     return (said.job, said.question) == (question.job, question.question)
+
+
+def _said_beside(said: PlannedMotions | None, question: PlannerScene) -> str:
+    """Return the end of a sentence on who did not answer: what it answered instead, if anything."""
+    if said is None:
+        return ""
+    return (
+        f"; it answered question {said.question} of job {said.job} where question "
+        f"{question.question} of job {question.job} was asked"
+    )

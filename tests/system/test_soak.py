@@ -63,7 +63,8 @@ foreground.FreshInterpreter = Launcher
 main()
 """
 """A drive whose stand-in car is that of `busy_car`."""
-SAMPLES, GROWN_BY = 1500, 100
+SAMPLES, GROWN_BY = 1500, 300
+"""Of latencies classes are counted: a machine that stumbles has some that were not there before."""
 STEP_NS = 20_000_000
 Feed = Callable[[int], None]
 """Gives one more sample, the n-th."""

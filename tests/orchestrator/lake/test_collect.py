@@ -280,10 +280,7 @@ def test_a_lake_that_is_damaged_where_rows_are_added_says_so(tmp_path: Path) -> 
     [
         (lambda out: made_run(out, exit="running"), "foretwin recover"),
         (lambda out: made_sweep(out / "s", complete=False), "`foretwin sweep` goes on"),
-        (
-            lambda out: made_sweep(out / "s", shard="1/3"),
-            "shard 1/3 of a sweep: `foretwin",
-        ),
+        (lambda out: made_sweep(out / "s", shard="1/3"), "shard 1/3 of a sweep: `foretwin"),
         (lambda out: made_run(out, told={"result_schema": "0"}), r"schema of results 0; this one"),
         (lambda out: made_run(out, told={}), r"schema of results not told; this one reads 1"),
     ],

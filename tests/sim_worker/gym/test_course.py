@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,25 @@ def test_actions_and_rewards_of_another_shape_are_told() -> None:
             envs.step(np.zeros(shape))
     with pytest.raises(UserError, match=r"reward of shape \(\): one number for each row"):
         envs.step(np.zeros((3, 2)))
+
+
+def test_a_reward_that_is_no_number_is_told_with_its_row() -> None:
+    worth = np.array([1.0, 2.0, np.nan])
+    envs = JunctionVectorEnv(3, world=ring(), cases=4, reward=lambda facts: worth)
+    envs.reset(seed=1)
+    with pytest.raises(UserError, match="reward nan of row 2: not finite"):
+        envs.step(np.zeros((3, 2)))
+
+
+@pytest.mark.parametrize("field", ["world", "job"])
+def test_a_file_of_another_kind_is_told_by_its_name(tmp_path: Path, field: str) -> None:
+    other = tmp_path / "town.osm"
+    other.write_text("<osm/>")
+    given = {"world": ring()} | {field: other}
+    with pytest.raises(UserError, match=r"town\.osm"):
+        JunctionEnv(**given)
+    with pytest.raises(UserError, match=r"none\.osm"):
+        JunctionEnv(**(given | {field: tmp_path / "none.osm"}))
 
 
 def test_one_number_for_each_car_is_an_action_along_the_path() -> None:

@@ -148,7 +148,9 @@ def test_who_talks_on_without_an_answer_has_no_more_time(tmp_path: Path) -> None
     with stack(tmp_path, "talks", answer_within_s=1.0) as planner:
         result = played(planner)
     assert result.outcome.lost == (0, 1)
-    assert "gave no answer within 1 s of wall time and was ended" in result.outcome.failures[0]
+    words = result.outcome.failures[0]
+    assert "gave no answer within 1 s of wall time and was ended; it answered question 0 " in words
+    assert "where question 5 of job 0 was asked" in words
 
 
 def test_who_hangs_in_every_job_is_asked_no_more(tmp_path: Path) -> None:
