@@ -76,9 +76,10 @@ def _numbered(name: str, values: Array) -> list[tuple[float, ClockColumn]]:
         time_s = (values - numbers[0]) * scale
         if time_s[np.isfinite(time_s)].max() < _LEAST_S:
             continue
-        counts = bool(np.all(np.diff(numbers) == 1.0))
         first_s = (numbers[0] - zero) * scale
         utc = _UTC_S[0] < first_s < _UTC_S[1]
+        # Nobody counts rows from a billion: so begins a logger's second after second.
+        counts = not utc and bool(np.all(np.diff(numbers) == 1.0))
         if unit in DAYS and not utc:
             continue
         base: TimeBase = "utc" if utc else "log" if abs(first_s) < 1.0 else "boot"

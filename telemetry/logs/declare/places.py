@@ -26,8 +26,9 @@ _LEAST_CHANGES = 15
 _OWN_TIMES = 0.9
 """So many positions have a time of their own; fewer by a clock that is too coarse for them."""
 _TOGETHER, _TOGETHER_COARSE, _FEW_STEPS = 0.6, 0.2, 8.0
-"""Columns of one receiver change in the same rows, of all in which one does; in fewer where both
-are rounded so that they change by a few steps at most: along a street one hardly changes."""
+"""Columns of one receiver change in the same rows, of all in which one does; in fewer where all but
+one are rounded so that they change by a few steps at most: along a street one hardly changes, and
+at a standstill none."""
 _EVENLY = 0.9
 _WHOLE_UNITS, _LEAST_WHOLE = ("1e-7 deg", "1e-6 deg", "1e-5 deg", "mas"), 20_000.0
 """Smaller whole numbers are revolutions and the like: 200 m around where both are nought."""
@@ -266,7 +267,8 @@ class _Changes:
         any_new = np.any([self._new[name] for name in names], axis=0)
         all_new = np.all([self._new[name] for name in names], axis=0)
         alike = float(all_new.sum() / max(any_new.sum(), 1))
-        if alike >= _TOGETHER_COARSE and all(self._coarse[name] for name in names):
+        coarse = sum(self._coarse[name] for name in names)
+        if alike >= _TOGETHER_COARSE and coarse >= len(names) - 1:
             alike = max(alike, _TOGETHER)
         if alike < _TOGETHER:
             return np.zeros(0, dtype=np.intp), alike

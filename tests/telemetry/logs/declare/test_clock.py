@@ -32,6 +32,14 @@ def test_a_clock_is_found_in_its_unit(unit: str, hz: float, zero_s: float, base:
         assert "2018-04-08" in found[unit].evidence
 
 
+@pytest.mark.parametrize(("first", "counts"), [(SPRING_S, False), (1_000.0, True)])
+def test_second_after_second_since_1970_is_no_number_of_rows(first: float, counts: bool) -> None:
+    columns = {"when": first + np.arange(900.0)}
+    (clock, *_) = clocks_of(LooseTable(Path("log.csv"), COMMAS, columns, {}, ()))
+    assert clock.unit == "s"
+    assert clock.counts is counts
+
+
 def test_rows_of_several_sensors_share_a_stamp_and_come_behind_a_finer_clock() -> None:
     shared = 8_000.0 + np.repeat(np.arange(0.0, 60.0, 0.2), 3)
     fine = 9_000.0 + np.cumsum(np.full(len(shared), 1 / 15.0))

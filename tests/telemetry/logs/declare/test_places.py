@@ -42,3 +42,17 @@ def test_positions_that_share_times_are_not_timed_by_that_clock() -> None:
     columns = {"x": 8.0 * time_s + 30.0 * np.sin(time_s / 9.0), "y": 100.0 * np.sin(time_s / 20.0)}
     assert places_of(columns, time_s)
     assert not places_of(columns, np.floor(time_s))
+
+
+def test_along_a_straight_road_one_coordinate_hardly_changes() -> None:
+    """A motorway to the north, second by second, in numbers of single precision."""
+    time_s = np.arange(900.0)
+    north = np.cumsum(15.2 + 15.0 * np.sin(time_s / 40.0))
+    lat = 41.65 + north * METRE_DEG
+    lon = -93.5 + 40.0 * np.sin(north / 2_000.0) * METRE_DEG / np.cos(np.radians(41.65))
+    columns = {"lat": lat.astype(np.float32) * 1.0, "lon": lon.astype(np.float32) * 1.0}
+    together = np.mean((np.diff(columns["lat"]) != 0) & (np.diff(columns["lon"]) != 0))
+    assert 0.3 < together < 0.6
+    places = [place for found in places_of(columns, time_s) for place in found]
+    assert {"latitude": "lat", "longitude": "lon"} in [place.fields for place in places]
+    assert {place.unit for place in places} == {"deg"}
