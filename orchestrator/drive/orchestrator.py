@@ -34,7 +34,7 @@ from foretwin.orchestrator.drive.standing import go_on, read_standing
 from foretwin.orchestrator.drive.start_worlds import prepare_start
 from foretwin.orchestrator.drive.summary import summed_up
 from foretwin.orchestrator.drive.supervision import CRASH, DriveError, DriveProcesses, Life
-from foretwin.orchestrator.drive.watcher_setups import COPILOT, addresses
+from foretwin.orchestrator.drive.watcher_setups import COPILOT, RECORDER, addresses
 from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
@@ -49,8 +49,6 @@ END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
 LAST_WORDS_S = 0.1
 """How long nothing may come from processes that have ended before all is taken for heard."""
 INTERRUPT_GRACE_S = 1.2
-DEATH_TOLD_S = 2.0
-"""How long after a silence the supervisor's word of a death may take on a busy machine."""
 
 
 class CrashError(RuntimeError):
@@ -197,10 +195,11 @@ class Orchestrator:
                 ended = loop.run()
         except LockStepError:
             # Who does not answer may have died: that is told next.
-            if not self._hears_of_death(conductor):
+            if not self._watch.comes_to_an_end(conductor):
                 raise
         word = "completed" if ended else self._stopped_by()
         if self._in_order(word):
+            self._watch.wait_for(RECORDER, conductor, stop=self._stop)
             conductor.finish()
         return word
 
@@ -217,14 +216,6 @@ class Orchestrator:
         if self._watch.ended_by is not None:
             raise DriveError(f"{self._watch.ended_by}; see log.jsonl")
         return VEHICLE_ENDED
-
-    def _hears_of_death(self, conductor: Conductor) -> bool:
-        """Wait a moment for the supervisor's word that somebody has died who ends the drive."""
-        deadline_s = time.monotonic() + DEATH_TOLD_S
-        while not self._watch.over and time.monotonic() < deadline_s:
-            self._look_after(conductor, time.monotonic())
-            conductor.handle(conductor.mailbox.take(LAST_WORDS_S))
-        return self._watch.over
 
     @property
     def _asked_to_end(self) -> bool:

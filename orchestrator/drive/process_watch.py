@@ -6,6 +6,8 @@ import contextlib
 import datetime
 import logging
 import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -29,6 +31,13 @@ HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
 gives way may have to wait for a processor that long."""
 RECONNECT_S = 2.0
 """So long after our own link came back another process may still be without its own."""
+DEATH_TOLD_S = 2.0
+"""How long after a silence the supervisor's word of a death may take on a busy machine."""
+BACK_WITHIN_S = 15.0
+"""Who sent telemetry keeps it for 20 s."""
+RECOVERS_S = 1.0
+"""What was missed is there so long after it was asked for."""
+_LISTEN_S = 0.1
 ROUTER_START_S = 15.0
 """What a router that was started again has until it must be there."""
 
@@ -114,6 +123,36 @@ class ProcessWatch:
             conductor.tell(Notice("warning", text))
         self._watch_router(now_s, linked=conductor.bus.connected)
         self._end_the_hung(conductor, now_s)
+
+    def comes_to_an_end(self, conductor: Conductor) -> bool:
+        """Wait a moment for the supervisor's word that somebody has died who ends the drive."""
+        deadline_s = time.monotonic() + DEATH_TOLD_S
+        while not self.over and time.monotonic() < deadline_s:
+            self._listen(conductor)
+        return self.over
+
+    def wait_for(self, process_id: str, conductor: Conductor, *, stop: Callable[[], bool]) -> None:
+        """Wait until one that died or hangs is there again and has what it missed.
+
+        It asks who sent it, and they leave with the run. There is no wait for one that is not
+        started any more, nor once `stop` says so.
+        """
+        self.look_after(conductor, time.monotonic())
+        if process_id in conductor.alive:
+            return
+        log.info("the drive ends once %s is there again", process_id)
+        deadline_s = time.monotonic() + BACK_WITHIN_S
+        while process_id not in conductor.alive and time.monotonic() < deadline_s:
+            if stop() or process_id in self.given_up:
+                return
+            self._listen(conductor)
+        deadline_s = min(deadline_s, time.monotonic() + RECOVERS_S)
+        while time.monotonic() < deadline_s and not stop():
+            self._listen(conductor)
+
+    def _listen(self, conductor: Conductor) -> None:
+        self.look_after(conductor, time.monotonic())
+        conductor.handle(conductor.mailbox.take(_LISTEN_S))
 
     def _certificates_of(self, plan: DrivePlan) -> CertificateEnd:
         if self._certificates is None:

@@ -30,7 +30,7 @@ CUTS = 4
 _TEMPORARY = ("*.writing", "*.arrows", "*.stderr", "*.tmp", "*.partial")
 _MOST_PUBLISHED = 1_000_000
 """A car sends 300 a second, bursts and strangers some thousands."""
-_LAST_WORDS = ("lost: ", "error: ")
+_LAST_WORDS = ("lost: ", "failed: ", "error: ")
 _STILL = frozenset({"recorder", "mirror", "vehicle", "orchestrator", "router", "disk", "link"})
 """Where none of these was disturbed, what they write comes to the disk in time."""
 

@@ -7,6 +7,7 @@ import json
 import os
 import resource
 import signal
+import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,23 @@ def test_a_killed_recorder_comes_back_and_nothing_is_lost(tmp_path: Path) -> Non
         wait_for(lambda: says(run, "recorder ended with code -9; started again"), "the death seen")
         screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
     assert process.returncode == 0, screen
+    assert_all_is_recorded(run, parts=2)
+    assert_nothing_left(run)
+
+
+@pytest.mark.judge
+def test_a_recorder_that_is_away_at_the_end_is_waited_for(tmp_path: Path) -> None:
+    """Who sent keeps it, and leaves with the run."""
+    out = tmp_path / "runs"
+    with started(out, *LIVE, "--end", "12") as process:
+        run = recorded_for_a_while(out)
+        while not says(run, "the drive is over"):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(child_pids(run)["recorder"], signal.SIGKILL)
+            time.sleep(0.05)
+        screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
+    assert process.returncode == 0, screen
+    assert says(run, "the drive ends once recorder is there again")
     assert_all_is_recorded(run, parts=2)
     assert_nothing_left(run)
 

@@ -6,6 +6,8 @@ import dataclasses
 import datetime
 import shutil
 import signal
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +17,10 @@ import pytest
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile, RefusedKind
 from foretwin.orchestrator.campaign.issuing import issue
 from foretwin.orchestrator.drive.process_watch import (
+    BACK_WITHIN_S,
     HUNG_AFTER_S,
     RECONNECT_S,
+    RECOVERS_S,
     ROUTER_START_S,
     ProcessWatch,
 )
@@ -109,6 +113,30 @@ def test_a_death_that_is_told_late_is_not_that_of_the_next_one(
     watched.look(2.0 * EVERY_S)
     assert watched.started("w0") == 2
     assert ("w0" in watched.house.conductor.alive) == counts
+
+
+def test_the_end_waits_for_who_is_started_again_until_it_has_what_it_missed(
+    watched: Watched,
+) -> None:
+    back = threading.Timer(0.3, watched.alive, ["recorder"])
+    back.start()
+    began_s = time.monotonic()
+    watched.watch.wait_for("recorder", watched.house.conductor, stop=lambda: False)
+    taken_s = time.monotonic() - began_s
+    back.join()
+    assert 0.3 + RECOVERS_S <= taken_s < BACK_WITHIN_S
+
+
+@pytest.mark.parametrize("why", ["there", "given up", "told to end"])
+def test_the_end_waits_for_nobody_who_does_not_come(watched: Watched, why: str) -> None:
+    if why == "there":
+        watched.alive("recorder")
+    if why == "given up":
+        watched.watch.given_up.add("recorder")
+    began_s = time.monotonic()
+    stop = why == "told to end"
+    watched.watch.wait_for("recorder", watched.house.conductor, stop=lambda: stop)
+    assert time.monotonic() - began_s < RECOVERS_S
 
 
 def test_nobody_is_silent_while_the_link_is_away_and_a_little_longer(watched: Watched) -> None:
