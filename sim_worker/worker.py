@@ -38,6 +38,7 @@ from foretwin.sim_worker.planners.hosted import HostedPlanner
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.planners.stack import StackPlanner
+from foretwin.sim_worker.vehicle.parameters import check_vehicle
 from foretwin.sim_worker.world_file import WorldFolder, WorldSource
 
 if TYPE_CHECKING:
@@ -90,8 +91,11 @@ class SimulationCache:
         return _Prepared(stage, SceneMaker(world))
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
-        """Change the parameters of the vehicle on every stage; Worlds stay compiled."""
-        self._vehicle = vehicle
+        """Change the parameters of the vehicle on every stage; Worlds stay compiled.
+
+        Raises ValueError, and changes nothing, for what is no road vehicle any more.
+        """
+        self._vehicle = check_vehicle(vehicle, before=self._vehicle)
         for prepared in self._stages.values():
             prepared.stage.use_vehicle(vehicle)
 

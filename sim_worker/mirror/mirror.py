@@ -19,6 +19,7 @@ from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
 from foretwin.sim_worker.mirror.track import Track
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory, TwinCommand
+from foretwin.sim_worker.vehicle.parameters import check_vehicle
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
 from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
@@ -97,7 +98,11 @@ class Mirror:
         self._pending.append((from_stamp_ns, world))
 
     def use_vehicle(self, vehicle: VehicleParameters, *, from_stamp_ns: int = 0) -> None:
-        """Give the twin these parameters from the first state at or after `from_stamp_ns` on."""
+        """Give the twin these parameters from the first state at or after `from_stamp_ns` on.
+
+        Raises ValueError for what is no road vehicle any more.
+        """
+        check_vehicle(vehicle, before=self._vehicle)
         self._pending_vehicles.append((from_stamp_ns, vehicle))
 
     def handle_command(self, command: ControlCommand) -> None:
