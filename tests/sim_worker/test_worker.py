@@ -181,6 +181,9 @@ def test_a_worker_goes_on_with_other_parameters_and_says_with_which(served: Memo
     futures = plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"])
     before = job(futures, horizon_s=2.0)
     after = msgspec.structs.replace(before, vehicle_version=1)
+    no_car = altered(CAR, steering_delay_s=-1.4)
+    with pytest.raises(TimeoutError, match=r"steering_delay_s .* is implausible"):
+        asked(served, "use_vehicle", UseVehicle(stamp_ns=0, vehicle=no_car, version=1))
     first = asked(served, "job", request(before)).result
     with pytest.raises(TimeoutError, match=r"job for version 1 .* at a worker with version 0"):
         asked(served, "job", request(after))
@@ -190,16 +193,6 @@ def test_a_worker_goes_on_with_other_parameters_and_says_with_which(served: Memo
     assert (first.vehicle_version, second.vehicle_version) == (0, 1)
     anew = run_job(after, BatchSimulation(crossroads(), heavy, nsim=32))
     assert result_digest(second) == result_digest(anew) != result_digest(first)
-
-
-def test_parameters_that_no_vehicle_has_are_refused_and_change_nothing(served: MemoryBus) -> None:
-    question = request(job(plan_futures(count=2, seed=0, planners=["pure_pursuit_idm"])))
-    before = asked(served, "job", question).result
-    for name, value in (("steering_delay_s", -1.4), ("mass_kg", 3.0)):
-        use = UseVehicle(stamp_ns=0, vehicle=altered(CAR, **{name: value}), version=1)
-        with pytest.raises(TimeoutError, match=f"{name} .* is implausible"):
-            asked(served, "use_vehicle", use)
-    assert result_digest(asked(served, "job", question).result) == result_digest(before)
 
 
 def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:

@@ -27,8 +27,7 @@ _OWN_TIMES = 0.9
 """So many positions have a time of their own; fewer by a clock that is too coarse for them."""
 _TOGETHER, _TOGETHER_COARSE, _FEW_STEPS = 0.6, 0.2, 8.0
 """Columns of one receiver change in the same rows, of all in which one does; in fewer where all but
-one are rounded so that they change by a few steps at most: along a street one hardly changes, and
-at a standstill none."""
+one are rounded so that they change by a few steps at most: along a street one hardly changes."""
 _EVENLY = 0.9
 _WHOLE_UNITS, _LEAST_WHOLE = ("1e-7 deg", "1e-6 deg", "1e-5 deg", "mas"), 20_000.0
 """Smaller whole numbers are revolutions and the like: 200 m around where both are nought."""
@@ -297,6 +296,5 @@ def _moves_like_a_car(time_s: Array, xy_m: Array) -> bool:
         _LEAST_P90_MPS < fast_mps < FASTEST_MPS
         and step_m.sum() > _LEAST_WAY_M
         and (lasts_s[far] > 0.0).any()
-        and far.any()
         and np.median(along[far] / fifth[far]) < _ROUGH
     )

@@ -154,6 +154,11 @@ def test_a_new_world_does_not_move_a_following_twin() -> None:
     assert _jumps(samples)[:, 0].max() < 0.03
 
 
+def test_a_twin_takes_no_parameters_that_no_vehicle_has() -> None:
+    with pytest.raises(ValueError, match=r"steering_delay_s -1\.4 is implausible"):
+        _mirror().use_vehicle(altered(CAR, steering_delay_s=-1.4))
+
+
 def test_other_parameters_do_not_move_a_following_twin() -> None:
     mirror = _mirror()
     mirror.set_roles(UseRoles(stamp_ns=0, roles={}, correction="follow"))

@@ -276,11 +276,6 @@ def test_a_standing_car_has_a_standing_twin() -> None:
     assert max(sample.gap_m for sample in samples) < 1e-3
 
 
-def test_a_twin_takes_no_parameters_that_no_vehicle_has() -> None:
-    with pytest.raises(ValueError, match=r"steering_delay_s -1\.4 is implausible"):
-        Mirror(CAR, drive_frame=FRAME).use_vehicle(altered(CAR, steering_delay_s=-1.4))
-
-
 def test_a_twin_goes_on_with_other_parameters_from_where_it_is() -> None:
     """A third of the ratio makes it turn three times as much; it does not jump there."""
     quick = altered(CAR, steering_ratio=16.0 / 3.0, wheelbase_m=2.9, cog_from_rear_axle_m=1.5)
