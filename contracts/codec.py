@@ -18,6 +18,7 @@ import numpy as np
 from msgspec import structs
 
 from foretwin.contracts.arrays import array_from_wire, array_to_wire
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.partial_file import partial_file
 
 SCHEMA_VERSION = 2
@@ -183,3 +184,12 @@ def write_message(message: msgspec.Struct, path: Path) -> None:
 def read_message(path: Path, kind: type[Message]) -> Message:
     """Read one message from a file; raises SchemaMismatch naming the file."""
     return decode(path.read_bytes(), kind, where=str(path)).message
+
+
+def read_given(path: Path, kind: type[Message]) -> Message:
+    """Read one message from a file that a user named; raises UserError, in one line, where it holds
+    something else or cannot be read."""
+    try:
+        return read_message(path, kind)
+    except (SchemaMismatch, OSError) as error:
+        raise UserError(" ".join(str(error).split())) from error

@@ -126,9 +126,7 @@ class ProcessWatch:
 
     def comes_to_an_end(self, conductor: Conductor) -> bool:
         """Wait a moment for the supervisor's word that somebody has died who ends the drive."""
-        deadline_s = time.monotonic() + DEATH_TOLD_S
-        while not self.over and time.monotonic() < deadline_s:
-            self._listen(conductor)
+        self._listen(conductor, time.monotonic() + DEATH_TOLD_S, until=lambda: self.over)
         return self.over
 
     def wait_for(self, process_id: str, conductor: Conductor, *, stop: Callable[[], bool]) -> None:
@@ -137,22 +135,26 @@ class ProcessWatch:
         It asks who sent it, and they leave with the run. There is no wait for one that is not
         started any more, nor once `stop` says so.
         """
+
+        def settled() -> bool:
+            return process_id in conductor.alive or process_id in self.given_up or stop()
+
         self.look_after(conductor, time.monotonic())
-        if process_id in conductor.alive:
+        if settled():
             return
         log.info("the drive ends once %s is there again", process_id)
         deadline_s = time.monotonic() + BACK_WITHIN_S
-        while process_id not in conductor.alive and time.monotonic() < deadline_s:
-            if stop() or process_id in self.given_up:
-                return
-            self._listen(conductor)
-        deadline_s = min(deadline_s, time.monotonic() + RECOVERS_S)
-        while time.monotonic() < deadline_s and not stop():
-            self._listen(conductor)
+        self._listen(conductor, deadline_s, until=settled)
+        if process_id in conductor.alive:
+            recovered_s = min(deadline_s, time.monotonic() + RECOVERS_S)
+            self._listen(conductor, recovered_s, until=stop)
 
-    def _listen(self, conductor: Conductor) -> None:
-        self.look_after(conductor, time.monotonic())
-        conductor.handle(conductor.mailbox.take(_LISTEN_S))
+    def _listen(
+        self, conductor: Conductor, deadline_s: float, *, until: Callable[[], bool]
+    ) -> None:
+        while not until() and time.monotonic() < deadline_s:
+            self.look_after(conductor, time.monotonic())
+            conductor.handle(conductor.mailbox.take(_LISTEN_S))
 
     def _certificates_of(self, plan: DrivePlan) -> CertificateEnd:
         if self._certificates is None:

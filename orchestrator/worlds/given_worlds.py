@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.codec import read_given
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.contracts.world_identity import with_id
@@ -26,10 +26,7 @@ def read_given_worlds(folder: Path) -> dict[str, World]:
     found: dict[str, World] = {}
     files: dict[str, Path] = {}
     for file in sorted(folder.glob("*.world")):
-        try:
-            world = read_message(file, World)
-        except (SchemaMismatch, OSError) as error:
-            raise UserError(" ".join(str(error).split())) from error
+        world = read_given(file, World)
         name = world.intersection.id
         if world.intersection.kind == "region":
             raise UserError(f"{file}: a World of a region; a drive uses those of junctions")

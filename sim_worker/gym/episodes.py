@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.codec import read_given
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.futures import RESULT_STEP_S, Future, Job, PathAhead
 from foretwin.contracts.scenario import EGO, Scenario
@@ -33,7 +33,6 @@ from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
 
-_Kept = TypeVar("_Kept", World, Job)
 CASE = "case"
 BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""
@@ -82,21 +81,13 @@ class Source(NamedTuple):
             raise UserError(f"early_or_late_s {self.early_or_late_s:g}: from 0")
         world = self.world
         if not isinstance(world, World):
-            world = _read(world, World)
+            world = read_given(Path(world), World)
         if self.job is not None:
-            job = self.job if isinstance(self.job, Job) else _read(self.job, Job)
+            job = self.job if isinstance(self.job, Job) else read_given(Path(self.job), Job)
             return _of_job(world, job)
         if len(self.states):
             return _of_states(self, world, vehicle)
         return _of_scenario(self, world, vehicle)
-
-
-def _read(file: Path | str, kind: type[_Kept]) -> _Kept:
-    """Return what a file of foretwin's holds; raises UserError where that is another thing."""
-    try:
-        return read_message(Path(file), kind)
-    except (SchemaMismatch, OSError) as error:
-        raise UserError(one_line(error)) from error
 
 
 class Episodes(NamedTuple):
