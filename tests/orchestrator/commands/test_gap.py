@@ -193,13 +193,18 @@ def test_what_is_no_drive_is_said_in_one_line(
         assert named in line
 
 
+@pytest.mark.parametrize("speed_late_ns", [None, 402_000_000])
 def test_a_logger_of_a_row_a_second_is_told_that_its_rows_are_too_far_apart(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], speed_late_ns: int | None
 ) -> None:
-    rows = [
-        ("gnss", GnssFix(stamp_ns=k * 10**9, position=GeoPoint(52.5 + 1e-4 * k, 13.4)))
-        for k in range(40)
-    ]
+    rows: list[tuple[str, Any]] = []
+    for k in range(40):
+        place = GeoPoint(52.5 + 1e-4 * k, 13.4)
+        rows.append(("gnss", GnssFix(stamp_ns=k * 10**9, position=place)))
+        if speed_late_ns is not None and k < 39:
+            late_ns = k * 10**9 + speed_late_ns
+            rows.append(("speed", SpeedSample(stamp_ns=late_ns, speed_mps=11.1)))
     info = VehicleInfo(vehicle_id="car", time_base="log", start_stamp_ns=0, end_stamp_ns=39 * 10**9)
     assert run(["gap", str(written(tmp_path / "rows.mcap", info, rows))]) == 2
-    assert "its samples come 1.0 s apart" in capsys.readouterr().err
+    apart_s = 1.0 if speed_late_ns is None else 0.6
+    assert f"its samples come {apart_s} s apart" in capsys.readouterr().err
