@@ -29,6 +29,7 @@ from foretwin.contracts.guard import Refused
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.log_file import JsonLines, LogFile
 from foretwin.contracts.one_heap import FreeMemory, share_one_heap
+from foretwin.contracts.process_name import name_process
 from foretwin.contracts.process_setup import BusSetup, parent_pid, setup_given
 from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile
 from foretwin.contracts.refusals import Refusals
@@ -166,6 +167,7 @@ def run_process(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     share_one_heap()
     file, setup = setup_given(kind, argv)
+    name_process(setup.process_id)
     hold(file)
     log_to_file(setup)
     if setup.trace_dir is not None:

@@ -21,6 +21,7 @@ from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.end_signals import on_end_signals
 from foretwin.contracts.own_log import OwnLog
 from foretwin.contracts.partial_file import partial_file
+from foretwin.contracts.process_name import name_process
 from foretwin.contracts.process_setup import RouterSetup, parent_pid, setup_given
 from foretwin.contracts.refusal_counts import RefusalFile
 from foretwin.contracts.router_log import FILTER, RouterLog
@@ -40,6 +41,7 @@ def run_router(argv: list[str] | None = None) -> None:
     ended = threading.Event()
     on_end_signals(ended.set)
     file, setup = setup_given(RouterSetup, argv)
+    name_process(setup.process_id)
     log = RouterLog()
     own_log = OwnLog(log.take, log.gap)
     os.environ |= {"RUST_LOG": FILTER, "NO_COLOR": "1"}

@@ -12,6 +12,8 @@ def main() -> None:
     """Run the command line and leave with its exit code."""
     # Nothing here renders with MuJoCo, whose look for a window costs each process an interpreter.
     os.environ.setdefault("MUJOCO_GL", "disable")
+    # Nor has anything matrices that are worth a second thread; forks do as this process does.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
     on_end_signals(_interrupt)
     from foretwin.orchestrator.commands.cli import run

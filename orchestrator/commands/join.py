@@ -34,7 +34,8 @@ from foretwin.orchestrator.commands.worker import drive_at
 from foretwin.orchestrator.drive.exit_words import EXIT_DONE, EXIT_PARTLY
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.record.which_run import run_folder
-from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, WhenDead
+from foretwin.orchestrator.runner.launch import FreshInterpreter
+from foretwin.orchestrator.runner.supervisor import Supervisor, WhenDead
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
 from foretwin.telemetry.ros2.mapping import read_mapping

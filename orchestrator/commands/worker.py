@@ -27,7 +27,8 @@ from foretwin.orchestrator.drive.exit_words import EXIT_DONE, EXIT_PARTLY
 from foretwin.orchestrator.drive.interrupt import Interruption
 from foretwin.orchestrator.processors import processors, trouble_with_workers
 from foretwin.orchestrator.record.machine import this_machine
-from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor, WhenDead
+from foretwin.orchestrator.runner.launch import FreshInterpreter
+from foretwin.orchestrator.runner.supervisor import Supervisor, WhenDead
 
 EXIT_REFUSED = USER
 DRIVE_S = 60.0

@@ -22,6 +22,7 @@ from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.foreground import Foreground, start_all
 from foretwin.orchestrator.drive.in_charge import SwornIn, sworn_in
+from foretwin.orchestrator.drive.launching import launcher
 from foretwin.orchestrator.drive.metrics_server import listening
 from foretwin.orchestrator.drive.orchestrator import CrashError, Orchestrator
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
@@ -32,7 +33,8 @@ from foretwin.orchestrator.drive.supervisor_link import SupervisorLink
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.run_state import LOG, RECORD, run_lock
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
-from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Supervisor
+from foretwin.orchestrator.runner.launch import FreshInterpreter
+from foretwin.orchestrator.runner.supervisor import Supervisor
 from foretwin.orchestrator.runner.warm_fork import trouble_with_forking
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -86,9 +88,9 @@ def _supervise(sworn: SwornIn) -> int:
     planner = RoundPlanner(plan.config, plan.vehicle)
     trouble = trouble_with_forking()
     if trouble is None:
-        return Foreground(plan, functools.partial(orchestrate, signer=sworn.signer)).run(
-            meanwhile=planner.draw_cases
-        )
+        work = functools.partial(orchestrate, signer=sworn.signer)
+        foreground = Foreground(plan, work, launch=launcher(plan))
+        return foreground.run(meanwhile=planner.draw_cases)
     log.info("nobody will start the orchestrator again: %s", trouble)
     supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
     try:

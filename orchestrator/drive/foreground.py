@@ -1,9 +1,9 @@
 """The supervisor of a drive: the process that `foretwin drive` stays once everything is read.
 
-It starts, watches and ends all others, and forks the orchestrator from what lies in its memory. An
-orchestrator that dies is forked again at once, and goes on with what it left, beside processes that
-know nothing of it. The supervisor has no thread, no bus and no table: nothing that others send or a
-disk does can end it.
+It starts, watches and ends all others, most as forks (`launching.py`), and forks the orchestrator
+from what lies in its memory. An orchestrator that dies is forked again at once, and goes on with
+what it left, beside processes that know nothing of it. The supervisor has no thread, no bus and no
+table: nothing that others send or a disk does can end it.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from collections.abc import Callable
 from foretwin.contracts.cpu_use import CpuMeter
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.one_heap import share_one_heap
+from foretwin.contracts.process_name import name_process
 from foretwin.contracts.terminal import command_line, say
 from foretwin.orchestrator.drive.exit_words import EXIT_FAILED
 from foretwin.orchestrator.drive.interrupt import Interruption
@@ -41,7 +42,8 @@ from foretwin.orchestrator.drive.supervision import (
 )
 from foretwin.orchestrator.drive.supervisor_link import SupervisorLink
 from foretwin.orchestrator.plan import DrivePlan
-from foretwin.orchestrator.runner.supervisor import FreshInterpreter, Launcher, Supervisor
+from foretwin.orchestrator.runner.launch import Launcher
+from foretwin.orchestrator.runner.supervisor import Supervisor
 from foretwin.orchestrator.runner.warm_fork import ForkedProcess, forked
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -59,12 +61,9 @@ class Foreground:
     Use `run` once. Raises UserError for what the orchestrator finds wrong with what was asked for.
     """
 
-    def __init__(
-        self, plan: DrivePlan, orchestrate: Orchestrate, *, launch: Launcher | None = None
-    ) -> None:
+    def __init__(self, plan: DrivePlan, orchestrate: Orchestrate, *, launch: Launcher) -> None:
         self._plan, self._orchestrate = plan, orchestrate
-        self._launch = FreshInterpreter(plan.processes_dir) if launch is None else launch
-        self._supervisor = Supervisor(self._launch)
+        self._supervisor = Supervisor(launch)
         self._interruption = Interruption()
         self._began_s = time.monotonic()
         self._meter = CpuMeter(plan.processes_dir, SUPERVISOR, alone=True)
@@ -106,6 +105,7 @@ class Foreground:
 
         def work() -> int:
             here.close()
+            name_process(ORCHESTRATOR)
             share_one_heap()
             # What comes before the orchestrator takes signals itself is for it as well.
             link = SupervisorLink(
@@ -163,8 +163,11 @@ class Foreground:
         self._look_after_processes()
         self._meter.look()
         supervisor = self._supervisor
-        pids = {name: supervisor.pid(name) for name in supervisor.running()}
-        line.tell(Running(pids, supervisor.restarted, self._first_death, list(self._deaths)))
+        line.tell(
+            Running(
+                supervisor.running(), supervisor.restarted, self._first_death, list(self._deaths)
+            )
+        )
 
     def _look_after_processes(self) -> None:
         for one in self._supervisor.poll(time.monotonic()):

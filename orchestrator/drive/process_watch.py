@@ -1,4 +1,4 @@
-"""Who of a drive's processes died or hangs, what follows from it, and what is missing after it."""
+"""Who of a drive's processes died, hangs or grows, and what is missing after it."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class WatchedProcesses(Protocol):
     def poll(self, now_s: float) -> list[Death]:
         """Return deaths since the last call."""
 
-    def running(self) -> list[str]:
-        """Return the ids of processes that have not ended."""
+    def running(self) -> dict[str, int]:
+        """Return the processes that have not ended, and the operating system's id of each."""
 
     def row(self, process_id: str) -> SupervisedRow:
         """Return the table's row of a process."""
@@ -116,6 +116,9 @@ class ProcessWatch:
             else:
                 self._missing(f"{text} and was not started again")
                 conductor.tell(Notice("error", f"{text}; the drive goes on without it"))
+        memory = conductor.context.memory
+        for text in memory.look(self.supervisor.running(), now_s):
+            conductor.tell(Notice("warning", text))
         conductor.refusals.look(now_s)
         for text in self._certificates_of(conductor.plan).news(datetime.datetime.now(UTC)):
             conductor.tell(Notice("warning", text))

@@ -14,7 +14,6 @@ from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.contracts.terminal import console, plain, say, visible, words
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission
-from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.rounds.arrival_band import ArrivalBand
 from foretwin.orchestrator.routing.arrival import NextJunction
@@ -62,7 +61,6 @@ class ProgressLine:
         if now_s - self._last_s < PERIOD_S:
             return
         self._last_s = now_s
-        self._watch_memory(now_s)
         progress = self._progress(now_s)
         conductor = self._conductor
         conductor.context.publish("progress", progress)
@@ -75,11 +73,6 @@ class ProgressLine:
         elif now_s - self._last_plain_s >= PLAIN_PERIOD_S:
             self._last_plain_s = now_s
             say(text, error=True)
-
-    def _watch_memory(self, now_s: float) -> None:
-        context = self._conductor.context
-        for text in context.memory.look(context.plan.processes_dir, now_s):
-            context.tell(Notice("warning", text))
 
     def _progress(self, now_s: float) -> Progress:
         conductor, mission = self._conductor, self._mission

@@ -175,8 +175,8 @@ class OwnProcesses:
         """Return deaths since the last call; see DriveProcesses."""
         return self._supervisor.poll(now_s)
 
-    def running(self) -> list[str]:
-        """Return who has not ended."""
+    def running(self) -> dict[str, int]:
+        """Return who has not ended, and the operating system's id of each."""
         return self._supervisor.running()
 
     def row(self, process_id: str) -> ProcessRow:

@@ -100,9 +100,9 @@ class SupervisorLink:
         row = self._rows[one.process_id]
         return Death(one.process_id, row, one.exit_code, one.restarted, one.pause_s, one.seen_s)
 
-    def running(self) -> list[str]:
-        """Return who ran when the supervisor last told."""
-        return list(self._running.pids)
+    def running(self) -> dict[str, int]:
+        """Return who ran when the supervisor last told, and the operating system's id of each."""
+        return self._running.pids
 
     def row(self, process_id: str) -> ProcessRow:
         """Return the table's row of a process."""

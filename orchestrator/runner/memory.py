@@ -1,6 +1,7 @@
 """The memory of a drive's processes: watched while it goes on, told where one grows, recorded.
 
-What counts is a process's own memory: resident, and not shared with others or with a file.
+What counts is a process's own memory: resident, in no file, and without what it shared with others
+as it was first looked at: a fork has all that its supervisor had.
 """
 
 from __future__ import annotations
@@ -9,9 +10,10 @@ import contextlib
 import math
 import os
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from foretwin.contracts.running import RunningMeans
 
@@ -23,9 +25,6 @@ FLOOR_S = 60.0
 GROWN_MB, MOST_MB = 256.0, 4096.0
 """Who has grown by so much since it settled, or is so large, is told of; again at each doubling."""
 _LEAST_SPAN_S = 600.0
-SEEK_AT_LEAST_EVERY_S = 60.0
-"""Who is not found, as he has ended or never was, is looked for ever more rarely: all processes of
-the machine are read for it."""
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -33,6 +32,9 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 class _Watched:
     pid: int
     since_s: float
+    shared_mb: float
+    """Of what lies in no file, what others had too at first. It is not asked again: that takes ten
+    milliseconds a process, a hundred times as long as how much there is."""
     now_mb: float = 0.0
     most_mb: float = 0.0
     settled: tuple[float, float] | None = None
@@ -81,11 +83,6 @@ class _Watched:
         return (product - hours * floor_mb) / (square - hours * hours)
 
 
-class _Sought(NamedTuple):
-    again_s: float = -math.inf
-    pause_s: float = LOOK_EVERY_S / 2.0
-
-
 @dataclass(slots=True)
 class MemoryWatch:
     """Looks into /proc; where there is none, nothing is known. Times are monotonic, in s."""
@@ -93,21 +90,29 @@ class MemoryWatch:
     proc: Path = Path("/proc")
     _watched: dict[str, _Watched] = field(default_factory=dict)
     _looked_s: float | None = None
-    _not_found: dict[str, _Sought] = field(default_factory=dict)
 
-    def look(self, setups: Path, now_s: float, *, own: str = "orchestrator") -> list[str]:
+    def look(
+        self, running: Mapping[str, int], now_s: float, *, own: str = "orchestrator"
+    ) -> list[str]:
         """Look again, at most every few seconds; returns what is to be told.
 
-        `setups` is the folder of the setups that processes were started with; `own` is this one.
+        `running` are the processes by name; `own` is this one.
         """
         if self._looked_s is not None and now_s - self._looked_s < LOOK_EVERY_S:
             return []
         self._looked_s = now_s
-        self._find(setups, own, now_s)
         told = []
-        for name, one in self._watched.items():
-            now_mb = self._own_mb(one.pid)
-            if now_mb is not None and one.take(now_s, now_mb):
+        for name, pid in {own: os.getpid(), **running}.items():
+            held_mb = self._held_mb(pid)
+            if held_mb is None:
+                continue
+            one = self._watched.get(name)
+            if one is None or one.pid != pid:
+                most_mb = 0.0 if one is None else one.most_mb
+                one = _Watched(pid, now_s, max(held_mb - self._alone_mb(pid), 0.0), most_mb=most_mb)
+                self._watched[name] = one
+            now_mb = max(held_mb - one.shared_mb, 0.0)
+            if one.take(now_s, now_mb):
                 told.append(f"{name} holds {now_mb:.0f} MB of memory{_since(one)}")
         return told
 
@@ -128,47 +133,22 @@ class MemoryWatch:
             for name, one in sorted(self._watched.items())
         }
 
-    def _find(self, setups: Path, own: str, now_s: float) -> None:
-        """Find processes that are not known yet, or were started again."""
-        here = {own: os.getpid()}
-        missing = {
-            path.stem
-            for path in setups.glob("*.json")
-            if (known := self._watched.get(path.stem)) is None or self._own_mb(known.pid) is None
-        }
-        sought = {name: self._not_found.pop(name, _Sought()) for name in missing}
-        due = {name for name, one in sought.items() if now_s >= one.again_s}
-        if due:
-            here |= self._pids(setups, due)
-        for name in missing - here.keys():
-            one = sought[name]
-            if name in due:
-                pause_s = min(2.0 * one.pause_s, SEEK_AT_LEAST_EVERY_S)
-                one = _Sought(now_s + pause_s, pause_s)
-            self._not_found[name] = one
-        for name, pid in here.items():
-            known = self._watched.get(name)
-            if known is None or known.pid != pid:
-                most = 0.0 if known is None else known.most_mb
-                self._watched[name] = _Watched(pid, now_s, most_mb=most)
-
-    def _pids(self, setups: Path, names: set[str]) -> dict[str, int]:
-        wanted = {os.fsencode(setups / f"{name}.json"): name for name in names}
-        found = {}
-        for entry in self.proc.glob("[0-9]*/cmdline"):
-            with contextlib.suppress(OSError):
-                arguments = entry.read_bytes().split(b"\0")
-                if b"--setup" in arguments:
-                    name = wanted.get(arguments[arguments.index(b"--setup") + 1])
-                    if name is not None:
-                        found[name] = int(entry.parent.name)
-        return found
-
-    def _own_mb(self, pid: int) -> float | None:
+    def _held_mb(self, pid: int) -> float | None:
+        """Return what a process holds in memory that lies in no file."""
         with contextlib.suppress(OSError, ValueError, IndexError):
             pages = (self.proc / str(pid) / "statm").read_text().split()
             return (int(pages[1]) - int(pages[2])) * _PAGE_BYTES / 1e6
         return None
+
+    def _alone_mb(self, pid: int) -> float:
+        """Return how much was written to and is shared with no other; all where that is not told.
+
+        By proc_pid_smaps(5), whose "kB" are of 1024 bytes.
+        """
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            told = (self.proc / str(pid) / "smaps_rollup").read_text()
+            return int(told.split("Private_Dirty:")[1].split()[0]) * 1024 / 1e6
+        return math.inf
 
 
 def _since(one: _Watched) -> str:

@@ -10,10 +10,8 @@ import contextlib
 import json
 import logging
 import math
-import os
 import signal
 import subprocess
-import sys
 import time
 from collections import defaultdict, deque
 from collections.abc import Collection
@@ -21,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
-from foretwin.contracts.process_setup import STARTED_BY, ProcessSetup, write_setup
+from foretwin.contracts.process_setup import ProcessSetup
+from foretwin.orchestrator.runner.launch import Child, Launcher
 from foretwin.orchestrator.runner.priorities import gives_way
 
 log = logging.getLogger("orchestrator")
@@ -57,57 +56,6 @@ class SupervisedRow(Protocol):
     @property
     def nice(self) -> int:
         """Added to its scheduling niceness once it can take work."""
-
-
-class Child(Protocol):
-    """A started process."""
-
-    pid: int
-
-    def poll(self) -> int | None:
-        """Return the exit code, None while it runs."""
-
-    def send_signal(self, sig: int) -> None:
-        """Send a signal."""
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Wait for the end."""
-
-
-class Launcher(Protocol):
-    """Starts one process; `module` is below the package `foretwin`."""
-
-    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
-        """Start a fresh interpreter running `module` with `setup`."""
-
-
-class FreshInterpreter:
-    """Starts each process as a new interpreter in a session of its own.
-
-    Never a fork: a forked child of an open Zenoh session hangs. A session of its own keeps a
-    terminal's Ctrl-C from the children, which the orchestrator ends in order. The interpreter's
-    standard error goes to the run's log, so that a crash leaves its traceback. What lies in the
-    working directory is not imported (`-P`).
-    """
-
-    def __init__(self, folder: Path, *, package: str = "foretwin") -> None:
-        self._folder, self._package = folder, package
-
-    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
-        """Start a fresh interpreter running `module` with `setup`."""
-        setup_file = self._folder / f"{setup.process_id}.json"
-        name = f"{self._package}.{module}"
-        write_setup(setup, setup_file)
-        own = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", STARTED_BY: f"{os.getpid()}"}
-        with (self._folder / f"{setup.process_id}.stderr").open("ab") as stderr:
-            return subprocess.Popen(
-                [sys.executable, "-P", "-m", name, "--setup", str(setup_file)],
-                stdin=subprocess.DEVNULL,
-                stdout=stderr,
-                stderr=stderr,
-                start_new_session=True,
-                env=os.environ | own,
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,9 +165,13 @@ class Supervisor:
             return None
         return 0.0 if len(recent) == 1 else FIRST_PAUSE_S * 2.0 ** (len(recent) - 2)
 
-    def running(self) -> list[str]:
-        """Return the ids of processes that have not ended."""
-        return [name for name, m in self._managed.items() if not m.gone and m.child.poll() is None]
+    def running(self) -> dict[str, int]:
+        """Return the processes that have not ended, and the operating system's id of each."""
+        return {
+            name: one.child.pid
+            for name, one in self._managed.items()
+            if not one.gone and one.child.poll() is None
+        }
 
     def kill(self, process_id: str) -> None:
         """End a process that hangs; `poll` then sees its death."""

@@ -82,23 +82,31 @@ def forked(work: Callable[[], int]) -> ForkedProcess:
     trouble = trouble_with_forking()
     if trouble is not None:
         raise RuntimeError(f"this process cannot be forked: {trouble}")
-    with contextlib.suppress(OSError, ValueError):  # a terminal that is gone, a full disk
-        sys.stdout.flush()
-        sys.stderr.flush()
+    _flush()
     gc.freeze()  # what is read already stays shared: the collector does not write to it
     pid = os.fork()
     if pid:
-        return ForkedProcess(pid)
+        try:
+            return ForkedProcess(pid)
+        except OSError:  # no descriptor to see its end by
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+            raise
     code = 1
     try:
         code = work()
     except BaseException:
         log.exception("a forked process ended by an error")
     finally:
-        with contextlib.suppress(OSError, ValueError):
-            sys.stdout.flush()
-            sys.stderr.flush()
+        _flush()
         os._exit(code)
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that is gone, a full disk; or none at all, as the command was started without.
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
 
 
 def _thread_names() -> Iterable[str]:

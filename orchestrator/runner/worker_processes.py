@@ -22,14 +22,8 @@ from foretwin.contracts.local_bus import (
 from foretwin.contracts.runner import Answer, Task, TaskCount
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.orchestrator.runner.bus_dispatcher import BusDispatcher
-from foretwin.orchestrator.runner.supervisor import (
-    Death,
-    FreshInterpreter,
-    Launcher,
-    Supervisor,
-    WhenDead,
-    fold_stderr,
-)
+from foretwin.orchestrator.runner.launch import FreshInterpreter, Launcher
+from foretwin.orchestrator.runner.supervisor import Death, Supervisor, WhenDead, fold_stderr
 
 log = logging.getLogger("orchestrator")
 
@@ -138,7 +132,7 @@ class WorkerProcesses:
     @property
     def pids(self) -> list[int]:
         """The operating system's ids of the processes that run."""
-        return [self._supervisor.pid(name) for name in self._supervisor.running()]
+        return list(self._supervisor.running().values())
 
     def submit(self, task: Task) -> None:
         """Take a task; see Runner."""

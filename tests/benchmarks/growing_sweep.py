@@ -28,7 +28,7 @@ from foretwin.contracts.placement import PlacedHere, WorldPlaces
 from foretwin.contracts.runner import Answer
 from foretwin.contracts.setup import ProcessSetup
 from foretwin.orchestrator.commands.sweep import run_sweep
-from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
+from foretwin.orchestrator.runner.launch import Child, FreshInterpreter
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
 from foretwin.orchestrator.sweep.jobs import JobMaker
 from foretwin.orchestrator.sweep.plan import SweepPlan

@@ -24,9 +24,9 @@ from foretwin.contracts.codec import encode
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.runner import Runner, Task, answers, job_task
 from foretwin.contracts.setup import ProcessSetup, WorkerSetup
+from foretwin.orchestrator.runner.launch import Child, FreshInterpreter
 from foretwin.orchestrator.runner.ray_cluster import ray_cluster
 from foretwin.orchestrator.runner.ray_runner import RayRunner
-from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
 from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
 from foretwin.orchestrator.sweep.jobs import JobMaker, cells_of
 from foretwin.orchestrator.sweep.plan import SweepPlan

@@ -8,6 +8,7 @@ import signal
 from pathlib import Path
 from typing import NamedTuple
 
+from foretwin.contracts.process_name import PREFIX
 from tests.system.foretwin_command import is_running
 
 MARK = "FORETWIN_CHAOS_DRIVE"
@@ -29,21 +30,14 @@ class Member(NamedTuple):
 def members(run: Path, mark: str, command_pid: int) -> list[Member]:
     """Return the processes of a run that live, sorted by name.
 
-    Who was started with a setup is named by it. The command is the supervisor; the orchestrator is
-    who was forked from it: the same command line, another process. What else carries the mark is
-    `other`. The run's log is not asked: on a full disk it tells nothing.
+    Who was started with a setup is named by it. The command is the supervisor; who was forked from
+    it is named by what the system calls it. What else carries the mark is `other`. The run's log is
+    not asked: on a full disk it tells nothing.
     """
-    found = []
-    command = _words(command_pid)
-    for pid in marked(mark):
-        if (name := _setup_name(pid, run)) is None:
-            name = "other"
-            if pid == command_pid:
-                name = "supervisor"
-            elif command and _words(pid) == command:
-                name = "orchestrator"
-        found.append(Member(name, pid))
-    return sorted(found)
+    names = {pid: _setup_name(pid, run) or _fork_name(pid) or "other" for pid in marked(mark)}
+    if command_pid in names:
+        names[command_pid] = "supervisor"
+    return sorted(Member(name, pid) for pid, name in names.items())
 
 
 def marked(mark: str) -> list[int]:
@@ -78,8 +72,11 @@ def _setup_name(pid: int, run: Path) -> str | None:
     return None
 
 
-def _words(pid: int) -> bytes:
-    """Return the command line of a process, empty where it is gone."""
+def _fork_name(pid: int) -> str | None:
+    """Return what a process is called that was started with no setup of its own."""
     with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    return b""
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+        called = Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip()
+        if called.startswith(PREFIX) and b"--setup" not in words:
+            return called.removeprefix(PREFIX)
+    return None

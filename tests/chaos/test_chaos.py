@@ -7,6 +7,7 @@ import random
 import shutil
 import subprocess
 import sys
+import textwrap
 import time
 from collections import Counter
 from pathlib import Path
@@ -18,7 +19,7 @@ from tests.chaos.disk import small_disk
 from tests.chaos.faults import DEADLY, LAST, OF_LINKS, OUTSIDE, STARTED_AGAIN, WEIGHTS, Case, draw
 from tests.chaos.host_clock import CLOCK, HostClock
 from tests.chaos.outsiders import Outsider
-from tests.chaos.run_processes import MARK, end_all, marked, members
+from tests.chaos.run_processes import MARK, Member, end_all, marked, members
 from tests.chaos.table import Consequence, DriveLine, keep, kept, table_of
 from tests.chaos.watcher import Seen, back_after_s
 from tests.system.foretwin_command import REPOSITORY, is_running, wait_for
@@ -93,21 +94,38 @@ def test_processes_of_a_drive_are_found_by_what_it_tells(tmp_path: Path) -> None
     mark, folder = f"chaos-test-{os.getpid()}", tmp_path / "run" / "processes"
     folder.mkdir(parents=True)
     sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
+    forks = """
+        import os, time
+        from foretwin.contracts.process_name import name_process
+        for name in ("orchestrator", "w0"):
+            if not os.fork():
+                name_process(name)
+                break
+        time.sleep(600)
+    """
     environment = os.environ | {MARK: mark}
     with (
         subprocess.Popen([*sleep, "--setup", str(folder / "w1.json")], env=environment) as worker,
-        subprocess.Popen(sleep, env=environment) as command,
-        subprocess.Popen(sleep, env=environment) as fork,
+        subprocess.Popen(sleep, env=environment) as planner,
+        subprocess.Popen(
+            [sys.executable, "-c", textwrap.dedent(forks)], env=environment
+        ) as command,
     ):
         try:
-            wait_for(lambda: len(marked(mark)) == 3, "all of them")
-            found = members(folder.parent, mark, command.pid)
-            assert found == [
-                ("orchestrator", fork.pid), ("supervisor", command.pid), ("w1", worker.pid),
-            ]  # fmt: skip
-            assert [one.kind for one in found] == ["orchestrator", "supervisor", "w"]
+            found: list[Member] = []
+
+            def all_there() -> bool:
+                found[:] = members(folder.parent, mark, command.pid)
+                names = [one.name for one in found]
+                return names == ["orchestrator", "other", "supervisor", "w0", "w1"]
+
+            wait_for(all_there, "all of them")
+            pids = {one.name: one.pid for one in found}
+            assert (pids["other"], pids["w1"]) == (planner.pid, worker.pid)
+            assert pids["supervisor"] == command.pid
+            assert [one.kind for one in found][-2:] == ["w", "w"]
         finally:
-            assert len(end_all(mark)) == 3
+            assert len(end_all(mark)) == 5
         wait_for(lambda: not is_running(worker.pid), "its end")
     assert marked(mark) == []
 

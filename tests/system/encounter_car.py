@@ -124,7 +124,7 @@ def main() -> None:
         run_process(StandinSetup, serve)
     from foretwin.orchestrator.commands import cli
     from foretwin.orchestrator.commands import join as command
-    from foretwin.orchestrator.runner.supervisor import FreshInterpreter
+    from foretwin.orchestrator.runner.launch import FreshInterpreter
 
     command.STANDIN = "system.encounter_car"
     command.FreshInterpreter = functools.partial(FreshInterpreter, package="tests")  # type: ignore[misc,assignment]

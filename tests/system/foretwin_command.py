@@ -73,9 +73,8 @@ def started(
 ) -> Iterator[subprocess.Popen[str] | WarmCommand]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
-    `entry` is what a fresh interpreter is given to run, and so are its processes; None for forks
-    of an interpreter that has imported all, which knows no `pace` but 1. One worker and no tuning
-    unless they are asked for: each process takes a second of a core to start.
+    `entry` is what a fresh interpreter is given to run; None for a fork of one that has imported
+    all, which knows no `pace` but 1. One worker and no tuning unless they are asked for.
     """
     for option, value in (("--tuning", "off"), ("--workers", "1")):
         if option not in arguments:

@@ -49,17 +49,18 @@ DAY_GB = 40.0
 """What a drive of 24 h leaves, extrapolated; `--keep` bounds it."""
 WITH_A_BUSY_CAR = """
 from foretwin.__main__ import main
-from foretwin.orchestrator.runner.supervisor import FreshInterpreter
+from foretwin.orchestrator.runner.fork_launch import Forks
+from foretwin.orchestrator.runner.launch import FreshInterpreter
 
-class Launcher(FreshInterpreter):
+class Launcher(Forks):
     def __call__(self, *, module, setup):
         if module != "telemetry.standin":
             return super().__call__(module=module, setup=setup)
         other = FreshInterpreter(self._folder, package="tests.system")
         return other(module="busy_car", setup=setup)
 
-from foretwin.orchestrator.drive import foreground
-foreground.FreshInterpreter = Launcher
+from foretwin.orchestrator.drive import launching
+launching.Forks = Launcher
 main()
 """
 """A drive whose stand-in car is that of `busy_car`."""

@@ -1,7 +1,7 @@
-"""Runs the command, and the processes it starts, as forks of an interpreter that has all imported.
+"""Runs the command as a fork of an interpreter that has imported what it and its processes need.
 
-A drive has ten processes, and importing takes most of what a short one costs. All else is as in
-fresh interpreters, in which the product starts them: `entry=FRESH` of `started` asks for these.
+Importing takes most of what a short drive costs. All else is as in a fresh interpreter, which
+`entry=FRESH` of `started` asks for.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import contextlib
 import functools
 import json
 import os
-import runpy
 import select
 import signal
 import socket
@@ -22,8 +21,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from foretwin.contracts.setup import ProcessSetup, write_setup
-from foretwin.orchestrator.runner.supervisor import Child
+from foretwin.orchestrator.runner.fork_launch import forget_signals, keep_only, run_module
 from foretwin.orchestrator.runner.warm_fork import ForkedProcess, forked
 
 REPOSITORY = Path(__file__).parents[2]
@@ -107,73 +105,17 @@ def _interpreter() -> socket.socket:
     return here
 
 
-class Forks:
-    """Starts each process of a drive as a fork of its supervisor; see FreshInterpreter."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
-        """Start a fork running `module` with `setup`."""
-        file = self._folder / f"{setup.process_id}.json"
-        write_setup(setup, file)
-        return forked(functools.partial(_be_process, module, file))
-
-
-def _be_process(module: str, file: Path) -> int:
-    os.setsid()
-    stderr = os.open(file.with_suffix(".stderr"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-    _forget_signals()
-    _keep_only(stderr)
-    return _run(f"foretwin.{module}", ["--setup", str(file)])
-
-
-def _forget_signals() -> None:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
-
-
-def _keep_only(out: int) -> None:
-    """Let `out` be where all is said, and no other file be held: locks are the parent's alone.
-
-    Numbers stay taken: who closes a file of the parent's must close none of the child's.
-    """
-    nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(out, 1)
-    os.dup2(out, 2)
-    for file in list(Path("/proc/self/fd").iterdir()):
-        with contextlib.suppress(OSError):
-            # What lies in /proc the child has opened itself, as it was forked.
-            if int(file.name) not in (1, 2) and not str(file.readlink()).startswith("/proc/"):
-                os.dup2(nothing, int(file.name))
-
-
-def _run(module: str, words: list[str]) -> int:
-    sys.argv = [module, *words]
-    for begun_anew in (module, f"{module}.__main__"):
-        sys.modules.pop(begun_anew, None)
-    try:
-        runpy.run_module(module, run_name="__main__", alter_sys=True)
-    except SystemExit as left:
-        if isinstance(left.code, str):
-            print(left.code, file=sys.stderr)
-        return left.code if isinstance(left.code, int) else int(left.code is not None)
-    return 0
-
-
 def _be_command(asked: dict[str, Any], out: int) -> int:
-    _forget_signals()
-    _keep_only(out)
+    forget_signals()
+    keep_only(out)
     os.chdir(asked["cwd"])
     os.environ.clear()
     os.environ.update(asked["env"])
-    return _run("foretwin", asked["words"])
+    return run_module("foretwin", asked["words"])
 
 
 def _serve(line: socket.socket) -> None:
     """Fork a command whenever one is asked for, and tell process and exit code of each."""
-    import_module("foretwin.orchestrator.drive.foreground").FreshInterpreter = Forks
     for name in IMPORTED:
         import_module(f"foretwin.{name}")
     running: dict[int, tuple[ForkedProcess, int]] = {}

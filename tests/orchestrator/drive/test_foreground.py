@@ -21,6 +21,7 @@ from types import SimpleNamespace
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.drive import foreground, supervisor_link
 from foretwin.orchestrator.drive.supervision import CRASHED, DriveError
+from foretwin.orchestrator.runner.launch import FreshInterpreter
 from foretwin.orchestrator.runner.supervisor import Supervisor
 
 foreground.start_all = lambda supervisor, plan: None
@@ -37,7 +38,7 @@ def die(number=signal.SIGKILL):
     os.kill(os.getpid(), number)
 
 def supervise(orchestrate):
-    return foreground.Foreground(plan, orchestrate).run()
+    return foreground.Foreground(plan, orchestrate, launch=FreshInterpreter(folder)).run()
 """
 
 

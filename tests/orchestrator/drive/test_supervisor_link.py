@@ -60,7 +60,7 @@ def test_each_death_is_told_once(line: Line) -> None:
     line.supervisor.tell(Running({"w1": 8}, 1, 1, [later]))
     assert [one.process_id for one in line.orchestrator.poll(0.0)] == ["vehicle"]
     assert line.orchestrator.poll(0.0) == []
-    assert (line.orchestrator.running(), line.orchestrator.restarted) == (["w1"], 1)
+    assert (line.orchestrator.running(), line.orchestrator.restarted) == ({"w1": 8}, 1)
 
 
 @pytest.mark.parametrize("line", [1], indirect=True)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -11,7 +14,6 @@ from foretwin.orchestrator.runner.memory import (
     GROWN_MB,
     LOOK_EVERY_S,
     MOST_MB,
-    SEEK_AT_LEAST_EVERY_S,
     SETTLED_AFTER_S,
     MemoryWatch,
 )
@@ -20,26 +22,28 @@ PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 class House:
-    """A folder of setups, and a /proc."""
+    """Processes that run, and a /proc."""
 
     def __init__(self, folder: Path) -> None:
-        self.setups, self.proc = folder / "processes", folder / "proc"
-        self.setups.mkdir()
+        self.running: dict[str, int] = {}
+        self.proc = folder / "proc"
         self.watch = MemoryWatch(self.proc)
 
-    def holds(self, pid: int, own_mb: float, *, name: str | None = None) -> None:
-        own = round(own_mb * 1e6 / PAGE_BYTES)
+    def holds(
+        self, pid: int, own_mb: float, *, shared_mb: float = 0.0, name: str | None = None
+    ) -> None:
+        pages = round((own_mb + shared_mb) * 1e6 / PAGE_BYTES)
         entry = self.proc / str(pid)
         entry.mkdir(parents=True, exist_ok=True)
-        (entry / "statm").write_text(f"{own + 900} {own + 300} 300 1 0 {own} 0\n")
+        (entry / "statm").write_text(f"{pages + 900} {pages + 300} 300 1 0 {pages} 0\n")
+        alone_kb = round(own_mb * 1e6 / 1024)
+        told = f"Rss: 7 kB\nShared_Dirty: 600 kB\nPrivate_Dirty:{alone_kb:8d} kB\nSwap: 0 kB\n"
+        (entry / "smaps_rollup").write_text(told)
         if name is not None:
-            setup = self.setups / f"{name}.json"
-            setup.touch()
-            command = ("python", "-m", "foretwin.x", "--setup", str(setup), "")
-            (entry / "cmdline").write_text("\0".join(command))
+            self.running[name] = pid
 
     def look(self, now_s: float) -> list[str]:
-        return self.watch.look(self.setups, now_s)
+        return self.watch.look(self.running, now_s)
 
 
 @pytest.fixture
@@ -88,13 +92,13 @@ def test_what_it_does_at_the_first_and_last_moment_is_no_growth(house: House) ->
 def test_who_grows_is_told_of_and_again_when_it_is_twice_as_large(house: House) -> None:
     told = []
     for minute in range(60):
-        house.holds(71, 50.0 + 50.0 * minute)
+        house.holds(71, 65.536 * (minute + 1))
         told += house.look(60.0 * minute)
     assert [text.split(",")[0] for text in told] == [
-        "w0 holds 600 MB of memory", "w0 holds 1200 MB of memory", "w0 holds 2400 MB of memory",
+        "w0 holds 655 MB of memory", "w0 holds 1311 MB of memory", "w0 holds 2621 MB of memory",
     ]  # fmt: skip
-    assert told[0].endswith(f", 300 MB more than {SETTLED_AFTER_S / 60:g} min after its start")
-    assert GROWN_MB <= 300.0
+    assert told[0].endswith(f", 262 MB more than {SETTLED_AFTER_S / 60:g} min after its start")
+    assert GROWN_MB <= 262.0
 
 
 def test_who_is_huge_at_once_is_told_of_at_once(house: House) -> None:
@@ -104,8 +108,7 @@ def test_who_is_huge_at_once_is_told_of_at_once(house: House) -> None:
 
 def test_one_that_was_started_again_begins_anew(house: House) -> None:
     house.look(0.0)
-    for file in ("statm", "cmdline"):
-        (house.proc / "71" / file).unlink()
+    (house.proc / "71" / "statm").unlink()
     house.look(10.0)
     house.holds(99, 20.0, name="w0")
     house.look(20.0)
@@ -114,31 +117,58 @@ def test_one_that_was_started_again_begins_anew(house: House) -> None:
     assert (record["at_end"], record["most"], record["settled"]) == (20.0, 50.0, None)
 
 
-def test_a_file_that_is_no_process_is_not_sought_among_all_processes_again_and_again(
-    house: House, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (house.setups / "standin_path.json").touch()
-    walks: list[float] = []
-    pids = MemoryWatch._pids
+def test_who_has_ended_keeps_what_was_known_and_is_not_told_of(house: House) -> None:
+    house.holds(71, MOST_MB - 1.0)
+    house.look(0.0)
+    (house.proc / "71" / "statm").unlink()
+    assert house.look(LOOK_EVERY_S) == []
+    assert house.watch.record()["w0"]["most"] == pytest.approx(MOST_MB - 1.0, abs=0.1)
 
-    def counted(watch: MemoryWatch, setups: Path, names: set[str]) -> dict[str, int]:
-        walks.append(now_s)
-        return pids(watch, setups, names)
 
-    monkeypatch.setattr(MemoryWatch, "_pids", counted)
-    now_s = 0.0
-    while now_s < 600.0:
-        house.look(now_s)
-        now_s += LOOK_EVERY_S
-    assert walks[:4] == [0.0, 5.0, 15.0, 35.0]
-    assert len(walks) < 15
-    # Whoever starts late is found all the same.
-    house.holds(80, 30.0, name="standin_path")
-    house.look(now_s + SEEK_AT_LEAST_EVERY_S)
-    assert house.watch.now_mb["standin_path"] == pytest.approx(30.0, abs=0.01)
+def test_what_a_fork_shares_at_first_is_not_its_own(house: House) -> None:
+    house.holds(72, 20.0, shared_mb=130.0, name="w1")
+    house.look(0.0)
+    # It has written to what it shared, and holds more.
+    house.holds(72, 120.0, shared_mb=50.0)
+    house.look(LOOK_EVERY_S)
+    assert house.watch.now_mb["w1"] == pytest.approx(40.0, abs=0.1)
+
+
+def test_where_it_is_not_told_what_is_shared_all_counts(house: House) -> None:
+    house.holds(72, 20.0, shared_mb=130.0, name="w1")
+    (house.proc / "72" / "smaps_rollup").unlink()
+    house.look(0.0)
+    assert house.watch.now_mb["w1"] == pytest.approx(150.0, abs=0.1)
+
+
+def test_of_a_real_fork_what_it_wrote_to_is_its_own() -> None:
+    script = """
+        import os, time
+        from foretwin.orchestrator.runner.memory import MemoryWatch
+        from foretwin.orchestrator.runner.warm_fork import forked
+        held = bytearray(os.urandom(50_000_000))
+        def child(written):
+            said, heard = os.pipe()[::-1]
+            def work():
+                for place in range(0, written, 4096):
+                    held[place] = 7
+                os.write(said, b"1")
+                time.sleep(600)
+            process = forked(work)
+            os.read(heard, 1)
+            watch = MemoryWatch()
+            watch.look({"w0": process.pid}, 0.0)
+            process.kill()
+            return watch.now_mb["w0"]
+        print(child(0) < 10.0, 20.0 <= child(20_000_000) < 30.0)
+    """
+    said = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], check=True, capture_output=True, text=True
+    )
+    assert said.stdout == "True True\n"
 
 
 def test_where_there_is_no_proc_nothing_is_known(tmp_path: Path) -> None:
     house = House(tmp_path)
     assert house.look(0.0) == []
-    assert house.watch.record()["orchestrator"]["at_end"] == 0.0
+    assert house.watch.record() == {}

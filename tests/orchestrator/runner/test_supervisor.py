@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace as Namespace
 
@@ -18,12 +17,9 @@ from foretwin.orchestrator.drive.processes import PROCESSES, ProcessRow, row_of
 from foretwin.orchestrator.runner import supervisor
 from foretwin.orchestrator.runner.supervisor import (
     MAX_RESTARTS,
-    FreshInterpreter,
     Supervisor,
     fold_stderr,
 )
-from tests.contracts.bus_sides import DEADLINE_S
-from tests.system.foretwin_command import REPOSITORY
 
 
 class FakeChild:
@@ -121,7 +117,7 @@ def test_who_keeps_dying_is_started_after_pauses_that_grow_and_then_given_up() -
         assert (len(children) == supervisor.restarted + 1) is True
         now_s += death.pause_s
         assert supervisor.poll(now_s) == []
-        assert supervisor.running() == ["recorder"]
+        assert list(supervisor.running()) == ["recorder"]
         pauses.append(death.pause_s)
     assert pauses == [0.0, 1.0, 2.0, 4.0, 8.0]
     assert supervisor.restarted == MAX_RESTARTS
@@ -129,7 +125,7 @@ def test_who_keeps_dying_is_started_after_pauses_that_grow_and_then_given_up() -
     (death,) = supervisor.poll(now_s)
     assert not death.restarted
     assert supervisor.poll(now_s + 100.0) == []
-    assert supervisor.running() == []
+    assert supervisor.running() == {}
 
 
 def test_who_cannot_be_started_now_is_started_later() -> None:
@@ -147,9 +143,9 @@ def test_who_cannot_be_started_now_is_started_later() -> None:
     (death,) = supervisor.poll(1.0)
     assert death.restarted
     assert supervisor.poll(1.5) == []
-    assert (supervisor.running(), supervisor.restarted) == ([], 0)
+    assert (supervisor.running(), supervisor.restarted) == ({}, 0)
     assert supervisor.poll(2.0) == []
-    assert (supervisor.running(), supervisor.restarted) == (["recorder"], 1)
+    assert (list(supervisor.running()), supervisor.restarted) == (["recorder"], 1)
 
 
 def test_a_death_long_ago_is_forgotten() -> None:
@@ -159,39 +155,6 @@ def test_a_death_long_ago_is_forgotten() -> None:
         children[-1].exit_code = -9
         (death,) = supervisor.poll(day * 86_400.0)
         assert (death.restarted, death.pause_s) == (True, 0.0)
-
-
-def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:
-    stubborn = tmp_path / "package" / "stubborn.py"
-    stubborn.parent.mkdir()
-    stubborn.write_text(
-        "import signal, sys, time\n"
-        "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
-        "from foretwin.contracts.process_setup import parent_pid\n"
-        "print(f'up, started by {parent_pid()}, then {parent_pid()}', flush=True)\n"
-        "time.sleep(600)\n"
-    )
-    launch = FreshInterpreter(tmp_path, package="package")
-    supervisor = Supervisor(launch)
-    path = os.pathsep.join((str(tmp_path), str(REPOSITORY)))
-    os.environ["PYTHONPATH"], before = path, os.environ.get("PYTHONPATH")
-    try:
-        supervisor.start(row("w")._replace(module="stubborn"), setup("w0"))
-    finally:
-        if before is None:
-            del os.environ["PYTHONPATH"]
-        else:
-            os.environ["PYTHONPATH"] = before
-    said = tmp_path / "w0.stderr"
-    deadline = time.monotonic() + DEADLINE_S
-    while "up" not in said.read_text() and time.monotonic() < deadline:
-        assert supervisor.running() == ["w0"]
-        time.sleep(0.01)
-    assert f"started by {os.getpid()}, then {os.getpid()}" in said.read_text()
-    pid = supervisor.pid("w0")
-    assert supervisor.stop(grace_s=0.0, term_s=0.2) == ["w0"]
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
 
 
 def test_what_a_process_said_last_lands_in_the_log(tmp_path: Path) -> None:

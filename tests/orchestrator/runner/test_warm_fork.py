@@ -70,6 +70,34 @@ def test_a_screen_that_is_a_file_on_a_full_disk_keeps_nobody_from_forking() -> N
     assert said == ["code 7"]
 
 
+def test_who_was_started_without_a_screen_forks() -> None:
+    said = run("""
+        import sys
+        before = sys.stdout
+        sys.stdout = sys.stderr = None
+        code = forked(lambda: 7).wait(60)
+        print(code, file=before)
+    """)
+    assert said == ["7"]
+
+
+def test_a_fork_whose_end_could_not_be_seen_is_ended() -> None:
+    said = run("""
+        def none_left(pid):
+            raise OSError(24, "Too many open files")
+        os.pidfd_open = none_left
+        try:
+            forked(lambda: signal.pause() or 0)
+        except OSError as error:
+            print(error)
+        try:
+            os.waitpid(-1, os.WNOHANG)
+        except ChildProcessError:
+            print("no child")
+    """)
+    assert said == ["[Errno 24] Too many open files", "no child"]
+
+
 def test_a_process_with_threads_is_not_forked() -> None:
     said = run("""
         print(trouble_with_forking())

@@ -13,7 +13,7 @@ from foretwin.contracts.runner import Task, answers
 from foretwin.contracts.setup import BusSetup, ProcessSetup, WorkerSetup
 from foretwin.contracts.simulation import PrepareRequest
 from foretwin.orchestrator.runner.dispatch import ATTEMPTS
-from foretwin.orchestrator.runner.supervisor import Child, FreshInterpreter
+from foretwin.orchestrator.runner.launch import Child, FreshInterpreter
 from foretwin.orchestrator.runner.worker_processes import NoWorkerError, WorkerProcesses
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
