@@ -60,6 +60,8 @@ class FrenetPath:
     are not finite.
     """
 
+    _is_eased = False
+
     def __init__(
         self, xy_m: Array, speed_limit_mps: Array | None = None, *, before_m: float = 20.0
     ) -> None:
@@ -125,7 +127,7 @@ class FrenetPath:
     def __reduce__(self) -> tuple[object, tuple[object, ...]]:
         """Travel to another process as what the path was made of."""
         xy_m, speed_limit_mps, before_m = self._given
-        if self.__dict__.get("eased") is self:
+        if self._is_eased:
             plain = FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
             return operator.attrgetter("eased"), (plain,)
         return functools.partial(FrenetPath, before_m=before_m), (xy_m, speed_limit_mps)
@@ -150,14 +152,19 @@ class FrenetPath:
         """
         return np.asarray(self.with_curve_speeds(lateral_accel_mps2, decel_mps2)[len(self._nodes)])
 
-    @functools.cached_property
+    @property
     def eased(self) -> FrenetPath:
         """The path as a vehicle drives it that does not turn at once where the line has a corner:
         each node is moved to the mean of those a car's length around it, and keeps its arc length.
         """
+        # None holds itself: what is done with then goes at once, however rarely garbage is sought.
+        return self if self._is_eased else self._eased
+
+    @functools.cached_property
+    def _eased(self) -> FrenetPath:
         xy_m, speed_limit_mps, before_m = self._given
         path = FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
-        path.__dict__["eased"] = path
+        path._is_eased = True
         path.__dict__["_pieces"] = node_table(*map(cut_corners, self._nodes[:2]))
         return path
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import gc
 import math
 import pickle
+import weakref
 
 import numpy as np
 import pytest
@@ -110,8 +112,21 @@ def test_an_eased_corner_is_cut_by_a_car_that_turns_on_the_way() -> None:
     assert corner.eased.eased is corner.eased
 
 
+def test_a_path_that_is_done_with_goes_without_a_search_for_garbage() -> None:
+    path = FrenetPath(np.array([[-40.0, 0.0], [0.0, 0.0], [0.0, 40.0]]))
+    plain, eased = weakref.ref(path), weakref.ref(path.eased.eased)
+    gc.disable()
+    try:
+        del path
+        assert plain() is None
+        assert eased() is None
+    finally:
+        gc.enable()
+
+
 def test_an_eased_path_travels_to_other_processes() -> None:
     again = pickle.loads(pickle.dumps(CIRCLE.eased))
+    assert again.eased is again
     assert again.node_poses == pytest.approx(CIRCLE.eased.node_poses)
     assert pickle.loads(pickle.dumps(CIRCLE)).node_poses == pytest.approx(CIRCLE.node_poses)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import msgspec
 import numpy as np
 import pytest
@@ -206,3 +208,17 @@ def test_metrics_that_a_job_names_come_back_for_every_future(stage: BatchSimulat
     assert metrics["ttc"][1] < 0.2
     with pytest.raises(ValueError, match="unknown metric fame"):
         run_job(msgspec.structs.replace(question, metrics=("fame",)), stage)
+
+
+def test_what_a_job_needed_is_gone_with_it(stage: BatchSimulation) -> None:
+    crossing = happening(1, "cccscp", planner="pure_pursuit_idm")
+    lead = happening(2, "lead_stopping", planner="constant_speed", **STANDING_LEAD)
+    question = job((faulty(0), crossing, lead))
+    run_job(question, stage)
+    gc.collect()
+    gc.disable()
+    try:
+        run_job(question, stage)
+        assert gc.collect() == 0, "what holds itself stays until garbage is sought"
+    finally:
+        gc.enable()
