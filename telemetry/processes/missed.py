@@ -21,9 +21,11 @@ class MissedSamples:
     """Tells of which channels something is missing for a while, a few times for each growth.
 
     A subscriber that finds a gap asks for it by itself, but once; where the sender's link is just
-    coming back, nobody answers.
+    coming back, or it stood still, nobody answers.
     """
 
+    first_s: float = FIRST_S
+    """How long to wait where something is missing for the first time."""
     _asked: dict[str, _Asked] = field(default_factory=dict)
 
     def due(self, missing: Mapping[str, int], now_s: float, *, at_once: bool = False) -> list[str]:
@@ -38,7 +40,8 @@ class MissedSamples:
                 self._asked.pop(channel, None)
                 continue
             if known is None or (count > known.missing and known.tries):
-                known = self._asked[channel] = _Asked(count, now_s + FIRST_S)
+                wait_s = self.first_s if known is None else FIRST_S
+                known = self._asked[channel] = _Asked(count, now_s + wait_s)
             known.missing = max(known.missing, count)
             if at_once or (known.tries < TRIES and now_s >= known.due_s):
                 known.tries += 1

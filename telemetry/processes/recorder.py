@@ -68,7 +68,9 @@ class RecorderProcess:
         self._messages = Mailbox(DEPTH, when_full="block" if lossless else "drop_oldest")
         # Apart, so that a flood of samples never drops an answer.
         self._answers = Mailbox(64)
-        self._missed = MissedSamples()
+        # Who follows another has asked for all as it began: what is missing yet will not come.
+        follows = bool(recording.tally.recorded)
+        self._missed = MissedSamples(first_s=0.0) if follows else MissedSamples()
         self._reported_lost = 0
         self._asked_s: float | None = None
         self._informed = False
