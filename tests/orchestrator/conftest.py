@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import pytest
 
-from foretwin.orchestrator.record.table_stream import TableStream
+from foretwin.orchestrator.record.results import ResultTables
 
 
 @pytest.fixture(autouse=True, scope="module")
-def streams_end_with_their_module() -> Iterator[None]:
-    """Close the results that tests leave open: `select` takes no file beyond the 1,024th."""
-    opened: dict[int, TableStream] = {}
-    begin, close = TableStream.__init__, TableStream.close
+def tables_end_with_their_module() -> Iterator[None]:
+    """End the results that tests leave open, some 25 files each and a thread that writes them:
+    `select` takes no file beyond the 1,024th."""
+    begun: list[ResultTables] = []
+    begin = ResultTables.__init__
 
-    def opening(stream: TableStream, *what: object, **how: object) -> None:
-        begin(stream, *what, **how)  # type: ignore[arg-type]
-        opened[id(stream)] = stream
-
-    def closing(stream: TableStream) -> None:
-        opened.pop(id(stream), None)
-        close(stream)
+    def beginning(tables: ResultTables, *what: object, **how: object) -> None:
+        begin(tables, *what, **how)  # type: ignore[arg-type]
+        begun.append(tables)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(TableStream, "__init__", opening)
-        patch.setattr(TableStream, "close", closing)
+        patch.setattr(ResultTables, "__init__", beginning)
         yield
-    for stream in opened.values():
-        os.close(stream._descriptor)
+    for tables in begun:
+        tables.leave()
