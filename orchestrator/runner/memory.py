@@ -10,7 +10,7 @@ import contextlib
 import math
 import os
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -96,25 +96,15 @@ class MemoryWatch:
     ) -> list[str]:
         """Look again, at most every few seconds; returns what is to be told.
 
-        `running` are the processes by name; `own` is this one.
+        `running` are the processes by name; `own` is this one. Each call takes in one that is new:
+        what it shares takes long to tell, and whose loop this is cannot stand still for all.
         """
-        if self._looked_s is not None and now_s - self._looked_s < LOOK_EVERY_S:
-            return []
-        self._looked_s = now_s
-        told = []
-        for name, pid in {own: os.getpid(), **running}.items():
-            held_mb = self._held_mb(pid)
-            if held_mb is None:
-                continue
-            one = self._watched.get(name)
-            if one is None or one.pid != pid:
-                most_mb = 0.0 if one is None else one.most_mb
-                one = _Watched(pid, now_s, max(held_mb - self._alone_mb(pid), 0.0), most_mb=most_mb)
-                self._watched[name] = one
-            now_mb = max(held_mb - one.shared_mb, 0.0)
-            if one.take(now_s, now_mb):
-                told.append(f"{name} holds {now_mb:.0f} MB of memory{_since(one)}")
-        return told
+        here = {own: os.getpid(), **running}
+        names = self._met(here, now_s)
+        if self._looked_s is None or now_s - self._looked_s >= LOOK_EVERY_S:
+            self._looked_s = now_s
+            names = [name for name, one in self._watched.items() if here.get(name) == one.pid]
+        return [text for name in names for text in self._told(name, now_s)]
 
     @property
     def now_mb(self) -> dict[str, float]:
@@ -132,6 +122,27 @@ class MemoryWatch:
             }
             for name, one in sorted(self._watched.items())
         }
+
+    def _met(self, here: Mapping[str, int], now_s: float) -> list[str]:
+        """Take in one process that is new, and return its name."""
+        for name, pid in here.items():
+            known = self._watched.get(name)
+            held_mb = None if known is not None and known.pid == pid else self._held_mb(pid)
+            if held_mb is not None:
+                shared_mb = max(held_mb - self._alone_mb(pid), 0.0)
+                most_mb = 0.0 if known is None else known.most_mb
+                self._watched[name] = _Watched(pid, now_s, shared_mb, most_mb=most_mb)
+                return [name]
+        return []
+
+    def _told(self, name: str, now_s: float) -> Iterator[str]:
+        one = self._watched[name]
+        held_mb = self._held_mb(one.pid)
+        if held_mb is None:
+            return
+        now_mb = max(held_mb - one.shared_mb, 0.0)
+        if one.take(now_s, now_mb):
+            yield f"{name} holds {now_mb:.0f} MB of memory{_since(one)}"
 
     def _held_mb(self, pid: int) -> float | None:
         """Return what a process holds in memory that lies in no file."""

@@ -43,7 +43,9 @@ class House:
             self.running[name] = pid
 
     def look(self, now_s: float) -> list[str]:
-        return self.watch.look(self.running, now_s)
+        """Look until all are known: each look takes in one."""
+        looks = (self.watch.look(self.running, now_s) for _ in range(len(self.running) + 1))
+        return [text for look in looks for text in look]
 
 
 @pytest.fixture
@@ -125,6 +127,25 @@ def test_who_has_ended_keeps_what_was_known_and_is_not_told_of(house: House) -> 
     assert house.watch.record()["w0"]["most"] == pytest.approx(MOST_MB - 1.0, abs=0.1)
 
 
+def test_each_look_asks_one_process_what_it_shares(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+    alone_mb = MemoryWatch._alone_mb
+
+    def counted(watch: MemoryWatch, pid: int) -> float:
+        asked.append(pid)
+        return alone_mb(watch, pid)
+
+    monkeypatch.setattr(MemoryWatch, "_alone_mb", counted)
+    house.holds(72, 20.0, name="w1")
+    house.running["gone"] = 99
+    for count in (1, 2, 3, 3):
+        house.watch.look(house.running, 0.1 * count)
+        assert len(asked) == count
+    assert house.watch.now_mb.keys() == {"orchestrator", "w0", "w1"}
+
+
 def test_what_a_fork_shares_at_first_is_not_its_own(house: House) -> None:
     house.holds(72, 20.0, shared_mb=130.0, name="w1")
     house.look(0.0)
@@ -157,7 +178,8 @@ def test_of_a_real_fork_what_it_wrote_to_is_its_own() -> None:
             process = forked(work)
             os.read(heard, 1)
             watch = MemoryWatch()
-            watch.look({"w0": process.pid}, 0.0)
+            for _ in range(2):  # itself, and then the other
+                watch.look({"w0": process.pid}, 0.0)
             process.kill()
             return watch.now_mb["w0"]
         print(child(0) < 10.0, 20.0 <= child(20_000_000) < 30.0)
