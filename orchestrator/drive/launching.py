@@ -9,7 +9,7 @@ from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.runner.fork_launch import Forks
 from foretwin.orchestrator.runner.launch import FreshInterpreter, Launcher
 
-_IMPORTED_HERE = {
+IMPORTED_HERE = {
     "orchestrator.worlds.builder_process": ("orchestrator.worlds.builder_process",),
     "sim_worker": ("sim_worker.worker", "sim_worker.mirror.process"),
     "sim_worker.analysis.process": ("sim_worker.analysis.process",),
@@ -36,5 +36,5 @@ def launcher(plan: DrivePlan) -> Launcher:
     return Forks(
         plan.processes_dir,
         fresh={row.module for row in PROCESSES if row.name == ROUTER},
-        imported=[name for module in modules for name in _IMPORTED_HERE.get(module, ())],
+        imported=[name for module in modules for name in IMPORTED_HERE.get(module, ())],
     )

@@ -18,6 +18,7 @@ import traceback
 from collections.abc import Collection
 from pathlib import Path
 
+from foretwin.contracts.end_signals import END_SIGNALS
 from foretwin.contracts.process_name import name_process
 from foretwin.contracts.process_setup import STARTED_BY, ProcessSetup, write_setup
 from foretwin.contracts.terminal import say
@@ -26,7 +27,7 @@ from foretwin.orchestrator.runner.warm_fork import forked, trouble_with_forking
 
 log = logging.getLogger("orchestrator")
 
-END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_ENDING = (signal.SIGINT, *END_SIGNALS)
 
 
 class Forks:
@@ -67,7 +68,7 @@ class Forks:
         write_setup(setup, file)
         stderr = os.open(file.with_suffix(".stderr"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
         # What ends a fork waits until it has handlers of its own, not its supervisor's.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
         try:
             name = f"{self._package}.{module}"
             return forked(functools.partial(_be_process, name, file, stderr, os.getpid()))
@@ -88,7 +89,7 @@ def _be_process(module: str, setup_file: Path, stderr: int, supervisor_pid: int)
     os.setsid()
     name_process(setup_file.stem)
     forget_signals()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, END_SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     keep_only(stderr)
     os.environ |= ONE_THREAD | {STARTED_BY: f"{supervisor_pid}"}
     leave_out_working_directory()
@@ -97,7 +98,7 @@ def _be_process(module: str, setup_file: Path, stderr: int, supervisor_pid: int)
 
 def forget_signals() -> None:
     """Take signals as one that has just begun does; what is ignored, as by nohup, stays ignored."""
-    for number in END_SIGNALS:
+    for number in _ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
             anew = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
             signal.signal(number, anew)

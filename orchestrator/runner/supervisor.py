@@ -192,10 +192,6 @@ class Supervisor:
         """Return the table's row of a process."""
         return self._managed[process_id].row
 
-    def pid(self, process_id: str) -> int:
-        """Return the operating system's id of a process."""
-        return self._managed[process_id].child.pid
-
     def stop(
         self, *, grace_s: float, term_s: float = TERM_S, but: Collection[str] = ()
     ) -> list[str]:

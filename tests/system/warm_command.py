@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import itertools
 import json
 import os
 import select
@@ -21,24 +22,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from foretwin.orchestrator.drive.launching import IMPORTED_HERE
 from foretwin.orchestrator.runner.fork_launch import forget_signals, keep_only, run_module
 from foretwin.orchestrator.runner.warm_fork import ForkedProcess, forked
 
 REPOSITORY = Path(__file__).parents[2]
 NUMBER_BYTES = 16
-IMPORTED = (
-    "contracts.bus",
-    "orchestrator.commands.cli",
-    "orchestrator.drive.drive",
-    "orchestrator.worlds.builder_process",
-    "sim_worker.analysis.process",
-    "sim_worker.mirror.process",
-    "sim_worker.worker",
-    "telemetry.processes.recorder",
-    "telemetry.processes.replay",
-    "telemetry.standin.__main__",
-)
-"""Not the viewer's Rerun, which starts threads as it is imported."""
 
 
 class WarmCommand:
@@ -116,7 +105,9 @@ def _be_command(asked: dict[str, Any], out: int) -> int:
 
 def _serve(line: socket.socket) -> None:
     """Fork a command whenever one is asked for, and tell process and exit code of each."""
-    for name in IMPORTED:
+    for name in ("contracts.bus", "orchestrator.commands.cli", "orchestrator.drive.drive"):
+        import_module(f"foretwin.{name}")
+    for name in itertools.chain.from_iterable(IMPORTED_HERE.values()):
         import_module(f"foretwin.{name}")
     running: dict[int, tuple[ForkedProcess, int]] = {}
     while True:

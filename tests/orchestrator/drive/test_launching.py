@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.orchestrator.drive.launching import _IMPORTED_HERE, launcher
+from foretwin.orchestrator.drive.launching import IMPORTED_HERE, launcher
 from foretwin.orchestrator.drive.processes import PROCESSES
 from foretwin.orchestrator.runner.fork_launch import Forks
 from foretwin.orchestrator.runner.launch import FreshInterpreter
@@ -21,12 +21,12 @@ STARTS_THREADS = {"viewer", "viewer.copilot", "telemetry.ros2"}
 
 
 def test_each_process_has_what_it_imports_imported_or_must_not() -> None:
-    others = {row.module for row in PROCESSES} - _IMPORTED_HERE.keys()
+    others = {row.module for row in PROCESSES} - IMPORTED_HERE.keys()
     assert others == STARTS_THREADS | {"contracts.router"}
 
 
 def test_all_that_is_imported_for_forks_starts_no_thread() -> None:
-    names = sorted({name for names in _IMPORTED_HERE.values() for name in names})
+    names = sorted({name for names in IMPORTED_HERE.values() for name in names})
     script = (
         "import sys\n"
         "from importlib import import_module\n"

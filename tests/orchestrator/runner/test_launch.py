@@ -42,7 +42,7 @@ def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:
         assert list(supervisor.running()) == ["w0"]
         time.sleep(0.01)
     assert f"started by {os.getpid()}, then {os.getpid()}" in said.read_text()
-    pid = supervisor.pid("w0")
+    pid = supervisor.running()["w0"]
     assert supervisor.stop(grace_s=0.0, term_s=0.2) == ["w0"]
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
