@@ -172,20 +172,39 @@ class PlayAgain(Exception):  # noqa: N818
 
 
 def rows_of(view: PlannerView, rows: Indices) -> PlannerView:
-    """Return what a planner sees that drives only some of the cars."""
-    users = view.users
-    if users is not None:
-        users = SeenUsers._make(field[rows] for field in users)
-    of_some = {
-        name: values[rows] for name in _BY_CAR if (values := getattr(view, name)) is not None
-    }
-    if view.heading is not None:
-        of_some["heading"] = view.heading[:, rows]
-    return view._replace(users=users, **of_some)
+    """Return what a planner sees at one tick that drives only some of the cars."""
+    return ViewOfSome(rows).of(view)
+
+
+class ViewOfSome:
+    """What a planner sees that drives only some of the cars, tick by tick."""
+
+    def __init__(self, rows: Indices) -> None:
+        self._rows = rows
+        self._steady: dict[str, tuple[Array, Array]] = {}
+
+    def of(self, view: PlannerView) -> PlannerView:
+        """Return it of what there is to be seen at a tick."""
+        rows, users = self._rows, view.users
+        if users is not None:
+            users = SeenUsers._make(field[rows] for field in users)
+        of_some = {
+            name: values[rows] for name in _BY_CAR if (values := getattr(view, name)) is not None
+        }
+        for name in _STEADY:
+            whole = getattr(view, name)
+            known = self._steady.get(name)
+            if known is None or known[0] is not whole:
+                known = self._steady[name] = whole, whole[rows]
+            of_some[name] = known[1]
+        if view.heading is not None:
+            of_some["heading"] = view.heading[:, rows]
+        return view._replace(users=users, **of_some)
 
 
 _BY_CAR = (
-    *("states", "arc_m", "offset_m", "desired_offset_m", "target_speed_mps", "speed_factor"),
-    *("lead_gap_m", "lead_speed_mps", "stop_arc_m", "climb_mps2"),
+    *("states", "arc_m", "offset_m", "lead_gap_m", "lead_speed_mps", "stop_arc_m", "climb_mps2"),
     "target_accel_mps2",
 )
+_STEADY = "desired_offset_m", "target_speed_mps", "speed_factor"
+"""Mostly the same arrays at each tick, written once: planners tell by that what has not changed."""

@@ -21,7 +21,7 @@ from foretwin.sim_worker.planner_interface import (
     PlayAgain,
     RemembersWithinJob,
     TakesBriefing,
-    rows_of,
+    ViewOfSome,
 )
 from foretwin.sim_worker.planners.registry import load_planner
 
@@ -118,21 +118,21 @@ class _Planners:
         self.failed: Flags = np.zeros(len(names), dtype=bool)
         self.any_failed = False
         self.reasons = [""] * len(names)
-        self._groups: list[tuple[str, Planner, Indices]] = []
+        self._groups: list[tuple[str, Planner, Indices, ViewOfSome]] = []
         for kind in sorted(set(names)):
             rows = np.flatnonzero([name == kind for name in names])
             planner = _begun(kind, rows, stacks, brief)
-            self._groups.append((kind, planner, rows))
+            self._groups.append((kind, planner, rows, ViewOfSome(rows)))
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         if len(self._groups) == 1:
-            name, planner, rows = self._groups[0]
+            name, planner, rows, _ = self._groups[0]
             return self._ask(name, planner, rows, view)
         accel, angle = np.zeros(len(view.arc_m)), np.zeros(len(view.arc_m))
         alone = view._replace(users=None)
-        for name, planner, rows in self._groups:
+        for name, planner, rows, some in self._groups:
             shown = view if getattr(planner, "looks_at_users", True) else alone
-            accel[rows], angle[rows] = self._ask(name, planner, rows, rows_of(shown, rows))
+            accel[rows], angle[rows] = self._ask(name, planner, rows, some.of(shown))
         return PlannerOutput(accel, angle)
 
     def _ask(self, name: str, planner: Planner, rows: Indices, view: PlannerView) -> PlannerOutput:
@@ -163,7 +163,7 @@ class _Planners:
     def remarks(self) -> list[str]:
         """Return what planners have to say of the cars that they did drive, empty for most."""
         found = [""] * len(self.reasons)
-        for _, planner, rows in self._groups:
+        for _, planner, rows, _ in self._groups:
             for place, said in getattr(planner, "remarks", {}).items():
                 if not self.failed[rows[place]]:
                     found[rows[place]] = said
@@ -173,7 +173,7 @@ class _Planners:
         """Return the places of those whose planner's process hung or died."""
         found = [
             int(rows[place])
-            for _, planner, rows in self._groups
+            for _, planner, rows, _ in self._groups
             for place in getattr(planner, "lost", ())
         ]
         return tuple(sorted(found))

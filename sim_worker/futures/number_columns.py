@@ -44,7 +44,9 @@ class NumberColumns:
 
     def applied(self, quantity: Quantity, base: Array | float) -> Array:
         """Return what becomes of a quantity (S,), or one for all, by what acts on it."""
-        value = np.broadcast_to(base, self.count)
+        value = np.asarray(base)
+        if not value.ndim:
+            value = np.broadcast_to(value, self.count)
         for multiplies, column in self._rows.get(quantity, ()):
             value = value * column if multiplies else value + column
         return value

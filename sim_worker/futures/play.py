@@ -142,7 +142,7 @@ class Play:
             share = scene.path.at_nodes(scene.limit_share, place.arc_m)
             target, rising = target * share, None if rising is None else rising * share
         if self._red.shape[-1]:
-            lines = np.broadcast_to(self._red[..., 0, :], (len(now), self._red.shape[-1]))
+            lines = self._red[..., 0, :]
             passed = lines < (place.arc_m + self.front_m)[:, None]
             stop = np.where(passed, np.inf, lines).min(axis=1)
         believed = scene.numbers.believed(now, place)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.compiled import IN, IN_ROWS, OUT, REAL, TABLE, WHOLE, given, kernel, types
 
 FIELDS = 6
@@ -127,6 +127,45 @@ def nearest_in_way(
             if aside < beside and -length < gap < nearest:
                 nearest, speed = gap, speed_mps[car, other] * cos[car, other]
         gap_m[car], lead_mps[car] = nearest, speed
+
+
+@kernel(types.void, _ROWS, _ROWS, _ROWS, given(3), IN, IN, given(3), IN_ROWS, types.boolean[:, :])
+def hide_behind(
+    futures: Indices,
+    hidden: Indices,
+    hiders: Indices,
+    poses: Array,
+    cos: Array,
+    sin: Array,
+    size_m: Array,
+    eyes_xy_m: Array,
+    unseen: Flags,
+) -> None:
+    """Mark in `unseen` (S, R) those of H hidden ones to whom the line from the eyes (S, 2) meets
+    what hides them; `cos` and `sin` (H,) are of how that is turned, sizes (S, R, 2)."""
+    for h in range(len(futures)):
+        s, r, by = futures[h], hidden[h], hiders[h]
+        x, y = poses[s, by, 0], poses[s, by, 1]
+        dx, dy = eyes_xy_m[s, 0] - x, eyes_xy_m[s, 1] - y
+        to_x, to_y = poses[s, r, 0] - x, poses[s, r, 1] - y
+        low, high = -math.inf, math.inf
+        for axis in range(2):
+            if axis == 0:
+                start, end = cos[h] * dx + sin[h] * dy, cos[h] * to_x + sin[h] * to_y
+            else:
+                start, end = cos[h] * dy - sin[h] * dx, cos[h] * to_y - sin[h] * to_x
+            half, way = 0.5 * size_m[s, by, axis], end - start
+            near, far = (-half - start) / way, (half - start) / way
+            # Of 0 / 0, where the line runs along a side, the other bound counts.
+            if math.isnan(near):
+                near = far
+            if math.isnan(far):
+                far = near
+            if math.isnan(near):  # whoever is not there hides nobody
+                low, high = math.inf, -math.inf
+            low, high = max(low, min(near, far)), min(high, max(near, far))
+        if low <= high and high >= 0.0 and low <= 1.0:
+            unseen[s, r] = True
 
 
 @kernel(types.void, _ROWS, IN, TABLE, TABLE, REAL[:, ::1])

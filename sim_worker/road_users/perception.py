@@ -11,7 +11,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
-from foretwin.sim_worker.road_users.compiled import nearest_in_way
+from foretwin.sim_worker.road_users.compiled import hide_behind, nearest_in_way
 from foretwin.sim_worker.road_users.path_table import PathPlace, PathProjection
 from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid, hidden
 from foretwin.sim_worker.road_users.traffic import Traffic
@@ -63,9 +63,10 @@ class Sight:
         self._size = np.stack([crowd.length_m, crowd.width_m], axis=-1)
         self._late = np.round(faults.delay_s / tick_s).astype(np.intp)
         self._faults, self._tick_s = faults, tick_s
-        self._hidden = np.nonzero((crowd.hidden_by >= 0) & crowd.present)
-        self._hides = crowd.hidden_by[self._hidden]
-        self._by_actors = len(self._hides) > 0
+        rows, them = np.nonzero((crowd.hidden_by >= 0) & crowd.present)
+        self._hidden = rows, them, crowd.hidden_by[rows, them].astype(np.intp)
+        """Futures, who is hidden in them and by whom, each (H,)."""
+        self._by_actors = len(rows) > 0
         self._unknown = crowd.present & ~crowd.known
         self._strangers = np.flatnonzero(self._unknown.any(axis=0))
         self._walls = walls if len(self._strangers) else None
@@ -119,7 +120,7 @@ class Sight:
             offset = offset + self._beside_m * np.cos(turned)
         unseen = self._unseen(tick, poses, eyes_xy_m)
         if unseen is not None:
-            on_arc = np.where(unseen, np.nan, on_arc)
+            np.copyto(on_arc, np.nan, where=unseen)
             poses = np.where(unseen[..., None], np.nan, poses)
         return SeenUsers(poses, speed, self._size, on_arc, offset, self._crowd.walks, turned)
 
@@ -131,38 +132,24 @@ class Sight:
         if self._ever_lost:
             unseen |= self._lost(np.asarray(tick) * self._tick_s)[:, None]
         if self._by_actors:
-            unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
+            rows, them, by = self._hidden
+            yaw = poses[rows, by, 2]
+            cos, sin = np.cos(yaw), np.sin(yaw)
+            hide_behind(rows, them, by, poses, cos, sin, self._size, eyes_xy_m, unseen)
         if self._walls is not None:
             due = not isinstance(tick, int) or tick % self._walls_every == 0
             if due or self._behind_walls is None:
                 these = slice(None), self._strangers
                 length_m = self._crowd.length_m[these]
                 found = hidden(self._walls, eyes_xy_m, poses[these], length_m)
-                self._behind_walls = found & self._unknown[these]
-            unseen[:, self._strangers] |= self._behind_walls
+                self._behind_walls = np.zeros_like(unseen)
+                self._behind_walls[these] = found & self._unknown[these]
+            unseen |= self._behind_walls
         return unseen
 
     def _lost(self, time_s: float | Array) -> Flags:
         since = time_s - self._faults.lost_from_s
         return np.asarray((since >= 0.0) & (since < self._faults.lost_for_s))
-
-    def _behind(self, poses: Array, eyes_xy_m: Array) -> Flags:
-        """(H,) bool: whether the line from the eyes to a hidden one meets what hides it."""
-        s, r = self._hidden
-        hider = poses[s, self._hides]
-        cos, sin = np.cos(hider[:, 2]), np.sin(hider[:, 2])
-        half = 0.5 * self._size[s, self._hides]
-
-        def from_hider(xy: Array) -> Array:
-            dx, dy = xy[:, 0] - hider[:, 0], xy[:, 1] - hider[:, 1]
-            return np.column_stack([cos * dx + sin * dy, cos * dy - sin * dx])
-
-        start = from_hider(eyes_xy_m[s])
-        way = from_hider(poses[s, r, :2]) - start
-        with np.errstate(divide="ignore", invalid="ignore"):
-            near, far = (-half - start) / way, (half - start) / way
-        low, high = np.fmin(near, far).max(axis=1), np.fmax(near, far).min(axis=1)
-        return np.asarray((low <= high) & (high >= 0.0) & (low <= 1.0))
 
     def lead(self, seen: SeenUsers, place: FrenetPoint) -> Lead:
         """Return who is in the way of base_link at `place` (S,) on the ego's path."""

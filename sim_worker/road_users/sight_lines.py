@@ -11,7 +11,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.world import World
-from foretwin.geometry.compiled import TABLE, kernel, types
+from foretwin.geometry.compiled import IN_ROWS, LINE, given, kernel, types
 from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.polygon_areas import polygons_from
 
@@ -68,46 +68,45 @@ def hidden(grid: OpaqueGrid, eyes_xy_m: Array, poses: Array, length_m: Array) ->
     """
     found = np.zeros(poses.shape[:2])
     half = np.maximum(0.5 * length_m - _ENDS_WITHIN_M, 0.0)
-    along = half[..., None] * np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], axis=-1)
+    yaw = poses[..., 2]
     _hidden(
         grid.cells,
-        np.array([grid.west_m, grid.south_m, grid.cell_m])[None],
-        np.ascontiguousarray(eyes_xy_m, dtype=np.float64),
-        np.ascontiguousarray(poses[..., 0]),
-        np.ascontiguousarray(poses[..., 1]),
-        np.ascontiguousarray(along[..., 0]),
-        np.ascontiguousarray(along[..., 1]),
+        np.array([grid.west_m, grid.south_m, grid.cell_m]),
+        eyes_xy_m,
+        poses,
+        half * np.cos(yaw),
+        half * np.sin(yaw),
         found,
     )
     return found > 0.0
 
 
-@kernel(types.void, _CELLS, TABLE, TABLE, TABLE, TABLE, TABLE, TABLE, types.float64[:, :])
+@kernel(types.void, _CELLS, LINE, IN_ROWS, given(3), IN_ROWS, IN_ROWS, types.float64[:, :])
 def _hidden(
     cells: Cells,
     grid: Array,
     eyes: Array,
-    x: Array,
-    y: Array,
+    poses: Array,
     along_x: Array,
     along_y: Array,
     found: Array,
 ) -> None:
     """Fill `found` (S, R) with 1 where all of middle, front and rear lie behind a wall."""
     rows, columns = cells.shape
-    west, south, cell = grid[0, 0], grid[0, 1], grid[0, 2]
-    for s in range(x.shape[0]):
+    west, south, cell = grid[0], grid[1], grid[2]
+    for s in range(poses.shape[0]):
         from_x, from_y = (eyes[s, 0] - west) / cell, (eyes[s, 1] - south) / cell
-        for r in range(x.shape[1]):
-            if not math.isfinite(x[s, r] + y[s, r] + from_x + from_y):
+        for r in range(poses.shape[1]):
+            x, y = poses[s, r, 0], poses[s, r, 1]
+            if not math.isfinite(x + y + from_x + from_y):
                 continue
             seen = False
             for end in range(3):
                 if end > 0 and along_x[s, r] == 0.0 and along_y[s, r] == 0.0:
                     break
                 share = 0.0 if end == 0 else (1.0 if end == 1 else -1.0)
-                way_x = (x[s, r] + share * along_x[s, r] - west) / cell - from_x
-                way_y = (y[s, r] + share * along_y[s, r] - south) / cell - from_y
+                way_x = (x + share * along_x[s, r] - west) / cell - from_x
+                way_y = (y + share * along_y[s, r] - south) / cell - from_y
                 steps = int(2.0 * math.sqrt(way_x * way_x + way_y * way_y)) + 1
                 outside, in_wall, blocked = False, False, False
                 for k in range(steps + 1):

@@ -90,7 +90,8 @@ def test_all_is_compiled_once_it_is_imported_and_nothing_later() -> None:
         "locate", "curve", "free_road", "forces", "ramp", "read_base", "all_sane", "cheapest_walks",
         "least_until_touch", "find_leaders", "stays_on_strips", "come_near", "least_m", "may_touch",
         "find_overlaps", "least_worst_case", "until_turning_touch", "_apart", "_arc",
-        "_relative_at", "find_ahead", "take_nearest", "nearest_in_way", "interpolate",
+        "_relative_at", "find_ahead", "take_nearest", "nearest_in_way", "hide_behind",
+        "interpolate",
     }  # fmt: skip
     assert {name: len(found) for name, found in signatures().items()} == dict.fromkeys(KERNELS, 1)
     with pytest.raises(TypeError, match="No matching definition"):

@@ -6,11 +6,15 @@ import math
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.road_users.compiled import (
     FIELDS,
     find_ahead,
+    hide_behind,
     interpolate,
     nearest_in_way,
     take_nearest,
@@ -130,3 +134,43 @@ def test_places_between_nodes_and_beyond_their_ends() -> None:
     assert found == pytest.approx(
         np.array([[-2.0, -1.0, -0.1], [1.25, 0.75, 0.25], [4.0, 3.5, 0.8]])
     )
+
+
+VAN_M = 6.0, 2.0
+ANYWHERE = st.tuples(st.floats(-15.0, 15.0), st.floats(-15.0, 15.0))
+
+
+def hidden_by_van(eyes: tuple[float, float], walker: tuple[float, float], van: Array) -> bool:
+    """Ask it of one future, in which a van (3,) stands before a walker, and of another beside."""
+    poses = np.full((2, 2, 3), np.nan)
+    poses[1] = van, (*walker, 0.0)
+    pairs = np.array([0, 1]), np.array([1, 1]), np.array([0, 0])
+    yaw = poses[pairs[0], pairs[2], 2]
+    unseen = np.zeros((2, 2), dtype=bool)
+    size = np.broadcast_to([VAN_M, (0.5, 0.5)], (2, 2, 2))
+    hide_behind(*pairs, poses, np.cos(yaw), np.sin(yaw), size, np.array([eyes, eyes]), unseen)
+    assert not unseen[0].any(), "who is not there hides nobody"
+    assert not unseen[1, 0]
+    return bool(unseen[1, 1])
+
+
+@given(eyes=ANYWHERE, walker=ANYWHERE, yaw_rad=st.floats(-4.0, 4.0))
+def test_a_van_hides_whoever_a_line_of_sight_reaches_only_through_it(
+    eyes: tuple[float, float], walker: tuple[float, float], yaw_rad: float
+) -> None:
+    half, aside = VAN_M[0] / 2.0, VAN_M[1] / 2.0
+    box = shapely.affinity.rotate(
+        shapely.box(-half, -aside, half, aside), yaw_rad, (0.0, 0.0), use_radians=True
+    )
+    line = shapely.LineString([eyes, walker])
+    # What only just meets a corner may go either way.
+    assume(line.intersects(box.buffer(-1e-6)) == line.intersects(box.buffer(1e-6)))
+    assert hidden_by_van(eyes, walker, np.array([0.0, 0.0, yaw_rad])) == line.intersects(box)
+
+
+@pytest.mark.parametrize(("aside_m", "hidden"), [(0.99, True), (1.01, False)])
+def test_a_line_that_runs_along_a_side_is_told_by_which_side_of_it(
+    aside_m: float, hidden: bool
+) -> None:
+    eyes, walker = (-20.0, aside_m), (20.0, aside_m)
+    assert hidden_by_van(eyes, walker, np.zeros(3)) == hidden
