@@ -47,9 +47,9 @@ class LiveLoop:
 
     A round falls due `rate_hz` times a wall second where the mission wants rounds. It starts with
     the newest state as soon as one comes from then on, so that a slow GNSS does not make results
-    older than need be, and at the latest half a period later. A round that is not complete when
-    the next one should start has passed its deadline: it is let finish, is late, and the next one
-    is missed.
+    older than need be, and at the latest half a period later. So long it waits for the round
+    before, too, which may have begun late itself: what is not complete then is let finish, and the
+    one that waited is missed.
     `pace` then makes the rounds after it smaller or rarer, so that a slow machine gives less, not
     late. What fell due while nothing of this ran (the machine slept, we were behind) is missed.
     """
@@ -116,7 +116,7 @@ class LiveLoop:
             missed_end.look(conductor.intake, now_s)
             ended = conductor.intake.end is not None and not self._telemetry_waits()
             # Of a portion the newest state counts.
-            begins = self._is_fresh and not self._telemetry_waits()
+            begins = self._is_fresh and not self._telemetry_waits() and not conductor.rounds.open
             if due and not ended and (begins or now_s >= self._at_the_latest_s):
                 # Where the machine is too slow, one round follows the other without a turn between.
                 conductor.make_changes()

@@ -55,11 +55,20 @@ def test_a_round_waits_for_a_fresh_state_but_not_for_long(driven: Any) -> None:
         assert 0.5 * number - 1e-3 <= started_s <= 0.5 * number + 0.251
 
 
-def test_a_late_round_counts_as_missed_and_the_next_is_left_out(driven: Any) -> None:
-    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
-    assert (len(conductor.started_s), conductor.tally.missed) == (10, 10)
-    assert conductor.started_s[:3] == pytest.approx([0.0, 1.0, 2.0], abs=0.03)
+def test_a_round_waits_half_a_period_for_the_one_before_and_is_missed_then(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 12.0), end_s=12.0, round_s=0.7)
+    assert conductor.started_s[:5] == pytest.approx([0.0, 0.7, 1.5, 2.2, 3.0], abs=0.03)
+    assert (len(conductor.started_s), conductor.tally.missed) == (16, 8)
     assert conductor.dropped_s == []
+
+
+def test_rounds_that_begin_with_a_slow_receiver_have_their_whole_period(driven: Any) -> None:
+    # Of fixes five times a second, every other round begins .1 s after it was due.
+    conductor = driven(states_s=every(0.2, 10.0), end_s=10.0, round_s=0.45, received=True)
+    assert conductor.tally.missed == 0
+    starts_s = np.array(conductor.started_s)
+    assert np.diff(starts_s).min() >= 0.45
+    assert (starts_s - conductor.seeds_s).max() < 0.1, "the newest state is the seed"
 
 
 def test_a_round_that_never_ends_is_given_up(driven: Any) -> None:
