@@ -23,6 +23,7 @@ from foretwin.world_gen.connections.connection_paths import draw_paths
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft, connect
 from foretwin.world_gen.connections.movements import movements
 from foretwin.world_gen.extent import Disc, Rectangle
+from foretwin.world_gen.garbage import rarely_collected
 from foretwin.world_gen.ground.crossings import crossings
 from foretwin.world_gen.ground.surroundings import Ground, ground_around
 from foretwin.world_gen.junctions.find_intersections import find_intersections
@@ -43,6 +44,7 @@ GENERATOR_VERSION = 28
 DEFAULT_RADIUS_M = 150.0
 
 
+@rarely_collected()
 def build_world(
     osm: OsmMap,
     graph: RoadGraph,
@@ -68,6 +70,7 @@ def build_world(
     return _world(index, *corrected, junction.summary, ground=ground)
 
 
+@rarely_collected()
 def build_region(
     osm: OsmMap,
     graph: RoadGraph,

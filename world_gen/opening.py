@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.world_gen.garbage import rarely_collected
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.map_store import MapStore, route_boxes
@@ -25,8 +26,6 @@ LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
 CLIP_MARGIN_M = 600.0
 """Beyond what is asked for: junctions at the edge must be whole, and know their neighbours."""
-_COLLECT_AFTER = 200_000
-"""Maps and Worlds are a million objects that stay: the collector need not look after every 700."""
 MAX_REGION_M = 50_000.0
 """A plane of this size is true to 8 parts in a million at its edges."""
 
@@ -61,6 +60,7 @@ class NodeClip(msgspec.Struct, frozen=True):
     margin_m: float
 
 
+@rarely_collected()
 def open_map(
     file: Path,
     *,
@@ -74,7 +74,6 @@ def open_map(
     With `service_roads`, driveways and parking aisles open to cars are roads like any other.
     Raises MapError where the file is no map or has no roads there.
     """
-    gc.set_threshold(_COLLECT_AFTER)
     if clip is not None and file.is_file() and file.stat().st_size >= large_bytes:
         osm = _clipped(file, clip, open_index)
     else:

@@ -21,9 +21,6 @@ from pathlib import Path
 
 log = logging.getLogger("orchestrator")
 
-_COLLECTED_AT = gc.get_threshold()
-"""How often the interpreter looks for garbage of its own accord. Who opens a map lets it look
-rarely, for what was read stays; in a fork, what is done with would stay as well."""
 _PUT_THEMSELVES_RIGHT = frozenset({"jemalloc_bg_thd"})
 
 
@@ -96,7 +93,6 @@ def forked(work: Callable[[], int]) -> ForkedProcess:
             os.waitpid(pid, 0)
             raise
     code = 1
-    gc.set_threshold(*_COLLECTED_AT)
     try:
         code = work()
     except BaseException:

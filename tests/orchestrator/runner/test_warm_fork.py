@@ -70,19 +70,6 @@ def test_a_screen_that_is_a_file_on_a_full_disk_keeps_nobody_from_forking() -> N
     assert said == ["code 7"]
 
 
-def test_a_fork_of_who_has_opened_a_map_looks_for_garbage_as_any_process_does() -> None:
-    said = run("""
-        import gc
-        from foretwin.orchestrator.embedded import MAP_FILE
-        from foretwin.world_gen.opening import open_map
-        usual = gc.get_threshold()
-        open_map(MAP_FILE)
-        print(gc.get_threshold() == usual)
-        print(forked(lambda: int(gc.get_threshold() == usual)).wait(60))
-    """)
-    assert said == ["False", "1"]
-
-
 def test_who_was_started_without_a_screen_forks() -> None:
     said = run("""
         import sys
