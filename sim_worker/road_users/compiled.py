@@ -156,14 +156,11 @@ def hide_behind(
                 start, end = cos[h] * dy - sin[h] * dx, cos[h] * to_y - sin[h] * to_x
             half, way = 0.5 * size_m[s, by, axis], end - start
             near, far = (-half - start) / way, (half - start) / way
-            # Of 0 / 0, where the line runs along a side, the other bound counts.
-            if math.isnan(near):
-                near = far
-            if math.isnan(far):
-                far = near
-            if math.isnan(near):  # whoever is not there hides nobody
+            if math.isnan(near) or math.isnan(far):
+                # A line that runs along a side, 0 / 0, is not stopped, nor is one of who is away.
                 low, high = math.inf, -math.inf
-            low, high = max(low, min(near, far)), min(high, max(near, far))
+            else:
+                low, high = max(low, min(near, far)), min(high, max(near, far))
         if low <= high and high >= 0.0 and low <= 1.0:
             unseen[s, r] = True
 

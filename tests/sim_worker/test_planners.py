@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import Future
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
-from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView, ViewOfSome
 from foretwin.sim_worker.planners import registry
 from foretwin.sim_worker.planners.built_in import BUILT_IN
 from foretwin.sim_worker.planners.registry import load_planner, planner_names
@@ -168,3 +169,19 @@ def test_a_car_across_its_path_with_wheels_turned_rejoins_it_without_a_loop(
                 assert np.abs(states[:, 3] * states[:, 5]).max() < 2.5
                 assert states[-1, 1] == pytest.approx(-1.5, abs=0.1)
                 assert states[-1, 2] == pytest.approx(0.0, abs=0.03)
+
+
+def test_who_drives_some_cars_is_shown_these_at_each_tick() -> None:
+    path, each = FrenetPath(turning_path().xy_m), np.array([1.0, 2.0, 3.0])
+    view = PlannerView(
+        0.0, np.arange(24.0).reshape(3, 8), path, each, each, each, each, each, each, each,
+        load_vehicle(),
+    )  # fmt: skip
+    rows = np.array([2, 0])
+    some = ViewOfSome(rows)
+    before = some.of(view)
+    assert before.states.tolist() == view.states[rows].tolist()
+    assert before.target_speed_mps.tolist() == [3.0, 1.0]
+    assert some.of(view).target_speed_mps is before.target_speed_mps, "it has not changed"
+    later = some.of(view._replace(target_speed_mps=np.array([4.0, 5.0, 6.0])))
+    assert later.target_speed_mps.tolist() == [6.0, 4.0]

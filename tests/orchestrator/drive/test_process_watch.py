@@ -25,6 +25,7 @@ from foretwin.orchestrator.drive.process_watch import (
     ProcessWatch,
 )
 from foretwin.orchestrator.drive.processes import PROCESSES
+from foretwin.orchestrator.runner.memory import MemoryWatch
 from foretwin.orchestrator.runner.supervisor import MAX_RESTARTS, Supervisor
 from tests.orchestrator.campaign.campaigns import campaign, now
 from tests.orchestrator.house import House
@@ -226,3 +227,12 @@ def test_a_certificate_that_ends_soon_is_told_once(tmp_path: Path, there: bool) 
     watched.watch = ProcessWatch(watched.watch.supervisor)
     watched.look(3.0)
     assert told(watched, "a certificate of this drive ends") == there
+
+
+def test_a_process_that_takes_too_much_memory_is_told_of_once(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MemoryWatch, "_held_mb", lambda *_: 5000.0)
+    monkeypatch.setattr(MemoryWatch, "_alone_mb", lambda *_: 5000.0)
+    watched.look(30.0)
+    assert told(watched, "w0 holds 5000 MB") == 1

@@ -24,6 +24,7 @@ def test_numbers_of_one_quantity_act_in_the_order_of_the_table() -> None:
     ])  # fmt: skip
     aims = columns.applied("aim.target_speed_mps", 10.0)
     assert aims.tolist() == [10.0, 6.0]
+    assert columns.applied("command.accel_mps2", 1.5).tolist() == [1.5, 1.5], "nothing acts on it"
     assert columns.factor("aim.target_speed_mps").tolist() == [1.0, 0.5]
     assert columns.of(np.array([1, 1])).applied("aim.target_speed_mps", 10.0).tolist() == [6.0, 6.0]
 

@@ -168,8 +168,11 @@ def test_a_van_hides_whoever_a_line_of_sight_reaches_only_through_it(
     assert hidden_by_van(eyes, walker, np.array([0.0, 0.0, yaw_rad])) == line.intersects(box)
 
 
-@pytest.mark.parametrize(("aside_m", "hidden"), [(0.99, True), (1.01, False)])
-def test_a_line_that_runs_along_a_side_is_told_by_which_side_of_it(
+@pytest.mark.parametrize(
+    ("aside_m", "hidden"),
+    [(0.99, True), (1.01, False), (-1.01, False), (1.0, False), (-1.0, False)],
+)
+def test_a_line_that_runs_along_a_side_is_stopped_within_it_alone(
     aside_m: float, hidden: bool
 ) -> None:
     eyes, walker = (-20.0, aside_m), (20.0, aside_m)
