@@ -94,7 +94,7 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     touch_xy_m: Array32
     touch_names: tuple[str, ...]
     late: bool = False
-    """Complete after the next round was due: nothing here is current any more."""
+    """It took longer than its period: nothing here is current any more."""
     horizon_s: float = 0.0
     """What the M points of each line span, evenly; 0 where it was not told."""
     hits: tuple[FutureHit, ...] = ()

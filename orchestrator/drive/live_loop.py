@@ -95,11 +95,14 @@ class LiveLoop:
                     self.housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             if not self._telemetry_waits():
-                until_s = min(self._gather_until(now_s), self._next_due_s, next_housekeeping_s)
+                starts_s = self._at_the_latest_s if conductor.rounds.open else self._next_due_s
+                until_s = min(self._gather_until(now_s), starts_s, next_housekeeping_s)
                 conductor.mailbox.gather(max(0.0, until_s - now_s))
             gathered_s = time.monotonic()
-            wake_s = min(next_housekeeping_s, self._at_the_latest_s, now_s + SILENCE_S)
-            until_s = min(self._at_the_latest_s, gathered_s + SILENCE_S)
+            # What should have started, and may not, waits for what comes.
+            latest_s = self._at_the_latest_s if self._at_the_latest_s > now_s else math.inf
+            wake_s = min(next_housekeeping_s, latest_s, now_s + SILENCE_S)
+            until_s = min(latest_s, gathered_s + SILENCE_S)
             item = conductor.mailbox.take(max(0.0, wake_s - gathered_s))
             if item is None:
                 now_s = time.monotonic()
@@ -116,7 +119,10 @@ class LiveLoop:
             missed_end.look(conductor.intake, now_s)
             ended = conductor.intake.end is not None and not self._telemetry_waits()
             # Of a portion the newest state counts.
-            begins = self._is_fresh and not self._telemetry_waits() and not conductor.rounds.open
+            begins = self._is_fresh and not self._telemetry_waits()
+            if due and begins and conductor.rounds.open:
+                conductor.rounds.next_is_due()
+                begins = not conductor.rounds.open
             if due and not ended and (begins or now_s >= self._at_the_latest_s):
                 # Where the machine is too slow, one round follows the other without a turn between.
                 conductor.make_changes()
@@ -197,7 +203,8 @@ class LiveLoop:
 
     def _leave_out(self, now_s: float) -> None:
         """Count a round that is due and will not be started: the drive is over."""
-        if now_s >= self._at_the_latest_s and self._fall_due(now_s):
+        waits = self.conductor.rounds.open and now_s >= self._next_due_s
+        if (waits or now_s >= self._at_the_latest_s) and self._fall_due(now_s):
             self.conductor.rounds.tally.missed += 1
 
     def _telemetry_waits(self) -> bool:

@@ -19,6 +19,7 @@ from foretwin.contracts.versions import versions
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.progress import worker_statuses
 from foretwin.orchestrator.record.ledger import jobs_ledger
+from foretwin.orchestrator.record.refused_elsewhere import refused_elsewhere
 
 PREFIX = "foretwin_"
 _QUANTILES = {"0.5": 50.0, "0.95": 95.0}
@@ -37,9 +38,7 @@ METRICS: dict[str, MetricRow] = {
     "drive_seconds": MetricRow("gauge", "Time of the drive, by the vehicle's clock."),
     "rounds_due_total": MetricRow("counter", "Rounds that were due."),
     "rounds_ended_total": MetricRow("counter", "Rounds by how they ended, as in the ledger."),
-    "rounds_late_total": MetricRow(
-        "counter", "Complete rounds that were so after the next was due."
-    ),
+    "rounds_late_total": MetricRow("counter", "Complete rounds that took longer than a period."),
     "rounds_open": MetricRow("gauge", "Rounds that are begun and not complete."),
     "round_futures": MetricRow(
         "gauge", "Futures of the next round: fewer where the machine is slow."
@@ -63,7 +62,7 @@ METRICS: dict[str, MetricRow] = {
     ),
     "telemetry_received_total": MetricRow("counter", "Samples of the car that came."),
     "telemetry_lost_total": MetricRow("counter", "Samples of the car that never came."),
-    "refused_total": MetricRow("counter", "Messages and files that were not let in."),
+    "refused_total": MetricRow("counter", "What was not let in, by who refused it."),
     "queue_length": MetricRow("gauge", "What waits in a queue."),
     "lost_total": MetricRow("counter", "Items that a full queue or a disk lost, by which."),
     "worker_state": MetricRow("gauge", "1 for the state in which a worker is, 0 for the others."),
@@ -145,7 +144,8 @@ class DriveCounts:
         yield from _quantiles("telemetry_delay_seconds", intake.counts.ages_ms)
         yield MetricSample("telemetry_received_total", intake.counts.received)
         yield MetricSample("telemetry_lost_total", intake.counts.lost)
-        yield MetricSample("refused_total", conductor.refusals.counted.record()["count"])
+        own = {"orchestrator": conductor.refusals.counted.record()["count"]}
+        yield from _by("refused_total", "by", own)
         yield MetricSample("queue_length", len(conductor.mailbox), (("queue", "mailbox"),))
         lost = {"mailbox": conductor.mailbox.dropped, "result_rows": conductor.tables.dropped}
         yield from _by("lost_total", "of", lost)
@@ -164,7 +164,9 @@ def process_samples(processes: Path) -> list[MetricSample]:
     for name, use in cpu_uses(processes).items():
         found.append(MetricSample("process_cpu_seconds_total", use.cpu_s, (("process", name),)))
         found.append(MetricSample("process_starts_total", use.lives, (("process", name),)))
-    return found
+    refused = refused_elsewhere(processes)
+    others = {by: refused[f"refused_by_{by}"]["count"] for by in ("router", "processes")}
+    return [*found, *_by("refused_total", "by", others)]
 
 
 def exposition(samples: list[MetricSample]) -> str:

@@ -80,7 +80,7 @@ class FuturesCount:
     rounds_of: Counter[int] = field(default_factory=Counter)
     """Complete rounds by the number of their futures."""
     late_rounds: int = 0
-    """Complete rounds that were so after the next one was due."""
+    """Complete rounds that took longer than their period."""
     off_lanes_rounds: int = 0
     """Rounds whose paths are driven in part where their World has no lane that way."""
     not_placed: Counter[str] = field(default_factory=Counter)
@@ -135,7 +135,7 @@ class FuturesCount:
     def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
         """Return the `futures` part of run.json; `rounds` counts the complete ones.
 
-        Of these, `late_rounds` were complete after the next was due. `missed_rounds` were due and
+        Of these, `late_rounds` took longer than their period. `missed_rounds` were due and
         not begun, `unseeded_rounds` had nothing to start from. Since the
         machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
         were not run. In `off_lanes_rounds` the path leaves the lanes of the World. `not_placed`

@@ -142,7 +142,7 @@ class RoundRunner:
         self._vehicles.add(vehicle)
 
     def next_is_due(self) -> None:
-        """Give up the round that is open at its deadline where nobody will or can complete it."""
+        """Give up the round that is open as another is due, if nobody will or can complete it."""
         for order in self.open.orders:
             for named in order.recorded:
                 self._take(self.dispatcher.without_takers(named.sha256))

@@ -65,7 +65,7 @@ class RoundDone:
     """A complete round: results in the order of its jobs, and how long it took.
 
     `latency_ms` from the receipt of the state to the last result, `seconds` from the round's start.
-    A `late` one was complete after the next was due: it is recorded, and never shown as current.
+    A `late` one took longer than its period: it is recorded, and never shown as current.
     """
 
     order: RoundOrder

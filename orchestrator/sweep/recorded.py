@@ -19,8 +19,8 @@ from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import kept_apart, length
 from foretwin.orchestrator.record.run_state import check_finished
+from foretwin.orchestrator.record.table_parts import parts_of_table, read_parts
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
-from foretwin.sim_worker.futures.checked_parquet import read_parquet
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
@@ -70,7 +70,8 @@ def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedStarts
     run = Path(recorded.run)
     check_finished(run)
     drive = first_left(run / DRIVE_FILE)
-    for part in (run / _ROUNDS, drive, run / WORLDS):
+    rounds = parts_of_table(run / _ROUNDS) or [run / _ROUNDS]
+    for part in (rounds[0], drive, run / WORLDS):
         if not part.exists():
             raise FileNotFoundError(f"recorded.run {run}: no {part.relative_to(run)} in it")
     states, said = _states(drive, vehicle, longest_gap_s=recorded.longest_gap_s)
@@ -115,7 +116,7 @@ def _starts(run: Path, states: list[VehicleState], *, every_s: float) -> tuple[R
 
 def _rounds(file: Path) -> list[dict[str, Any]]:
     try:
-        rows: list[dict[str, Any]] = read_parquet(file).to_pylist()
+        rows: list[dict[str, Any]] = read_parts(file).to_pylist()
     except (OSError, pa.ArrowException) as error:
         raise UserError(f"recorded.run: {file} cannot be read: {error}") from error
     return sorted(rows, key=lambda row: (row["stamp_ns"], row["round_id"]))

@@ -32,7 +32,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
         "sim_seconds": "seconds simulated, all futures together",
         "cpu_seconds": "processor time of the workers",
         "sha256": "hash of all results of the round",
-        "late": "whether it was complete only after the next one was due",
+        "late": "whether it took longer than its period",
     },
     "futures": {
         "future_id": "its id for ever, from the hash of its job and its place in it",

@@ -28,6 +28,8 @@ class Mailbox:
         self._clock = clock
         self._items = deque(sorted(items))
         self.gathered_s: list[float] = []
+        self.answer_s: Callable[[], float | None] = lambda: None
+        """When a worker answers, which ends gathering."""
 
     def __len__(self) -> int:
         return sum(at_s <= self._clock.now_s for at_s, _ in self._items)
@@ -37,7 +39,10 @@ class Mailbox:
 
     def gather(self, most_s: float) -> None:
         self.gathered_s.append(most_s)
-        self._clock.now_s += most_s + 1e-6  # nobody wakes up too early
+        until_s, answer_s = self._clock.now_s + most_s, self.answer_s()
+        if answer_s is not None and answer_s > self._clock.now_s:
+            until_s = min(until_s, answer_s)
+        self._clock.now_s = until_s + 1e-6  # nobody wakes up too early
 
     def take(self, timeout_s: float = 0.0) -> str | None:
         until_s = self._clock.now_s + max(timeout_s, 1e-4)
@@ -67,7 +72,10 @@ class Conductor:
         received: bool = False,
         wants_rounds: bool = True,
         towards_vehicle: bool = False,
+        takers: bool = True,
     ) -> None:
+        self._takers = takers
+        """Whether anybody will complete a round that is open."""
         self._received = received
         """Whether a state counts as received when it came, not when it is handled."""
         self._clock = clock
@@ -78,6 +86,7 @@ class Conductor:
         self.plan = SimpleNamespace(config=config, towards_vehicle=towards_vehicle)
         self.bus = MemoryBus()
         self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
+        self.mailbox.answer_s = lambda: self._open_until_s
         self.intake = SimpleNamespace(states=0, latest=None, end=None)
         self._settled_s = settled_s
         self.tuning = SimpleNamespace(parameters=self)
@@ -98,7 +107,7 @@ class Conductor:
         return self._clock.now_s >= 100.0 + self._settled_s
 
     def next_is_due(self) -> None:
-        if self._clock.now_s - 100 - self.started_s[-1] > 10.0:
+        if not self._takers or self._clock.now_s - 100 - self.started_s[-1] > 10.0:
             self.dropped_s.append(self._clock.now_s - 100)
             self._open_until_s = None
 

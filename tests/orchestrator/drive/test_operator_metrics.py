@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.cpu_use import CpuMeter
+from foretwin.contracts.refusal_counts import OwnRefusals, RefusalFile, RefusedKind
 from foretwin.contracts.simulation import WorkerStatus
 from foretwin.orchestrator.drive import operator_metrics
 from foretwin.orchestrator.drive.operator_metrics import (
@@ -149,3 +150,16 @@ def test_every_metric_is_in_the_document_and_none_else() -> None:
     rows = re.findall(rf"^\| `{PREFIX}(\w+)(?:\{{[^`]*\}})?` \|", text, re.MULTILINE)
 
     assert rows == list(METRICS)
+
+
+def test_who_knocks_is_counted_by_who_did_not_let_it_in(house: House, tmp_path: Path) -> None:
+    for by, count in (("router", 3), ("recorder", 2), ("w0", 1)):
+        kind = RefusedKind(sender="viewer", reason="say", key="k", count=count)
+        RefusalFile(tmp_path, by).write(OwnRefusals(kinds=(kind,)))
+    page = told([*DriveCounts(house.conductor).samples(1.0), *process_samples(tmp_path)])
+    refused = {name: value for name, value in page.items() if name.startswith("refused_total")}
+    assert refused == {
+        'refused_total{by="orchestrator"}': 0.0,
+        'refused_total{by="router"}': 3.0,
+        'refused_total{by="processes"}': 3.0,
+    }

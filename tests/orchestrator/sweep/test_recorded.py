@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.record.table_parts import put_away_name
 from foretwin.orchestrator.sweep.plan import SweepPlan
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
@@ -52,6 +55,17 @@ def test_starts_are_where_the_car_was_and_lead_where_it_went(run: Path) -> None:
         line = start.path(frame).xy_m
         assert line[:, 1] == pytest.approx(np.full(len(line), -1.5), abs=0.05)
         assert line[-1, 0] == pytest.approx(START_X_M + SPEED_MPS * 17.9, abs=1.0)
+
+
+def test_rounds_that_were_put_away_are_started_from_too(run: Path, tmp_path: Path) -> None:
+    parted = Path(shutil.copytree(run, tmp_path / "run"))
+    whole = parted / "results" / "rounds.parquet"
+    rounds = pq.read_table(whole)
+    pq.write_table(rounds.slice(0, 10), put_away_name(whole, 1))
+    pq.write_table(rounds.slice(10), whole)
+    assert _loaded(parted).starts == _loaded(run).starts
+    whole.unlink()  # as a recorder that had just begun a part leaves it
+    assert [start.round_id for start in _loaded(parted).starts] == [1, 3, 5, 7, 9]
 
 
 def test_scenarios_are_timed_to_the_recorded_car(run: Path) -> None:
