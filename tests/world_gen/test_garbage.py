@@ -46,3 +46,13 @@ def test_who_looks_more_rarely_or_never_goes_on_so(threshold: int) -> None:
     gc.set_threshold(threshold, 10, 10)
     with rarely_collected():
         assert gc.get_threshold()[0] == threshold
+
+
+def test_of_two_at_once_the_last_one_puts_it_back() -> None:
+    first, second = rarely_collected(), rarely_collected()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert gc.get_threshold()[0] == COLLECT_AFTER
+    second.__exit__(None, None, None)
+    assert gc.get_threshold() == USUAL
