@@ -11,7 +11,7 @@ import msgspec
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.exit_codes import DONE, PARTLY
 from foretwin.contracts.new_folder import named_in_errors
-from foretwin.contracts.segments import DRIVE_FILE
+from foretwin.contracts.segments import DRIVE_FILE, first_left
 from foretwin.orchestrator.commands.output import check_html_file
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
@@ -81,7 +81,7 @@ def _redaction(word: str | None) -> Redaction | None:
 def _people(run: Path, against: Path) -> list[HumanRow]:
     from foretwin.orchestrator.commands.compare import compare_logs
 
-    found = compare_logs(run / DRIVE_FILE, against)
+    found = compare_logs(first_left(run / DRIVE_FILE), against)
     return [
         HumanRow(row.horizon_s, row.along.places, *map(_rms, (row.along, row.across, row.speed)))
         for row in found.difference.after

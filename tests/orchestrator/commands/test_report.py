@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from foretwin.orchestrator.commands import progress_bar
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.segments import DRIVE_FILE, segment_file
+from foretwin.orchestrator.commands import compare, progress_bar
 from foretwin.orchestrator.commands.cli import run
 from tests.orchestrator.across.test_changes import case, sweep_of
 from tests.orchestrator.report.told_runs import NAME, told_run
@@ -108,3 +110,18 @@ def test_mistakes_are_told_in_one_line_and_leave_nothing(
     assert told in said
     assert said.count("\n") == 1
     assert not list(tmp_path.glob("report*"))
+
+
+def test_people_are_compared_with_what_is_left_of_the_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compared(first: Path, second: Path) -> None:
+        raise UserError(f"{first.name} and {second.name}")
+
+    monkeypatch.setattr(compare, "compare_logs", compared)
+    folder = told_run(tmp_path)
+    for part in folder.glob("drive*.mcap"):
+        part.unlink()
+    segment_file(folder / DRIVE_FILE, 2).write_bytes(b"as --keep leaves it")
+    assert run(["report", str(folder), "--out", "report.html", "--against", "other.mcap"]) == 2
+    assert "drive-002.mcap and other.mcap" in capsys.readouterr().err
