@@ -1,7 +1,7 @@
 """What a process does when: spans on the host's monotonic clock, as a Chrome trace that Perfetto
 opens.
 
-Off unless `begin` was called: a span costs then about a tenth of a microsecond. Each process writes
+Off unless `begin` was called: a span costs then less than a microsecond. Each process writes
 a file of its own that only grows, so that a killed one leaves what it did; `joined` makes one of
 them.
 """

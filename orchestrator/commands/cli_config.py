@@ -28,8 +28,9 @@ def config(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="drive, sweep, scenario, vehicle, declaration, recording, ros2, standin or "
-            "overpass [default: drive; of --check, what FILE is; of --explain, all]"
+            help="drive, sweep, scenario, vehicle, declaration, recording, ros2, standin, "
+            "overpass, sensor, anchor or layout [default: drive; of --check, what FILE is; of "
+            "--explain, all]"
         ),
     ] = None,
 ) -> CommandResult:

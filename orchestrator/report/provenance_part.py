@@ -84,6 +84,7 @@ _TELL_PLACES = {
     "standin_dem",
     "progress_table",
     "config",
+    "secure",
 }
 
 
@@ -91,9 +92,19 @@ def _settings(config: Mapping[str, Any], *, places: bool) -> Listed:
     rows = tuple(
         row(name, TableCell(_short(name, value), code=True))
         for name, value in config.items()
-        if value not in (None, False, [], {}) and (places or name not in _TELL_PLACES)
+        if value not in (None, False, [], {})
+        and (places or not (name in _TELL_PLACES or _names_a_file(value)))
     )
     return Listed("Settings that were not left out", ("setting", "value"), rows, folded=True)
+
+
+def _names_a_file(value: Any) -> bool:
+    """Whether a setting is, or holds anywhere, what may be the name of a file or an address."""
+    if isinstance(value, Mapping):
+        return any(map(_names_a_file, value.values()))
+    if isinstance(value, list | tuple):
+        return any(map(_names_a_file, value))
+    return isinstance(value, str) and any(sign in value for sign in "./\\")
 
 
 def _short(name: str, value: Any) -> str:
@@ -110,13 +121,14 @@ def _files(folder: Path, *, places: bool) -> Listed:
     rows, hashed = [], 0
     for path in found[:_MOST_FILES]:
         size = path.stat().st_size
-        hashed += size
-        digest = _sha256(path) if hashed <= _HASHED_BYTES else "not hashed: too large for a report"
+        small = hashed + size <= _HASHED_BYTES
+        hashed += size * small
+        digest = _sha256(path) if small else "not hashed: too large for a report"
         rows.append(
             row(
                 str(path.relative_to(folder)),
                 number(size / 1000.0, 1, "kB"),
-                TableCell(digest, code=hashed <= _HASHED_BYTES),
+                TableCell(digest, code=small),
             )
         )
     left = f"{len(found) - _MOST_FILES} more files." if len(found) > _MOST_FILES else ""

@@ -20,6 +20,10 @@ _IDS = re.compile(
 )
 _DEGREES = re.compile(r"-?\b\d{1,3}\.\d{5,}\b")
 _SHORTEST_NAME = 3
+_NAME_FILES = frozenset(
+    {"map", "log", "route", "file", "dem", "standin_dem", "network", "anchor", "road_user_log"}
+)
+"""Settings that name files which are called after places, as often as not."""
 
 
 class PlaceNames:
@@ -69,11 +73,21 @@ def names_of(record: Mapping[str, Any], worlds: Iterable[World]) -> set[str]:
             for arm in junction.arms:
                 found |= _parts(arm.name)
     for settings in (record.get("config") or {}, record.get("spec") or {}, record.get("map") or {}):
-        for name in ("map", "log", "route", "file", "dem"):
-            path = Path(str(settings.get(name) or ""))
-            if path.suffix:
-                found |= {path.name, path.stem}
+        for path in _files_in(settings):
+            found |= {path.name, path.stem}
     return found
+
+
+def _files_in(settings: Any) -> Iterator[Path]:
+    """Yield the files of a drive and its place that settings name, those of other cars too."""
+    if isinstance(settings, list | tuple):
+        for one in settings:
+            yield from _files_in(one)
+    if isinstance(settings, Mapping):
+        for name, value in settings.items():
+            if isinstance(value, str) and name in _NAME_FILES and Path(value).suffix:
+                yield Path(value)
+            yield from _files_in(value)
 
 
 def _parts(name: str | None) -> set[str]:

@@ -1,6 +1,6 @@
 """How soon the verdict falls: `python -m tests.sim_worker.analysis.gap.verdict_figures`.
 
-`faults 1 6` judges 25 faults on the ways of seeds 1 to 5, `quiet 100 212` the hour without
+`faults 1 6` judges 25 faults on the ways of seeds 1 to 5, `quiet 100 213` the hour without
 faults, `real` every drive of the data folder (FORETWIN_DATA).
 """
 
