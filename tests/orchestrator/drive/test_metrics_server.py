@@ -54,7 +54,9 @@ def test_who_asks_is_told_what_the_loop_reads(tmp_path: Path) -> None:
         page = httpx.get(f"{address}/metrics")
 
     assert (page.status_code, page.headers["content-type"]) == (200, TYPE)
-    assert page.text.splitlines()[-1] == "foretwin_drive_seconds 7"
+    said = page.text.splitlines()
+    assert "foretwin_drive_seconds 7" in said
+    assert said[-1] == 'foretwin_refused_total{by="processes"} 0', "what lies in files"
 
 
 def test_a_loop_that_hangs_tells_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ CONFIG: dict[str, Any] = {
     "secure": "tempelhof",
     "anchor": "tempelhof.toml",
     "vehicles": [{"id": "second", "log": "/data/gendarmenmarkt_friday.mcap"}],
-    "virtual_traffic": {"source": "sumo", "network": "/home/me/kreuzberg.xodr"},
+    "virtual_traffic": {"source": "sumo", "network": "networks/kreuzberg.xodr"},
     "metrics": "192.168.7.3:9464",
 }
 TELLING = "berlin", "tempelhof", "gendarmenmarkt", "kreuzberg", "192.168"
