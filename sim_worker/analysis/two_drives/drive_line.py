@@ -18,7 +18,7 @@ STEP_M = 1.0
 _MOVED_M, _CREPT_M, _CREEPS_MPS = 0.5, 3.0, 0.3
 """Nearer states are noise of positions, and of a car that hardly moves those nearer than 3 m."""
 _HOLE_M, _HOLE_S = 40.0, 3.0
-"""A drive is not known between states that lie farther apart in both, or leap."""
+"""A drive is not known between states so far apart, nor over so long, unless it hardly moves."""
 _COURSE_M = 3.0
 
 
