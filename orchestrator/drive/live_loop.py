@@ -118,12 +118,7 @@ class LiveLoop:
             due = now_s >= self._next_due_s and not self._is_unplaced(now_s)
             missed_end.look(conductor.intake, now_s)
             ended = conductor.intake.end is not None and not self._telemetry_waits()
-            # Of a portion the newest state counts.
-            begins = self._is_fresh and not self._telemetry_waits()
-            if due and begins and conductor.rounds.open:
-                conductor.rounds.next_is_due()
-                begins = not conductor.rounds.open
-            if due and not ended and (begins or now_s >= self._at_the_latest_s):
+            if due and not ended and self._begins(now_s):
                 # Where the machine is too slow, one round follows the other without a turn between.
                 conductor.make_changes()
                 # New parameters take workers a few milliseconds; no round may be half of one kind.
@@ -156,6 +151,17 @@ class LiveLoop:
         latest = self.conductor.intake.latest
         return latest is not None and latest.receipt_mono_ns * 1e-9 >= self._next_due_s
 
+    def _begins(self, now_s: float) -> bool:
+        """Whether what is due starts now, or is missed: it waits for nothing any more."""
+        late = now_s >= self._at_the_latest_s
+        # Of a portion the newest state counts.
+        if not late and (not self._is_fresh or self._telemetry_waits()):
+            return False
+        rounds = self.conductor.rounds
+        if rounds.open:
+            rounds.next_is_due()
+        return late or not rounds.open
+
     def _fall_due(self, now_s: float) -> bool:
         """Count the rounds due by now; returns whether one of them can be run.
 
@@ -187,8 +193,6 @@ class LiveLoop:
         """Start the round that is due, or count why it is not."""
         conductor = self.conductor
         rounds, latest = conductor.rounds, conductor.intake.latest
-        if rounds.open:
-            rounds.next_is_due()
         speed = conductor.plan.config.speed or 1.0
         age_s = math.inf if latest is None else now_s - latest.receipt_mono_ns / 1e9
         if rounds.open:

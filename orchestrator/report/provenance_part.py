@@ -122,7 +122,8 @@ def _files(folder: Path, *, places: bool) -> Listed:
     for path in found[:_MOST_FILES]:
         size = path.stat().st_size
         small = hashed + size <= _HASHED_BYTES
-        hashed += size * small
+        if small:
+            hashed += size
         digest = _sha256(path) if small else "not hashed: too large for a report"
         rows.append(
             row(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -164,3 +165,8 @@ def test_the_kind_of_a_file_is_seen(file: str, kind: str, monkeypatch: pytest.Mo
 
 def test_every_scenario_that_comes_along_is_seen_as_one() -> None:
     assert {kind_of(file) for file in CATALOGUE.glob("*.toml")} == {"scenario"}
+
+
+def test_the_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    words = re.findall(r"\w+", said(["--help"], capsys))
+    assert set(EVERY) - set(words) == set()

@@ -26,9 +26,9 @@ CONFIG: dict[str, Any] = {
 TELLING = "berlin", "tempelhof", "gendarmenmarkt", "kreuzberg", "192.168"
 
 
-def table_of(chapter: Chapter, title: str) -> dict[str, Listed]:
-    found = {one.title: one for one in chapter.blocks if isinstance(one, Listed)}
-    return {title: found[title]}
+def table_of(chapter: Chapter, title: str) -> Listed:
+    (found,) = (one for one in chapter.blocks if isinstance(one, Listed) and one.title == title)
+    return found
 
 
 def settings(*, places: bool, folder: Path) -> str:
@@ -57,7 +57,7 @@ def test_what_is_too_large_to_hash_leaves_the_others_their_hashes(
     (tmp_path / "results").mkdir()
     for name, size in (("drive.mcap", 101), ("results/futures.parquet", 60), ("run.json", 40)):
         (tmp_path / name).write_bytes(bytes(size))
-    listed = table_of(provenance_part(tmp_path, {}), "Files of the folder")["Files of the folder"]
+    listed = table_of(provenance_part(tmp_path, {}), "Files of the folder")
     hashed = {str(one[0]): "not hashed" not in str(one) for one in listed.rows}
     assert sorted(hashed.values()) == [False, True, True]
     (large,) = (name for name, known in hashed.items() if not known)
