@@ -226,7 +226,7 @@ def test_a_state_of_a_car_that_is_shown_things_waits_for_no_portion(
 
 @pytest.fixture
 def turns(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """What a loop does in turn: its turns, with their seconds, and the items that it takes."""
+    """What a loop does in turn, with its seconds: turns, items that it takes, rounds."""
 
     def drive(*, answer_at: int | None = None, handling_s: float = 0.0, **settings: Any) -> Any:
         clock, done = Clock(), list[tuple[str, float]]()
@@ -234,14 +234,19 @@ def turns(monkeypatch: pytest.MonkeyPatch) -> Any:
         conductor = Conductor(clock, **settings)
         if answer_at is not None:
             conductor.mailbox.answer_at(answer_at)
-        handle = conductor.handle
+        handle, start = conductor.handle, conductor.start_round
 
         def handled(item: str) -> None:
             clock.now_s += handling_s
             done.append((item, clock.now_s))
             handle(item)
 
+        def started() -> bool:
+            done.append(("round", clock.now_s))
+            return start()
+
         conductor.handle = handled  # type: ignore[method-assign]
+        conductor.start_round = started  # type: ignore[method-assign]
         turn = lambda: done.append(("turn", clock.now_s))  # noqa: E731
         LiveLoop(conductor, lambda _: None, lambda: False, turn).run()  # type: ignore[arg-type]
         return done
@@ -267,6 +272,14 @@ def test_samples_of_a_portion_need_no_turn_and_what_else_comes_gets_one(turns: A
     assert done.count("state") == 900
     assert done.count("turn") < 150
     assert done[done.index("answer") + 1] == "turn"
+
+
+def test_a_round_waits_for_the_samples_that_came_with_an_answer(turns: Any) -> None:
+    states: Any = {"states_s": [0.0, 0.51, 0.512, 0.514], "end_s": 0.9, "received": True}
+    done = [what for what, _ in turns(answer_at=2, handling_s=0.004, **states)]
+    assert done.count("round") == 2
+    after = done[done.index("answer") :]
+    assert after.index("round") > max(place for place, what in enumerate(after) if what == "state")
 
 
 def test_changes_asked_for_are_looked_at_every_turn(driven: Any) -> None:
