@@ -19,7 +19,8 @@ _IDS = re.compile(
     r"\b[wnr]-?\d{4,}[\w.>/-]*|(?<=\bway )-?\d+|(?<=\bnode )-?\d+|(?<=\brelation )-?\d+"
 )
 _DEGREES = re.compile(r"-?\b\d{1,3}\.\d{5,}\b")
-_SHORTEST_NAME = 3
+_SHORTEST_NAME = 2
+"""As Q7 in Mannheim; one letter alone is a word of too many sentences."""
 _NAME_FILES = frozenset(
     {"map", "log", "route", "file", "dem", "standin_dem", "network", "anchor", "road_user_log"}
 )

@@ -47,6 +47,7 @@ def test_a_name_has_the_same_letter_everywhere_and_ids_are_left_out() -> None:
     )
     assert names.without("lane w23755731.25663407.f0 with 12.5 m") == "lane … with 12.5 m"
     assert PlaceNames(()).without("Ring") == "Ring"
+    assert PlaceNames({"Q7"}).without("Q7, not Q72") == "street A, not Q72"
 
 
 def test_the_crossing_of_these_tests_has_names_to_be_left_out() -> None:
