@@ -84,8 +84,10 @@ class OpenComparisons:
         weights: Array | None = None,
     ) -> None:
         """Add a round's nominal future, the first of its first job, and the mean of all by their
-        `weights` (S,)."""
+        `weights` (S,). A round of the same state as the one before is no further evidence."""
         trajectory = done.results[0].trajectory
+        if self._waiting and self._waiting[-1][0].stamp_ns == trajectory.stamp_ns:
+            return
         states = np.asarray(trajectory.states[0], dtype=np.float64)
         poses = target_from_source(self.frame, world_frame, states[:, :2], states[:, 2])
         xy = poses.xy_m - _shift_m(seed)

@@ -79,6 +79,7 @@ class ProgressForecasts:
         self.calibration = Calibration(model.time_s)
         self._newest: _NewestForecast | None = None
         self._given: dict[int, _Given] = {}
+        self._counted: tuple[int, int] | None = None
         self._waiting: list[_NotYet] = []
 
     def go_on(self, history: MotionHistory, calibration: Calibration) -> None:
@@ -150,13 +151,20 @@ class ProgressForecasts:
         return ArrivalBand(max(band.early_s - since_s, 0.0), late_s)
 
     def take_round(self, done: RoundDone) -> None:
-        """Take a complete round: its forecast counts from when its instants have come."""
+        """Take a complete round: its forecast counts from when its instants have come.
+
+        A round of the same state as the one before is no further evidence.
+        """
         order = done.order
         given = self._given.pop(order.round_id, None)
         self._given = {r: one for r, one in self._given.items() if r > order.round_id}
         now = self.history.now
         if given is None or now is None or given.stretch != now.stretch:
             return
+        begun = given.stamp_ns, given.stretch
+        if begun == self._counted:
+            return
+        self._counted = begun
         spread = _spread_of_futures(done, given.calibrated, self._instants)
         for instant in self._instants:
             due_ns = given.stamp_ns + round(self._model.time_s[instant] * 1e9)

@@ -174,6 +174,19 @@ def test_a_stamp_that_is_more_than_a_second_old_is_a_clock_set_anew(
     assert len(found) == (4 if goes_on else 0)
 
 
+def test_a_second_round_of_one_state_is_no_further_evidence() -> None:
+    handler, found = OpenComparisons(DRIVE, 8.0), []
+    for state in car(DRIVE):
+        found += handler.take_state(state)
+        if 0 <= state.stamp_ns - START_NS <= 100_000_000:
+            for round_id in (0, 1):
+                done = round_done(straight(), round_id=round_id, stamp_ns=state.stamp_ns)
+                handler.take_round(done, DRIVE, state)
+
+    assert len(found) == 2 * 4
+    assert {one.round_id for one in found} == {0}
+
+
 def test_the_mean_future_is_weighed_by_how_likely_futures_are() -> None:
     """One stays on the way, one lies 4 m to the left and is a third as likely, one is lost."""
     lost = straight((0.0, 0.0))

@@ -197,6 +197,20 @@ def test_a_round_that_never_completes_does_not_count() -> None:
     assert drive(forecasts, from_s=0.1, until_s=9.0, rounds=False) == []
 
 
+def test_two_rounds_of_one_state_are_no_more_evidence_than_one() -> None:
+    """A receiver of 1 Hz gives rounds of 2 Hz one state in two."""
+    once, twice = fresh(), fresh()
+    for forecasts, rounds in ((once, 1), (twice, 2)):
+        forecasts.take_state(state(0.0), START_NS)
+        for round_id in range(rounds):
+            forecasts.forecast(round_id, INTENT, state(0.0), (), FRAME)
+            forecasts.take_round(round_done(straight(), round_id=round_id))
+    found = [drive(one, from_s=0.1, until_s=9.0, rounds=False) for one in (once, twice)]
+
+    assert len(found[0]) == 8
+    assert found[1] == found[0]
+
+
 def test_another_orchestrator_goes_on_with_what_was_learnt() -> None:
     one, other = fresh(), fresh()
     drive(one, until_s=60.0)
