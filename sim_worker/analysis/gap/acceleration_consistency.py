@@ -197,8 +197,10 @@ def _finding(
     kind, by_model = _KINDS[cause], by_car + off
     off_car, off_model = abs(by_car - kind.usual), abs(by_model - kind.usual)
     culprit: Culprit = "vehicle" if off_car > off_model else "model"
+    accused = "car" if culprit == "vehicle" else "model"
     if min(off_car, off_model) > kind.limit + 3.0 * std:
         culprit = "both"
+        accused = "car" if off_car < off_model else "model"  # as sure as of the lesser
     unit = kind.unit.format(plateau=plateau)
     said = f"the car does {by_car:.2f} and the model {by_model:.2f}{unit}"
     departs = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
@@ -213,4 +215,5 @@ def _finding(
         for whose, does in (("car", by_car), ("model", by_model))
     )
     text = f"{said}: {departs[culprit]} from the command"
-    return Finding(culprit, cause, text, evidence, began_ns)
+    by = f"{accused}_{cause}"
+    return Finding(culprit, cause, text, evidence, began_ns, decided_by=by)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from foretwin.contracts.gap import Culprit, Evidence
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, Lag
 from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 _DEGREES = 180.0 / math.pi
 GAIN_LEFT_OPEN = 0.2
@@ -26,7 +27,7 @@ _GYRO_RADPS = 0.045
 _OFFSET_RAD, _OFFSET_PM = 0.02, 0.01
 _MISSING_MPS2, _FOLLOWS = 0.5, 0.9
 """A right model misses no more than 0.17 m/s²; one whose gain alone is off still follows."""
-_SLOW_S = 0.36
+_WIRE_S, _SLOW_S = 0.3, 0.36
 """Steering by wire takes 0.05 to 0.3 s."""
 _LATE_S = 0.1
 """Sensors' stamps and what tyres do on their way to a side force leave as much open."""
@@ -46,6 +47,14 @@ class Finding(NamedTuple):
     evidence: tuple[Evidence, ...]
     since_ns: int = 0
     """When it began."""
+    decided_by: str = ""
+    """Name of the comparison that accuses; empty is the first."""
+
+    @property
+    def deciding(self) -> Evidence:
+        """The comparison that accuses, among others that agree."""
+        named = (one for one in self.evidence if one.name == self.decided_by)
+        return next(named, self.evidence[0])
 
 
 def findings_of(seen: Consistency) -> Finding | None:
@@ -143,8 +152,9 @@ def _actuator(seen: Consistency, pair: DelayedLine) -> Finding | None:
         said = f"the car turns {by_command.gain:.2f} times as the model does under its commands"
         evidence.append(_of("motion_by_command", by_command, said))
 
-    def accuse(cause: str, text: str) -> Finding:
-        return Finding("vehicle", cause, f"{text}: {own}", tuple(evidence))
+    def accuse(cause: str, text: str, *more: Evidence) -> Finding:
+        by = more[0].name if more else ""
+        return Finding("vehicle", cause, f"{text}: {own}", (*evidence, *more), decided_by=by)
 
     if not math.isnan(pair.saturated_at):
         return accuse(
@@ -165,14 +175,17 @@ def _actuator(seen: Consistency, pair: DelayedLine) -> Finding | None:
     if seen.excited_s < _SETTLED_S:
         return None
     if pair.delay_s > _SLOW_S:
-        return accuse("steering_delay", "the car steers late")
+        said = f"measured steering comes {pair.delay_s:.2f} s after the command"
+        late = _evidence("command_delay_s", pair.delay_s, _WIRE_S, PERIOD_S, said)
+        return accuse("steering_delay", "the car steers late", late)
     if abs(line.offset) > _OFFSET_RAD + 3.0 * line.offset_std:
-        evidence.append(
-            _offset("measured_offset", line, f"{math.degrees(line.offset):+z.1f}° at the tyres")
+        beside = _offset(
+            "measured_offset", line, f"{math.degrees(line.offset):+z.1f}° at the tyres"
         )
         if by_command is not None and abs(by_command.offset) < _OFFSET_PM:
-            return accuse("offset_sensor", "the steering sensor is off while the motion is as told")
-        return accuse("steering_offset", "the car steers beside what it is told")
+            told = "the steering sensor is off while the motion is as told"
+            return accuse("offset_sensor", told, beside)
+        return accuse("steering_offset", "the car steers beside what it is told", beside)
     return None
 
 
@@ -200,7 +213,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
         if late > 0.12 and model.delay_s > _SLOW_S and model.line.explained > 0.8:
             said = f"the model steers {model.delay_s:.2f} s after the command, the car "
             said += f"{car.delay_s:.2f} s"
-            more = _evidence("model_delay_s", model.delay_s, car.delay_s, 0.02, said)
+            more = _evidence("model_delay_s", model.delay_s, car.delay_s, PERIOD_S, said)
             return accuse("steering_delay", f"the model steers too late: {said}", more)
     if line is None or (car is not None and not obeys) or not confirmed(seen.gyro_by_course):
         return None

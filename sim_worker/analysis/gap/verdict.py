@@ -204,9 +204,9 @@ def _found_in(pairs: SignalPairs, seen: Consistency) -> Finding | None:
 
 
 def _confidence(found: Finding) -> float:
-    """Return how sure it is that the first comparison departs: its normal deviations, to 0.99."""
-    first = found.evidence[0]
-    away = abs(first.value - first.expected) / max(first.std, 1e-6)
+    """Return how sure it is that what accuses departs: its normal deviations, to 0.99."""
+    one = found.deciding
+    away = abs(one.value - one.expected) / max(one.std, 1e-6)
     return float(np.clip(math.erf(away / math.sqrt(8.0)), 0.5, 0.99))
 
 

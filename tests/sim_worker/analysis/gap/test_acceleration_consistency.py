@@ -8,7 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks, PushTest
+from foretwin.sim_worker.analysis.gap.acceleration_consistency import (
+    PushBlocks,
+    PushTest,
+    _finding,
+)
 from foretwin.sim_worker.analysis.gap.consistency import change_index
 from foretwin.sim_worker.analysis.gap.findings import Finding
 
@@ -87,6 +91,22 @@ def test_drag_is_told_from_a_weak_drive_by_what_happens_while_nothing_is_asked()
     told = first_of(blocks(asked, asked, asked - 0.9))
     assert told is not None
     assert (told[1].culprit, told[1].cause) == ("model", "drag")
+
+
+@pytest.mark.parametrize(
+    ("by_car", "off", "culprit", "accused"),
+    [
+        (0.4, 0.6, "vehicle", "car_brake_gain"),
+        (1.0, -0.6, "model", "model_brake_gain"),
+        (0.2, 1.3, "both", "model_brake_gain"),
+        (1.5, -1.3, "both", "car_brake_gain"),
+    ],
+)
+def test_what_accuses_is_the_comparison_of_who_departs_and_of_both_the_lesser(
+    by_car: float, off: float, culprit: str, accused: str
+) -> None:
+    found = _finding("brake_gain", np.nan, by_car=by_car, off=off, std=0.05, began_ns=0)
+    assert (found.culprit, found.deciding.name) == (culprit, accused)
 
 
 PUSHES = np.tile([0.0] * 8 + [0.5] * 8 + [1.3] * 8 + [-0.6] * 8 + [-1.5] * 8, 3)

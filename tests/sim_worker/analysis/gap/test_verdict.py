@@ -39,8 +39,6 @@ from tests.sim_worker.faulty_standin import (
 )
 from tests.telemetry.standin_drive import FRAME
 
-COVERS = ("foretwin.sim_worker.analysis.gap.findings",)
-
 SEED, END_S = 2, 12.0
 """Of the fast tests: one drive simulated once."""
 FOUND = (
@@ -80,7 +78,7 @@ def test_an_injected_fault_is_found_and_named(fault: str) -> None:
     assert verdict.cause in NAMES[fault]
     assert verdict.evidence
     assert verdict.text
-    assert 0.5 <= verdict.confidence <= 1.0
+    assert 0.9 <= verdict.confidence <= 0.99  # of what accuses, not of what agrees
     assert excited_s(fault, verdict, seed=SEED, end_s=END_S) <= IN_TIME_S
 
 
