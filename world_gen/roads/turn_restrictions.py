@@ -13,6 +13,8 @@ from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGrap
 
 _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
 """The most specific word holds; one for lorries or buses alone does not, nor one at times."""
+_TIMED = frozenset({"day_on", "day_off", "hour_on", "hour_off", "time", "opening_hours"})
+"""How mappers said when a restriction holds, before `restriction:conditional`."""
 _CARS = frozenset({"motorcar", "motor_vehicle", "vehicle"})
 
 
@@ -83,7 +85,7 @@ def read_turn_restrictions(osm: OsmMap, graph: RoadGraph) -> TurnRestrictions:
     on_red: set[tuple[int, int]] = set()
     for relation in sorted(osm.relations.values(), key=lambda r: r.id):
         tags = relation.tags
-        if tags.get("type") != "restriction":
+        if tags.get("type") != "restriction" or not _TIMED.isdisjoint(tags):
             continue
         word = next((tags[key] for key in _KEYS if key in tags), "")
         exempt = {part.strip() for part in tags.get("except", "").split(";")}

@@ -34,6 +34,8 @@ def _leaving_west(tags, ends=(12,)) -> set[int]:
         ({"restriction:conditional": "no_left_turn @ (07:00-09:00)"}, {11, 12, 14}),
         ({"restriction": "no_left_turn", "except": "bus;vehicle"}, {11, 12, 14}),
         ({"restriction": "no_left_turn", "except": "bicycle"}, {11, 14}),
+        ({"restriction": "no_left_turn", "hour_on": "07:00", "hour_off": "18:00"}, {11, 12, 14}),
+        ({"restriction": "no_left_turn", "time": "07:00-09:00"}, {11, 12, 14}),
         ({"restriction": "only_left_turn"}, {12}),
         ({"restriction": "no_left_turn_on_red"}, {11, 12, 14}),  # the turn itself is free
         ({"restriction": "no_straight_on"}, {11, 14}),  # the word is wrong, the members count
