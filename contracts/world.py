@@ -25,7 +25,8 @@ JunctionKind = Literal[_RingKind, _PlainKind, "region"]
 """`region` is no junction: it names a World made of a whole stretch of map."""
 Control = Literal["signals", "stop", "all_way_stop", "give_way", "roundabout", "uncontrolled"]
 DrivingSide = Literal["right", "left"]
-LaneKind = Literal["driving", "bus", "bicycle", "parking", "tram"]
+LaneKind = Literal["driving", "bus", "bicycle", "parking", "tram", "closed"]
+"""What a lane is for; `closed` ones are nobody's: hard shoulders, lanes that a tag bars."""
 Turn = Literal["straight", "left", "right", "u_turn"]
 LineControl = Literal["signal", "stop", "give_way", "none"]
 LaneChange = Literal["both", "left", "right", "none"]

@@ -91,7 +91,7 @@ class DrivingPace:
         bends: BendSpeeds = STRAIGHT,
     ) -> list[float]:
         """Return the expected seconds from a position of the route to later ones, in order."""
-        limits = np.array([directed.edge.speed_limit_mps.value for directed in route.edges])
+        limits = np.array([directed.speed_limit_mps.value for directed in route.edges])
         usual = np.maximum(self.share * limits, _LEAST_SPEED_MPS)
         ends, speeds = route.start_m[1:].tolist(), usual.tolist()
         edge = min(int(np.searchsorted(route.start_m[1:], from_m, side="right")), len(ends) - 1)

@@ -165,7 +165,7 @@ class WayAhead:
     def speed_limit_mps(self) -> float:
         """The limit of the road that the car is on."""
         assert self._match is not None
-        return self._match.directed_edge.edge.speed_limit_mps.value
+        return self._match.directed_edge.speed_limit_mps.value
 
     @property
     def usual_speed_mps(self) -> float:

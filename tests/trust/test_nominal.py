@@ -57,5 +57,5 @@ def test_a_drawn_road_lies_about_where_it_was_driven_and_has_junctions(tmp_path:
 
     assert 0.1 < np.median(away) < 1.0
     assert away.max() < 3.0
-    assert all(edge.speed_limit_mps.value == pytest.approx(70 / 3.6) for edge in own)
+    assert all(edge.limit_forward_mps.value == pytest.approx(70 / 3.6) for edge in own)
     assert len(find_intersections(osm, graph)) >= 3

@@ -40,6 +40,7 @@ _KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
     "bicycle": ("bicycleLane", ("bicycle",)),
     "parking": ("parking", ("vehicle",)),
     "tram": ("restricted", ("train",)),
+    "closed": ("restricted", ("priorityVehicle",)),
 }
 """Type and users of lanes by kind; those for driving have the type of their road alone."""
 _CLASS_TYPES = {"motorway": "interstate", "trunk": "highway"}

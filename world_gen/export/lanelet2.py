@@ -33,6 +33,7 @@ _KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
     "bicycle": ("bicycle_lane", ("bicycle",)),
     "parking": ("parking", ()),
     "tram": ("rail", ("train",)),
+    "closed": ("emergency_lane", ("vehicle:emergency",)),
 }
 """Subtype and participants of lanes by kind."""
 VIRTUAL: Tags = {"type": "virtual"}

@@ -10,7 +10,7 @@ from foretwin.world_gen.export.opendrive_curve import Curve
 from foretwin.world_gen.export.opendrive_roads import OdrLane, OdrRoad
 from foretwin.world_gen.export.xml_tree import Element, child, element
 
-LANE_TYPE = {"bicycle": "biking"}
+LANE_TYPE = {"bicycle": "biking", "closed": "restricted"}
 """What OpenDRIVE calls kinds of lanes that it does not call as the World does."""
 ROAD_TYPE = {
     "motorway": ("motorway", "motorway"),

@@ -19,6 +19,7 @@ from foretwin.world_gen.export import picture_style as style
 from foretwin.world_gen.export.picture_style import Look, View
 
 ARROW_SPACING_M = 24.0
+_UNDRIVEN = ("parking", "closed")
 _KIND_COLOUR: Mapping[str, str] = {"bus": style.BUS, "bicycle": style.BICYCLE, "tram": style.TRAM}
 _TURN_DEG: Mapping[Turn, float] = {"straight": 0.0, "left": 75.0, "right": -75.0, "u_turn": 160.0}
 _GENERAL: frozenset[YieldRule] = frozenset(("near_side", "far_side", "order", "merge_order"))
@@ -78,7 +79,7 @@ def _draw_lanes(axes: Axes, world: World, view: View) -> None:
         left, right = offset(lane.centerline, half), offset(lane.centerline, -half)
         edge = _LineLook(style.LANE_EDGE, lane.width_m.source, broad, 4.5 + order, fade)
         lines += [(edge, left), (edge, right)]
-        if lane.kind == "parking":
+        if lane.kind in _UNDRIVEN:
             strips.append(np.concatenate([left, right[::-1]]))
         else:
             source = counted.get(lane.road_id, "inferred")
@@ -88,7 +89,7 @@ def _draw_lanes(axes: Axes, world: World, view: View) -> None:
         axes.add_collection(PolyCollection(strips, facecolors=style.PARKING, zorder=1.3))
     _draw_lines(axes, lines)
     if view.close:
-        _draw_arrows(axes, (lane for lane in near if lane.kind != "parking"), view)
+        _draw_arrows(axes, (lane for lane in near if lane.kind not in _UNDRIVEN), view)
 
 
 def _colour(lane: Lane) -> str:

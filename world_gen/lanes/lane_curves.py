@@ -50,6 +50,12 @@ class LaneDraft(msgspec.Struct):
     successors: list[str] = msgspec.field(default_factory=list)
     position_source: PlaceSource | msgspec.UnsetType = msgspec.UNSET
 
+    @property
+    def speed_limit_mps(self) -> Quantity:
+        """The lane's own limit, else that of its road in its direction."""
+        of_road = DirectedEdge(self.edge, self.plan.reverse).speed_limit_mps
+        return self.plan.speed_limit_mps or of_road
+
     def finished(self) -> Lane:
         """Return the lane as the World holds it."""
         return Lane(
@@ -59,7 +65,7 @@ class LaneDraft(msgspec.Struct):
             kind=self.kind,
             centerline=self.centerline,
             width_m=self.width_m,
-            speed_limit_mps=self.edge.speed_limit_mps,
+            speed_limit_mps=self.speed_limit_mps,
             role=self.role,
             turns=self.turns,
             turns_source=self.plan.turns_source,

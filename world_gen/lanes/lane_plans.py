@@ -38,6 +38,8 @@ class LanePlan(msgspec.Struct, frozen=True, kw_only=True):
     change: LaneChange = "both"
     change_source: Provenance = "default"
     counted: bool = True
+    speed_limit_mps: Quantity | None = None
+    """Of this lane alone; None where the road's holds."""
 
 
 class CrossSection(msgspec.Struct, frozen=True, kw_only=True, dict=True):

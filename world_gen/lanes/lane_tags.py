@@ -11,6 +11,7 @@ from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
 from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import RoadEdge
+from foretwin.world_gen.roads.speed_limits import posted_limit
 
 DEFAULT_WIDTH_M = 3.0
 BUS_WIDTH_M = 3.25
@@ -39,6 +40,8 @@ _CHANGES: Mapping[str, LaneChange] = {
     "only_left": "left",
 }
 _ALLOWED = frozenset({"designated", "yes"})
+_BUSES_ALONE = frozenset({"psv", "bus"})
+_CLOSED = frozenset({"no", "private"})
 
 
 class Direction:
@@ -102,6 +105,7 @@ def lanes_of_direction(
     turns = tags.fitted("turn:lanes", default=tags.text("turn"))
     widths = tags.fitted("width:lanes")
     changes = tags.fitted("change:lanes", default=tags.text("change"))
+    limits = tags.fitted("maxspeed:lanes")
     kinds = _kinds(tags)
     tagged = "oneway" in edge.tags or "junction" in edge.tags
     source: Provenance = "tagged" if tagged else "inferred"
@@ -123,7 +127,8 @@ def lanes_of_direction(
                 change=change or "both",
                 change_source="tagged" if change else "default",
                 # Counted, as the map counts it, but cars have no business there.
-                counted=kinds[i] != "bicycle",
+                counted=kinds[i] in ("driving", "bus"),
+                speed_limit_mps=posted_limit(limits[i]),
             )
         )
     for place in beside:
@@ -149,10 +154,13 @@ def _kinds(tags: Direction) -> list[LaneKind]:
     bus = tags.fitted("bus:lanes", "psv:lanes")
     barred = tags.fitted("motor_vehicle:lanes", "vehicle:lanes", "access:lanes")
     for i in range(count):
-        if bus[i] == "designated" or (barred[i] == "no" and bus[i] in _ALLOWED):
+        closed = barred[i] in _CLOSED
+        if bus[i] == "designated" or barred[i] in _BUSES_ALONE or (closed and bus[i] in _ALLOWED):
             kinds[i] = "bus"
-        elif barred[i] == "no" and len(bicycle) == count and bicycle[i] in _ALLOWED:
+        elif closed and len(bicycle) == count and bicycle[i] in _ALLOWED:
             kinds[i] = "bicycle"
+        elif closed:
+            kinds[i] = "closed"
     if "bus" not in kinds and not any(bus):
         outermost = min(_outer_bus_lanes(tags), count - 1)
         for k in range(outermost):

@@ -106,7 +106,8 @@ class _Meaning(NamedTuple):
 
     allowed: Directions
     lanes: LaneCounts
-    limit: Quantity
+    limits: tuple[Quantity, Quantity]
+    """Along the nodes and against them."""
     layer: int
     car: bool
 
@@ -115,8 +116,8 @@ def _meaning(items: frozenset[tuple[str, str]], country: str) -> _Meaning:
     tags = dict(items)
     allowed = directions(tags)
     car = is_car_road(tags) and open_to_cars(tags)
-    limit = speed_limit(tags, country)
-    return _Meaning(allowed, lane_counts(tags, allowed), limit, road_layer(tags), car)
+    limits = speed_limit(tags, country), speed_limit(tags, country, reverse=True)
+    return _Meaning(allowed, lane_counts(tags, allowed), limits, road_layer(tags), car)
 
 
 def _edges(
@@ -161,7 +162,8 @@ def _edges(
                     car=means.car,
                     road_class=tags["highway"],
                     name=name,
-                    speed_limit_mps=means.limit,
+                    limit_forward_mps=means.limits[0],
+                    limit_backward_mps=means.limits[1],
                     lanes_forward=means.lanes.forward,
                     lanes_backward=means.lanes.backward,
                     layer=means.layer,

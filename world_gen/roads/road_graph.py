@@ -35,7 +35,8 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     car: bool
     road_class: str
     name: str
-    speed_limit_mps: Quantity
+    limit_forward_mps: Quantity
+    limit_backward_mps: Quantity
     lanes_forward: Quantity
     lanes_backward: Quantity
     layer: int
@@ -107,6 +108,11 @@ class DirectedEdge(NamedTuple):
     def allowed(self) -> bool:
         """Whether cars may drive this way round."""
         return self.edge.backward if self.reverse else self.edge.forward
+
+    @property
+    def speed_limit_mps(self) -> Quantity:
+        """Speed limit in driving direction."""
+        return self.edge.limit_backward_mps if self.reverse else self.edge.limit_forward_mps
 
     @property
     def lanes(self) -> Quantity:

@@ -13,8 +13,12 @@ _MOTOR_SPORTS = frozenset({"motor", "motor_sports", "motor_racing", "autocross",
 RING_TAGS = frozenset({"roundabout", "circular"})
 
 _FORBIDDEN = frozenset(
-    {"no", "private", "agricultural", "forestry", "emergency", "official", "military"}
+    {
+        *("no", "private", "permit", "agricultural", "forestry", "emergency", "official"),
+        *("military", "bus", "psv", "taxi", "hgv", "bicycle", "foot"),
+    }
 )
+"""Values that leave the public's cars out; those of kinds of traffic let these alone through."""
 _ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
 
 

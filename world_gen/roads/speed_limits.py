@@ -21,28 +21,37 @@ _ZONE_KMPH = {
 _KMPH_FROM_UNIT = {"": 1.0, "kmh": 1.0, "km/h": 1.0, "kph": 1.0, "mph": 1.609344, "knots": 1.852}
 _SPEED = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*([a-z/]*)\s*$")
 _ZONE_KEYS = ("maxspeed", "maxspeed:type", "source:maxspeed", "zone:maxspeed", "zone:traffic")
+_UNLIMITED_KMPH = 130.0
+"""What a German motorway without a limit recommends."""
 _THROUGH = frozenset({"primary", "secondary", "tertiary"})
 """Classes whose roads lead through towns and between them."""
 _FAST = frozenset({"motorway", "trunk"})
 
 
-def speed_limit(tags: Mapping[str, str], country: str = "") -> Quantity:
+def speed_limit(tags: Mapping[str, str], country: str = "", *, reverse: bool = False) -> Quantity:
     """Return the speed limit in m/s: a sign's number is tagged, a zone's inferred, else default.
 
-    Where the two directions differ the higher one counts. An unlimited motorway gets the
-    recommended 130 km/h.
+    It is that along the way's nodes, with `reverse` that against them. A direction of which nothing
+    is told has the other's sign, inferred. An unlimited motorway gets the recommended 130 km/h.
     """
-    keys = ("maxspeed", "maxspeed:forward", "maxspeed:backward")
-    both, *each = (_signed_kmph(tags.get(key)) for key in keys)
-    signed = both or max((speed for speed in each if speed is not None), default=None)
-    if signed is not None:
-        return Quantity(signed / 3.6, "tagged")
-    if tags.get("maxspeed") == "none":
-        return Quantity(130.0 / 3.6, "inferred")
-    for key in _ZONE_KEYS:
+    own, other = ("backward", "forward") if reverse else ("forward", "backward")
+    for key in (f"maxspeed:{own}", "maxspeed"):
+        if (posted := posted_limit(tags.get(key))) is not None:
+            return posted
+    for key in (zone for one in _ZONE_KEYS for zone in (f"{one}:{own}", one)):
         if (speed := _zone_kmph(tags.get(key), country)) is not None:
             return Quantity(speed / 3.6, "inferred")
+    if (posted := posted_limit(tags.get(f"maxspeed:{other}"))) is not None:
+        return Quantity(posted.value, "inferred")
     return Quantity(_usual_kmph(tags, rules_of(country)) / 3.6, "default")
+
+
+def posted_limit(text: str | None) -> Quantity | None:
+    """Return what a sign says, in m/s; None where it is none of a number, or of no limit."""
+    speed = _signed_kmph(text)
+    if speed is not None:
+        return Quantity(speed / 3.6, "tagged")
+    return Quantity(_UNLIMITED_KMPH / 3.6, "inferred") if text == "none" else None
 
 
 def in_town(tags: Mapping[str, str]) -> bool:

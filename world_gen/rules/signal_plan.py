@@ -209,7 +209,7 @@ def _unlike(
 
 
 def _amber_s(groups: Sequence[LaneGroup]) -> float:
-    limit_mps = max(lane.edge.speed_limit_mps.value for g in groups for lane in g.lanes)
+    limit_mps = max(lane.speed_limit_mps.value for g in groups for lane in g.lanes)
     return next(amber_s for kmph, amber_s in _AMBER_S if limit_mps * 3.6 <= kmph + 0.5)
 
 

@@ -210,11 +210,11 @@ def test_a_road_has_the_limit_of_all_of_its_tags(
 ) -> None:
     sketch = crossing((20, [1, 2, 3, 4, 5], {"highway": "secondary", "name": "", **tags}))
     (edge,) = [edge for edge in sketch.graph(tmp_path).edges if edge.way_id == 20]
-    assert edge.speed_limit_mps.value == pytest.approx(kmph / 3.6)
+    assert edge.limit_forward_mps.value == pytest.approx(kmph / 3.6)
 
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("name", ["leeds", "liechtenstein"])
 def test_real_roads_have_the_limits_of_all_of_their_tags(name: str, data_dir: Path) -> None:
     edges = build_road_graph(read_map(data_dir / MAPS[name])).edges
-    assert all(edge.speed_limit_mps == speed_limit(edge.tags, edge.country) for edge in edges)
+    assert all(edge.limit_forward_mps == speed_limit(edge.tags, edge.country) for edge in edges)

@@ -21,7 +21,11 @@ MPH = 1.609344
         ({"maxspeed": "walk"}, 7.0, "inferred"),
         ({"maxspeed": "none"}, 130.0, "inferred"),
         ({"maxspeed": "signals", "maxspeed:forward": "80"}, 80.0, "tagged"),
-        ({"maxspeed:forward": "70", "maxspeed:backward": "50"}, 70.0, "tagged"),
+        ({"maxspeed:forward": "50", "maxspeed:backward": "70"}, 50.0, "tagged"),
+        ({"maxspeed": "60", "maxspeed:backward": "30"}, 60.0, "tagged"),
+        ({"maxspeed:backward": "70"}, 70.0, "inferred"),
+        ({"maxspeed:backward": "70", "zone:traffic": "DE:urban"}, 50.0, "inferred"),
+        ({"maxspeed:forward": "none", "maxspeed:backward": "100"}, 130.0, "inferred"),
         ({"maxspeed": "50;30"}, 50.0, "tagged"),
         ({"maxspeed": "fast", "highway": "residential"}, 30.0, "default"),
         ({"maxspeed": "urban"}, 50.0, "inferred"),
@@ -30,6 +34,28 @@ MPH = 1.609344
 )
 def test_speed_limit(tags: dict[str, str], km_per_h: float, source: str) -> None:
     limit = speed_limit(tags)
+    assert limit.value * 3.6 == pytest.approx(km_per_h, abs=0.01)
+    assert limit.source == source
+
+
+@pytest.mark.parametrize(
+    ("tags", "km_per_h", "source"),
+    [
+        ({"maxspeed": "50"}, 50.0, "tagged"),
+        ({"maxspeed:forward": "50", "maxspeed:backward": "70"}, 70.0, "tagged"),
+        ({"maxspeed": "60", "maxspeed:backward": "30"}, 30.0, "tagged"),
+        ({"maxspeed": "60", "maxspeed:forward": "30"}, 60.0, "tagged"),
+        (
+            {"source:maxspeed:backward": "DE:rural", "source:maxspeed": "DE:urban"},
+            100.0,
+            "inferred",
+        ),
+    ],
+)
+def test_the_other_direction_has_a_limit_of_its_own(
+    tags: dict[str, str], km_per_h: float, source: str
+) -> None:
+    limit = speed_limit(tags, reverse=True)
     assert limit.value * 3.6 == pytest.approx(km_per_h, abs=0.01)
     assert limit.source == source
 
