@@ -14,7 +14,6 @@ from foretwin.orchestrator.across.paired_statistics import (
     LEVEL,
     PairedChange,
     adjusted,
-    mcnemar_p,
     paired_change,
 )
 from foretwin.orchestrator.across.pairs import ComparedSide, paired
@@ -32,10 +31,10 @@ Pair = tuple[dict[str, Any], dict[str, Any]]
 def changes_between(first: ComparedSide, second: ComparedSide) -> dict[str, Any]:
     """Return what changed from the first to the second, as an object that JSON holds.
 
-    A case fails where its future collides. `failing` counts cases that were played on both sides,
-    by exact McNemar; `measures` are of those in which both have a value, `alone` counts those in
-    which one side has. `measures`, `alone` and `places` have p values adjusted for how many of them
-    there are.
+    A case fails where its future collides. `failing` counts cases that were played on both sides;
+    `measures` are of those in which both have a value, `alone` counts those in which one side has.
+    p values are over places, None where these are too few; those of `measures` and `alone` are
+    adjusted for how many of them there are.
     Raises UserError where both sides have no case in common.
     """
     if first.row.kind != second.row.kind:
@@ -76,9 +75,13 @@ def changes_between(first: ComparedSide, second: ComparedSide) -> dict[str, Any]
 
 
 def is_worse(found: dict[str, Any]) -> bool:
-    """Whether significantly more cases newly fail than were fixed: what `--fail-on-worse` asks."""
+    """Whether more of these cases newly fail than were fixed: what `--fail-on-worse` asks.
+
+    The same cases are played on both sides, and without chance: that is a fact about them, at one
+    place as at many, and says nothing of other places.
+    """
     failing = found["failing"]
-    return bool(failing["newly"] > failing["fixed"] and failing["p_value"] < LEVEL)
+    return bool(failing["newly"] > failing["fixed"])
 
 
 def _played(row: dict[str, Any]) -> bool:
@@ -88,11 +91,10 @@ def _played(row: dict[str, Any]) -> bool:
 def _failing(played: Sequence[Pair]) -> dict[str, Any]:
     counts = _counts(played)
     if not played:
-        return {**counts, "p_value": 1.0, "change": None}
+        return {**counts, "p_value": None, "change": None}
     differences = np.array([float(b["collided"]) - float(a["collided"]) for a, b in played])
     change = paired_change(differences, [a["junction_id"] for a, _ in played])
-    p_value = mcnemar_p(counts["newly"], counts["fixed"])
-    return {**counts, "p_value": p_value, "change": change._asdict()}
+    return {**counts, "p_value": change.p_value, "change": change._asdict()}
 
 
 def _counts(played: Sequence[Pair]) -> dict[str, int]:
@@ -130,8 +132,11 @@ def _measures(
             }
         )
     for row in _with_adjusted(rows, [row["change"]["p_value"] for row in rows]):
-        if row["p_adjusted"] is None or row["p_adjusted"] >= LEVEL:
-            row["word"] = "the same" if row["change"]["mean"] == 0.0 else "not significant"
+        p_value = row["p_adjusted"]
+        if row["change"]["mean"] == 0.0:
+            row["word"] = "the same"
+        elif p_value is None or p_value >= LEVEL:
+            row["word"] = "too few places" if p_value is None else "not significant"
     return rows
 
 
@@ -149,8 +154,10 @@ def _alone(
             "both": sum(a and b for a, b in has),
         }
         if counts["first"] or counts["second"]:
-            p_value = mcnemar_p(counts["second"], counts["first"])
-            rows.append({"measure": name, **counts, "p_value": p_value})
+            oftener = np.array([float(b) - float(a) for a, b in has])
+            change = paired_change(oftener, [a["junction_id"] for a, _ in played])
+            told = {"p_value": change.p_value, "units": change.units}
+            rows.append({"measure": name, **counts, **told})
     return _with_adjusted(rows, [row["p_value"] for row in rows])
 
 
@@ -189,12 +196,7 @@ def _places(played: Sequence[Pair]) -> list[dict[str, Any]]:
     at: dict[str, list[Pair]] = defaultdict(list)
     for pair in played:
         at[pair[0]["junction_id"]].append(pair)
-    rows: list[dict[str, Any]] = []
-    for junction_id, pairs in at.items():
-        counts = _counts(pairs)
-        p_value = mcnemar_p(counts["newly"], counts["fixed"])
-        rows.append({"junction_id": junction_id, **counts, "p_value": p_value})
-    _with_adjusted(rows, [row["p_value"] for row in rows])
+    rows = [{"junction_id": junction_id, **_counts(pairs)} for junction_id, pairs in at.items()]
     return sorted(rows, key=lambda row: (row["fixed"] - row["newly"], row["junction_id"]))
 
 

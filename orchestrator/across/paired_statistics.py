@@ -1,10 +1,10 @@
 """What a change of paired values comes to: an interval, and how likely chance alone makes it.
 
-Pairs of one place are alike, so places are drawn where there are enough of them, whole, and else
-pairs. All tests are SciPy's: exact McNemar as a binomial test of the discordant pairs (McNemar
-1947, Psychometrika 12), a sign-flip permutation test and the percentile bootstrap (Efron and
-Tibshirani 1993, An Introduction to the Bootstrap), of clusters as Davison and Hinkley 1997, section
-3.8, and Benjamini and Hochberg 1995 for many tests at once.
+Pairs of one place are alike, those of one approach half a second apart most of all, so places are
+drawn, whole, and of too few places nothing is said. All tests are SciPy's: a sign-flip permutation
+test and the percentile bootstrap (Efron and Tibshirani 1993, An Introduction to the Bootstrap), of
+clusters as Davison and Hinkley 1997, section 3.8, and Benjamini and Hochberg 1995 for many tests at
+once.
 """
 
 from __future__ import annotations
@@ -26,35 +26,25 @@ _SEED = 0
 
 class PairedChange(NamedTuple):
     """Mean of B minus A with its 95 % interval; `p_value` that the sign is chance's; None where
-    there are too few units, of which there are `units` (`of_places`, else of pairs)."""
+    there are fewer places than `LEAST_PLACES`."""
 
     mean: float
     low: float | None
     high: float | None
     p_value: float | None
     units: int
-    of_places: bool
-
-
-def mcnemar_p(newly: int, fixed: int) -> float:
-    """Return the two-sided p of exact McNemar: as many pairs changed one way as the other?"""
-    if newly + fixed == 0:
-        return 1.0
-    return float(stats.binomtest(newly, newly + fixed, 0.5).pvalue)
+    """Places in which there are pairs."""
 
 
 def paired_change(differences: Array, places: Sequence[object]) -> PairedChange:
     """Return the mean of paired differences (N,), N > 0, whose places are given beside them."""
     names, of = np.unique(np.asarray([str(one) for one in places]), return_inverse=True)
-    of_places = len(names) >= LEAST_PLACES
-    if not of_places:
-        of = np.arange(len(differences))
     sums, counts = np.bincount(of, weights=differences), np.bincount(of).astype(float)
-    mean, units = float(np.mean(differences)), len(sums)
-    if not np.any(differences):
-        return PairedChange(0.0, 0.0, 0.0, 1.0, units, of_places)
+    mean, units = float(np.mean(differences)), len(names)
     if units < LEAST_PLACES:
-        return PairedChange(mean, None, None, None, units, of_places)
+        return PairedChange(mean, None, None, None, units)
+    if not np.any(differences):
+        return PairedChange(0.0, 0.0, 0.0, 1.0, units)
     drawn = stats.bootstrap(
         (sums, counts), _ratio, paired=True, vectorized=True, n_resamples=RESAMPLES,
         confidence_level=CONFIDENCE, method="percentile", rng=np.random.default_rng(_SEED),
@@ -64,7 +54,7 @@ def paired_change(differences: Array, places: Sequence[object]) -> PairedChange:
         rng=np.random.default_rng(_SEED),
     )  # fmt: skip
     low, high = (float(side) for side in drawn.confidence_interval)
-    return PairedChange(mean, low, high, float(flipped.pvalue), units, of_places)
+    return PairedChange(mean, low, high, float(flipped.pvalue), units)
 
 
 def adjusted(p_values: Sequence[float | None]) -> list[float | None]:

@@ -66,8 +66,7 @@ def compare(
         bool,
         typer.Option(
             "--fail-on-worse",
-            help="runs, sweeps: exit code 3 where more cases newly fail than were fixed, and exact "
-            "McNemar p < 0.05",
+            help="runs, sweeps: exit code 3 where more cases newly fail than were fixed",
         ),
     ] = False,
     every: Annotated[

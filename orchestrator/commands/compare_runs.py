@@ -10,7 +10,7 @@ from typing import Any
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import command_line, plain
 from foretwin.orchestrator.across.changes import changes_between, is_worse
-from foretwin.orchestrator.across.paired_statistics import LEVEL
+from foretwin.orchestrator.across.paired_statistics import LEAST_PLACES, LEVEL
 from foretwin.orchestrator.across.pairs import side_of
 from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
 from foretwin.orchestrator.commands.told import CommandResult
@@ -29,7 +29,7 @@ def compare_runs(
     fail_on_worse: bool,
 ) -> CommandResult:
     """Return what changed from one run or sweep to another; its code is 0, or where it is asked 3
-    if significantly more cases newly fail than were fixed.
+    if more cases newly fail than were fixed.
 
     `planners` names one for each side, with a comma between; with `every` measures are listed whose
     change may be chance. Raises UserError in one line.
@@ -103,11 +103,10 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
     yield f"to the same bits: {found['equal']}"
     yield (
         f"collided: {failing['first']} → {failing['second']}: {failing['newly']} newly failing, "
-        f"{failing['fixed']} fixed; exact McNemar p = {failing['p_value']:.3g}, "
-        + ("significant" if failing["p_value"] < LEVEL else "not significant")
+        f"{failing['fixed']} fixed"
     )
     if failing["change"] is not None:
-        yield f"change of the share: {_interval(failing['change'], 100.0)} %"
+        yield from _share_lines(failing["change"])
     yield from _measure_lines(found["measures"], every=every)
     yield from _alone_lines(found["alone"], every=every)
     yield from _place_lines(found["places"])
@@ -118,6 +117,20 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
             yield f"{name}: {where}: {command_line('repeat', folder, one['future_id'])}"
         if len(cases) > _MOST_LISTED:
             yield f"{name}: {len(cases) - _MOST_LISTED} more: --json"
+
+
+def _share_lines(change: dict[str, Any]) -> Iterator[str]:
+    """Yield how the share of collisions changed, and whether the choice of places explains it."""
+    said, p_value = f"change of the share: {_interval(change, 100.0)} %", change["p_value"]
+    if p_value is not None:
+        sure = "significant" if p_value < LEVEL else "not significant"
+        yield f"{said}, p = {p_value:.3g}, {sure}"
+        return
+    yield said
+    yield (
+        f"fewer than {LEAST_PLACES} places: too few to tell a change from the choice of places; "
+        "what is counted here is true of these cases alone"
+    )
 
 
 def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
@@ -146,9 +159,12 @@ def _measure_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
     if left:
         words = ", ".join(f"{count} {word}" for word, count in sorted(left.items()))
         yield f"{left.total()} more changed significantly ({words}): --all"
-    if chance := len(changed) - len(sure):
-        measures = "measure" if chance == 1 else "measures"
-        yield f"{chance} {measures} changed not significantly: --all"
+    unsure = changed[len(sure) :]
+    at_few = sum(row["p_adjusted"] is None for row in unsure)
+    if chance := len(unsure) - at_few:
+        yield f"{_measures(chance)} changed not significantly: --all"
+    if at_few:
+        yield f"{_measures(at_few)} changed at too few places to tell: --all"
 
 
 def _alone_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
@@ -159,12 +175,22 @@ def _alone_lines(rows: list[dict[str, Any]], *, every: bool) -> Iterator[str]:
     for row in shown:
         yield (
             f"{row['measure']}: only A has a value in {row['first']} cases, "
-            f"only B in {row['second']}, p adjusted {row['p_adjusted']:.3g}; "
+            f"only B in {row['second']}, {_sureness(row)}; "
             f"what changed is told of {row['both']} with both"
         )
     if left := len(rows) - len(shown):
         measures = "measure has" if left == 1 else "measures have"
         yield f"{left} more {measures} a value on one side alone in some cases: --all"
+
+
+def _measures(count: int) -> str:
+    return f"{count} {'measure' if count == 1 else 'measures'}"
+
+
+def _sureness(row: dict[str, Any]) -> str:
+    if row["p_adjusted"] is None:
+        return f"at too few places to tell ({row['units']})"
+    return f"p adjusted {row['p_adjusted']:.3g}"
 
 
 def _order(row: dict[str, Any]) -> tuple[bool, bool, float]:
@@ -182,13 +208,13 @@ def _place_lines(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in changed[:_MOST_LISTED]:
         yield (
             f"  {row['junction_id']}: collided {row['first']} → {row['second']} of {row['pairs']}, "
-            f"{row['newly']} newly, {row['fixed']} fixed, p adjusted {row['p_adjusted']:.3g}"
+            f"{row['newly']} newly, {row['fixed']} fixed"
         )
 
 
 def _interval(change: dict[str, Any], scale: float) -> str:
     mean = f"{scale * change['mean']:+z.3g}"
-    units = f"{change['units']} {'places' if change['of_places'] else 'pairs'}"
+    places = f"{change['units']} {'place' if change['units'] == 1 else 'places'}"
     if change["low"] is None:
-        return f"{mean} (too few to tell: {units})"
-    return f"{mean} [{scale * change['low']:+z.3g}, {scale * change['high']:+z.3g}] ({units})"
+        return f"{mean} (too few to tell: {places})"
+    return f"{mean} [{scale * change['low']:+z.3g}, {scale * change['high']:+z.3g}] ({places})"

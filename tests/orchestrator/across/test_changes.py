@@ -65,27 +65,57 @@ def test_newly_failing_and_fixed_cases_are_named_place_by_place(tmp_path: Path) 
     assert [one["case"] for one in found["fixed"]] == [0]
     failing = found["failing"]
     assert (failing["first"], failing["second"], failing["newly"], failing["fixed"]) == (1, 3, 3, 1)
-    assert failing["p_value"] == pytest.approx(0.625)
+    assert failing["p_value"] == pytest.approx(0.5)  # One more at two of seven places.
     places = {row["junction_id"]: (row["newly"], row["fixed"]) for row in found["places"]}
     assert (places["n0"], places["n1"], places["n2"]) == ((2, 1), (1, 0), (0, 0))
     assert found["places"][0]["junction_id"] in ("n0", "n1")
     assert found["inputs"] == {"seed": {"first": None, "second": 2}}
 
 
-def test_worse_is_what_mcnemar_calls_significant(tmp_path: Path) -> None:
-    good = sweep_of(tmp_path / "good", [case(number) for number in range(28)])
-    for newly, worse in ((5, False), (6, True)):
-        rows = [case(number, collided=number < newly) for number in range(28)]
-        found = compared(good, sweep_of(tmp_path / f"{newly}", rows))
+def test_one_case_more_that_collides_is_worse_wherever_it_is(tmp_path: Path) -> None:
+    here = [case(number, collided=number == 0, junction_id="n") for number in range(28)]
+    first = sweep_of(tmp_path / "first", here)
+    for name, hit, worse in (("one", {0, 1}, True), ("other", {1}, False), ("none", set(), False)):
+        rows = [case(number, collided=number in hit, junction_id="n") for number in range(28)]
+        found = compared(first, sweep_of(tmp_path / name, rows))
 
-        assert is_worse(found) is worse  # p is 2 · 0.5^newly
-        assert not is_worse(compared(tmp_path / f"{newly}", good))
+        assert is_worse(found) is worse
+        assert found["failing"]["p_value"] is None
+
+
+def test_many_cases_at_one_place_are_a_fact_there_and_nothing_significant(tmp_path: Path) -> None:
+    """Twelve of twenty at one of twenty places: every case for itself would have p = 0.0005."""
+    rows = [case(n, junction_id=f"n{n // 20}", place=f"{n % 20}") for n in range(400)]
+    hit = [row | {"collided": row["case"] < 12} for row in rows]
+
+    found = compared(sweep_of(tmp_path / "a", rows), sweep_of(tmp_path / "b", hit))
+
+    assert is_worse(found)
+    assert found["failing"]["newly"] == 12
+    assert found["failing"]["p_value"] > 0.9
+    assert found["places"][0] == {
+        "junction_id": "n0", "pairs": 20, "first": 0, "second": 12, "newly": 12, "fixed": 0,
+    }  # fmt: skip
+
+
+def test_futures_of_five_approaches_are_five_places_however_many(tmp_path: Path) -> None:
+    """Without a systematic change at five junctions 85 % of draws were called significant."""
+    rng = np.random.default_rng(0)
+    places, shift = [n % 5 for n in range(400)], rng.normal(0.0, 0.3, 5)
+    before = [case(n, junction_id=f"n{at}", metric_ttc=2.0) for n, at in enumerate(places)]
+    after = [row | {"metric_ttc": 2.0 + shift[n % 5]} for n, row in enumerate(before)]
+
+    found = compared(sweep_of(tmp_path / "a", before), sweep_of(tmp_path / "b", after))
+
+    ttc = next(row for row in found["measures"] if row["measure"] == "metric_ttc")
+    assert (ttc["change"]["units"], ttc["p_adjusted"], ttc["word"]) == (5, None, "too few places")
+    assert ttc["change"]["mean"] == pytest.approx(shift.mean())
 
 
 def test_rows_in_another_order_and_sides_in_the_other_one_say_the_same(tmp_path: Path) -> None:
-    # At three places pairs are drawn by chance, not places: which ones must not hang on the order.
+    # Places are drawn by chance: which ones must not hang on the order.
     rng = np.random.default_rng(3)
-    more = [{"junction_id": f"n{n % 3}", "metric_ttc": float(rng.normal(2.0))} for n in range(20)]
+    more = [{"metric_ttc": float(rng.normal(2.0))} for n in range(20)]
     before = [case(n, **one) for n, one in enumerate(more)]
     after = [row | {"metric_ttc": row["metric_ttc"] + rng.normal(0.5)} for row in before]
     a, b = sweep_of(tmp_path / "a", before), sweep_of(tmp_path / "b", after)
@@ -113,7 +143,7 @@ def test_two_planners_of_one_sweep_are_paired_case_by_case(tmp_path: Path) -> No
     assert found["inputs"] == {"planner": {"first": ["mine"], "second": ["yours"]}}
     ttc = next(row for row in found["measures"] if row["measure"] == "metric_ttc")
     assert (ttc["change"]["mean"], ttc["word"], ttc["unit"]) == (-1.0, "worse", "s")
-    assert ttc["change"]["of_places"]
+    assert ttc["change"]["units"] == 7
     assert compared(sweep, sweep)["pairs"] == 28
 
 
@@ -128,10 +158,11 @@ def test_what_one_side_alone_has_a_value_of_is_counted_beside_the_means(tmp_path
     (ttc,) = [row for row in found["measures"] if row["measure"] == "metric_ttc"]
     assert (ttc["pairs"], ttc["word"]) == (14, "better")  # of those that were near before
     (alone,) = found["alone"]
-    assert {name: alone[name] for name in ("measure", "first", "second", "both")} == {
-        "measure": "metric_ttc", "first": 0, "second": 14, "both": 14,
+    p_value = pytest.approx(2.0 * 0.5**7)  # At all of seven places, however many cases.
+    assert alone == {
+        "measure": "metric_ttc", "first": 0, "second": 14, "both": 14, "units": 7,
+        "p_value": p_value, "p_adjusted": p_value,
     }  # fmt: skip
-    assert alone["p_adjusted"] == pytest.approx(2.0 * 0.5**14)
     assert compared(first, first)["alone"] == []
 
 

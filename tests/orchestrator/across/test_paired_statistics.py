@@ -5,23 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.orchestrator.across.paired_statistics import adjusted, mcnemar_p, paired_change
+from foretwin.orchestrator.across.paired_statistics import adjusted, paired_change
 
 
-@pytest.mark.parametrize(
-    ("newly", "fixed", "p_value"),
-    [(0, 0, 1.0), (5, 5, 1.0), (5, 0, 2 * 0.5**5), (0, 6, 2 * 0.5**6), (1, 7, 2 * 9 * 0.5**8)],
-)
-def test_exact_mcnemar_is_the_binomial_of_those_that_changed(
-    newly: int, fixed: int, p_value: float
-) -> None:
-    assert mcnemar_p(newly, fixed) == pytest.approx(p_value)
+def test_a_change_that_all_places_share_is_sure() -> None:
+    change = paired_change(np.full(20, 2.0) + np.linspace(-0.1, 0.1, 20), list(range(20)))
 
-
-def test_a_change_that_all_pairs_share_is_sure() -> None:
-    change = paired_change(np.full(20, 2.0) + np.linspace(-0.1, 0.1, 20), ["one place"] * 20)
-
-    assert (change.units, change.of_places) == (20, False)
+    assert change.units == 20
     assert change.mean == pytest.approx(2.0)
     assert change.low is not None
     assert change.high is not None
@@ -37,7 +27,7 @@ def test_of_many_pairs_at_few_places_places_count_where_they_suffice() -> None:
 
     change = paired_change(differences, places.tolist())
 
-    assert (change.units, change.of_places) == (8, True)
+    assert change.units == 8
     assert change.low is not None
     assert change.high is not None
     assert change.low < 0.0 < change.high
@@ -55,9 +45,19 @@ def test_places_with_more_pairs_weigh_more() -> None:
     assert change.high > 30 / 35
 
 
-def test_too_few_say_nothing_and_no_change_is_no_change() -> None:
-    few = paired_change(np.array([1.0, 2.0]), ["a", "b"])
-    assert (few.mean, few.low, few.p_value) == (1.5, None, None)
+@pytest.mark.parametrize("places", [1, 5])
+def test_however_many_pairs_too_few_places_say_nothing(places: int) -> None:
+    """Four hundred futures of five approaches are five approaches."""
+    few = paired_change(np.full(400, 1.5), [number % places for number in range(400)])
+
+    assert few == (1.5, None, None, None, places)
+
+
+def test_six_places_that_agree_are_the_fewest_that_are_sure() -> None:
+    assert paired_change(np.ones(60), [n % 6 for n in range(60)]).p_value == 2 * 0.5**6
+
+
+def test_no_change_is_no_change() -> None:
     assert paired_change(np.zeros(9), list(range(9)))[:4] == (0.0, 0.0, 0.0, 1.0)
 
 

@@ -28,10 +28,8 @@ def test_what_changed_is_said_with_how_sure_it_is_and_how_to_see_it(
     assert command(["compare", *sweeps]) == 0
 
     said = capsys.readouterr().out
-    assert (
-        "collided: 0 → 7: 7 newly failing, 0 fixed; exact McNemar p = 0.0156, significant" in said
-    )
-    assert "change of the share: +25 [+25, +25] (7 places) %" in said
+    assert "collided: 0 → 7: 7 newly failing, 0 fixed\n" in said
+    assert "change of the share: +25 [+25, +25] (7 places) %, p = 0.0156, significant\n" in said
     assert "min_clearance_m (m)" in said
     assert "worse" in said
     assert f"newly failing: scp at n0: scp 0: foretwin repeat '{sweeps[1]}' mine-0" in said
@@ -70,15 +68,37 @@ def test_measures_that_one_side_alone_has_are_told_where_that_is_no_chance(
     assert command(["compare", first, second, "--all"]) == 0
     whole = capsys.readouterr().out
 
-    ttc = "metric_ttc: only A has a value in 0 cases, only B in 9, p adjusted 0.00781; what "
+    ttc = "metric_ttc: only A has a value in 0 cases, only B in 9, p adjusted 0.0312; what "
     assert f"{ttc}changed is told of 0 with both" in short
     assert "1 more measure has a value on one side alone in some cases: --all" in short
     assert "progress_m: only A has a value in 0 cases, only B in 1, p adjusted 1;" in whole
     assert "on one side alone" not in whole
 
 
+def test_at_one_place_counts_are_told_and_nothing_is_called_significant(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [case(n, junction_id="n", metric_ttc=None) for n in range(28)]
+    hit = [row | {"collided": row["case"] < 12, "min_clearance_m": 0.2} for row in rows]
+    hit[20] |= {"metric_ttc": 0.5}
+    sweeps = [str(sweep_of(tmp_path / name, of)) for name, of in (("a", rows), ("b", hit))]
+
+    assert command(["compare", *sweeps, "--fail-on-worse"]) == 3
+    short = capsys.readouterr().out
+    assert command(["compare", *sweeps, "--all"]) == 0
+    whole = capsys.readouterr().out
+
+    assert "collided: 0 → 12: 12 newly failing, 0 fixed\n" in short
+    assert "change of the share: +42.9 (too few to tell: 1 place) %\nfewer than 6 places" in short
+    assert "1 measure changed at too few places to tell: --all" in short
+    (clearance,) = (line for line in whole.splitlines() if line.startswith("min_clearance_m"))
+    assert clearance.split("(too few to tell: 1 place)")[1].strip() == "too few places"
+    assert "only B in 1, at too few places to tell (1); what changed" in whole
+    assert "significant" not in short + whole
+
+
 def test_what_is_surest_stands_first() -> None:
-    change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
+    change = {"mean": 1.0, "low": None, "units": 3}
     rows = [
         {"measure": name, "unit": "m", "first": 0.0, "second": 1.0, "change": change,
          "word": "worse", "relative": False, "p_adjusted": p_value}
@@ -108,7 +128,7 @@ def test_a_score_that_is_relative_to_others_of_its_job_is_said_to_be(
 
 
 def test_of_forty_five_measures_those_are_shown_that_are_for_the_worse_or_the_better() -> None:
-    change = {"mean": 1.0, "low": None, "units": 3, "of_places": False}
+    change = {"mean": 1.0, "low": None, "units": 3}
     rows = [
         {"measure": f"m{place:02d}", "unit": "m", "first": 0.0, "second": 1.0, "change": change,
          "word": word, "relative": False, "p_adjusted": 1e-9 / (place + 1)}
