@@ -29,6 +29,8 @@ class CaseCount(msgspec.Struct, frozen=True, kw_only=True):
     placed: int
     collided: int
     failed: int
+    played: int | None = None
+    """Placed, and played to their end; None in a part from before that was counted."""
     clearance_m: tuple[float, ...] = ()
     scores: tuple[float, ...] = ()
     reasons: dict[str, int] = {}

@@ -148,7 +148,8 @@ def sweep_row(record: Mapping[str, Any], *, folder: str, record_text: str) -> Ru
     if shard := record.get("shard"):
         run += f"-{shard.replace('/', 'of')}"
     failures = record.get("failures")
-    placed, collided, failed = (record.get(name) for name in ("placed", "collided", "failed"))
+    collided, failed = record.get("collided"), record.get("failed")
+    played = record.get("played", record.get("placed"))  # The latter of before that was counted.
     # What a start that went on took is not what the sweep took; of shards it is the sum.
     jobs = record.get("jobs")
     at_once = "shards" in record or record.get("jobs_played", jobs) == jobs
@@ -165,7 +166,7 @@ def sweep_row(record: Mapping[str, Any], *, folder: str, record_text: str) -> Ru
         junctions=record.get("worlds"),
         futures=record.get("rows"),
         collided=collided,
-        verdict=None if collided is None else f"{collided} of {placed} collided, {failed} failed",
+        verdict=None if collided is None else f"{collided} of {played} collided, {failed} failed",
         troubles=None if failures is None else len(failures) + (failed or 0),
         foretwin=_version(record),
         folder=folder,

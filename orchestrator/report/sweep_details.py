@@ -93,7 +93,7 @@ def left_out_chapter(sweep: SweepMaterial) -> Chapter:
             )
         )
     else:
-        blocks.append(Prose("Every case could be played."))
+        blocks.append(Prose("No case was left out."))
     nowhere = sweep.record.get("placed_nowhere") or []
     if nowhere:
         named = ", ".join(scenario_title(one) for one in nowhere)

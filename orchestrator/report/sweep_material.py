@@ -21,7 +21,7 @@ from foretwin.orchestrator.report.material import KeptWorlds, TableRow, most_cri
 from foretwin.orchestrator.sweep.folder import WORLDS
 from foretwin.orchestrator.sweep.manifest import listed_parts
 from foretwin.orchestrator.sweep.spec import SweepSpec
-from foretwin.orchestrator.sweep.summary import summed
+from foretwin.orchestrator.sweep.summary import played_of, summed
 from foretwin.sim_worker.futures.checked_parquet import read_parquet
 from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.metrics.table import ROW_METRICS
@@ -64,6 +64,9 @@ class SweepMaterial:
             raise UserError(f"{folder}: no {SUMMARY} to be read: {error}") from error
         if "scenarios" not in self.record:
             self.record |= _until_now(folder, self.record)
+        for one in self.record.get("scenarios") or ():
+            one["played"] = played_of(one)
+            one.setdefault("not_placed_rows", sum(one["not_placed"].values()))
         self._worlds = KeptWorlds(folder)
 
     @cached_property

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from foretwin.contracts.terminal import command_line
 from foretwin.orchestrator.progress import Progress, untold
 from foretwin.orchestrator.report.blocks import (
+    UNKNOWN,
     Block,
     Chapter,
     Drawn,
@@ -40,6 +41,10 @@ from foretwin.orchestrator.report.sweep_details import (
 from foretwin.orchestrator.report.sweep_material import SweepMaterial
 
 _WORST, _PICTURES = 12, 6
+_OF_THE_REST = (
+    "A future that failed is not among those played: whether it would have collided is not known, "
+    "and it has no score. Those that were played may be the easier cases."
+)
 
 
 def sweep_report(
@@ -93,11 +98,11 @@ def _verdict(sweep: SweepMaterial) -> tuple[str, Tone]:
     groups = sweep.record.get("scenarios") or []
     if not sweep.futures.num_rows:
         return "The sweep holds no rows: nothing was played.", "bad"
-    placed, collided = (sum(one[name] for one in groups) for name in ("placed", "collided"))
+    played, collided = (sum(one[name] for one in groups) for name in ("played", "collided"))
     by_planner = {
         planner: [
             sum(one[name] for one in groups if one["planner"] == planner)
-            for name in ("collided", "placed")
+            for name in ("collided", "played")
         ]
         for planner in sorted({one["planner"] for one in groups})
     }
@@ -108,7 +113,8 @@ def _verdict(sweep: SweepMaterial) -> tuple[str, Tone]:
             if there
         )
     )
-    said = f"Of {plural(placed, 'case')} that could be played {collided} end in a collision"
+    were = "was" if played == 1 else "were"
+    said = f"Of {plural(played, 'case')} that {were} played {collided} end in a collision"
     if len(ranked) > 1:
         (_, best, hit, there), (_, worst, most, of) = ranked[0], ranked[-1]
         said += f": fewest with {best} ({hit} of {there}), most with {worst} ({most} of {of})"
@@ -122,33 +128,37 @@ def _verdict(sweep: SweepMaterial) -> tuple[str, Tone]:
 
 def _figures(sweep: SweepMaterial) -> tuple[KeyFigure, ...]:
     record = sweep.record
-    rows, placed = int(record.get("rows") or 0), int(record.get("placed") or 0)
+    groups = record.get("scenarios") or []
+    rows, played = int(record.get("rows") or 0), sum(one["played"] for one in groups)
     collided, failed = int(record.get("collided") or 0), int(record.get("failed") or 0)
-    share = collided / placed if placed else 0.0
+    left_out = sum(one["not_placed_rows"] for one in groups)
+    share = f"{collided / played:.0%}" if played else UNKNOWN
     worst = pc.max(sweep.futures["criticality"]).as_py() if sweep.futures.num_rows else None
     return (
-        KeyFigure(str(rows), "cases", f"{placed} could be played"),
+        KeyFigure(str(rows), "cases", f"{played} played to their end"),
         KeyFigure(
-            f"{share:.0%}", "collide", f"{collided} of {placed}", "watch" if collided else "good"
+            share, "collide", f"{collided} of {played} played", "watch" if collided else "good"
         ),
         KeyFigure(scientific(worst).text, "gravest", "highest criticality", tone_of(worst)),
-        KeyFigure(str(rows - placed), "left out", "the scenario has no place there"),
+        KeyFigure(str(left_out), "left out", "the scenario has no place there"),
         KeyFigure(str(failed), "failed", "not played to their end", "bad" if failed else "good"),
     )
 
 
 def _outcomes(sweep: SweepMaterial) -> Listed:
+    groups = sweep.record.get("scenarios") or []
     rows = tuple(
         row(
             scenario_title(one["scenario"]),
             one["planner"],
-            *(number(float(one[name]), 0) for name in ("cases", "placed")),
+            *(number(float(one[name]), 0) for name in ("cases", "played")),
             number(float(one["collided"]), 0, tone="watch" if one["collided"] else ""),
             number(float(one["failed"]), 0, tone="bad" if one["failed"] else ""),
             number(one["median_clearance_m"], 2, "m"),
             number(one["mean_score"], 3),
+            number(one.get("scored"), 0),
         )
-        for one in sweep.record.get("scenarios") or []
+        for one in groups
     )
     return Listed(
         "Outcome by scenario and planner",
@@ -161,9 +171,11 @@ def _outcomes(sweep: SweepMaterial) -> Listed:
             "failed",
             "median clearance",
             "mean score",
+            "scored",
         ),
         rows,
-        frozenset(range(2, 8)),
+        frozenset(range(2, 9)),
+        note=_OF_THE_REST if any(one["failed"] for one in groups) else "",
     )
 
 
@@ -171,7 +183,7 @@ def _by_place(sweep: SweepMaterial) -> Chapter:
     title = "By place"
     futures = sweep.played
     if not futures.num_rows:
-        return Chapter("places", title, (Prose("No case could be played."),))
+        return Chapter("places", title, (Prose("No case was played to its end."),))
     keys = ["junction_id", "scenario", "planner"]
     grouped = (
         futures.group_by(keys)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,16 @@ from foretwin.orchestrator.sweep.spec import SweepSpec
 from foretwin.sim_worker.road_users.likeness import likeness_words
 
 _SCORE = "driving_score"
-COUNTS = ("cases", "placed", "collided", "failed")
+COUNTS = ("cases", "placed", "played", "collided", "failed")
 """What is counted of each scenario and planner."""
+_SHOWN = ("cases", "played", "collided", "failed")
 _REASONS = 1000
 """So many different ones are counted of each."""
 
 
 class _CaseSums:
     def __init__(self) -> None:
-        self.cases = self.placed = self.collided = self.failed = 0
+        self.cases = self.placed = self.played = self.collided = self.failed = 0
         self.clearance_m = RunningQuantiles()
         self.scores, self.scored = 0.0, 0
         self.reasons: collections.Counter[str] = collections.Counter()
@@ -35,8 +36,10 @@ class _CaseSums:
         self.not_placed_rows = 0
 
     def add(self, count: CaseCount) -> None:
+        told = msgspec.structs.asdict(count)
+        told["played"] = played_of(told)
         for name in COUNTS:
-            setattr(self, name, getattr(self, name) + getattr(count, name))
+            setattr(self, name, getattr(self, name) + told[name])
         for clearance_m in count.clearance_m:
             self.clearance_m.take(clearance_m)
         self.scores = math.fsum((self.scores, *count.scores))
@@ -75,12 +78,26 @@ class Summary:
                 "mean_score": _rounded(
                     group.scores / group.scored if self._scored and group.scored else None
                 ),
+                "scored": group.scored,
                 "reasons": _most(group.reasons),
                 "not_placed": _most(group.not_placed),
                 "not_placed_rows": group.not_placed_rows,
             }
             for (scenario, planner), group in sorted(self._groups.items())
         ]
+
+
+def played_of(entry: Mapping[str, Any]) -> int:
+    """Return how many cases of an entry of `scenarios` were played to their end: what collided is
+    a share of these.
+
+    Of a sweep from before that was counted, those that neither failed nor were left out.
+    """
+    if (told := entry.get("played")) is not None:
+        return int(told)
+    left_out = entry.get("not_placed_rows", sum(entry["not_placed"].values()))
+    rest: int = min(entry["placed"], entry["cases"] - entry["failed"] - left_out)
+    return max(0, rest)
 
 
 def summed(spec: SweepSpec, entries: Iterable[PartEntry]) -> dict[str, Any]:
@@ -147,21 +164,25 @@ def _no_place_lines(unplaced: list[Any]) -> list[str]:
     return lines
 
 
+def _of(entry: dict[str, Any]) -> str:
+    return "" if entry["scored"] == entry["played"] else f" of {entry['scored']}"
+
+
 def print_summary(out: Path, summary: dict[str, Any]) -> None:
     """Print a sweep's summary as a table."""
     from rich.table import Column, Table
 
     named = (Column(name, no_wrap=True) for name in ("scenario", "planner"))
-    numbers = (*COUNTS, "median clearance", "mean score")
+    numbers = (*_SHOWN, "median clearance", "mean score")
     table = Table(*named, *(Column(name, justify="right", no_wrap=True) for name in numbers))
     for entry in summary["scenarios"]:
         clearance, score = entry["median_clearance_m"], entry["mean_score"]
         table.add_row(
             words(entry["scenario"]),
             words(entry["planner"]),
-            *(str(entry[name]) for name in COUNTS),
+            *(str(entry[name]) for name in _SHOWN),
             "" if clearance is None else f"{clearance:.2f} m",
-            "" if score is None else f"{score:.3f}",
+            "" if score is None else f"{score:.3f}{_of(entry)}",
         )
     console().print(table)
     shard = f", shard {summary['shard']}" if "shard" in summary else ""

@@ -76,7 +76,7 @@ def rows_sha256(futures: pa.Table) -> str:
 
 def count_cases(rows: Iterable[Row]) -> tuple[CaseCount, ...]:
     """Return what came of rows, by scenario and planner; a case that cannot be played at its place
-    is not placed."""
+    is not placed, and one that fails is not played: it collides with nobody and has no score."""
     groups: dict[tuple[str, str], list[Row]] = collections.defaultdict(list)
     for row in rows:
         groups[row["scenario"], row["planner"]].append(row)
@@ -94,6 +94,7 @@ def _counted(scenario: str, planner: str, rows: list[Row]) -> CaseCount:
         planner=planner,
         cases=len(rows),
         placed=len(placed),
+        played=sum(bool(row["valid"]) for row in placed),
         collided=sum(bool(row["collided"]) for row in placed),
         failed=sum(bool(row["failure"]) for row in rows),
         clearance_m=known("min_clearance_m"),

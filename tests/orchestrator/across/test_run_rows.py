@@ -41,14 +41,14 @@ def test_a_drive_is_told_by_its_record(tmp_path: Path) -> None:
 def test_a_sweep_is_told_by_its_record(tmp_path: Path) -> None:
     spec = {"map": "maps/town.osm", "scenarios": ["scp"], "planners": ["a", "b"], "seed": 3,
             "vehicles": ["bmw_320i"]}  # fmt: skip
-    told = {"spec": spec, "rows": 40, "placed": 34, "collided": 12, "failed": 1, "worlds": 4,
-            "failures": {}, "playing_s": 2.5}  # fmt: skip
+    told = {"spec": spec, "rows": 40, "placed": 34, "played": 33, "collided": 12, "failed": 1,
+            "worlds": 4, "failures": {}, "playing_s": 2.5}  # fmt: skip
 
     row = row_of_folder(made_sweep(tmp_path / "sweep", **told))
 
     assert (row.run, row.kind, row.state) == ("sweep-0cdb5ed7a3db79d9", "sweep", "completed")
     assert (row.what, row.planner, row.map, row.futures) == ("scp", "a, b", "town.osm", 40)
-    assert row.verdict == "12 of 34 collided, 1 failed"
+    assert row.verdict == "12 of 33 collided, 1 failed"
     assert (row.junctions, row.collided, row.troubles, row.wall_s) == (4, 12, 1, 2.5)
     assert row.time is not None
 

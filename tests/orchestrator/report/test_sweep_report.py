@@ -42,7 +42,7 @@ def page(swept: Path) -> str:
 def test_it_tells_outcomes_and_stands_alone(swept: Path, page: str) -> None:
     read, record = ReadPage(page), json.loads((swept / "sweep.json").read_text())
 
-    assert f"Of {record['placed']} cases that could be played {record['collided']}" in page
+    assert f"Of {record['played']} cases that were played {record['collided']}" in page
     assert "Outcome by junction, scenario and planner" in page
     assert "constant_speed" in page
     assert read.loaded == []
@@ -77,13 +77,47 @@ def test_of_a_sweep_that_was_stopped_it_tells_what_is_there(swept: Path, tmp_pat
     (out / "manifest.jsonl").write_text("\n".join([*lines[:-1], ""]))
     (out / "rows" / f"job-{dropped['job']:06d}.parquet").unlink()
     (out / "sweep.json").write_text(json.dumps({"complete": False, "spec": record["spec"]}))
-    gone = {name: sum(one[name] for one in dropped["counts"]) for name in ("placed", "collided")}
+    gone = {name: sum(one[name] for one in dropped["counts"]) for name in ("played", "collided")}
 
     page = html_of(report_of_folders([out]))
 
-    placed, collided = (record[name] - gone[name] for name in gone)
-    assert f"Of {placed} cases that could be played {collided} end in a collision" in page
+    played, collided = (record[name] - gone[name] for name in gone)
+    assert f"Of {played} cases that were played {collided} end in a collision" in page
     assert "jobs are missing" in page
+
+
+def test_futures_that_failed_are_neither_played_nor_left_out(swept: Path, tmp_path: Path) -> None:
+    """Of two that meet the same cases, who fails in most of them is not the one that hits least."""
+    out = tmp_path / "failing"
+    shutil.copytree(swept, out)
+    record = json.loads((out / "sweep.json").read_text())
+    names = "cases", "placed", "played", "collided", "failed", "not_placed_rows", "scored"
+    of = {"careful": (110, 100, 100, 20, 0, 10, 100), "failing": (110, 80, 40, 9, 60, 10, 40)}
+    entry = record["scenarios"][0] | {"not_placed": {"too short": 10}, "reasons": {}}
+    groups = [
+        entry | dict(zip(names, of[planner], strict=True)) | {"planner": planner} for planner in of
+    ]
+    told = {"scenarios": groups, "rows": 220, "placed": 180, "collided": 29, "failed": 60}
+    (out / "sweep.json").write_text(json.dumps(record | told))
+
+    report = report_of_folders([out])
+
+    assert report.verdict == (
+        "Of 140 cases that were played 29 end in a collision: fewest with careful (20 of 100), "
+        "most with failing (9 of 40); 60 futures failed."
+    )
+    figures = {one.name: (one.value, one.note) for one in report.figures}
+    del figures["gravest"]
+    assert figures == {
+        "cases": ("220", "140 played to their end"),
+        "collide": ("21%", "29 of 140 played"),
+        "left out": ("20", "the scenario has no place there"),
+        "failed": ("60", "not played to their end"),
+    }
+    for group in groups:
+        del group["played"], group["scored"]
+    (out / "sweep.json").write_text(json.dumps(record | told | {"scenarios": groups}))
+    assert report_of_folders([out]).verdict == report.verdict
 
 
 def test_a_sweep_whose_rows_are_damaged_is_refused(swept: Path, tmp_path: Path) -> None:

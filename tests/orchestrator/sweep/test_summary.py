@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from foretwin.contracts.parts import CaseCount
 from foretwin.contracts.placement import NotPlaced
 from foretwin.orchestrator.sweep.spec import load_spec
-from foretwin.orchestrator.sweep.summary import Summary, print_summary
+from foretwin.orchestrator.sweep.summary import Summary, played_of, print_summary
 from tests.orchestrator.sweeps import small_sweep
 
 COUNT = CaseCount(scenario="scp", planner="x", cases=10, placed=9, collided=0, failed=0)
@@ -47,7 +47,38 @@ def test_in_whatever_order_parts_come_they_add_up_to_the_same(tmp_path: Path) ->
     assert entry["median_clearance_m"] == round(statistics.median(values), 4)
     scores = [score for part in parts for score in part.scores]
     assert entry["mean_score"] == round(statistics.fmean(scores), 4)
-    assert forwards.totals() == {"rows": 500, "placed": 450, "collided": 0, "failed": 0}
+    assert entry["scored"] == 50
+    assert forwards.totals() == {
+        "rows": 500, "placed": 450, "played": 450, "collided": 0, "failed": 0,
+    }  # fmt: skip
+
+
+def test_what_failed_is_not_among_those_played(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Sixty of a hundred fail, fifteen of them where others collide: 9 of 40, not 9 of 100."""
+    summary = Summary(load_spec(small_sweep(tmp_path)).spec)
+    of_rest = {"placed": 100, "played": 40, "collided": 9, "failed": 60, "scores": (0.5,) * 38}
+    summary.add(replace(COUNT, cases=100, **of_rest))
+    (entry,) = summary.table()
+
+    assert {name: entry[name] for name in ("placed", "played", "collided", "scored")} == {
+        "placed": 100, "played": 40, "collided": 9, "scored": 38,
+    }  # fmt: skip
+    cells = [
+        [cell.strip() for cell in line.split("│")[1:-1]]
+        for line in printed(capsys, [entry]).splitlines()
+    ]
+    assert ["scp", "x", "100", "40", "9", "60", "", "0.500 of 38"] in cells
+
+
+def test_parts_from_before_played_cases_were_counted_say_what_they_can(tmp_path: Path) -> None:
+    summary = Summary(load_spec(small_sweep(tmp_path)).spec)
+    summary.add(replace(COUNT, cases=10, placed=6, failed=3, not_placed={"too short": 2}))
+
+    assert summary.totals()["played"] == 5
+    older = {"cases": 10, "placed": 6, "failed": 0, "not_placed": {"the most frequent three": 2}}
+    assert played_of(older) == 6
 
 
 def printed(

@@ -74,7 +74,7 @@ def test_without_a_result_every_row_says_why() -> None:
     assert part.given_up == 4
     assert part_of().given_up == 0
     (count,) = part.counts
-    assert (count.cases, count.placed, count.failed) == (4, 0, 4)
+    assert (count.cases, count.placed, count.played, count.failed) == (4, 0, 0, 4)
     assert count.reasons == {"no answer in 1 s": 4}
 
 
@@ -91,19 +91,19 @@ def test_values_stand_in_the_order_of_the_scenario_though_jobs_sort_them() -> No
 
 
 def test_cases_are_counted_by_scenario_and_planner() -> None:
-    played = {"scenario": "scp", "planner": "a", "failure": "", "left_out": "",
+    played = {"scenario": "scp", "planner": "a", "failure": "", "left_out": "", "valid": True,
               "trajectory_sha256": "0", "collided": False, "min_clearance_m": 2.0}  # fmt: skip
     rows = [
         played,
         {**played, "collided": True, "min_clearance_m": None, "metric_driving_score": 0.5},
-        {**played, "failure": "its planner failed"},
-        {**played, "left_out": "too short", "trajectory_sha256": None},
+        {**played, "failure": "its planner failed", "valid": False, "min_clearance_m": None},
+        {**played, "left_out": "too short", "trajectory_sha256": None, "valid": None},
         {**played, "planner": "b"},
     ]
     first, second = count_cases(rows)
     assert first == CaseCount(
-        scenario="scp", planner="a", cases=4, placed=3, collided=1, failed=1,
-        clearance_m=(2.0, 2.0), scores=(0.5,),
+        scenario="scp", planner="a", cases=4, placed=3, played=2, collided=1, failed=1,
+        clearance_m=(2.0,), scores=(0.5,),
         reasons={"its planner failed": 1}, not_placed={"too short": 1},
     )  # fmt: skip
     assert (second.planner, second.cases, second.scores) == ("b", 1, ())
