@@ -35,6 +35,7 @@ from foretwin.orchestrator.report.material import (
     in_lock_step,
     part_of,
 )
+from foretwin.sim_worker.analysis.occurred.conflicts import conflicts_of
 from foretwin.sim_worker.analysis.occurred.odd import DrivenSpan, OddExposure
 from foretwin.sim_worker.analysis.occurred.rows import THRESHOLDS
 
@@ -169,9 +170,10 @@ def _exposures(parts: Sequence[OddExposure | DrivenSpan]) -> dict[ExposureUnit, 
 def _happened(record: Mapping[str, Any], occurred: Occurred, rows: RowCounts) -> dict[str, int]:
     found = {"marked events": rows.marked}
     if occurred.sees_others:
-        met = Counter(name for one in occurred.scenarios for name in one.beyond)
-        found[_CONFLICT] = sum(one.is_conflict for one in occurred.scenarios)
-        found |= {f"{_CONFLICT} by {_NAMES.get(one, one)}": met[one] for one in THRESHOLDS}
+        found[_CONFLICT] = len(conflicts_of(occurred.scenarios))
+        for one in THRESHOLDS:
+            met = conflicts_of(occurred.scenarios, by=one)
+            found[f"{_CONFLICT} by {_NAMES.get(one, one)}"] = len(met)
     if rows.takeovers is not None:
         found[_TAKEOVERS] = rows.takeovers
     alarms = part_of(record, "tuning", "gap", "alarms")
@@ -190,14 +192,11 @@ def _by_junction_kind(
     if not occurred.sees_others:
         return {}
     kinds = {str(one["id"]): str(one["kind"]) for one in record.get("intersections") or ()}
-    passes: Counter[str] = Counter()
-    met: Counter[str] = Counter()
-    for one in occurred.scenarios:
-        if not one.junction_id:
-            continue
-        kind = kinds.get(one.junction_id, _UNSEEN)
-        passes[kind] += not one.other_id
-        met[kind] += one.is_conflict
+    ways = (one for one in occurred.scenarios if not one.other_id)
+    passes, met = (
+        Counter(kinds.get(one.junction_id, _UNSEEN) for one in rows if one.junction_id)
+        for rows in (ways, conflicts_of(occurred.scenarios))
+    )
     return {
         IndicatorKey(_CONFLICT, "pass", kind): CountedEvents(met[kind], float(count))
         for kind, count in passes.items()

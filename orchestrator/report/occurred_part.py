@@ -19,6 +19,7 @@ from foretwin.orchestrator.report.blocks import (
 )
 from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.passages import JunctionPassed
+from foretwin.sim_worker.analysis.occurred.conflicts import conflicts_of
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
 
 _MOST_LISTED = 300
@@ -41,12 +42,13 @@ def occurred_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Chapter
 def told_of(found: Occurred, start_ns: int, passed: Sequence[JunctionPassed]) -> Chapter:
     """Return the section of what was recognised; drive time begins at `start_ns`."""
     blocks: list[Block] = [Prose(f"{note[:1].upper()}{note[1:]}.", "quiet") for note in found.notes]
-    conflicts = sum(bool(one.beyond) for one in found.scenarios)
+    beyond = sum(one.is_conflict for one in found.scenarios)
+    conflicts = plural(len(conflicts_of(found.scenarios)), "conflict")
     blocks.insert(
         0,
         Prose(
             f"{plural(len(found.scenarios), 'scenario')} recognised from the recorded motion and "
-            f"detections; {conflicts} of them beyond a threshold."
+            f"detections; {beyond} of them beyond a threshold ({conflicts})."
         ),
     )
     if found.scenarios:

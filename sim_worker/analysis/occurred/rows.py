@@ -162,7 +162,7 @@ THRESHOLDS: dict[str, Threshold] = {
         "AASHTO (2018), A Policy on Geometric Design, 3.2.2: what most drivers accept",
     ),
 }
-"""Beyond one of them a scenario is a conflict."""
+"""Beyond one of them a scenario tells of a conflict; others may tell of the same one."""
 
 
 class OccurredScenario(msgspec.Struct, frozen=True, kw_only=True):

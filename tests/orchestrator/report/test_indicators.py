@@ -42,7 +42,7 @@ def driven(*, sees_others: bool = True) -> Occurred:
     )
     scenarios = (
         scenario("x"), scenario("x"), scenario("x", "7", "ttc_s", "drac_mps2"),
-        scenario("x", "8"), scenario("o"), scenario("", "9", "ttc_s"), scenario("o", "9", "pet_s"),
+        scenario("x", "8"), scenario("o"), scenario("", "9", "ttc_s"), scenario("o", "10", "pet_s"),
     )  # fmt: skip
     by_software = DrivenSpan(driven_m=2000.0, driven_s=360.0)
     return Occurred(scenarios=scenarios, sees_others=sees_others, odd=odd, by_software=by_software)
@@ -98,6 +98,27 @@ def test_conflicts_at_junctions_are_held_against_passes_by_kind() -> None:
 
     assert found[IndicatorKey("conflicts", "pass", "crossing")] == CountedEvents(1, 2.0)
     assert found[IndicatorKey("conflicts", "pass", "roundabout")] == CountedEvents(1, 1.0)
+
+
+def test_one_encounter_that_three_rows_tell_of_is_one_conflict() -> None:
+    """A cut-in, following and the lead's braking of one car, on the way to and in a junction."""
+    one = driven()
+    rows = tuple(
+        OccurredScenario(kind=kind, begin_ns=begin, end_ns=end, junction_id=at, other_id="a",
+                         beyond=beyond)
+        for kind, begin, end, at, beyond in (
+            ("cut_in", 1, 5, "", ()), ("following", 3, 8, "x", ("ttc_s",)),
+            ("lead_decelerates", 6, 9, "x", ("ttc_s", "drac_mps2")),
+        )
+    )  # fmt: skip
+    occurred = msgspec.structs.replace(one, scenarios=(scenario("x"), *rows))
+
+    found = counted_in(RECORD, occurred, RowCounts(marked=0, takeovers=None))
+
+    assert found[IndicatorKey("conflicts", "km")] == CountedEvents(1, 7.0)
+    assert found[IndicatorKey("conflicts by TTC", "km")].events == 1
+    assert found[IndicatorKey("conflicts by DRAC", "km")].events == 1
+    assert found[IndicatorKey("conflicts", "pass", "crossing")] == CountedEvents(1, 1.0)
 
 
 def test_rounds_telemetry_and_jobs_are_shares_of_those_that_were_due() -> None:

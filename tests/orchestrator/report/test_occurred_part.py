@@ -38,6 +38,7 @@ def test_scenarios_stand_by_time_with_their_junction(tmp_path: Path) -> None:
     said, table = chapter.blocks
     assert isinstance(said, Prose)
     assert said.text.startswith("1 scenario recognised")
+    assert said.text.endswith("; 1 of them beyond a threshold (1 conflict).")
     assert isinstance(table, Listed)
     (cells,) = table.rows
     assert [cell.text for cell in cells[:4]] == ["2.0\u00a0s", "5.0\u00a0s", "cut in", "car 7"]
