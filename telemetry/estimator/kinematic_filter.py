@@ -36,6 +36,8 @@ from foretwin.telemetry.estimator.measured import MOST_SPEED_MPS
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 _MAX_STEP_S = 0.05
+_HARDEST_MPS2 = 10.0
+"""No car on tyres turns harder (1 g)."""
 _STANDING_CURVATURE_PM = 0.1
 
 
@@ -112,8 +114,10 @@ class KinematicFilter:
         mean = self.mean
         if not self.may_reverse and mean.item(SPEED) < 0.0:
             mean[SPEED] = 0.0
-        if abs(mean.item(CURVATURE)) > MAX_CURVATURE_PM:
-            mean[CURVATURE] = math.copysign(MAX_CURVATURE_PM, mean[CURVATURE])
+        speed, curvature = mean.item(SPEED), mean.item(CURVATURE)
+        most = min(MAX_CURVATURE_PM, _HARDEST_MPS2 / max(speed * speed, 1.0))
+        if abs(curvature) > most:
+            mean[CURVATURE] = math.copysign(most, curvature)
 
     def sensor_xy(self, lever_m: tuple[float, float]) -> Array:
         """Return where a sensor at `lever_m` (forward, left) of base_link is, shape (2,)."""

@@ -146,16 +146,19 @@ class Doubt:
     """What standard deviation to give a sensor that states none: its recent surprises, bounded.
 
     Speeds and courses of a satellite receiver lag behind its positions by up to a second; taken at
-    their word they would lead the track away.
+    their word they would lead the track away. What the filter itself did not know counts for
+    nothing (Mehra 1970, eq. 18): it would teach itself to distrust who could correct it.
     """
 
     def __init__(self, least: float, most: float = math.inf) -> None:
         self._least, self._most = least, most
         self._mean_square = 0.0
 
-    def std(self, surprise: float) -> float:
-        """Take the latest surprise and return the standard deviation to use for it."""
-        self._mean_square += 0.02 * (surprise * surprise - self._mean_square)
+    def std(self, surprise: float, own_variance: float = 0.0) -> float:
+        """Take the latest surprise, which the filter expected to have `own_variance` without any
+        noise, and return the standard deviation to use for it."""
+        square = surprise * surprise - own_variance
+        self._mean_square = max(0.0, self._mean_square + 0.02 * (square - self._mean_square))
         return min(max(self._least, 2.0 * math.sqrt(self._mean_square)), self._most)
 
 

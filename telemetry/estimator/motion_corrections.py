@@ -147,7 +147,8 @@ class MotionCorrections:
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
                 local_yaw = yaw + convergence_rad
                 surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))
-                square = filter_.correct_yaw(local_yaw, self._yaw_doubt.std(surprise))
+                std = self._yaw_doubt.std(surprise, filter_.covariance.item(YAW, YAW))
+                square = filter_.correct_yaw(local_yaw, std)
                 self._surprises.take("heading", square, LINE_95)
                 if yaw_rate is not None:
                     std = self._yaw_rate_doubt.std(abs(yaw_rate - filter_.yaw_rate_radps))
@@ -174,6 +175,7 @@ class MotionCorrections:
         if self._stands:
             filter_.stand(0.01, 0.05)
         else:
-            std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]))
+            own = filter_.covariance.item(SPEED, SPEED)
+            std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]), own)
             square = filter_.correct_speed(speed_mps, std + 0.005 * abs(speed_mps))
             self._surprises.take("speed", square, LINE_95)

@@ -174,7 +174,9 @@ class PositionCorrections:
             square = innovation.square(white)
         borne_out, self._doubted = bool(self._doubted), ()
         self._usual = max(self._usual * (_UP if square > PLANE_95 * self._usual else _DOWN), 1.0)
-        self._expect(filter_, square, white, alone=alone, unfelt=unfelt)
+        shown = _SHOWS_TURNING_M / white
+        filter_.steady = min(_NIMBLE, shown) if alone else min(1.0, shown) if unseen else 1.0
+        self._expect_pedals(filter_, square, unfelt=unfelt)
         yaw_before = filter_.mean[YAW]
         if (
             abs(filter_.mean[SPEED]) < CREEPING_MPS
@@ -215,11 +217,8 @@ class PositionCorrections:
         self.noise.restart()
         self._doubted = ()
 
-    def _expect(
-        self, filter_: KinematicFilter, square: float, white_m: float, *, alone: bool, unfelt: bool
-    ) -> None:
+    def _expect_pedals(self, filter_: KinematicFilter, square: float, *, unfelt: bool) -> None:
         """Let surprises say how calmly the car is driven, where fixes alone tell of pedals."""
-        filter_.steady = min(_NIMBLE, _SHOWS_TURNING_M / white_m) if alone else 1.0
         if not unfelt or square > _DOUBTFUL:
             filter_.calm = 1.0
             return

@@ -141,7 +141,8 @@ class PositionNoise:
         white = _WHITE_SHARE * min(max(fix.std_m or 0.0, 1e-3), 1e4)
         if self.seen_m is not None and self._jerked_m < _CLEAR * white:
             return max(self.seen_m, LEAST_STD_M)
-        return max(white, self._seen_beyond(white))
+        # This share is nobody's word: where surprises cannot tell, as much as they leave open.
+        return max(white, self._seen_beyond(white), min(self._untold_m, std))
 
     def _seen_beyond(self, stated_m: float) -> float:
         """Return what was seen where it gives the lie to `stated_m`, 0 elsewhere."""

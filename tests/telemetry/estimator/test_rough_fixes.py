@@ -1,0 +1,63 @@
+"""Positions once a second that are rough from one to the next, as without any smoothing."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import HeadingSample, SpeedSample
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from tests.telemetry.position_track import fix, info, xy
+
+COVERS = ("foretwin.telemetry.estimator.position_noise",)
+
+SPEED_MPS, SECONDS = 10.0, 120
+
+
+class Errors(NamedTuple):
+    """What 95 % of the states after the first half minute are within."""
+
+    position_m: float
+    yaw_deg: float
+
+
+def straight_on(
+    *, rough_m: float, stated_m: float | None, seed: int, headings: bool = False
+) -> Errors:
+    """Drive east with true wheels, and where told with headings good to a degree."""
+    estimator, random = StateEstimator(info()), np.random.default_rng(seed)
+    found = []
+    for second in range(SECONDS):
+        stamp_ns, x_m = second * 10**9, SPEED_MPS * second
+        estimator.handle("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=SPEED_MPS))
+        if headings:
+            told = random.normal(0.0, math.radians(1.0))
+            estimator.handle("heading", HeadingSample(stamp_ns=stamp_ns, yaw_rad=told))
+        off_m = random.normal(0.0, rough_m, 2)
+        state = estimator.handle(*fix(float(second), x_m + off_m[0], off_m[1], stated_m))
+        if state is not None and second >= 30:
+            away_m = float(np.hypot(*(xy(state) - (x_m, 0.0))))
+            found.append((away_m, math.degrees(abs(state.yaw_rad))))
+    return Errors(*np.percentile(found, 95, axis=0).tolist())
+
+
+@pytest.mark.parametrize("stated_m", [2.1, 3.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_wheels_do_not_make_them_worse(seed: int, stated_m: float) -> None:
+    """The fixes are within 5.1 m; a filter that took their noise for turns was 20 m off."""
+    errors = straight_on(rough_m=2.1, stated_m=stated_m, seed=seed)
+
+    assert errors.position_m < 6.0
+    assert errors.yaw_deg < 35.0
+
+
+@pytest.mark.parametrize("rough_m", [0.5, 1.0, 2.1])
+def test_headings_beside_them_are_believed(rough_m: float) -> None:
+    """A filter that is unsure of its yaw does not take that for noise of the headings."""
+    errors = straight_on(rough_m=rough_m, stated_m=rough_m, seed=1, headings=True)
+
+    assert errors.yaw_deg < 3.0
+    assert errors.position_m < 1.5 * rough_m
