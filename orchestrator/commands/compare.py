@@ -166,7 +166,8 @@ def _spread(one: Spread) -> dict[str, Any]:
 
 def _after(row: AfterDifference) -> dict[str, Any]:
     sides = {"along_m": row.along, "across_m": row.across, "speed_mps": row.speed}
-    return {"horizon_s": row.horizon_s, **{name: _spread(one) for name, one in sides.items()}}
+    spreads = {name: _spread(one) for name, one in sides.items()}
+    return {"horizon_s": row.horizon_s, "left_out": row.left_out, **spreads}
 
 
 def _stretch(one: StretchDifference, frame: LocalFrame) -> dict[str, Any]:

@@ -61,13 +61,16 @@ def after_lines(found: DriveDifference) -> Iterator[str]:
     """Yield how far apart both are some seconds after they passed a place at like speed: the
     scale for gaps between a car and its model."""
     yield f"seconds after a place that both passed at like speed (within {LIKE_SPEED_MPS:g} m/s)"
-    yield f"{'after':>5}{'places':>8}" + "".join(
+    yield f"{'after':>5}{'places':>8}{'left out':>10}" + "".join(
         f"{name:>9}{'95 %':>8}" for name in ("along, m", "across, m", "m/s")
     )
     for row in found.after:
+        begun = f"{row.horizon_s:>3g} s{row.along.places:>8}{row.left_out:>10}"
         if not row.along.places:
-            yield f"{row.horizon_s:>3g} s{0:>8}  no such place"
+            yield f"{begun}  no such place"
             continue
         sides = (row.along, row.across, row.speed)
         cells = "".join(f"{one.rms:>9.2f}{one.size_p95:>8.2f}" for one in sides)
-        yield f"{row.horizon_s:>3g} s{row.along.places:>8}{cells}"
+        yield f"{begun}{cells}"
+    if any(row.left_out for row in found.after):
+        yield "left out: so near the end of a passage that a car may be past it by then"

@@ -157,7 +157,8 @@ def _people(people: Sequence[HumanRow]) -> list[Block]:
             ("after", "places", "along", "across", "speed"),
             rows,
             frozenset(range(5)),
-            note="Seconds after a place that both passed at like speed.",
+            note="Seconds after a place that both passed at like speed, and from which neither can "
+            "have left the road in common by then.",
         )
     ]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Flags
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker.analysis.two_drives.common_stretches import (
     LEAST_M,
     CommonStretch,
@@ -32,6 +32,8 @@ HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 LIKE_SPEED_MPS = 0.5
 """What comes after a place is compared from places that both passed at like speed: a model, too,
 begins at the car's."""
+SPEEDS_UP_MPS2 = 3.0
+"""Hardly anybody speeds up by more for seconds. Chosen."""
 _OVER_M = 100.0
 _EVERY_S = 1.0
 
@@ -60,12 +62,17 @@ class StretchDifference(NamedTuple):
 
 
 class AfterDifference(NamedTuple):
-    """How far two drives that passed a place at like speed are apart some seconds later."""
+    """How far two drives that passed a place at like speed are apart some seconds later.
+
+    `left_out` such places lie so near the end of their stretch that a car might be beyond it by
+    then: whether one is says which of them was faster, so it is not asked.
+    """
 
     horizon_s: float
     along: Spread
     across: Spread
     speed: Spread
+    left_out: int
 
 
 class DriveDifference(NamedTuple):
@@ -152,24 +159,53 @@ def _over(a_m: Array, lost_s: Array) -> Array:
 def _after(
     a: DriveLine, b: DriveLine, stretches: Sequence[StretchDifference]
 ) -> list[AfterDifference]:
+    fastest_mps = max(
+        float(max(b.speed_mps[one.stretch.rows_b].max(), a.at_m(a.speed_mps, one.a_m).max()))
+        for one in stretches
+    )
+    starts = [_at_like_speed(one) for one in stretches]
     found = []
     for horizon_s in HORIZONS_S:
-        parts = [_apart(a, b, one, horizon_s) for one in stretches]
+        kept = [
+            at[_stays(b, one, at, horizon_s, fastest_mps=fastest_mps)]
+            for one, at in zip(stretches, starts, strict=True)
+        ]
+        parts = [_apart(a, b, one, at, horizon_s) for one, at in zip(stretches, kept, strict=True)]
         along, across, speed = (np.concatenate(column) for column in zip(*parts, strict=True))
-        found.append(AfterDifference(horizon_s, spread(along), spread(across), spread(speed)))
+        left_out = sum(map(len, starts)) - len(along)
+        found.append(
+            AfterDifference(horizon_s, spread(along), spread(across), spread(speed), left_out)
+        )
     return found
 
 
-def _apart(
-    a: DriveLine, b: DriveLine, one: StretchDifference, horizon_s: float
-) -> tuple[Array, Array, Array]:
-    """Return how far both are apart `horizon_s` after places that they passed at like speed, once
-    a second: along, across and in speed."""
+def _at_like_speed(one: StretchDifference) -> Indices:
+    """Return the places of a stretch, once a second, that both passed at like speed."""
     at = np.unique(np.searchsorted(one.a_s, np.arange(one.a_s[0], one.a_s[-1], _EVERY_S)))
-    at = at[np.abs(one.values["speed_mps"][at]) <= LIKE_SPEED_MPS]
+    return np.asarray(at[np.abs(one.values["speed_mps"][at]) <= LIKE_SPEED_MPS])
+
+
+def _stays(
+    b: DriveLine, one: StretchDifference, at: Indices, horizon_s: float, *, fastest_mps: float
+) -> Flags:
+    """Return at which places no car can leave the stretch within `horizon_s`.
+
+    It is asked of what is known at the place alone: a car that speeds up at once from the faster
+    of both speeds, up to the fastest that either drove anywhere in common.
+    """
+    b_mps = b.speed_mps[one.stretch.rows_b[at]]
+    begins_mps = np.maximum(b_mps, b_mps - one.values["speed_mps"][at])
+    speeding_s = np.minimum((fastest_mps - begins_mps) / SPEEDS_UP_MPS2, horizon_s)
+    gained_m = SPEEDS_UP_MPS2 * speeding_s * (horizon_s - 0.5 * speeding_s)
+    left_m = np.minimum(one.a_m[-1] - one.a_m[at], one.b_m[-1] - one.b_m[at])
+    return np.asarray(begins_mps * horizon_s + gained_m <= left_m)
+
+
+def _apart(
+    a: DriveLine, b: DriveLine, one: StretchDifference, at: Indices, horizon_s: float
+) -> tuple[Array, Array, Array]:
+    """Return how far both are apart `horizon_s` after places: along, across and in speed."""
     then_a_m, then_b_m = a.come_m(one.a_s[at] + horizon_s), b.come_m(one.b_s[at] + horizon_s)
-    there = (then_a_m <= one.a_m[-1]) & (then_b_m <= one.b_m[-1])
-    at, then_a_m, then_b_m = at[there], then_a_m[there], then_b_m[there]
     along = (then_b_m - one.b_m[at]) - (then_a_m - one.a_m[at])
     lateral = one.values["lateral_m"]
     across = np.interp(then_a_m, one.a_m, lateral) - lateral[at]

@@ -125,9 +125,12 @@ def test_a_gap_is_told_beside_how_far_people_differ(
     assert said["against"]["log"] == again
     after = {row["horizon_s"]: row for row in said["against"]["after"]}
     assert after[4.0]["along_m"]["p50"] == pytest.approx(0.8, abs=0.1)
+    # The road's last 4 s, at the least, are too near its end.
+    assert 4 <= after[4.0]["left_out"] <= 5
     assert said["rows"]
     assert run(["gap", pair[0], "--against", again]) == 0
     told = capsys.readouterr().out
+    assert "left out: so near the end of a passage that a car may be past it by then" in told
     assert told.index("what a gap is measured against") < told.index("RMS of the gap")
     away = str(recorded(tmp_path / "away.mcap", BEND + np.array([0.0, 700.0]), 8.0))
     assert run(["gap", pair[0], "--against", away]) == 2

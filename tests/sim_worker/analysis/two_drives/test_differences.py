@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import msgspec
 import numpy as np
 import pytest
@@ -71,6 +73,38 @@ def test_what_comes_after_a_place_is_compared_from_like_speeds() -> None:
     assert two.along.quantiles[0] == pytest.approx(0.5 * 0.5 * 2.0**2, abs=0.3)
     assert two.speed.quantiles[0] == pytest.approx(1.0, abs=0.3)
     assert two.across.rms == pytest.approx(0.0, abs=0.02)
+
+
+def test_who_is_faster_does_not_drop_out_where_a_stretch_ends() -> None:
+    """From 10 m/s one goes on as fast, the other as often at 15 m/s as at 6 m/s, on 110 m each."""
+    ways = [np.array([[0.0, 400.0 * k], [110.0, 400.0 * k]]) for k in range(8)]
+    a, b = [], []
+    for k, way in enumerate(ways):
+        then_mps = 15.0 if k % 2 else 6.0
+        a += driven(way, 10.0, start_s=60.0 * k)
+        b += driven(way, partial(_after_5_m, then_mps), start_s=60.0 * k, left_m=1.0)
+    after = {row.horizon_s: row for row in compared(line(a), line(b)).after}
+    assert after[4.0].along.places == 8
+    slower_m, faster_m = np.array(after[4.0].along.quantiles)[[0, -1]]
+    assert faster_m > 15.0
+    assert slower_m < -12.0
+    # In 8 s a car at 15 m/s leaves any of them, so that the slower ones say nothing alone.
+    assert (after[8.0].along.places, after[8.0].left_out) == (0, 8)
+    assert [after[s].along.places + after[s].left_out for s in (1.0, 2.0, 4.0, 8.0)] == [8] * 4
+
+
+def _after_5_m(then_mps: float, at_m: float) -> float:
+    return 10.0 if at_m < 5.0 else then_mps
+
+
+def test_a_stretch_is_long_enough_for_cars_that_speed_up_from_where_they_are() -> None:
+    """From 3 m/s nobody goes 100 m in 8 s by speeding up to 15 m/s; who has 15 m/s goes 120."""
+    slow, fast = np.array([[0.0, 0.0], [115.0, 0.0]]), np.array([[0.0, 400.0], [115.0, 400.0]])
+    both = driven(slow, 3.0) + driven(fast, 15.0, start_s=60.0)
+    eight = compared(line(both), line(both)).after[-1]
+    # 8 s at 15 m/s, less 4 s of speeding up, are 96 m: the first 19 m, at 3 m/s, are far enough.
+    assert 5 <= eight.along.places <= 7
+    assert eight.left_out > 30
 
 
 def test_what_is_common_counts_each_metre_once_and_the_rest_is_alone() -> None:
