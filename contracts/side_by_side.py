@@ -21,8 +21,8 @@ class Disagreement(msgspec.Struct, frozen=True, kw_only=True):
 
     `stamp_ns` is that of the first plan that was departed from, `position` where the car was then,
     `junction_id` the junction it was at or had before it, `route_m` how far along its route. The
-    figures are the greatest in size, ADS minus human: `lateral_m` of the ways, positive left;
-    `along_m` and `speed_mps` at the same instants.
+    figures are the greatest in size, ADS minus human: `lateral_m` of the ways, positive left, None
+    where none could be compared; `along_m` and `speed_mps` at the same instants.
     """
 
     vehicle_id: str
@@ -37,7 +37,7 @@ class Disagreement(msgspec.Struct, frozen=True, kw_only=True):
     position: GeoPoint
     junction_id: str | None
     route_m: float | None
-    lateral_m: float
+    lateral_m: float | None
     along_m: float
     speed_mps: float
 
@@ -45,8 +45,10 @@ class Disagreement(msgspec.Struct, frozen=True, kw_only=True):
 class DrivenSegment(msgspec.Struct, frozen=True, kw_only=True):
     """A stretch between two takeovers, and how far plans lay from what was then driven in it.
 
-    The figures are 95th percentiles of each plan's greatest size, None where no plan was compared.
-    `cut` plans were compared as far as the next takeover, `too_short` ones not at all.
+    The figures are 95th percentiles of each plan's greatest size, None where no plan was compared:
+    `lateral_m` of the plans whose way could be, `ways` of them; it cannot where the car or its plan
+    stands or hardly moves. `cut` plans were compared as far as the next takeover, `too_short` ones
+    not at all.
     """
 
     number: int
@@ -54,6 +56,7 @@ class DrivenSegment(msgspec.Struct, frozen=True, kw_only=True):
     from_stamp_ns: int
     to_stamp_ns: int
     plans: int
+    ways: int
     cut: int
     too_short: int
     lateral_m: float | None

@@ -126,7 +126,7 @@ def disagreement_text(one: Disagreement, junction: str | None) -> str:
         where += f", {one.route_m:.0f} m along the route"
     apart = (
         f"{abs(one.lateral_m):.1f} m to the {'left' if one.lateral_m > 0.0 else 'right'}"
-        if one.aspect == "way"
+        if one.aspect == "way" and one.lateral_m is not None
         else f"{one.speed_mps:+z.1f} m/s, {one.along_m:+z.1f} m"
     )
     return f"{WORDS[one.kind]} ({apart}) from {where}"

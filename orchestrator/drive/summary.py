@@ -44,7 +44,7 @@ def side_by_side_lines(found: Any, junctions: Sequence[dict[str, Any]] = ()) -> 
     names = {junction["id"]: junction_name(junction) for junction in junctions}
     lines = [
         f"  {one['control_mode']} for {(one['to_stamp_ns'] - one['from_stamp_ns']) / 1e9:.1f} s: "
-        f"{one['plans']} plans of the ADS, 95 % within {one['lateral_m']:.1f} m across, "
+        f"{one['plans']} plans of the ADS, 95 % within {_across(one)}"
         f"{one['along_m']:.1f} m along, {one['speed_mps']:.1f} m/s of what was then driven"
         for one in found["segments"]
         if one["plans"]
@@ -57,6 +57,15 @@ def side_by_side_lines(found: Any, junctions: Sequence[dict[str, Any]] = ()) -> 
     ]
     more = len(found["disagreements"]) - DISAGREEMENTS_SHOWN
     return [*lines, f"  and {more} more in results/disagreements.parquet"] if more > 0 else lines
+
+
+def _across(segment: dict[str, Any]) -> str:
+    """Say how far plans lay across, and of how many that is known where not of all."""
+    across_m, ways = segment["lateral_m"], segment.get("ways", segment["plans"])
+    if across_m is None:
+        return ""
+    of = "" if ways == segment["plans"] else f" (of the {ways} whose way could be compared)"
+    return f"{across_m:.1f} m across{of}, "
 
 
 class LastWords(NamedTuple):

@@ -74,9 +74,20 @@ def disagreement_part(run: RunMaterial, passed: Sequence[JunctionPassed]) -> Cha
         blocks.append(
             Listed(
                 "Stretches between takeovers, and how far plans lay from what was driven (95 %)",
-                ("from", "to", "mode", "plans", "across", "along", "speed", "disagreements"),
+                (
+                    "from",
+                    "to",
+                    "mode",
+                    "plans",
+                    "ways",
+                    "across",
+                    "along",
+                    "speed",
+                    "disagreements",
+                ),
                 tuple(_segment(run, one) for one in segments[:MOST_LISTED]),
-                frozenset({0, 1, 3, 4, 5, 6, 7}),
+                frozenset({0, 1, 3, 4, 5, 6, 7, 8}),
+                note="Ways are compared across where neither car nor plan stands or hardly moves.",
             )
         )
     if found:
@@ -104,6 +115,7 @@ def _segment(run: RunMaterial, one: TableRow) -> tuple[TableCell, ...]:
         _at(run, one, "to_stamp_ns"),
         one["control_mode"].replace("_", " "),
         number(float(one["plans"]), 0),
+        number(one.get("ways"), 0),
         number(one["lateral_m"], 1, "m"),
         number(one["along_m"], 1, "m"),
         number(one["speed_mps"], 1, "m/s"),

@@ -45,12 +45,13 @@ class Limits:
 class Departure(NamedTuple):
     """A plan seen from what was driven, each where it is greatest in size, signed.
 
-    `lateral_m` and `turned_rad` between the two ways wherever both led; `along_m` along the driven
-    heading and `speed_mps` at the same instants; speeds at the end of both.
+    `lateral_m` and `turned_rad` between the two ways wherever both led, None where one of them is
+    too short to tell; `along_m` along the driven heading and `speed_mps` at the same instants;
+    speeds at the end of both.
     """
 
-    lateral_m: float
-    turned_rad: float
+    lateral_m: float | None
+    turned_rad: float | None
     along_m: float
     speed_mps: float
     planned_end_mps: float
@@ -74,6 +75,8 @@ def departure(planned: Array, driven: Array) -> Departure:
 
 def way_kind(found: Departure, limits: Limits) -> DisagreementKind | None:
     """Say what a departure means for the way, None where it is within the limits."""
+    if found.lateral_m is None or found.turned_rad is None:
+        return None
     aside_m = abs(found.lateral_m)
     if aside_m <= limits.beside_m:
         return None
@@ -96,20 +99,21 @@ def pace_kind(found: Departure, limits: Limits) -> DisagreementKind | None:
     return None
 
 
-def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
+def _between_ways(planned: Array, driven: Array) -> tuple[float, float] | tuple[None, None]:
     """Return the greatest offset and angle of the planned way from the driven, as far as both go.
 
-    Ways, not instants: a stop on a lane's middle departs in pace, not in way.
+    None where one of them stands or hardly moves. Ways, not instants: a stop on a lane's middle
+    departs in pace, not in way.
     """
     moved = _moved(driven)
     if len(moved) < 2 or len(_moved(planned)) < 2:
-        return 0.0, 0.0
+        return None, None
     way = FrenetPath(moved[:, :2], before_m=0.0)
     place = way.locate(planned[:, :2])
     gone_m = arc_lengths(planned[:, :2])
     common = (place.arc_m < way.length_m) & (gone_m <= way.length_m)
     if not common.any() or min(way.length_m, float(gone_m[-1])) < _LEAST_WAY_M:
-        return 0.0, 0.0
+        return None, None
     turned = wrap_angle(planned[common, 2] - way.pose_at(place.arc_m[common]).yaw_rad)
     return _greatest(place.offset_m[common]), _greatest(np.asarray(turned))
 

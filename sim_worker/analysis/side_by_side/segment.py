@@ -100,8 +100,12 @@ class AspectWatch:
                 **figures,
             )
         graver = kind is not None and _GRAVEST.index(kind) < _GRAVEST.index(old.kind)
-        farthest = {name: max(getattr(old, name), here, key=abs) for name, here in figures.items()}
+        farthest = {name: _farther(getattr(old, name), here) for name, here in figures.items()}
         return replace(old, kind=kind if graver else old.kind, end_stamp_ns=stamp_ns, **farthest)
+
+
+def _farther(one: float | None, other: float | None) -> float | None:
+    return max((value for value in (one, other) if value is not None), key=abs, default=None)
 
 
 @dataclass(slots=True)
@@ -129,7 +133,9 @@ class Segment:
         """Count one compared plan."""
         self.plans += 1
         for name, peaks in self._peaks.items():
-            peaks.take(abs(getattr(found, name)))
+            apart: float | None = getattr(found, name)
+            if apart is not None:
+                peaks.take(abs(apart))
 
     def record(self) -> DrivenSegment:
         """Return what is known of it so far."""
@@ -140,6 +146,7 @@ class Segment:
             from_stamp_ns=self.from_ns,
             to_stamp_ns=self.last_ns if self.until_ns is None else self.until_ns,
             plans=self.plans,
+            ways=self._peaks["lateral_m"].count,
             cut=self.cut,
             too_short=self.too_short,
             disagreements=self.disagreements,

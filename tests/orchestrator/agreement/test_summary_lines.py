@@ -23,3 +23,18 @@ def test_each_segment_and_each_place_is_a_line_and_many_are_counted() -> None:
     assert len(lines) == 1 + DISAGREEMENTS_SHOWN + 1
     assert lines[-1] == "  and 3 more in results/disagreements.parquet"
     assert side_by_side_lines(None) == []
+
+
+def test_of_how_many_plans_the_way_is_known_is_said_where_it_is_not_of_all() -> None:
+    segment: dict[str, Any] = {
+        "control_mode": "manual", "from_stamp_ns": 0, "to_stamp_ns": 630_000_000_000, "plans": 3150,
+        "ways": 150, "lateral_m": 1.8, "along_m": 0.0, "speed_mps": 0.0,
+    }  # fmt: skip
+    stood = segment | {"ways": 0, "lateral_m": None}
+    lines = side_by_side_lines({"segments": [segment, stood], "disagreements": []})
+    assert lines == [
+        "  manual for 630.0 s: 3150 plans of the ADS, 95 % within 1.8 m across (of the 150 whose "
+        "way could be compared), 0.0 m along, 0.0 m/s of what was then driven",
+        "  manual for 630.0 s: 3150 plans of the ADS, 95 % within 0.0 m along, 0.0 m/s of what was "
+        "then driven",
+    ]

@@ -203,7 +203,7 @@ def test_what_was_found_until_then_stays_found(tmp_path: Path) -> None:
     for found in (FOUND, gap(3.0), gap(4.0), gap(4.0, independent=False), ALARM, VERDICT):
         findings.take(found)
     segment = DrivenSegment(
-        number=0, control_mode="manual", from_stamp_ns=1, to_stamp_ns=2, plans=3, cut=0,
+        number=0, control_mode="manual", from_stamp_ns=1, to_stamp_ns=2, plans=3, ways=3, cut=0,
         too_short=0, lateral_m=0.1, along_m=0.1, speed_mps=0.1, disagreements=0,
     )  # fmt: skip
     house.conductor.ads.standing.ended.append(segment)

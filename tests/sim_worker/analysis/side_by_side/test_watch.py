@@ -17,8 +17,6 @@ from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import HORIZON_S, SegmentsStanding, SideBySide
 
-COVERS = ("foretwin.sim_worker.analysis.side_by_side.segment",)
-
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 START_NS = 7_000_000_000
 Course = Callable[[Array], Array]
