@@ -8,7 +8,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from foretwin.contracts.gap import ALARM_HORIZON_S, limits_after
+from foretwin.contracts.gap import ALARM_HORIZON_S, GapSample
+from foretwin.orchestrator.record.gap_samples import gap_samples
 from foretwin.sim_worker.analysis.occurred.rows import OccurredScenario
 
 _AROUND_NS = 1_000_000_000
@@ -17,9 +18,9 @@ _AROUND_NS = 1_000_000_000
 class ModelGap(msgspec.Struct, frozen=True, kw_only=True):
     """The gap at the horizon of alarms in one scenario's time, `samples` of it; none where 0.
 
-    Medians and 95th percentiles of |model - reality|; `within_limits` by the one table of limits,
-    None without a sample. `independent` is false where the model was driven by commands that were
-    estimated from the same motion: then it says little.
+    Medians and 95th percentiles of |model - reality|; `within_limits` where none is beyond those of
+    alarms, None without a sample. `independent` is false where the model was driven by commands
+    that were estimated from the same motion: then it says little.
     """
 
     samples: int = 0
@@ -36,8 +37,8 @@ def model_gaps(
     scenarios: Sequence[OccurredScenario], rows: Iterable[Mapping[str, Any]]
 ) -> tuple[ModelGap, ...]:
     """Return the gap of each scenario's time, a second around it included."""
-    told = [row for row in rows if abs(float(row["horizon_s"]) - ALARM_HORIZON_S) < 1e-6]
-    stamps = np.array([row["stamp_ns"] for row in told], dtype=np.int64)
+    told = [one for one in gap_samples(rows) if abs(one.horizon_s - ALARM_HORIZON_S) < 1e-6]
+    stamps = np.array([one.stamp_ns for one in told], dtype=np.int64)
     return tuple(
         _gap(
             [
@@ -51,21 +52,17 @@ def model_gaps(
     )
 
 
-def _gap(rows: Sequence[Mapping[str, Any]]) -> ModelGap:
-    if not rows:
+def _gap(samples: Sequence[GapSample]) -> ModelGap:
+    if not samples:
         return ModelGap()
-    limits = limits_after(ALARM_HORIZON_S)
-    gaps = {
-        name: np.abs(np.array([row[name] for row in rows], dtype=np.float64)) for name in limits
-    }
-    along, across = gaps["along_m"], gaps["across_m"]
+    along, across, speed = np.abs([(one.along_m, one.across_m, one.speed_mps) for one in samples]).T
     return ModelGap(
-        samples=len(rows),
+        samples=len(samples),
         along_p50_m=float(np.median(along)),
         along_p95_m=float(np.percentile(along, 95)),
         across_p50_m=float(np.median(across)),
         across_p95_m=float(np.percentile(across, 95)),
-        speed_p95_mps=float(np.percentile(gaps["speed_mps"], 95)),
-        within_limits=all(bool((gaps[name] <= limit).all()) for name, limit in limits.items()),
-        independent=all(bool(row["independent"]) for row in rows),
+        speed_p95_mps=float(np.percentile(speed, 95)),
+        within_limits=not any(one.beyond_limits for one in samples),
+        independent=all(one.independent for one in samples),
     )

@@ -52,7 +52,7 @@ MIRRORED = "vehicle_id role real shown correction"
 PARAMETER = "stamp_ns name before value std origin pinned"
 GAP = (
     "stamp_ns horizon_s manoeuvre along_m across_m yaw_rad yaw_rate_radps speed_mps accel_mps2 "
-    "independent"
+    "independent along_std_m across_std_m yaw_std_rad speed_std_mps"
 )
 """Which fields of messages stand in the tables of these names, in this order."""
 _FLIP = "flip_{0}_factor:float flip_{0}_m:float"

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import msgspec
 import pyarrow as pa
 
-from foretwin.contracts.gap import GapSample
+from foretwin.orchestrator.record.gap_samples import gap_samples
 from foretwin.sim_worker.analysis.gap.errors import GapRow, gap_table
 
 
@@ -27,8 +26,6 @@ def gaps_of(table: pa.Table | None) -> list[GapRow]:
 
     Runs by estimated commands count where there are no others: the rest were late or lost.
     """
-    rows = [] if table is None else table.to_pylist()
-    # A run's gaps are those of its own car, which the table does not repeat.
-    samples = msgspec.convert([{"vehicle_id": "", **row} for row in rows], list[GapSample])
+    samples = gap_samples([] if table is None else table.to_pylist())
     commanded = [one for one in samples if one.independent]
     return gap_table(commanded or samples, also_all=True)

@@ -12,6 +12,7 @@ from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.sim_worker.metrics.table import METRICS
 from tests.reference.future_words import COLUMNS as FUTURE_WORDS
 from tests.reference.future_words import OF_A_PLACE, each_of
+from tests.reference.gap_words import COLUMNS as GAP_WORDS
 
 _ROWS = {
     "rounds": "one round that was run",
@@ -76,6 +77,7 @@ _EVERYWHERE = {
 }
 _COLUMNS: Mapping[str, Mapping[str, str]] = {
     **FUTURE_WORDS,
+    **GAP_WORDS,
     "comparisons": {
         **each_of(
             _OF_A_PREDICTION,
@@ -242,24 +244,6 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "prior": "value that was in force",
         "reason": "why nothing is said, or what it would take to narrow the interval",
         "taken": "whether it counts from then on",
-    },
-    "gaps": {
-        "horizon_s": "how long the model ran freely",
-        "manoeuvre": "what the car did",
-        "along_m": "along the real heading, positive ahead",
-        "across_m": "across it, positive left",
-        "yaw_rad": "in yaw",
-        "yaw_rate_radps": "in yaw rate",
-        "speed_mps": "in speed",
-        "accel_mps2": "in acceleration",
-    },
-    "verdicts": {
-        "since_stamp_ns": "since when",
-        "culprit": "model, vehicle, both, none or undecided",
-        "cause": "a key such as steering_gain; empty where none is known",
-        "text": "the verdict in a sentence",
-        "evidence": "what speaks for it",
-        "confidence": "how sure the culprit is, 0 to 1",
     },
     "junctions": {
         "id": "as foretwin intersections calls it",

@@ -16,9 +16,12 @@ def row(second: float, along_m: float, *, horizon_s: float = ALARM_HORIZON_S) ->
         "stamp_ns": round(second * SECOND_NS),
         "horizon_s": horizon_s,
         "along_m": along_m,
+        "manoeuvre": "straight",
         "across_m": -0.1,
         "yaw_rad": 0.01,
+        "yaw_rate_radps": 0.0,
         "speed_mps": 0.2,
+        "accel_mps2": 0.0,
         "independent": True,
     }
 
@@ -54,3 +57,11 @@ def test_one_gap_beyond_the_table_of_limits_is_enough() -> None:
     (gap,) = model_gaps([happened(10.0, 12.0)], [row(10.0, 0.1), row(11.0, -limit - 0.01)])
 
     assert gap.within_limits is False
+
+
+def test_what_unsure_states_leave_open_widens_the_limits_as_it_does_those_of_alarms() -> None:
+    """Beyond 1.6 m, and within 1.6 m + 2 · 1.5 m: no alarm was raised."""
+    unsure = row(10.0, 2.0) | {"along_std_m": 1.5}
+    told = [model_gaps([happened(10.0, 12.0)], rows) for rows in ([unsure], [row(10.0, 2.0)])]
+
+    assert [gap.within_limits for (gap,) in told] == [True, False]

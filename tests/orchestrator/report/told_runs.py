@@ -201,12 +201,14 @@ def _comparison(horizon_s: float) -> dict[str, Any]:
 def _gap(horizon_s: float) -> dict[str, Any]:
     sides = {"along_m": 0.3 * horizon_s, "across_m": 0.4 * horizon_s, "yaw_rad": 0.01}
     rest = {"yaw_rate_radps": 0.0, "speed_mps": 0.1, "accel_mps2": 0.0, "independent": True}
+    names = ("along_std_m", "across_std_m", "yaw_std_rad", "speed_std_mps")
     return {
         "stamp_ns": START_NS,
         "horizon_s": horizon_s,
         "manoeuvre": "straight",
         **sides,
         **rest,
+        **dict.fromkeys(names, 0.0),
     }
 
 
