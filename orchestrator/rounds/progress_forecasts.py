@@ -96,7 +96,8 @@ class ProgressForecasts:
         if waiting and waiting[0].given.stretch != now.stretch:
             waiting.clear()  # nobody knows how far the car went meanwhile
         while waiting and waiting[0].due_ns <= now.stamp_ns:
-            found.append(self._settled(heapq.heappop(waiting), drive_time_s))
+            outcome = self._settled(heapq.heappop(waiting), drive_time_s)
+            found += [] if outcome is None else [outcome]
         return found
 
     @traced("forecast of a round")
@@ -174,9 +175,13 @@ class ProgressForecasts:
                 _NotYet(due_ns, order.round_id, instant, order.junction_id, given, at),
             )
 
-    def _settled(self, one: _NotYet, drive_time_s: float) -> ForecastOutcome:
+    def _settled(self, one: _NotYet, drive_time_s: float) -> ForecastOutcome | None:
+        """Return what came of a forecast, None where a round came too late to know."""
         given, k = one.given, one.instant
-        travelled = self.history.travelled_at(one.due_ns) - given.travelled_m
+        there_m = self.history.travelled_at(one.due_ns)
+        if there_m is None:
+            return None
+        travelled = there_m - given.travelled_m
         levels = np.array(given.calibrated.levels)
         sides = np.stack([given.calibrated.distance_m[k], given.table.distance_m[k], one.futures])
         share, table_share = share_below(levels, sides[:2], np.full((2, 1), travelled))[:, 0]

@@ -33,6 +33,31 @@ def test_a_car_that_speeds_up_steadily_goes_half_its_speed_times_the_time() -> N
     assert history.since_standing_s == pytest.approx(3.6)
 
 
+def test_how_far_it_had_gone_at_an_instant_of_seconds_ago_is_not_guessed_from_now() -> None:
+    """20 states a second of a car that brakes from 12 m/s at 4 m/s² and stands after 3 s."""
+    history = driven(*((k / 20, max(12.0 - k / 5, 0.0)) for k in range(101)))
+
+    for ago_s, gone_m in ((0.02, 18.0), (2.0, 18.0), (4.0, 10.0), (4.02, 9.84), (4.98, 0.24)):
+        assert history.travelled_at(round((5.0 - ago_s) * S)) == pytest.approx(gone_m, abs=0.01)
+
+
+def test_between_uneven_states_the_nearest_on_either_side_count() -> None:
+    """A state that comes soon after another is kept only while it is one of the last two."""
+    history = driven((0, 10.0), (0.04, 10.0), (1.04, 0.0))
+
+    assert history.travelled_at(round(0.02 * S)) == pytest.approx(0.2)
+    assert history.travelled_at(round(0.54 * S)) == pytest.approx(0.4 + 2.5)
+
+
+def test_what_was_before_all_that_is_remembered_is_not_known() -> None:
+    history = driven(*((k / 10, 10.0) for k in range(5, 400)))
+    oldest_s = 39.9 - KEPT_S
+
+    assert history.travelled_at(round(oldest_s * S)) == pytest.approx(10.0 * (oldest_s - 0.5))
+    assert history.travelled_at(round((oldest_s - 0.01) * S)) is None
+    assert driven((1, 10.0)).travelled_at(S // 2) is None
+
+
 def test_backwards_is_travelled_too() -> None:
     history = driven((0, -2.0), (1, -2.0))
 
@@ -66,7 +91,7 @@ def test_what_is_remembered_has_an_end_and_the_way_only_grows(steps: list) -> No
         if before is not None and before.stretch == history.now.stretch:
             assert history.now.travelled_m >= before.travelled_m
         before = history.now
-        assert history._kept[-1][0] - history._kept[0][0] <= KEPT_S * S
+        assert history._kept[-1].stamp_ns - history._kept[0].stamp_ns <= KEPT_S * S
 
 
 def test_a_copy_goes_on_alike() -> None:
