@@ -49,7 +49,7 @@ class ForecastOutcome(msgspec.Struct, frozen=True, kw_only=True):
 
     `share` is the part of the forecast that lay below what came. The CRPS of the forecast, of the
     same before it was calibrated in this drive (`table`), and of the round's futures, all taken as
-    equally likely (`futures`).
+    equally likely (`futures`; None where none of them is valid).
     """
 
     round_id: int
@@ -63,7 +63,7 @@ class ForecastOutcome(msgspec.Struct, frozen=True, kw_only=True):
     share: float
     crps_m: float
     crps_table_m: float
-    crps_futures_m: float
+    crps_futures_m: float | None
 
 
 def rising(quantiles_m: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 from foretwin.contracts.forecast import ForecastOutcome
 from foretwin.contracts.running import RunningMeans
+from foretwin.sim_worker.futures.columns import row_of
 
 RANKS = 10
 """Bins of the rank histogram: each would hold as much as any other."""
@@ -20,72 +21,68 @@ class ForecastCount:
     """Means over all instants that came, by horizon, and how their shares spread."""
 
     by_horizon: dict[float, RunningMeans] = field(default_factory=dict)
+    futures: dict[float, RunningMeans] = field(default_factory=dict)
+    """Of rounds with a valid future alone: how these, equally likely, fared."""
     ranks: list[int] = field(default_factory=lambda: [0] * RANKS)
 
     def take(self, outcomes: Iterable[ForecastOutcome]) -> None:
         """Count what came of forecasts."""
-        for one in outcomes:
-            self._add(
-                one.horizon_s,
-                one.share,
-                one.p90_m - one.p10_m,
-                (one.crps_m, one.crps_futures_m, one.crps_table_m),
-                abs(one.p50_m - one.travelled_m),
-            )
+        self.take_rows(map(row_of, outcomes))
 
     def take_rows(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Count the rows of a table of forecasts."""
         for row in rows:
-            crps = row["crps_m"], row["crps_futures_m"], row["crps_table_m"]
+            horizon_s, share = row["horizon_s"], row["share"]
+            self.ranks[min(int(share * RANKS), RANKS - 1)] += 1
+            covered = float(LOW <= share <= HIGH)
             width_m = row["p90_m"] - row["p10_m"]
             off_m = abs(row["p50_m"] - row["travelled_m"])
-            self._add(row["horizon_s"], row["share"], width_m, crps, off_m)
-
-    def _add(
-        self,
-        horizon_s: float,
-        share: float,
-        width_m: float,
-        crps_m: tuple[float, float, float],
-        off_m: float,
-    ) -> None:
-        self.ranks[min(int(share * RANKS), RANKS - 1)] += 1
-        covered = float(LOW <= share <= HIGH)
-        self.by_horizon.setdefault(horizon_s, RunningMeans()).take(
-            (covered, *crps_m, width_m, off_m)
-        )
+            told = covered, row["crps_m"], row["crps_table_m"], width_m, off_m
+            self.by_horizon.setdefault(horizon_s, RunningMeans()).take(told)
+            futures = self.futures.setdefault(horizon_s, RunningMeans())
+            if (crps_m := row["crps_futures_m"]) is not None:
+                futures.take((crps_m,))
 
     @property
     def rows(self) -> RunningMeans:
         """All horizons together."""
-        return sum((self.by_horizon[h] for h in sorted(self.by_horizon)), RunningMeans())
+        return _all(self.by_horizon)
 
     def record(self) -> dict[str, Any] | None:
         """Return the `calibration` part of run.json, None where no forecast came true.
 
         Of moving cars, over all instants that came. `crps_uncalibrated` is that of the rounds'
-        futures, all taken as equally likely, `crps_table` that of the table alone, before what came
-        in this drive moved it; all in metres. `rank_histogram` are the parts of all outcomes that
-        fell into each tenth of their forecasts.
+        futures, all taken as equally likely, over the `count_uncalibrated` of them that have a
+        valid one; `crps_table` that of the table alone, before what came in this drive moved it;
+        all in metres. `rank_histogram` are the parts of all outcomes that fell into each tenth of
+        their forecasts.
         """
-        rows = self.rows
+        rows, futures = self.rows, _all(self.futures)
         if not rows.count:
             return None
         return {
-            **_figures(rows),
+            **_figures(rows, futures),
             "rank_histogram": [round(n / rows.count, 4) for n in self.ranks],
-            "by_horizon_s": {f"{h:g}": _figures(of) for h, of in sorted(self.by_horizon.items())},
+            "by_horizon_s": {
+                f"{h:g}": _figures(of, self.futures[h]) for h, of in sorted(self.by_horizon.items())
+            },
         }
 
 
-def _figures(rows: RunningMeans) -> dict[str, Any]:
-    covered, crps, futures, table, width_m, off_m = (round(mean, 4) for mean in rows.means)
+def _all(by_horizon: Mapping[float, RunningMeans]) -> RunningMeans:
+    return sum((by_horizon[h] for h in sorted(by_horizon)), RunningMeans())
+
+
+def _figures(rows: RunningMeans, futures: RunningMeans) -> dict[str, Any]:
+    covered, crps, table, width_m, off_m = (round(mean, 4) for mean in rows.means)
+    uncalibrated = [round(mean, 4) for mean in futures.means]
     return {
         "p10_p90_coverage": covered,
         "p10_p90_width_m": width_m,
         "crps": crps,
-        "crps_uncalibrated": futures,
+        "crps_uncalibrated": uncalibrated[0] if uncalibrated else None,
         "crps_table": table,
         "median_error_m": off_m,
         "count": rows.count,
+        "count_uncalibrated": futures.count,
     }

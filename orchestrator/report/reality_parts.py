@@ -238,9 +238,10 @@ def calibration_part(run: RunMaterial) -> Chapter:
     count, covered = plural(told["count"], "instant"), told["p10_p90_coverage"]
     text = (
         f"Of {count} that came, {covered:.0%} lay in the band that should hold 80 %. The mean "
-        f"score (CRPS, small is good) is {told['crps']:.2f} m, and "
-        f"{told['crps_uncalibrated']:.2f} m where all futures count alike."
+        f"score (CRPS, small is good) is {told['crps']:.2f} m"
     )
+    alike_m = told["crps_uncalibrated"]
+    text += "." if alike_m is None else f", and {alike_m:.2f} m where all futures count alike."
     return Chapter(
         "calibration",
         title,

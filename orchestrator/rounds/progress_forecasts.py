@@ -66,7 +66,8 @@ class _NotYet(NamedTuple):
     instant: int
     intersection_id: str
     given: _Given
-    futures: Array
+    futures: Array | None
+    """Quantiles (Q,) of the round's futures, None where none is valid."""
 
 
 class ProgressForecasts:
@@ -169,7 +170,7 @@ class ProgressForecasts:
         spread = _spread_of_futures(done, given.calibrated, self._instants)
         for instant in self._instants:
             due_ns = given.stamp_ns + round(self._model.time_s[instant] * 1e9)
-            at = spread[instant]
+            at = None if spread is None else spread[instant]
             heapq.heappush(
                 self._waiting,
                 _NotYet(due_ns, order.round_id, instant, order.junction_id, given, at),
@@ -183,10 +184,11 @@ class ProgressForecasts:
             return None
         travelled = there_m - given.travelled_m
         levels = np.array(given.calibrated.levels)
-        sides = np.stack([given.calibrated.distance_m[k], given.table.distance_m[k], one.futures])
+        futures = () if one.futures is None else (one.futures,)
+        sides = np.stack([given.calibrated.distance_m[k], given.table.distance_m[k], *futures])
         share, table_share = share_below(levels, sides[:2], np.full((2, 1), travelled))[:, 0]
         self.calibration.take(k, drive_time_s, float(table_share))
-        crps = 2.0 * pinball(levels, sides, np.full(3, travelled)).mean(axis=1)
+        crps = 2.0 * pinball(levels, sides, np.full(len(sides), travelled)).mean(axis=1)
         p10, p50, p90 = np.interp((0.1, 0.5, 0.9), levels, sides[0]).tolist()
         return ForecastOutcome(
             round_id=one.round_id,
@@ -200,7 +202,7 @@ class ProgressForecasts:
             share=float(share),
             crps_m=float(crps[0]),
             crps_table_m=float(crps[1]),
-            crps_futures_m=float(crps[2]),
+            crps_futures_m=float(crps[2]) if futures else None,
         )
 
 
@@ -221,9 +223,13 @@ def _ahead(
     return facts._replace(junction_m=junction_m, control=float(CONTROLS.index(control)))
 
 
-def _spread_of_futures(done: RoundDone, forecast: ProgressForecast, instants: list[int]) -> Array:
-    """Return (T, Q) quantiles of how far a round's futures get, each as likely as any other."""
-    found = np.zeros((len(forecast.time_s), len(forecast.levels)))
+def _spread_of_futures(
+    done: RoundDone, forecast: ProgressForecast, instants: list[int]
+) -> Array | None:
+    """Return (T, Q) quantiles of how far a round's valid futures get, each as likely as any other.
+
+    None where there is none.
+    """
     step_s = done.order.jobs[0].step_s
     places = [round(float(forecast.time_s[k]) / step_s) for k in instants]
     ways = [
@@ -231,6 +237,8 @@ def _spread_of_futures(done: RoundDone, forecast: ProgressForecast, instants: li
         for result in done.results
     ]
     at = np.concatenate([np.zeros((0, len(places))), *(way[:, places] for way in ways)])
-    if len(at):
-        found[instants] = np.quantile(at, forecast.levels, axis=0).T
+    if not len(at):
+        return None
+    found = np.zeros((len(forecast.time_s), len(forecast.levels)))
+    found[instants] = np.quantile(at, forecast.levels, axis=0).T
     return found

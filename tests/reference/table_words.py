@@ -97,7 +97,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "share": "the part of the forecast that lay below what came",
         "crps_m": "CRPS of the forecast",
         "crps_table_m": "of the same before it was calibrated in this drive",
-        "crps_futures_m": "of the round's futures, all taken as equally likely",
+        "crps_futures_m": "of the round's futures, all taken as equally likely, if any is valid",
     },
     "plan_comparisons": {
         "plan_stamp_ns": "stamp of the plan",

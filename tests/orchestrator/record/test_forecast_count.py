@@ -45,5 +45,21 @@ def test_rows_of_the_table_count_as_what_they_were_made_of() -> None:
     assert msgspec.json.encode(one.record())
 
 
+def test_a_round_without_a_valid_future_is_left_out_of_what_futures_come_to() -> None:
+    without = [msgspec.structs.replace(outcome(0.5, horizon_s=h), crps_futures_m=None)
+               for h in (1.0, 4.0)]  # fmt: skip
+    one, other = ForecastCount(), ForecastCount()
+    one.take([*SOME, *without])
+    other.take_rows(row_of(found) for found in [*SOME, *without])
+    told = one.record()
+
+    assert told is not None
+    assert told == other.record()
+    assert (told["count"], told["count_uncalibrated"], told["crps_uncalibrated"]) == (6, 4, 1.0)
+    four = told["by_horizon_s"]["4"]
+    assert (four["count"], four["count_uncalibrated"]) == (1, 0)
+    assert (four["crps"], four["crps_uncalibrated"]) == (0.5, None)
+
+
 def test_where_nothing_came_nothing_is_said() -> None:
     assert ForecastCount().record() is None

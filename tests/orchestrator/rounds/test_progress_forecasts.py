@@ -125,16 +125,18 @@ def test_the_futures_alone_are_scored_as_they_spread() -> None:
     assert first.crps_m == first.crps_table_m  # nothing has come yet
 
 
-def test_a_round_without_futures_counts_for_the_forecast_alone() -> None:
-    forecasts = fresh()
-    forecasts.take_state(state(0.0), START_NS)
-    forecasts.forecast(0, INTENT, state(0.0), (), FRAME)
-    done = round_done(straight(speed_mps=9.0), round_id=0, stamp_ns=START_NS)
-    forecasts.take_round(replace(done, results=()))
-    (first,) = forecasts.take_state(state(1.0), START_NS)
+def test_a_round_without_valid_futures_counts_for_the_forecast_alone() -> None:
+    none_valid = round_done(straight(speed_mps=9.0), outcome={"valid": np.array([False])})
+    for done in (none_valid, replace(none_valid, results=())):
+        forecasts = fresh()
+        forecasts.take_state(state(0.0), START_NS)
+        forecasts.forecast(0, INTENT, state(0.0), (), FRAME)
+        forecasts.take_round(done)
+        (first,) = forecasts.take_state(state(1.0), START_NS)
 
-    assert first.travelled_m == pytest.approx(10.0)
-    assert first.crps_futures_m > 5.0 > first.crps_m
+        assert first.travelled_m == pytest.approx(10.0)
+        assert first.crps_m < 5.0
+        assert first.crps_futures_m is None
 
 
 def test_what_came_narrows_the_band_of_a_steady_driver() -> None:
