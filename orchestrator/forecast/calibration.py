@@ -35,7 +35,8 @@ class Calibration:
         """Take the instants (T,) of the forecasts to come."""
         self._prior = PRIOR_ROUNDS_PER_S * time_s[:, None]
         self._came = np.zeros((len(time_s), len(_GRID) + 1))
-        """Weights between the places of the grid, as of `_at_s`."""
+        """Weights of what came up to each place of the grid, from the one before it, as of `_at_s`;
+        last, of what came beyond."""
         self._at_s: float | None = None
 
     def take(self, instant: int, drive_time_s: float, share: float) -> None:
@@ -60,8 +61,7 @@ class Calibration:
         if not self._came.any():
             return forecast
         levels = np.array(forecast.levels)
-        # Half of what fell just below a place of the grid counts as below it.
-        below = np.cumsum(self._came, axis=1)[:, :-1] - 0.5 * self._came[:, :-1]
+        below = np.cumsum(self._came, axis=1)[:, :-1]
         spread = self._prior * _GRID + below
         spread /= self._prior + self._came.sum(axis=1, keepdims=True)
         shares = np.stack([np.interp(levels, row, _GRID) for row in spread])

@@ -49,6 +49,26 @@ def test_a_band_that_is_too_narrow_too_wide_or_aside_comes_to_hold_its_share(
     assert held(Calibration(ONE_S), came, forecast()) == pytest.approx(0.8, abs=0.04)
 
 
+def test_an_honest_forecast_stays_where_it_is() -> None:
+    """As much came in each part of it as it said; places of the grid are up to 0.25 m apart."""
+    calibration, told = Calibration(ONE_S), forecast()
+    for k in range(20_000):
+        calibration.take(0, 0.0, (k + 0.5) / 20_000)
+    now = calibration.calibrated(told)
+
+    assert now.distance_m[0] == pytest.approx(told.distance_m[0], abs=0.002)
+
+
+def test_both_sides_of_a_forecast_are_moved_alike() -> None:
+    one, other = Calibration(ONE_S), Calibration(ONE_S)
+    for share in np.random.default_rng(3).beta(2.0, 4.0, 500):
+        one.take(0, 0.0, float(share))
+        other.take(0, 0.0, float(1.0 - share))
+    low, high = (each.calibrated(forecast()).distance_m[0] for each in (one, other))
+
+    assert low - 20.0 == pytest.approx(20.0 - high[::-1], abs=1e-6)
+
+
 def test_a_driver_who_changes_is_followed_within_some_half_lives() -> None:
     random = np.random.default_rng(6)
     half = round(4 * HALF_LIFE_S / 0.5)
