@@ -2,7 +2,8 @@
 
 Sensors stamp by clocks of their own, and late. The shift is sought on a grid and then fitted
 together with all else, by Gauss and Newton; deviations come from leaving out one stretch of
-driving after the other (block jackknife: Künsch 1989), since neighbouring samples err alike.
+driving after the other (block jackknife: Künsch 1989), since neighbouring samples err alike. What a
+prior holds does not move with that, and is as uncertain as the prior.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import special
 
 from foretwin.contracts.arrays import Array, Flags, Indices
 
@@ -26,14 +28,15 @@ _ROUNDS = 3
 class ShiftedFit(NamedTuple):
     """y = columns shifted by `shift_s` @ sizes; a positive shift: y comes later than the columns.
 
-    `covariance` (C + 1, C + 1) is of sizes and shift. `without` (B, C + 1) has both as each
-    stretch of driving leaves them that is left out; `block` (N,) says which that is, -1 where
-    nothing was compared.
+    `covariance` (C + 1, C + 1) is of sizes and shift, `quantile` (C + 1,) is half of their 95 %
+    intervals in standard deviations. `without` (B, C + 1) has both as each stretch of driving
+    leaves them that is left out; `block` (N,) says which that is, -1 where nothing was compared.
     """
 
     sizes: Array
     shift_s: float
     covariance: Array
+    quantile: Array
     without: Array
     block: Indices
 
@@ -42,9 +45,10 @@ class ShiftedFit(NamedTuple):
         """Standard deviation of the shift."""
         return float(np.sqrt(self.covariance[-1, -1]))
 
-    def std(self, index: int) -> float:
-        """Return the standard deviation of one size."""
-        return float(np.sqrt(self.covariance[index, index]))
+    @property
+    def half_widths(self) -> Array:
+        """Half of the 95 % intervals of sizes and shift (C + 1,)."""
+        return np.asarray(self.quantile * np.sqrt(np.diagonal(self.covariance)))
 
 
 def shifted(column: Array, shift_s: float, *, period_s: float) -> Array:
@@ -82,7 +86,8 @@ def shifted_fit(
     most = 0 if np.isfinite(shift_prior_s) else longest
     late, variance = _best_on_grid(y, columns, known, most)
     shift_s = late * period_s
-    theta, without, covariance = np.zeros(0), np.zeros(0), np.zeros(0)
+    prior = np.diag(np.append(prior_std, shift_prior_s) ** -2.0)
+    theta, without, normal = np.zeros(0), np.zeros(0), np.zeros(0)
     for _ in range(_ROUNDS):
         rows = np.stack(
             [shifted(column, shift_s, period_s=period_s) for column in columns.T], axis=1
@@ -96,17 +101,30 @@ def shifted_fit(
         for number in range(count):
             mine = used & (block == number)
             each[number] = weight * design[mine].T @ joined[mine]
-        prior = np.diag(np.append(prior_std, shift_prior_s) ** -2.0)
         wanted = prior @ np.append(around, -shift_s)
-        theta = _solve(each.sum(axis=0), prior, wanted)
-        without = np.stack([_solve(each.sum(axis=0) - one, prior, wanted) for one in each])
-        off = without - without.mean(axis=0)
-        covariance = (count - 1) / count * off.T @ off
+        normal = each.sum(axis=0)
+        theta = _solve(normal, prior, wanted)
+        without = np.stack([_solve(normal - one, prior, wanted) for one in each])
         variance = max(float(np.mean((y[used] - design[used] @ theta) ** 2)), 1e-12)
         moved_s = float(np.clip(theta[-1], -0.1, 0.1))
         without[:, -1] += shift_s
         shift_s = float(np.clip(shift_s + moved_s, -longest_s, longest_s))
-    return ShiftedFit(theta[:-1], shift_s, covariance, without, block)
+    off = without - without.mean(axis=0)
+    told = (count - 1) / count * off.T @ off
+    held, *_ = np.linalg.lstsq(normal[:, :-1] + prior, np.sqrt(prior), rcond=None)
+    covariance = told + held @ held.T
+    freedom = _freedom(np.diagonal(told), np.diagonal(covariance), count)
+    quantile = np.asarray(special.stdtrit(freedom, 0.975))
+    return ShiftedFit(theta[:-1], shift_s, covariance, quantile, without, block)
+
+
+def _freedom(told: Array, whole: Array, count: int) -> Array:
+    """Return degrees of freedom of variances (C,), of which `told` (C,) come from few stretches.
+
+    Satterthwaite's (1946): what a prior adds is known, as of any number of them.
+    """
+    share = told / np.maximum(whole, 1e-300)
+    return np.asarray((count - 1) / np.maximum(share, 1e-6) ** 2)
 
 
 def _solve(normal: Array, prior: Array, wanted: Array) -> Array:

@@ -96,11 +96,11 @@ def turning_object(turning: TurningGap) -> dict[str, Any]:
             for name, clock in clocks.items()
         },
         "response_left_open_s": _SURE * turning.response_std_s,
-        "gyro_bias_radps": _fitted(turning.gyro_bias_radps, turning.gyro_bias_std_radps),
+        "gyro_bias_radps": _fitted(turning.gyro_bias_radps, turning.gyro_bias_half_radps),
         "steering_offset_rad": _fitted(
-            turning.steering_offset_rad, turning.steering_offset_std_rad
+            turning.steering_offset_rad, turning.steering_offset_half_rad
         ),
-        "gain": _fitted(turning.gain, turning.gain_std),
+        "gain": _fitted(turning.gain, turning.gain_half),
         "conditional_on": _CONDITION,
     }
 
@@ -125,17 +125,17 @@ def turning_lines(turning: TurningGap) -> list[str]:
         late += f"; speed {_clock(turning.speed_clock)}"
     if turning.position_clock is not None:
         late += f"; positions {_clock(turning.position_clock)}"
-    bias, bias_std = turning.gyro_bias_radps, turning.gyro_bias_std_radps
-    zero, zero_std = turning.steering_offset_rad, turning.steering_offset_std_rad
+    bias, bias_half = turning.gyro_bias_radps, turning.gyro_bias_half_radps
+    zero, zero_half = turning.steering_offset_rad, turning.steering_offset_half_rad
     said = (
         f"the model at measured steering and speed against the gyro, {len(half)} s: {rms[0]:.2f} "
         f"°/s apart (RMS of means over a second; {rms[1]:.2f} with the vehicle file's steering "
         f"as it is); each second's 95 % interval, told by the others, is ±{np.median(half):.2f} "
         f"°/s wide (median; ±{np.max(half):.2f} at most) and holds {turning.within:.0%} of them",
         late,
-        f"gyro bias {_DEGREES * bias:+z.2f} ± {_SURE * _DEGREES * bias_std:.2f} °/s, steering "
-        f"{_DEGREES * zero:+z.2f} ± {_SURE * _DEGREES * zero_std:.2f}° at the tyres beside the "
-        f"file; the car turns {turning.gain:.2f} ± {_SURE * turning.gain_std:.2f} times as the "
+        f"gyro bias {_DEGREES * bias:+z.2f} ± {_DEGREES * bias_half:.2f} °/s, steering "
+        f"{_DEGREES * zero:+z.2f} ± {_DEGREES * zero_half:.2f}° at the tyres beside the "
+        f"file; the car turns {turning.gain:.2f} ± {turning.gain_half:.2f} times as the "
         "model",
         f"intervals (95 %) hold given {_CONDITION}",
     )
@@ -150,8 +150,8 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _fitted(value: float, std: float) -> dict[str, float]:
-    return {"value": value, "half_95": _SURE * std}
+def _fitted(value: float, half: float) -> dict[str, float]:
+    return {"value": value, "half_95": half}
 
 
 def verdict_lines(

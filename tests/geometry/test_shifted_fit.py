@@ -26,9 +26,14 @@ def turning(time_s: Array) -> Array:
 
 
 def fitted(
-    y: Array, *, prior_std: Array = FREE, shift_prior_s: float = float("inf")
+    y: Array,
+    *,
+    column: Array | None = None,
+    prior_std: Array = FREE,
+    shift_prior_s: float = float("inf"),
 ) -> ShiftedFit | None:
-    columns = np.stack([turning(TIME_S), ONE], axis=1)
+    followed = turning(TIME_S) if column is None else column
+    columns = np.stack([followed, ONE[: len(followed)]], axis=1)
     return shifted_fit(
         y,
         columns,
@@ -69,6 +74,30 @@ def test_what_is_known_before_holds_where_a_signal_says_nothing() -> None:
     assert fit is not None
     assert fit.sizes[0] == pytest.approx(1.0, abs=0.02)
     assert fit.shift_s == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("turns", "half_width", "quantile"),
+    [(0.01, 0.195, 1.96), (0.05, 0.18, 1.96), (0.2, 0.10, 2.2), (1.0, 0.028, 2.55)],
+)
+def test_intervals_hold_whether_the_drive_tells_the_gain_or_the_prior_holds_it(
+    turns: float, half_width: float, quantile: float
+) -> None:
+    """From a straight road to a winding one, 36 s of each: then six stretches tell the gain."""
+    random, held, half_widths, quantiles = np.random.default_rng(3), [], [], []
+    count, known = 1800, np.array([0.1, np.inf])
+    column = turns * turning(TIME_S[:count])
+    for _ in range(100):
+        gain = 1.0 + 0.1 * random.normal()
+        alike = 0.02 * np.repeat(random.normal(size=count // 15), 15)
+        fit = fitted(gain * column + alike, column=column, prior_std=known, shift_prior_s=0.05)
+        assert fit is not None
+        held.append(abs(fit.sizes[0] - gain) < fit.half_widths[0])
+        half_widths.append(fit.half_widths[0])
+        quantiles.append(fit.quantile[0])
+    assert 90 <= np.sum(held) <= 99
+    assert np.median(half_widths) == pytest.approx(half_width, rel=0.15)
+    assert np.median(quantiles) == pytest.approx(quantile, abs=0.1)
 
 
 def test_less_than_half_a_minute_says_nothing() -> None:

@@ -35,7 +35,10 @@ _GAIN_STD = 0.3
 
 
 class ClockOffset(NamedTuple):
-    """Samples are stamped `late_s` later than the inertial unit's, with a standard deviation."""
+    """Samples are stamped `late_s` later than the inertial unit's, with a standard deviation.
+
+    1.96 of `std_s` hold 95 of 100, also where few stretches of driving tell it.
+    """
 
     late_s: float
     std_s: float
@@ -111,7 +114,7 @@ def _offset(unit: Array, sensor: Array, *, open_s: float) -> ClockOffset | None:
         )
         if fit is None:
             return None
-        found.append((fit.shift_std_s, -fit.shift_s))
+        found.append((float(fit.half_widths[-1]) / _SURE, -fit.shift_s))
     std_s, late_s = min(found)
     apart_s = max(abs(late_s - other) for _, other in found)
     return ClockOffset(late_s, math.hypot(std_s, 0.5 * apart_s, open_s))

@@ -76,11 +76,12 @@ class TurningGap(NamedTuple):
     """What the vehicle file leaves open of how late its model turns in: the steering's clock is
     told given its tyres and inertia."""
     gyro_bias_radps: float
-    gyro_bias_std_radps: float
+    gyro_bias_half_radps: float
+    """Half of a 95 % interval, as that of the gain and of the steering's zero."""
     gain: float
-    gain_std: float
+    gain_half: float
     steering_offset_rad: float
-    steering_offset_std_rad: float
+    steering_offset_half_rad: float
 
     @property
     def full_width_radps(self) -> float:
@@ -90,7 +91,7 @@ class TurningGap(NamedTuple):
     @property
     def departure(self) -> str:
         """What the car's turning says against the model, empty where parameters leave it open."""
-        if abs(self.gain - 1.0) <= GAIN_LEFT_OPEN + 2.0 * self.gain_std:
+        if abs(self.gain - 1.0) <= GAIN_LEFT_OPEN + self.gain_half:
             return ""
         return (
             f"the car turns {self.gain:.2f} times as the model does at the measured steering: the "
@@ -269,11 +270,11 @@ def _told(
         position_clock=None if speed_clock is None else position_offset(record, speed_clock),
         response_std_s=response_std_s,
         gyro_bias_radps=float(fit.sizes[2]),
-        gyro_bias_std_radps=fit.std(2),
+        gyro_bias_half_radps=float(fit.half_widths[2]),
         gain=float(fit.sizes[0]),
-        gain_std=fit.std(0),
+        gain_half=float(fit.half_widths[0]),
         steering_offset_rad=float(fit.sizes[1]),
-        steering_offset_std_rad=fit.std(1),
+        steering_offset_half_rad=float(fit.half_widths[1]),
     )
 
 

@@ -87,7 +87,8 @@ def _line(name: str, gap: TurningGap) -> str:
         f"mean {full.mean():.2f}, widest {full.max():.2f} °/s, RMS {rms:.2f} °/s, steering "
         f"{_clock(gap.steering_clock)}, speed {_clock(gap.speed_clock)}, positions "
         f"{_clock(gap.position_clock)}, gain {gap.gain:.3f} ± "
-        f"{_SURE * gap.gain_std:.3f}"
+        f"{gap.gain_half:.3f}, zero {math.degrees(gap.steering_offset_rad):+.2f} ± "
+        f"{math.degrees(gap.steering_offset_half_rad):.2f}°"
     )
 
 
