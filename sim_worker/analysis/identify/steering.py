@@ -179,11 +179,15 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
 
 EDGES_MPS = (2.0, 5.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0)
 _LEAST_TYRE_RAD = 0.01
-_LEAST_S, _ALIKE_S = 2.0, 0.5
+_LEAST_S, _LEAST_BENDS = 2.0, 3
+"""Of turning that tells a ratio: a bend errs in its own way from end to end, and how bends differ
+no fewer tell."""
+_APART_S = 1.0
+"""Of driving between two bends. Chosen: a steering wheel that crosses its centre begins another."""
 
 
 def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin, ...]:
-    """Return the ratio in each range of speeds with 2 s of turning at least.
+    """Return the ratio in each range of speeds with 2 s of turning and three bends at least.
 
     A ratio that falls with speed in spite of the fitted understeer tells of variable-ratio
     steering; `fit` is that of the same `record`.
@@ -199,8 +203,10 @@ def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin
         if inside.sum() * period_s < _LEAST_S:
             continue
         time_s = record.time_s[at][inside]
+        if _bends(time_s, tyre[inside]) < _LEAST_BENDS:
+            continue
         try:
-            line = fit_linear(wheel[inside][:, None], tyre[inside], time_s, length_s=_ALIKE_S)
+            line = fit_linear(wheel[inside][:, None], tyre[inside], time_s)
         except ValueError:
             continue
         inverse, half = float(line.values[0]), line.half_width(0)
@@ -217,3 +223,9 @@ def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin
             )
         )
     return tuple(bins)
+
+
+def _bends(time_s: Array, tyre_rad: Array) -> int:
+    """Return how many bends turning (N,) is of: each to one side, and apart from the others."""
+    begins = (np.diff(time_s) > _APART_S) | (np.diff(np.sign(tyre_rad)) != 0.0)
+    return 1 + int(np.count_nonzero(begins))

@@ -23,7 +23,6 @@ COVERS = (
     "foretwin.sim_worker.analysis.identify.actuator",
     "foretwin.sim_worker.analysis.identify.longitudinal",
     "foretwin.sim_worker.analysis.identify.steering_signals",
-    "foretwin.sim_worker.analysis.identify.steering",
 )
 
 CAR = read_parameters().car
@@ -92,12 +91,12 @@ def test_the_wheelbase_is_told_where_the_tyre_angle_is_measured() -> None:
     assert estimate(told, "wheelbase_m").value == pytest.approx(2.5789, rel=0.01)
 
 
-def test_the_map_says_one_ratio_at_every_speed() -> None:
-    bins = city().steering_map
-    assert len(bins) >= 3
-    for entry in bins:
-        assert entry.ratio == pytest.approx(CAR.steering_ratio, rel=0.02)
-        assert entry.low < entry.ratio < entry.high
+def test_the_map_says_the_ratio_where_bends_are_many_enough() -> None:
+    """A minute has five bends at 5 to 8 m/s, one below and two above."""
+    (entry,) = city().steering_map
+    assert (entry.from_mps, entry.to_mps) == (5.0, 8.0)
+    assert entry.ratio == pytest.approx(CAR.steering_ratio, rel=0.02)
+    assert entry.low < CAR.steering_ratio < entry.high
 
 
 def test_a_straight_motorway_changes_nothing() -> None:
