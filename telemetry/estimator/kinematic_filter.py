@@ -31,7 +31,7 @@ from foretwin.telemetry.estimator.filter_state import (
     X,
     Y,
 )
-from foretwin.telemetry.estimator.innovations import PositionInnovation
+from foretwin.telemetry.estimator.innovations import LineInnovation, PositionInnovation
 from foretwin.telemetry.estimator.measured import MOST_SPEED_MPS
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
@@ -101,14 +101,14 @@ class KinematicFilter:
             self.mean, self.covariance, dt, self.may_reverse, densities, self._gnss_std_m
         )
 
-    def correct(self, row: Array, residual: float, std: float) -> float:
-        """Apply one scalar measurement; return its normalised square.
+    def correct(self, row: Array, residual: float, std: float) -> LineInnovation:
+        """Apply one scalar measurement; return how far it lay off, beside the variance expected.
 
         `row` is its derivative by the state.
         """
         variance: float = compiled.correct(self.mean, self.covariance, row, residual, std)
         self._limit()
-        return float(residual * residual) / variance
+        return LineInnovation(float(residual), max(variance - std * std, 0.0))
 
     def _limit(self) -> None:
         mean = self.mean
@@ -230,22 +230,24 @@ class KinematicFilter:
         self.covariance[:, index] = 0.0
         self.covariance[index, index] = std * std
 
-    def correct_speed(self, speed_mps: float, std_mps: float) -> float:
-        """Apply a measured speed, whose scale is estimated; return its normalised square."""
+    def correct_speed(self, speed_mps: float, std_mps: float) -> LineInnovation:
+        """Apply a measured speed, whose scale is estimated; return how far it lay off."""
         if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
             self.covariance[SPEED_SCALE, SPEED_SCALE] = motion_noise.SPEED_SCALE_STD**2
         row = np.zeros(len(self.mean))
         row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
         return self.correct(row, speed_mps - float(self.mean[SPEED] * row[SPEED]), std_mps)
 
-    def correct_yaw(self, yaw_rad: float, std_rad: float) -> float:
-        """Apply a measured yaw in the local frame; return its normalised square."""
+    def correct_yaw(self, yaw_rad: float, std_rad: float) -> LineInnovation:
+        """Apply a measured yaw in the local frame; return how far it lay off."""
         row = np.zeros(len(self.mean))
         row[YAW] = 1.0
         return self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
 
-    def correct_yaw_rate(self, rate_radps: float, std_radps: float, *, biased: bool) -> float:
-        """Apply a measured yaw rate; return its normalised square.
+    def correct_yaw_rate(
+        self, rate_radps: float, std_radps: float, *, biased: bool
+    ) -> LineInnovation:
+        """Apply a measured yaw rate; return how far it lay off.
 
         `biased` for a gyro, whose bias is estimated.
         """

@@ -9,7 +9,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.filter_state import ACCEL, ACCEL_BIAS, GYRO_BIAS, SPEED, YAW
 from foretwin.telemetry.estimator.gyro import Gyro
-from foretwin.telemetry.estimator.innovations import LINE_95, SurpriseCount
+from foretwin.telemetry.estimator.innovations import SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
 from foretwin.telemetry.estimator.mounting import MountingLearner
@@ -21,6 +21,8 @@ STANDING_MPS = 0.05
 _STOPPING_MPS, _STOPPING_S, _STOPPING_MPS2 = 1.0, 0.5, 4.0
 """A car that is faster than the first does not stand because wheels say so at once: they must say
 it for the time that braking takes, and half a second more. Chosen."""
+_LEAST_SPEED_STD_MPS, _LEAST_YAW_STD_RAD = 0.05, 0.02
+"""However well a measured speed or heading agrees. Chosen."""
 _MOST_SPEED_STD_MPS = 3.0
 """However much a measured speed surprises: heard less, it could not contradict a filter that forces
 mislead. Chosen: with less, wheels that say nought for half a second stop a car at 9 m/s."""
@@ -39,8 +41,8 @@ class MotionCorrections:
     ) -> None:
         self._measured = measured
         self._wheelbase_m = wheelbase_m
-        self._speed_doubt = Doubt(0.05, _MOST_SPEED_STD_MPS)
-        self._yaw_doubt = Doubt(0.02)
+        self._speed_doubt = Doubt(_LEAST_SPEED_STD_MPS, _MOST_SPEED_STD_MPS)
+        self._yaw_doubt = Doubt(_LEAST_YAW_STD_RAD)
         self._yaw_rate_doubt = Doubt(0.01)
         self._gyro_doubt = Doubt(0.0)
         self._accel_doubt = Doubt(0.5)
@@ -148,8 +150,8 @@ class MotionCorrections:
                 local_yaw = yaw + convergence_rad
                 surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))
                 std = self._yaw_doubt.std(surprise, filter_.covariance.item(YAW, YAW))
-                square = filter_.correct_yaw(local_yaw, std)
-                self._surprises.take("heading", square, LINE_95)
+                off = filter_.correct_yaw(local_yaw, std)
+                self._surprises.take_line("heading", off, least_std=_LEAST_YAW_STD_RAD)
                 if yaw_rate is not None:
                     std = self._yaw_rate_doubt.std(abs(yaw_rate - filter_.yaw_rate_radps))
                     filter_.correct_yaw_rate(yaw_rate, std, biased=False)
@@ -162,9 +164,9 @@ class MotionCorrections:
     def _correct_turning(self, filter_: KinematicFilter, rate_radps: float) -> None:
         off = abs(rate_radps - filter_.yaw_rate_radps - filter_.mean.item(GYRO_BIAS))
         doubt = self._gyro_doubt.std(off / _USUAL_SURPRISE)
-        std = max(self._gyro.std_radps, doubt)
-        square = filter_.correct_yaw_rate(rate_radps, std, biased=True)
-        self._surprises.take("imu", square, LINE_95)
+        known = self._gyro.std_radps
+        innovation = filter_.correct_yaw_rate(rate_radps, max(known, doubt), biased=True)
+        self._surprises.take_line("imu", innovation, least_std=known, usual=_USUAL_SURPRISE)
         self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
 
     def _correct_speed(self, filter_: KinematicFilter, speed_mps: float) -> None:
@@ -177,5 +179,10 @@ class MotionCorrections:
         else:
             own = filter_.covariance.item(SPEED, SPEED)
             std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]), own)
-            square = filter_.correct_speed(speed_mps, std + 0.005 * abs(speed_mps))
-            self._surprises.take("speed", square, LINE_95)
+            scale_std = 0.005 * abs(speed_mps)
+            self._surprises.take_line(
+                "speed",
+                filter_.correct_speed(speed_mps, std + scale_std),
+                least_std=_LEAST_SPEED_STD_MPS + scale_std,
+                most_std=_MOST_SPEED_STD_MPS + scale_std,
+            )

@@ -10,6 +10,7 @@ from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.estimator.innovations import (
     LINE_95,
     PLANE_95,
+    LineInnovation,
     PositionInnovation,
     SurpriseCount,
 )
@@ -39,13 +40,43 @@ def test_a_copy_counts_by_itself() -> None:
     assert other.counts["gnss"] == (2, 1)
 
 
-def drive(*, std_m: float, noise_m: float, late: bool) -> StateEstimator:
+def line_share(noise_std: float, *, usual: float = 1.0) -> float:
+    """Return which share is within of a sensor whose noise may be 0.05 to 3."""
+    count = SurpriseCount()
+    for residual in np.random.default_rng(5).normal(0.0, noise_std, 5000):
+        innovation = LineInnovation(residual, 0.0)
+        count.take_line("speed", innovation, least_std=0.05, most_std=3.0, usual=usual)
+    found = count.counts["speed"]
+    assert found.taken == 4980
+    return found.within / found.taken
+
+
+def test_a_sensor_that_states_no_noise_is_judged_by_its_surprises_before() -> None:
+    for noise_std in (0.1, 0.6, 2.0):
+        assert line_share(noise_std) == pytest.approx(0.95, abs=0.012)
+    assert line_share(0.02) > 0.99
+    assert line_share(6.0) == pytest.approx(0.67, abs=0.02)
+
+
+def test_a_gyro_is_judged_by_the_noise_it_shows_between_neighbours() -> None:
+    assert line_share(0.05, usual=3.0) == pytest.approx(0.95, abs=0.012)
+    assert line_share(0.1, usual=3.0) == pytest.approx(0.67, abs=0.02)
+
+
+def test_what_comes_all_at_once_is_a_surprise() -> None:
+    count = SurpriseCount()
+    for residual in [0.1] * 20 + [1.0]:
+        count.take_line("speed", LineInnovation(residual, 0.0), least_std=0.05)
+    assert count.counts["speed"] == (1, 0)
+
+
+def drive(*, std_m: float, noise_m: float, late: bool, speed_noise: float = 0.03) -> StateEstimator:
     random = np.random.default_rng(4)
     estimator = StateEstimator(info())
     samples: list[Sample] = []
     for k in range(800):
         speed = SpeedSample(
-            stamp_ns=round(k * 0.05e9), speed_mps=9.0 + float(random.normal(0, 0.03))
+            stamp_ns=round(k * 0.05e9), speed_mps=9.0 + float(random.normal(0, speed_noise))
         )
         samples.append(("speed", speed))
         if k % 4 == 0:
@@ -69,6 +100,18 @@ def test_what_a_drive_says_of_itself_tells_an_honest_receiver_from_one_that_lies
     assert lying.position_noise_m is not None
     assert lying.position_noise_m > 0.5
     assert set(honest.surprises) == {"gnss", "speed"}
+
+
+@pytest.mark.parametrize(
+    ("noise_mps", "least", "most"), [(0.02, 0.99, 1.0), (0.6, 0.92, 0.98), (6.0, 0.5, 0.8)]
+)
+def test_the_share_of_speeds_shows_wheels_that_are_worse_than_any_are_taken_to_be(
+    noise_mps: float, least: float, most: float
+) -> None:
+    found = drive(std_m=0.1, noise_m=0.1, late=False, speed_noise=noise_mps).consistency
+    speed = found.surprises["speed"]
+    assert 770 <= speed.taken <= 780
+    assert least <= speed.within / speed.taken <= most
 
 
 def test_samples_out_of_order_are_counted_once() -> None:
