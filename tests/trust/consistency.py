@@ -1,4 +1,10 @@
-"""Whether states are as good as they say: standstills, headings, errors, and NEES against truth."""
+"""Whether states are as good as they say: standstills, headings, errors, and shares within them.
+
+Of the place a state tells one deviation, the root of the mean of the variances on both axes, and
+so what it calls 95 % is a circle: of an honest filter that knows both axes alike 95 of 100 errors
+are within it, of one that knows the one twice as well as the other 93.6, ten times as well 91.8,
+never less than 91.7.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +35,7 @@ _BEFORE_S = 0.3
 
 
 class Consistency(NamedTuple):
-    """Figures of one drive; shares are those within what states call 95 %.
+    """Figures of one drive; shares are those within what states call 95 %, of places in a circle.
 
     `false_standstills_s` and `yaw_losses_s` are when they begin, in seconds since the first fix;
     those in `torn_s` would have counted, but the reference is no car's motion there.

@@ -121,6 +121,20 @@ def test_states_that_are_true_are_found_faultless_and_others_not() -> None:
     assert bad.speed_rms_mps > 0.5
 
 
+@pytest.mark.parametrize(("better", "share"), [(1.0, 0.95), (0.5, 0.936), (0.1, 0.918)])
+def test_one_deviation_for_both_axes_holds_less_where_one_is_known_better(
+    better: float, share: float
+) -> None:
+    truth = smoothed(FRAME, STAMPS, driven(), position_std_m=0.01)
+    random, within = np.random.default_rng(2), []
+    for _ in range(50):
+        off = random.normal(0.0, 0.1, (len(STAMPS), 2)) * [1.0, better]
+        told_m = np.full(len(STAMPS), 0.1 * np.sqrt(0.5 * (1.0 + better**2)))
+        states = perfect(truth)._replace(xy_m=truth.track.xy_m + off, position_std_m=told_m)
+        within.append(consistency_of(states, truth).position_within)
+    assert np.mean(within) == pytest.approx(share, abs=0.008)
+
+
 @pytest.mark.real_data
 def test_a_survey_receivers_slips_are_found_on_a_real_drive(data_dir: Path) -> None:
     drive = next(d for d in given_drives(data_dir) if d.name == "potsdamer-platz")
