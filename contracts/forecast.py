@@ -6,6 +6,8 @@ exponentially, as fast as between the two nearest to it.
 
 from __future__ import annotations
 
+import functools
+
 import msgspec
 import numpy as np
 
@@ -14,7 +16,10 @@ from foretwin.contracts.arrays import Array
 PROGRESS_TIMES_S = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Instants of a forecast, from the state that it begins with."""
 PROGRESS_LEVELS = tuple(k / 20 for k in range(1, 20))
-"""Of its quantiles: evenly spaced, so that the mean of their pinball losses is half the CRPS."""
+"""Of its quantiles."""
+_SCORED = 100
+"""Levels at which a forecast is scored, the middles of as many equal shares: of a normal one the
+score is right to 0.01 %."""
 LEAST_APART_M = 0.01
 """Two neighbouring quantiles never coincide: a car is not known to a centimetre."""
 
@@ -112,13 +117,28 @@ def value_at(levels: Array, quantiles: Array, shares: Array) -> Array:
     )
 
 
-def pinball(levels: Array, quantiles: Array, values: Array) -> Array:
-    """Return the loss (T, Q) of quantiles (T, Q) where (T,) `values` came.
+def crps_of(levels: Array, quantiles: Array, values: Array) -> Array:
+    """Return the CRPS (T,) of T distributions, told by quantiles (T, Q) at `levels` (Q,), where
+    `values` (T,) came, in their unit.
 
-    Twice its mean over evenly spaced levels is the CRPS (Gneiting, Raftery 2007, 4.2).
+    Twice the mean pinball loss over all levels (Gneiting, Raftery 2007, 4.2), of what lies between
+    the quantiles and beyond them too: over those alone it would be 4 to 5 % too large.
     """
-    over = values[:, None] - quantiles
-    return np.asarray(np.where(over >= 0.0, levels * over, (levels - 1.0) * over))
+    scored, shares = _scored(tuple(levels.tolist()))
+    over = values[:, None] - quantiles @ shares
+    loss = np.where(over >= 0.0, scored * over, (scored - 1.0) * over)
+    return np.asarray(2.0 * loss.mean(axis=1))
+
+
+@functools.lru_cache(maxsize=8)
+def _scored(levels: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return the levels to score at (S,), and what of each quantile (Q, S) their values are made.
+
+    `value_at` is linear in the quantiles.
+    """
+    scored = (np.arange(_SCORED) + 0.5) / _SCORED
+    each = np.broadcast_to(scored, (len(levels), _SCORED))
+    return scored, value_at(np.array(levels), np.eye(len(levels)), each)
 
 
 def _tail(level: Array, quantile: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.forecast import pinball
+from foretwin.contracts.forecast import crps_of
 from foretwin.orchestrator.forecast.calibration import Calibration, shares_of
 from foretwin.orchestrator.forecast.examples import Examples
 from foretwin.orchestrator.forecast.features import FEATURES
@@ -80,8 +80,8 @@ def score(
             (
                 shares_of(told, true[:, None])[:, 0],
                 shares_of(table, true[:, None])[:, 0],
-                2.0 * pinball(told.levels, told.distance_m, true).mean(axis=1),
-                2.0 * pinball(table.levels, table.distance_m, true).mean(axis=1),
+                crps_of(told.levels, told.distance_m, true),
+                crps_of(table.levels, table.distance_m, true),
                 told.at(BAND[1]) - told.at(BAND[0]),
                 table.at(BAND[1]) - table.at(BAND[0]),
                 np.abs(told.median_m - true),

@@ -12,7 +12,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.forecast import (
     ForecastOutcome,
     ProgressForecast,
-    pinball,
+    crps_of,
     share_below,
 )
 from foretwin.contracts.frames import LocalFrame, local_from_geo
@@ -188,7 +188,7 @@ class ProgressForecasts:
         sides = np.stack([given.calibrated.distance_m[k], given.table.distance_m[k], *futures])
         share, table_share = share_below(levels, sides[:2], np.full((2, 1), travelled))[:, 0]
         self.calibration.take(k, drive_time_s, float(table_share))
-        crps = 2.0 * pinball(levels, sides, np.full(len(sides), travelled)).mean(axis=1)
+        crps = crps_of(levels, sides, np.full(len(sides), travelled))
         p10, p50, p90 = np.interp((0.1, 0.5, 0.9), levels, sides[0]).tolist()
         return ForecastOutcome(
             round_id=one.round_id,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,7 +14,7 @@ from foretwin.contracts.forecast import (
     PROGRESS_LEVELS,
     PROGRESS_TIMES_S,
     ProgressForecast,
-    pinball,
+    crps_of,
     rising,
     share_below,
     value_at,
@@ -93,9 +95,19 @@ def test_quantiles_that_cross_are_put_in_order_and_apart_and_no_car_goes_back(
     assert found[0, 0] == max(crossed[0].min(), 0.0)
 
 
-def test_twice_the_mean_loss_is_the_crps() -> None:
-    """Of a uniform distribution over a metre whose middle comes: 1/12 m."""
+def test_the_score_of_a_uniform_forecast_is_its_crps() -> None:
+    """Of one over a metre whose middle comes: 1/12 m."""
     fine = (np.arange(2000) + 0.5) / 2000
-    loss = pinball(fine, fine[None], np.array([0.5]))
 
-    assert 2.0 * loss.mean() == pytest.approx(1.0 / 12.0, abs=1e-4)
+    assert crps_of(fine, fine[None], np.array([0.5])) == pytest.approx(1.0 / 12.0, abs=1e-4)
+
+
+def test_an_honest_normal_forecast_scores_what_it_must_and_a_point_its_distance() -> None:
+    """Expected CRPS of a normal distribution: 1/√π deviations (Gneiting, Raftery 2007, 4.2)."""
+    told = np.array([NormalDist().inv_cdf(level) for level in PROGRESS_LEVELS])
+    came = np.array([NormalDist().inv_cdf((k + 0.5) / 2000) for k in range(2000)])
+
+    scores = crps_of(LEVELS, np.broadcast_to(told, (len(came), len(told))), came)
+    assert scores.mean() == pytest.approx(np.pi**-0.5, rel=0.002)
+    point = crps_of(LEVELS, np.full((2, len(told)), 3.0), np.array([1.0, 7.5]))
+    assert point == pytest.approx([2.0, 4.5])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.forecast import ForecastOutcome, pinball, share_below
+from foretwin.contracts.forecast import ForecastOutcome, crps_of, share_below
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.forecast.features import CONTROLS
@@ -107,8 +107,7 @@ def test_what_came_is_held_against_the_quantiles_that_were_told() -> None:
         )
         values = np.array([[one.travelled_m]])
         assert one.share == pytest.approx(share_below(told.levels, quantiles_m, values)[0, 0])
-        loss = pinball(told.levels, quantiles_m, values[0])
-        assert one.crps_m == pytest.approx(2.0 * loss.mean())
+        assert one.crps_m == pytest.approx(crps_of(told.levels, quantiles_m, values[0])[0])
         assert (one.round_id, one.intersection_id) == (3, "n4")
         assert one.stamp_ns == START_NS + 500_000_000
 
@@ -116,12 +115,9 @@ def test_what_came_is_held_against_the_quantiles_that_were_told() -> None:
 def test_the_futures_alone_are_scored_as_they_spread() -> None:
     """Two futures a metre to either side of what comes: the CRPS of their quantiles is known."""
     first = drive(fresh(), until_s=9.0)[0]
-    levels = np.arange(1, 20) / 20
-    quantiles = 9.0 + 2.0 * levels
-    over = 10.0 - quantiles
-    expected = 2.0 * np.mean(np.where(over >= 0, levels * over, (levels - 1.0) * over))
 
-    assert first.crps_futures_m == pytest.approx(expected, abs=1e-3)
+    # Uniform over 2 m whose middle comes: 2/12 m, and a little for what lies beyond the outer two.
+    assert first.crps_futures_m == pytest.approx(1.0 / 6.0, rel=0.01)
     assert first.crps_m == first.crps_table_m  # nothing has come yet
 
 
