@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import msgspec
 
 from foretwin.contracts.world import DrivingSide, Turn
-from foretwin.world_gen.connections.movements import Movement
+from foretwin.world_gen.connections.movements import Movement, parts_softly
 from foretwin.world_gen.lanes.lane_curves import LaneDraft
 from foretwin.world_gen.lanes.legs import is_ring_edge
 
@@ -27,6 +27,8 @@ def lanes_chosen(
     `starts` are the road's lanes from the left, `middle` those for turns from both directions,
     `room` is the number of lanes that each movement leads to. Where a one-way road forks,
     `beside` is that of the branch straight on, else 0: there one lane at most leads into both.
+    Where a road parts softly and no arrow names a branch, the arrows straight on mean it as well,
+    and their lanes are shared out as those of a road without arrows.
     A lane that no movement takes up, since its arrow points where the map has no road, leads
     where it turns least from what its arrow says: no lane ends before a junction.
     """
@@ -34,6 +36,7 @@ def lanes_chosen(
         return [starts for _ in ways]
     abreast = (*middle, *starts) if driving_side == "right" else (*starts, *middle)
     order = {lane.id: i for i, lane in enumerate(abreast)}
+    parting = _parting(ways, starts)
     found: list[list[LaneDraft]] = []
     for way, its_room in zip(ways, room, strict=True):
         turning = [lane for lane in middle if way.turn in lane.turns]
@@ -45,7 +48,9 @@ def lanes_chosen(
         elif is_ring_edge(way.away.edge):
             found.append(_staying_on_ring(starts, ways, its_room, driving_side))
         else:
-            found.append(_starting_lanes(way, starts, ways, its_room, beside, driving_side))
+            found.append(
+                _starting_lanes(way, starts, ways, parting, its_room, beside, driving_side)
+            )
     # A movement that the arrows leave no lane is none, even where lanes are left over.
     open_ways = [i for i, lanes in enumerate(found) if lanes and room[i]]
     taken = {lane.id for lanes in found for lane in lanes}
@@ -85,6 +90,15 @@ def _apart(wanted: Turn, offered: Turn) -> int:
 
 def _tagged(lane: LaneDraft) -> bool:
     return lane.plan.turns_source == "tagged"
+
+
+def _parting(ways: Sequence[Movement], starts: Sequence[LaneDraft]) -> frozenset[Turn]:
+    """Return the sides to which branches part that no arrow names, beside arrows straight on."""
+    named = {turn for lane in starts if _tagged(lane) for turn in lane.plan.turns}
+    if "straight" not in named:
+        return frozenset()
+    unnamed = (way for way in ways if way.turn not in named and way.turn != "u_turn")
+    return frozenset(way.turn for way in unnamed if parts_softly(way))
 
 
 def _staying_on_ring(
@@ -136,30 +150,33 @@ def _starting_lanes(
     movement: Movement,
     starts: list[LaneDraft],
     ways: Sequence[Movement],
+    parting: Collection[Turn],
     room: int,
     beside: int,
     driving_side: DrivingSide,
 ) -> list[LaneDraft]:
-    """Return the lanes that a movement begins from where a road leads to more than one."""
+    """Return the lanes that a movement begins from where a road leads to more than one.
+
+    `parting` are the sides to which lanes part whose arrows point straight on.
+    """
     turn = movement.turn
     far: Turn = "left" if driving_side == "right" else "right"
     cars = [lane for lane in starts if lane.kind == "driving"] or starts
     fits, named = cars, 1
     tagged = any(_tagged(lane) for lane in starts)
+    parts = turn in parting and parts_softly(movement)
     if tagged:
-        meant = {turn, far} if turn == "u_turn" else {turn}
+        meant = {turn, far} if turn == "u_turn" else {"straight" if parts else turn}
         fits = [lane for lane in starts if not _tagged(lane) or meant & set(lane.plan.turns)]
-        named = sum(_tagged(lane) for lane in fits)
+        named = 1 if parts else sum(_tagged(lane) for lane in fits)
     if turn == "u_turn":
         return _outermost(fits, far)
     if turn != "straight":
         # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
         with_room = min(room, len(cars) + 1 - beside) if beside else 1
         return _outermost(fits, turn, max(named, with_room))
-    if tagged:
-        return fits
-    have = {m.turn for m in ways}
-    straight = list(starts)
+    have = parting if tagged else {m.turn for m in ways}
+    straight = list(fits if tagged else starts)
     # The lane on the far side, from which drivers turn across the road, is the first to be lost.
     sides: list[Turn] = ["left", "right"] if driving_side == "right" else ["right", "left"]
     for side in sides:

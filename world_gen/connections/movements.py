@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import msgspec
 import numpy as np
@@ -171,13 +171,28 @@ def _turned_rad(toward: DirectedEdge, path: tuple[DirectedEdge, ...], away: Dire
     """
     if not path:
         return 0.0
+    return sum(_bends_rad(toward, path, away))
+
+
+def parts_softly(movement: Movement) -> bool:
+    """Return whether a way through a place nowhere heads `STRAIGHT_RAD` or more aside."""
+    if abs(movement.angle_rad) >= STRAIGHT_RAD:
+        return False
+    bends_rad = _bends_rad(movement.toward, movement.inside, movement.away)
+    return all(abs(turned_rad) < STRAIGHT_RAD for turned_rad in accumulate(bends_rad))
+
+
+def _bends_rad(
+    toward: DirectedEdge, path: tuple[DirectedEdge, ...], away: DirectedEdge
+) -> list[float]:
+    """Return the bends on a way through a place, positive to the left."""
     into = heading_out(toward.back)
     heads = [(-into[0], -into[1])]
     for part in path:
         steps = np.diff(part.xy_m, axis=0).tolist()
         heads += [(x, y) for x, y in steps if math.hypot(x, y) > MIN_STEP_M]
     heads.append(heading_out(away))
-    return sum(math.atan2(x * v - y * u, x * u + y * v) for (x, y), (u, v) in pairwise(heads))
+    return [math.atan2(x * v - y * u, x * u + y * v) for (x, y), (u, v) in pairwise(heads)]
 
 
 def _turn(angle: float, straightest: float, angles: list[float]) -> Turn:

@@ -52,6 +52,43 @@ def test_at_most_one_lane_of_a_motorway_leads_into_both_branches():
     assert _pairs(world, 1, 3) == {(1, 0), (2, 1)}
 
 
+def test_arrows_straight_on_mean_every_branch_that_no_arrow_names():
+    world = _motorway(True, (3, 2, 1), **{"turn:lanes": "through|through|through"})
+    assert _pairs(world, 1, 2) == {(0, 0), (1, 1)}
+    assert _pairs(world, 1, 3) == {(2, 0)}
+    assert not [note for note in world.notes if "left out" in note]
+    named = _motorway(True, (3, 2, 1), **{"turn:lanes": "through|through;right|right"})
+    assert _pairs(named, 1, 3) == {(1, 0), (2, 0)}
+
+
+def test_three_branches_share_lanes_whose_arrows_all_point_straight_on():
+    nodes = {0: (0.0, 0.0), 1: (-120.0, 0.0), 2: (110.0, 60.0), 3: (120.0, 4.0), 4: (115.0, -45.0)}
+    arrows = {"lanes": "3", "turn:lanes": "through|through|through"}
+    ways = [(1, [1, 0], arrows), (2, [0, 2], {}), (3, [0, 3], {}), (4, [0, 4], {})]
+    osm = drawn_map(
+        nodes, [(i, nds, ONE_WAY | {"lanes": "1", "name": f"To {i}"} | t) for i, nds, t in ways]
+    )
+    world = world_of(osm)
+    assert [_pairs(world, 1, i) for i in (2, 3, 4)] == [{(0, 0)}, {(1, 0)}, {(2, 0)}]
+
+
+def test_arrows_straight_on_mean_no_way_that_turns_off_and_back():
+    """A ramp of the same heading begins across the other carriageway: that is a turn."""
+    nodes = {0: (0.0, 0.0), 1: (-120.0, 0.0), 2: (120.0, 0.0), 3: (120.0, 14.0)}
+    nodes |= {4: (0.0, 14.0), 5: (-120.0, 14.0), 6: (120.0, 40.0)}
+    street = {"highway": "primary", "name": "Street", "oneway": "yes", "lanes": "2"}
+    ways = [
+        (1, [1, 0], street | {"turn:lanes": "through|through"}),
+        (2, [0, 2], street),
+        (3, [3, 4, 5], street),
+        (4, [0, 4], {"highway": "primary"}),
+        (5, [4, 6], {"highway": "primary_link", "name": "Ramp", "oneway": "yes"}),
+    ]
+    world = world_of(drawn_map(nodes, ways))
+    assert _pairs(world, 1, 2) == {(0, 0), (1, 1)}
+    assert not _pairs(world, 1, 5)
+
+
 @pytest.mark.parametrize(
     ("lanes", "main", "ramp"),
     [
