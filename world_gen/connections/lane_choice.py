@@ -8,6 +8,7 @@ import msgspec
 
 from foretwin.contracts.world import DrivingSide, Turn
 from foretwin.world_gen.connections.movements import Movement, parts_softly
+from foretwin.world_gen.connections.slight_arrows import told_apart
 from foretwin.world_gen.lanes.lane_curves import LaneDraft
 from foretwin.world_gen.lanes.legs import is_ring_edge
 
@@ -168,6 +169,7 @@ def _starting_lanes(
     if tagged:
         meant = {turn, far} if turn == "u_turn" else {"straight" if parts else turn}
         fits = [lane for lane in starts if not _tagged(lane) or meant & set(lane.plan.turns)]
+        fits = told_apart(movement, ways, fits)
         named = 1 if parts else sum(_tagged(lane) for lane in fits)
     if turn == "u_turn":
         return _outermost(fits, far)

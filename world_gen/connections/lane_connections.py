@@ -13,6 +13,7 @@ from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, merges
 from foretwin.world_gen.connections.lane_choice import lanes_chosen, named_by_tags
 from foretwin.world_gen.connections.movements import Movement
+from foretwin.world_gen.connections.slight_arrows import read_as_straight
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
@@ -81,6 +82,7 @@ def connect(
         plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
         middle = lanes.incoming(toward, around.lanes_along(toward).turning)
+        read_as_straight(mine, starts)
         named = named_by_tags(mine, starts)
         beside = beside_at_fork(cluster, named, around)
         all_ends = [lanes.outgoing(m.away, _plans(cluster, m.away, around)) for m in mine]

@@ -34,6 +34,8 @@ class LanePlan(msgspec.Struct, frozen=True, kw_only=True):
     left_m: float = 0.0
     turns: tuple[Turn, ...] = ()
     turns_source: Provenance = "inferred"
+    arrows: tuple[str, ...] = ()
+    """The tagged words that `turns` is read from, which know slight and sharp turns."""
     direction_source: Provenance = "inferred"
     change: LaneChange = "both"
     change_source: Provenance = "default"

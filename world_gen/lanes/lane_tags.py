@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import LaneChange, LaneKind, Turn
@@ -112,7 +112,8 @@ def lanes_of_direction(
     letter = "b" if reverse else "f"
     lanes = []
     for i in range(count):
-        named = _turns(turns[i])
+        arrows = tuple(word.strip() for word in turns[i].split(";"))
+        named = _turns(arrows)
         change = _CHANGES.get(changes[i])
         lanes.append(
             LanePlan(
@@ -123,6 +124,7 @@ def lanes_of_direction(
                 width_m=_lane_width(edge, widths[i], kinds[i]),
                 turns=named,
                 turns_source="tagged" if named else "inferred",
+                arrows=arrows if named else (),
                 direction_source=source,
                 change=change or "both",
                 change_source="tagged" if change else "default",
@@ -183,8 +185,8 @@ def _outer_bus_lanes(tags: Direction) -> int:
     return int(of_side(tags.edge.tags, "busway", kerb) == "lane")
 
 
-def _turns(words: str) -> tuple[Turn, ...]:
-    found = (_TURNS.get(word.strip()) for word in words.split(";"))
+def _turns(words: Iterable[str]) -> tuple[Turn, ...]:
+    found = (_TURNS.get(word) for word in words)
     return tuple(dict.fromkeys(turn for turn in found if turn))
 
 
