@@ -37,7 +37,7 @@ def whole_map(path: Path) -> tuple[OsmMap, World]:
     [
         ("berlin", 8),
         ("moritzplatz", 3),
-        ("kingsway", 3),
+        ("kingsway", 2),
         pytest.param("badhersfeld", 19, marks=pytest.mark.judge),
         pytest.param("monaco", 4, marks=pytest.mark.judge),
     ],

@@ -101,6 +101,7 @@ def _junction(
         ring=ring,
         ring_edges=ring_edges,
         all_way_stops=all_way,
+        leaving=graph.leaving,
     )
     return Junction(
         summary=IntersectionSummary(

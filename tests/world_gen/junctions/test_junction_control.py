@@ -74,3 +74,66 @@ def test_light_for_those_on_foot_inside_leaves_a_junction_to_its_stop_signs(
     sketch.road(103, [6, 9, 2], "South Lane")
     summary = only(sketch.junctions(tmp_path)).summary
     assert (summary.kind, summary.control) == ("staggered", control)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "control"),
+    [
+        # A crossing lies between the light and the sign, so the sign rules.
+        ({31.0: "traffic_signals", 19.0: "crossing", 9.0: "give_way"}, "give_way"),
+        ({31.0: "traffic_signals", 19.0: "crossing", 9.0: "stop"}, "stop"),
+        ({31.0: "traffic_signals", 19.0: "crossing"}, "signals"),
+        # Nothing lies between: the sign is for when the light is off.
+        ({31.0: "traffic_signals", 21.0: "give_way"}, "signals"),
+        ({31.0: "traffic_signals", 26.0: "give_way", 19.0: "crossing"}, "signals"),
+        # The crossing is the junction's own.
+        ({13.0: "traffic_signals", 9.0: "crossing", 5.0: "give_way"}, "signals"),
+    ],
+)
+def test_sign_behind_a_light_and_its_crossing_rules(
+    nodes: dict[float, str], control: str, tmp_path: Path
+) -> None:
+    summary = only(_signed_lane(nodes).junctions(tmp_path)).summary
+    assert summary.control == control
+
+
+@pytest.mark.parametrize(
+    ("street", "control"),
+    [
+        ({12.0: "traffic_signals"}, "signals"),
+        ({20.0: "traffic_signals", 17.0: "crossing"}, "signals"),
+        ({29.0: "traffic_signals"}, "signals"),
+        ({29.0: "traffic_signals", 27.0: "crossing"}, "give_way"),
+    ],
+)
+def test_lights_of_other_roads_make_a_signalled_junction_unless_they_serve_crossings(
+    street: dict[float, str], control: str, tmp_path: Path
+) -> None:
+    lane = {31.0: "traffic_signals", 19.0: "crossing", 9.0: "give_way"}
+    assert only(_signed_lane(lane, street).junctions(tmp_path)).summary.control == control
+
+
+def test_a_footpath_between_light_and_sign_counts_as_a_crossing(tmp_path: Path) -> None:
+    sketch = _signed_lane({38.0: "traffic_signals", 30.0: "", 8.0: "give_way"})
+    sketch.node(8, -12.0, -30.0)
+    sketch.way(104, [8, 21], highway="service", footway="crossing")
+    (junction,) = sketch.junctions(tmp_path)
+    assert (junction.summary.control, junction.lights) == ("give_way", frozenset())
+
+
+def _signed_lane(lane: dict[float, str], street: dict[float, str] | None = None) -> Sketch:
+    """Return a one-way lane from the south into a one-way street from the west, with nodes of
+    such `highway` at metres before their meeting; those of the lane from 20 on."""
+    sketch = Sketch()
+    for node, x_m, y_m in ((1, 0.0, 0.0), (2, -150.0, 0.0), (3, 150.0, 0.0), (4, 0.0, -150.0)):
+        sketch.node(node, x_m, y_m)
+    on_lane = [
+        sketch.node(20 + i, 0.0, -at_m, highway=word) for i, (at_m, word) in enumerate(lane.items())
+    ]
+    on_street = [
+        sketch.node(40 + i, -at_m, 0.0, highway=word)
+        for i, (at_m, word) in enumerate((street or {}).items())
+    ]
+    sketch.road(101, [2, *on_street, 1, 3], "High Street", highway="secondary", oneway="yes")
+    sketch.road(102, [4, *on_lane, 1], "Slip Lane", oneway="yes")
+    return sketch

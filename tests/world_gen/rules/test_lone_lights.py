@@ -71,3 +71,21 @@ def test_behind_a_crossing_where_the_lane_begins_the_line_stays_at_the_light():
     )
     (line,) = [line for line in world_of(osm).stop_lines if ":light" in line.id]
     assert line.ends[:, 0] == pytest.approx([14.0, 14.0], abs=0.02)
+
+
+def test_a_light_with_a_crossing_and_a_sign_behind_it_stands_alone():
+    nodes = CROSS | {5: (0.0, -31.0), 6: (0.0, -19.0), 7: (0.0, -9.0)}
+    one_way = {"highway": "residential", "oneway": "yes"}
+    osm = drawn_map(
+        nodes,
+        [(13, [3, 0, 1], one_way | {"name": "Street"}), (14, [4, 5, 6, 7, 0], one_way)],
+        node_tags={5: LIGHT, 6: CROSSING, 7: {"highway": "give_way"}},
+    )
+    world = world_of(osm)
+    found = {(line.lane_id[:3], line.control.value) for line in world.stop_lines}
+    assert found == {("w13", "none"), ("w14", "signal"), ("w14", "give_way")}
+    assert [signal.osm_nodes for signal in world.signals] == [(5,)]
+    assert {(c.from_lane_id[:3], c.control) for c in world.connections} == {
+        ("w13", "none"),
+        ("w14", "give_way"),
+    }

@@ -96,7 +96,6 @@ def test_junctions_farther_apart_have_plans_of_their_own():
 @pytest.mark.parametrize(
     ("name", "members"),
     [
-        ("kingsway", ("n21653578", "n2918379027")),
         ("leeds", ("n615978081", "n643951", "n9823132")),
         pytest.param("liechtenstein", ("n315636894", "n315636895"), marks=pytest.mark.judge),
     ],
