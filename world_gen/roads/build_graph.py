@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Collection, Sequence
 from functools import cache
 from itertools import chain, pairwise
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.countries.outlines import CountryPlace, places_of
 from foretwin.world_gen.osm.driving_side import driving_sides
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
+from foretwin.world_gen.roads.barriers import closed_nodes, ended_before
 from foretwin.world_gen.roads.joined_edges import joined, read_tags
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph, side_of
 from foretwin.world_gen.roads.road_tags import (
@@ -40,8 +42,9 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     """Return the graph of everything a car's wheels might follow, in the map's frame.
 
     Ways are cut where they share a node with themselves or another kept way, and at their ends,
-    and short pieces joined where that parts nothing (`joined_edges`). Ways are taken in the order
-    of their ids, so that edges, and with them all that follows, are the same for the same map.
+    and short pieces joined where that parts nothing (`joined_edges`). They end on both sides of
+    what closes them to cars (`barriers`). Ways are taken in the order of their ids, so that edges,
+    and with them all that follows, are the same for the same map.
     Raises `MapError` where the map holds no road for cars.
     """
     ways = [way for way in osm.ways.values() if is_kept_road(way.tags)]
@@ -56,9 +59,12 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     begin = np.cumsum([0, *(len(path) for _, path in kept)])[:-1]
     places = places_of(lat_lon[row[begin]])
     sides = _sides(kept, places, lat_lon[row], xy_m[row])
-    as_mapped = _edges(kept, places, sides, flat.tolist(), xy_m[row], uses[row] > 1)
-    edges = joined(as_mapped, _kept_nodes(osm))
+    closed = closed_nodes(kept, flat, osm.node_tags)
+    cut_here = (uses > 1) | np.isin(ids, list(closed))
+    as_mapped = _edges(kept, places, sides, flat.tolist(), xy_m[row], cut_here[row])
+    edges = joined(ended_before(as_mapped, closed), _kept_nodes(osm))
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
+    at |= _ends_before(closed, edges)
     nodes = {node for edge in edges for node in (edge.start_node, edge.end_node)}
     leaving: dict[int, list[DirectedEdge]] = {node: [] for node in sorted(nodes)}
     for edge in edges:
@@ -70,7 +76,15 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
         edges=tuple(edges),
         node_xy_m={node: (at[node][0], at[node][1]) for node in leaving},
         leaving={node: tuple(directed) for node, directed in leaving.items()},
+        closed_nodes=closed,
     )
+
+
+def _ends_before(closed: Collection[int], edges: Sequence[RoadEdge]) -> dict[int, list[float]]:
+    """Return where roads end before closed nodes, by the nodes they have there."""
+    both = {*closed, *(-node for node in closed)}
+    at_start = {e.start_node: e.xy_m[0].tolist() for e in edges if e.start_node in both}
+    return at_start | {e.end_node: e.xy_m[-1].tolist() for e in edges if e.end_node in both}
 
 
 def _kept_nodes(osm: OsmMap) -> frozenset[int]:

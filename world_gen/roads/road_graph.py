@@ -130,6 +130,9 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     node_xy_m: Mapping[int, tuple[float, float]]
     leaving: Mapping[int, tuple[DirectedEdge, ...]]
     """Directed edges that start at a node, in a fixed order."""
+    closed_nodes: frozenset[int] = frozenset()
+    """Nodes at which a road is closed to cars: it ends before them, on the one side in a node of
+    this id, on the other in one of its negative."""
 
     def middle_of(self, nodes: Iterable[int]) -> tuple[float, float]:
         """Return the mean of the places of nodes."""

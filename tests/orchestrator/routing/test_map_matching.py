@@ -13,8 +13,10 @@ from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.map_matching import MapMatcher, Match
 from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
 from foretwin.orchestrator.routing.route import RouteError
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.orchestrator.grid_map import drive, graph_of, grid, headings, road
+from tests.world_gen.drawn_maps import drawn_map
 
 COVERS = (
     "foretwin.orchestrator.routing.line_matching",
@@ -218,6 +220,16 @@ def test_a_line_that_leaves_the_map_for_long_becomes_two_routes() -> None:
 
     assert len(matched.routes) == 2
     assert matched.near_road_share < 0.3
+
+
+def test_a_drive_past_a_bollard_becomes_two_routes() -> None:
+    nodes = {1: (0.0, 0.0), 2: (100.0, 0.0), 3: (200.0, 0.0)}
+    street = [(5, (1, 2, 3), {"highway": "residential"})]
+    for barrier, routes in (("bollard", 2), ("gate", 1)):
+        graph = build_road_graph(drawn_map(nodes, street, node_tags={2: {"barrier": barrier}}))
+        line = drive([(10, 0), (190, 0)], spacing_m=8.0) + graph.edges[0].xy_m[0]
+        found = match_line(graph, geo_from_local(graph.frame, line)).routes
+        assert len(found) == routes
 
 
 def test_a_line_off_the_map_is_refused_in_one_line() -> None:

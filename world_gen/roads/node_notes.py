@@ -1,0 +1,19 @@
+"""What a World's notes say of single nodes of its roads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from foretwin.world_gen.roads.road_graph import RoadEdge
+
+Tags = Mapping[str, str]
+
+
+def barrier_notes(
+    edges: Iterable[RoadEdge], closed: frozenset[int], node_tags: Mapping[int, Tags]
+) -> Iterator[str]:
+    """Name the nodes `closed` to cars before which some of the edges end."""
+    ends = {node for edge in edges for node in (edge.start_node, edge.end_node)}
+    for node in sorted(node for node in closed if node in ends or -node in ends):
+        barrier = node_tags[node]["barrier"]
+        yield f"node {node}: barrier={barrier} closes the road to cars; lanes end before it"
