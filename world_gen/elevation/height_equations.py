@@ -87,8 +87,8 @@ _Level = tuple[int, bool]
 def _levels(edges: Sequence[RoadEdge]) -> Callable[[RoadEdge], tuple[_Level, _Level]]:
     """Return what tells where an edge's ends share a height with others.
 
-    Where a tunnel and a street both go on through a node they do not meet, though the map joins
-    them: one in Monaco passes 100 m below.
+    Where a tunnel and a street both go on through a node they have a height each, though the map
+    joins them.
     """
     below: Counter[int] = Counter()
     above: Counter[int] = Counter()

@@ -21,6 +21,7 @@ from foretwin.world_gen.osm.driving_side import driving_sides
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
 from foretwin.world_gen.roads.barriers import closed_nodes, ended_before
 from foretwin.world_gen.roads.joined_edges import joined, read_tags
+from foretwin.world_gen.roads.levels import passed_over
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph, side_of
 from foretwin.world_gen.roads.road_tags import (
     Directions,
@@ -43,7 +44,8 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
 
     Ways are cut where they share a node with themselves or another kept way, and at their ends,
     and short pieces joined where that parts nothing (`joined_edges`). They end on both sides of
-    what closes them to cars (`barriers`). Ways are taken in the order of their ids, so that edges,
+    what closes them to cars (`barriers`), and go on where they pass over each other (`levels`).
+    Ways are taken in the order of their ids, so that edges,
     and with them all that follows, are the same for the same map.
     Raises `MapError` where the map holds no road for cars.
     """
@@ -60,7 +62,8 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     places = places_of(lat_lon[row[begin]])
     sides = _sides(kept, places, lat_lon[row], xy_m[row])
     closed = closed_nodes(kept, flat, osm.node_tags)
-    cut_here = (uses > 1) | np.isin(ids, list(closed))
+    over = passed_over(kept, flat)
+    cut_here = ((uses > 1) & ~np.isin(ids, list(over))) | np.isin(ids, list(closed))
     as_mapped = _edges(kept, places, sides, flat.tolist(), xy_m[row], cut_here[row])
     edges = joined(ended_before(as_mapped, closed), _kept_nodes(osm))
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
@@ -77,6 +80,7 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
         node_xy_m={node: (at[node][0], at[node][1]) for node in leaving},
         leaving={node: tuple(directed) for node, directed in leaving.items()},
         closed_nodes=closed,
+        passed_over=over,
     )
 
 

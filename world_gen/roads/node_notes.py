@@ -17,3 +17,11 @@ def barrier_notes(
     for node in sorted(node for node in closed if node in ends or -node in ends):
         barrier = node_tags[node]["barrier"]
         yield f"node {node}: barrier={barrier} closes the road to cars; lanes end before it"
+
+
+def level_notes(edges: Iterable[RoadEdge], passed_over: frozenset[int]) -> Iterator[str]:
+    """Name the nodes of some edges that a map joins though one road passes over the other."""
+    if passed_over:
+        nodes = {node for edge in edges for node in edge.node_ids}
+        for node in sorted(passed_over & nodes):
+            yield f"node {node}: in the map two roads of different levels meet; taken as apart"

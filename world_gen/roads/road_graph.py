@@ -133,6 +133,8 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     closed_nodes: frozenset[int] = frozenset()
     """Nodes at which a road is closed to cars: it ends before them, on the one side in a node of
     this id, on the other in one of its negative."""
+    passed_over: frozenset[int] = frozenset()
+    """Nodes that two roads share though one passes over the other: neither begins or ends there."""
 
     def middle_of(self, nodes: Iterable[int]) -> tuple[float, float]:
         """Return the mean of the places of nodes."""
