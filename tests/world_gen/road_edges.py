@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import DrivingSide
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
@@ -18,8 +18,9 @@ def road(
     backward: int = 1,
     road_class: str = "residential",
     side: DrivingSide = "right",
+    counts: Provenance = "tagged",
 ) -> RoadEdge:
-    """Return an edge of way 7 with so many lanes each way."""
+    """Return an edge of way 7 with so many lanes each way, a number that comes from `counts`."""
     return RoadEdge(
         index=0,
         way_id=7,
@@ -35,8 +36,8 @@ def road(
         name="",
         limit_forward_mps=Quantity(8.3, "default"),
         limit_backward_mps=Quantity(8.3, "default"),
-        lanes_forward=Quantity(forward, "tagged"),
-        lanes_backward=Quantity(backward, "tagged"),
+        lanes_forward=Quantity(forward, counts),
+        lanes_backward=Quantity(backward, counts),
         layer=0,
         driving_side=side,
         tags=tags or {},

@@ -50,7 +50,7 @@ def cross_section(edge: RoadEdge, *, centre_reverse: bool = False) -> CrossSecti
     if _is_shared(edge, ordered):
         ordered = _halves(edge, ordered, notes)
     else:
-        ordered = _fit_total_width(edge, ordered)
+        ordered = _fit_total_width(edge, ordered, notes)
     total = _width(ordered)
     left = total / 2 + _placement_shift(edge, ordered, total, notes)
     left += _width(beside.left)
@@ -115,12 +115,19 @@ def _centre(edge: RoadEdge, reverse: bool, notes: list[str]) -> list[LanePlan]:
 
 
 def _is_shared(edge: RoadEdge, lanes: list[LanePlan]) -> bool:
-    """Return whether both directions have but one lane, on which cars cannot pass each other."""
-    if edge.tags.get("lanes") != "1" or [lane.reverse for lane in lanes] not in _ONE_EACH_WAY:
+    """Return whether both directions have but one lane, on which cars cannot pass each other.
+
+    That is what `lanes=1` says, or where no tag counts lanes a width that holds no two.
+    """
+    if [lane.reverse for lane in lanes] not in _ONE_EACH_WAY:
+        return False
+    if any(lane.width_m.source == "tagged" for lane in lanes):
         return False
     total_m = _tagged_total_m(edge)
-    tagged = any(lane.width_m.source == "tagged" for lane in lanes)
-    return not tagged and (total_m is None or total_m < PASSING_M)
+    if edge.tags.get("lanes") == "1":
+        return total_m is None or total_m < PASSING_M
+    counted = {edge.lanes_forward.source, edge.lanes_backward.source} != {"default"}
+    return not counted and total_m is not None and total_m < 2.0 * MIN_WIDTH_M
 
 
 def _halves(edge: RoadEdge, lanes: list[LanePlan], notes: list[str]) -> list[LanePlan]:
@@ -136,7 +143,7 @@ def _tagged_total_m(edge: RoadEdge) -> float | None:
     return metres(edge.tags.get("width")) or metres(edge.tags.get("est_width"))
 
 
-def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan]) -> list[LanePlan]:
+def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan], notes: list[str]) -> list[LanePlan]:
     """Spread a tagged total width over lanes whose own width is not tagged."""
     total = _tagged_total_m(edge)
     if total is None or not lanes or any(lane.width_m.source == "tagged" for lane in lanes):
@@ -144,6 +151,9 @@ def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan]) -> list[LanePlan]:
     cars = [lane for lane in lanes if lane.kind != "bicycle"]
     each = (total - (_width(lanes) - _width(cars))) / max(len(cars), 1)
     if not MIN_WIDTH_M <= each <= MAX_WIDTH_M:
+        notes.append(
+            f"way {edge.way_id}: its width of {total:g} m does not fit its lanes; not used"
+        )
         return lanes
     # The way's width is tagged, a lane's share of it is worked out; kerb-side parking that the
     # width may include is unknown, so a lane gets no more than 1.5 times its class's width.

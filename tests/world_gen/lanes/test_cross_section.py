@@ -54,6 +54,26 @@ def test_a_lane_each_way_is_not_shared():
     assert cross_section(_road({"lanes": "1", "width:lanes:forward": "3.2"})).width_m > 6.0
 
 
+@pytest.mark.parametrize(
+    ("width", "widths_m"),
+    [("2", [1.25, 1.25]), ("3", [1.5, 1.5]), ("3.9", [1.95, 1.95]), ("4", [2.0, 2.0])],
+)
+def test_a_street_too_narrow_for_two_lanes_has_one(width, widths_m):
+    section = cross_section(_road({"width": width}, counts="default"))
+    assert [lane.width_m for lane in section.lanes] == [Quantity(m, "inferred") for m in widths_m]
+    shared = "way 7: one lane for both directions; each has half of its width"
+    assert section.notes == ((shared,) if width != "4" else ())
+
+
+def test_a_width_that_its_counted_lanes_cannot_have_is_named_and_not_used():
+    for tags, forward, backward in (({"lanes": "2"}, 1, 1), ({}, 2, 0)):
+        section = cross_section(
+            _road({"width": "3.25", **tags}, forward=forward, backward=backward)
+        )
+        assert section.width_m == 6.0
+        assert section.notes == ("way 7: its width of 3.25 m does not fit its lanes; not used",)
+
+
 def test_lanes_are_numbered_from_the_left_as_their_driver_sees_them():
     section = cross_section(_road(forward=2, backward=2))
     assert [lane.left_m for lane in section.along(reverse=False).driven] == [-1.5, -4.5]
