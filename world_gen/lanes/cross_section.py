@@ -150,18 +150,21 @@ def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan], notes: list[str]) ->
         return lanes
     cars = [lane for lane in lanes if lane.kind != "bicycle"]
     each = (total - (_width(lanes) - _width(cars))) / max(len(cars), 1)
-    if not MIN_WIDTH_M <= each <= MAX_WIDTH_M:
+    if each < MIN_WIDTH_M:
         notes.append(
             f"way {edge.way_id}: its width of {total:g} m does not fit its lanes; not used"
         )
         return lanes
     # The way's width is tagged, a lane's share of it is worked out; kerb-side parking that the
     # width may include is unknown, so a lane gets no more than 1.5 times its class's width.
+    most_m = {lane.label: min(1.5 * lane.width_m.value, MAX_WIDTH_M) for lane in cars}
+    if any(each > most for most in most_m.values()):
+        notes.append(f"way {edge.way_id}: its lanes need less than its width of {total:g} m")
     return [
         lane
         if lane.kind == "bicycle"
         else msgspec.structs.replace(
-            lane, width_m=Quantity(round(min(each, 1.5 * lane.width_m.value), 3), "inferred")
+            lane, width_m=Quantity(round(min(each, most_m[lane.label]), 3), "inferred")
         )
         for lane in lanes
     ]

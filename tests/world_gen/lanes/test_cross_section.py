@@ -65,6 +65,19 @@ def test_a_street_too_narrow_for_two_lanes_has_one(width, widths_m):
     assert section.notes == ((shared,) if width != "4" else ())
 
 
+@pytest.mark.parametrize(("width", "each_m"), [("8", 4.0), ("9", 4.5), ("14", 4.5), ("16", 4.5)])
+def test_a_lane_gets_of_a_great_width_half_as_much_again_as_is_usual(width, each_m):
+    section = cross_section(_road({"width": width}))
+    assert [lane.width_m for lane in section.lanes] == [Quantity(each_m, "inferred")] * 2
+    left = f"way 7: its lanes need less than its width of {width} m"
+    assert section.notes == ((left,) if float(width) > 9.0 else ())
+
+
+def test_the_only_lane_of_a_race_track_is_as_wide_as_any_may_be():
+    section = cross_section(_road({"width": "10"}, backward=0, road_class="raceway"))
+    assert section.width_m == 7.5
+
+
 def test_a_width_that_its_counted_lanes_cannot_have_is_named_and_not_used():
     for tags, forward, backward in (({"lanes": "2"}, 1, 1), ({}, 2, 0)):
         section = cross_section(
