@@ -15,7 +15,7 @@ from foretwin.world_gen.lanes.lane_tags import (
     lanes_of_direction,
     usual_width_m,
 )
-from foretwin.world_gen.lanes.side_lanes import side_lanes
+from foretwin.world_gen.lanes.side_lanes import SideLanes, side_lanes
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 MAX_LANES = 12
@@ -50,7 +50,7 @@ def cross_section(edge: RoadEdge, *, centre_reverse: bool = False) -> CrossSecti
     if _is_shared(edge, ordered):
         ordered = _halves(edge, ordered, notes)
     else:
-        ordered = _fit_total_width(edge, ordered, notes)
+        ordered, beside = _fit_total_width(edge, ordered, beside, notes)
     total = _width(ordered)
     left = total / 2 + _placement_shift(edge, ordered, total, notes)
     left += _width(beside.left)
@@ -143,31 +143,45 @@ def _tagged_total_m(edge: RoadEdge) -> float | None:
     return metres(edge.tags.get("width")) or metres(edge.tags.get("est_width"))
 
 
-def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan], notes: list[str]) -> list[LanePlan]:
-    """Spread a tagged total width over lanes whose own width is not tagged."""
+def _fit_total_width(
+    edge: RoadEdge, lanes: list[LanePlan], beside: SideLanes, notes: list[str]
+) -> tuple[list[LanePlan], SideLanes]:
+    """Spread a tagged total width over lanes whose own width is not tagged.
+
+    It reaches from kerb to kerb (https://wiki.openstreetmap.org/wiki/Key:width) and holds the
+    bicycle lanes beside them. Where it is less than is usual for all of them, bicycle lanes are
+    narrower in proportion.
+    """
     total = _tagged_total_m(edge)
     if total is None or not lanes or any(lane.width_m.source == "tagged" for lane in lanes):
-        return lanes
+        return lanes, beside
     cars = [lane for lane in lanes if lane.kind != "bicycle"]
-    each = (total - (_width(lanes) - _width(cars))) / max(len(cars), 1)
+    bicycles = [p for p in (*lanes, *beside.left, *beside.right) if p.kind == "bicycle"]
+    free = [lane for lane in bicycles if lane.width_m.source != "tagged"]
+    rest_m = total - _width([lane for lane in bicycles if lane.width_m.source == "tagged"])
+    narrowed = min(1.0, rest_m / _width([*cars, *free]))
+    each = (rest_m - narrowed * _width(free)) / max(len(cars), 1)
     if each < MIN_WIDTH_M:
         notes.append(
             f"way {edge.way_id}: its width of {total:g} m does not fit its lanes; not used"
         )
-        return lanes
+        return lanes, beside
     # The way's width is tagged, a lane's share of it is worked out; kerb-side parking that the
     # width may include is unknown, so a lane gets no more than 1.5 times its class's width.
-    most_m = {lane.label: min(1.5 * lane.width_m.value, MAX_WIDTH_M) for lane in cars}
-    if any(each > most for most in most_m.values()):
+    fitted = {lane.label: min(each, 1.5 * lane.width_m.value, MAX_WIDTH_M) for lane in cars}
+    if any(width_m < each for width_m in fitted.values()):
         notes.append(f"way {edge.way_id}: its lanes need less than its width of {total:g} m")
-    return [
-        lane
-        if lane.kind == "bicycle"
-        else msgspec.structs.replace(
-            lane, width_m=Quantity(round(min(each, most_m[lane.label]), 3), "inferred")
-        )
-        for lane in lanes
-    ]
+    if narrowed < 1.0:
+        fitted |= {lane.label: narrowed * lane.width_m.value for lane in free}
+
+    def fit(lane: LanePlan) -> LanePlan:
+        if lane.label not in fitted:
+            return lane
+        width_m = Quantity(round(fitted[lane.label], 3), "inferred")
+        return msgspec.structs.replace(lane, width_m=width_m)
+
+    left, right = (tuple(map(fit, side)) for side in beside)
+    return [*map(fit, lanes)], SideLanes(left, right)
 
 
 def _placement_shift(

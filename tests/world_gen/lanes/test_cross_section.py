@@ -65,6 +65,34 @@ def test_a_street_too_narrow_for_two_lanes_has_one(width, widths_m):
     assert section.notes == ((shared,) if width != "4" else ())
 
 
+@pytest.mark.parametrize(
+    ("width", "tags", "cars_m", "bicycles_m"),
+    [
+        ("10", {"cycleway:both": "lane"}, 3.15, 1.85),
+        ("7.85", {"cycleway:right": "lane"}, 3.0, 1.85),
+        # Less than is usual: all are narrower in proportion.
+        ("7", {"cycleway:both": "lane"}, 2.165, 1.335),
+        ("7", {"cycleway:both": "lane", "cycleway:both:width": "1.5"}, 2.0, 1.5),
+        # Beside the road, or of a width that no lanes have: the width is that of the rest.
+        ("7", {"cycleway:both": "track"}, 3.5, None),
+        ("5", {"cycleway:both": "lane"}, 3.0, 1.85),
+    ],
+)
+def test_a_width_from_kerb_to_kerb_holds_the_bicycle_lanes(width, tags, cars_m, bicycles_m):
+    section = cross_section(_road({"width": width, **tags}))
+    found = {lane.kind: lane.width_m.value for lane in section.lanes}
+    assert found["driving"] == pytest.approx(cars_m, abs=0.001)
+    assert found.get("bicycle") == (bicycles_m and pytest.approx(bicycles_m, abs=0.001))
+    if width != "5":
+        assert section.width_m == pytest.approx(float(width), abs=0.01)
+    assert bool(section.notes) == (width == "5")
+
+
+def test_parking_beside_the_road_is_no_part_of_its_width():
+    section = cross_section(_road({"width": "6", "parking:both": "street_side"}))
+    assert [lane.width_m.value for lane in section.lanes] == [2.0, 3.0, 3.0, 2.0]
+
+
 @pytest.mark.parametrize(("width", "each_m"), [("8", 4.0), ("9", 4.5), ("14", 4.5), ("16", 4.5)])
 def test_a_lane_gets_of_a_great_width_half_as_much_again_as_is_usual(width, each_m):
     section = cross_section(_road({"width": width}))
