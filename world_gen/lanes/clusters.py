@@ -28,7 +28,7 @@ from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
 from foretwin.world_gen.roads.joined_edges import read_tags
-from foretwin.world_gen.roads.node_notes import barrier_notes, level_notes
+from foretwin.world_gen.roads.node_notes import barrier_notes, level_crossing_notes, level_notes
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, country_of, side_of
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
@@ -138,6 +138,7 @@ def surroundings(
             *restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
             *barrier_notes(edges.values(), graph.closed_nodes, index.osm.node_tags),
             *level_notes((graph.edges[i] for i in edges), graph.passed_over),
+            *level_crossing_notes((graph.edges[i] for i in edges), index.osm.node_tags),
             *_side_notes(edges, side),
             *_beyond_notes(made_for, edges, cut_m, extent),
         ),

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 Tags = Mapping[str, str]
+_GUARDED = ("crossing:barrier", "crossing:light")
 
 
 def barrier_notes(
@@ -25,3 +26,16 @@ def level_notes(edges: Iterable[RoadEdge], passed_over: frozenset[int]) -> Itera
         nodes = {node for edge in edges for node in edge.node_ids}
         for node in sorted(passed_over & nodes):
             yield f"node {node}: in the map two roads of different levels meet; taken as apart"
+
+
+def level_crossing_notes(edges: Iterable[RoadEdge], node_tags: Mapping[int, Tags]) -> Iterator[str]:
+    """Name the nodes at which some edges cross a railway on its level, with what guards it."""
+    nodes = {node for edge in edges for node in edge.node_ids if node in node_tags}
+    for node in sorted(nodes):
+        tags = node_tags[node]
+        if tags.get("railway") == "level_crossing":
+            told = ", ".join(f"{key}={tags[key]}" for key in _GUARDED if key in tags)
+            yield (
+                f"node {node}: level crossing{told and f' ({told})'}; the World holds no stop "
+                "line, light or barrier before its rails"
+            )

@@ -11,8 +11,6 @@ from foretwin.world_gen.roads.barriers import STANDS_BACK_M, closes_to_cars
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, Tags, drawn_map, world_of
 
-COVERS = ("foretwin.world_gen.roads.node_notes",)
-
 BOLLARD: Tags = {"barrier": "bollard", "bicycle": "yes"}
 MIDDLE = 20
 """A node on Street, 60 m east of where it crosses Avenue."""

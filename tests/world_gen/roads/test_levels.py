@@ -10,8 +10,6 @@ from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import CROSS, STREET, Tags, drawn_map
 
-COVERS = ("foretwin.world_gen.roads.node_notes",)
-
 TUNNEL: Tags = {**STREET, "name": "Below", "tunnel": "yes", "layer": "-1"}
 BRIDGE: Tags = {**STREET, "name": "Above", "bridge": "yes", "layer": "1"}
 
