@@ -29,6 +29,11 @@ from foretwin.telemetry.logs.mountings import (
     static_tree,
 )
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder
+from foretwin.telemetry.ros_messages.ackermann import (
+    NO_ACCELERATION,
+    AckermannCommands,
+    AckermannTarget,
+)
 from foretwin.telemetry.ros_messages.foreign import (
     FOREIGN,
     POSE,
@@ -82,7 +87,7 @@ def open_foreign(
             skipped[NOT_UPRIGHT] += contents.counts[imu or ""]
         clock = FixClock(lag_ns, most_ahead_ns=WINDOW_NS)
         samples = _foreign_samples(recording, chosen, decode, frame, mounting, clock, skipped)
-        return _joined(reordered(samples, window_ns=WINDOW_NS))
+        return _joined(reordered(samples, window_ns=WINDOW_NS), skipped)
 
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
     lag_ns, antenna_frame = _first_fix(recording, positions.topic, decode)
@@ -190,18 +195,27 @@ def _foreign_samples(
                     yield channel_of(message), message
 
 
-def _joined(samples: Iterator[Sample]) -> Iterator[Sample]:
-    """Join the reports of a status; those of one stamp become one sample."""
-    joiner = StatusJoiner()
+def _joined(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample]:
+    """Join the reports of a status, those of one stamp to one sample, and commands with speeds."""
+    joiner, commands = StatusJoiner(), AckermannCommands()
     waiting: drive.VehicleStatus | None = None
     for channel, message in samples:
         stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if waiting is not None and stamp_ns != waiting.stamp_ns:
             yield "status", waiting
             waiting = None
-        if isinstance(message, drive.VehicleStatus):
-            waiting = joiner.join(message)
-        else:
-            yield channel, message
+        match message:
+            case drive.VehicleStatus():
+                waiting = joiner.join(message)
+                continue
+            case drive.SpeedSample():
+                commands.note(message)
+            case AckermannTarget():
+                command = commands.command(message)
+                if command is None:
+                    skipped[NO_ACCELERATION] += 1
+                    continue
+                message = command
+        yield channel, message
     if waiting is not None:
         yield "status", waiting

@@ -23,6 +23,11 @@ from foretwin.telemetry.ros2.mapping import Mapping
 from foretwin.telemetry.ros2.merged_objects import HeardObjects
 from foretwin.telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
 from foretwin.telemetry.ros2.rows import REAL_CLOUD, InRow
+from foretwin.telemetry.ros_messages.ackermann import (
+    NO_ACCELERATION,
+    AckermannCommands,
+    AckermannTarget,
+)
 from foretwin.telemetry.ros_messages.clouds import cloud_of
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, UnusableError, channel_of, stamp_of
 from foretwin.telemetry.ros_messages.motion import route_from_lanelets
@@ -67,7 +72,7 @@ class Inwards:
         self._by_bridge_key = {
             bridge_key(row.topic, namespace=mapping.namespace): row for row in mapping.inwards
         }
-        self._joiner = StatusJoiner()
+        self._joiner, self._commands = StatusJoiner(), AckermannCommands()
         self._transforms = TransformTree()
         self._antenna_frame: str | None = None
         self.counts: Counter[str] = Counter()
@@ -199,6 +204,11 @@ class Inwards:
         for message in how.read(ros, stamp_ns, self._mapping.map_frame):
             if isinstance(message, drive.VehicleStatus):
                 message = self._joiner.join(message)
+            if isinstance(message, AckermannTarget):
+                command = self._commands.command(message)
+                if command is None:
+                    raise UnusableError(NO_ACCELERATION)
+                message = command
             if isinstance(message, drive.SignalState):
                 samples += self._light(self.lights.in_world(message), row, arrived)
                 continue
@@ -251,6 +261,8 @@ class Inwards:
             self.first_stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if isinstance(message, drive.GnssFix):
             self.fix = message.position
+        if isinstance(message, drive.SpeedSample):
+            self._commands.note(message)
         if isinstance(message, drive.SteeringSample) and message.tire_angle_rad is not None:
             self.tire_angle_rad = message.tire_angle_rad
             self.tire_angle_mono_ns = arrived.received_mono_ns

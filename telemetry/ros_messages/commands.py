@@ -8,6 +8,7 @@ from typing import Any
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.ackermann import towards
 from foretwin.telemetry.ros_messages.parts import ros_message, within_float32
 
 
@@ -35,20 +36,26 @@ def control_from_command(message: drive.ControlCommand, *, speed_mps: float) -> 
 
 
 def ackermann_from_command(message: drive.ControlCommand, *, speed_mps: float) -> Any:
-    """Return the AckermannDriveStamped of a command; see control_from_command."""
+    """Return the AckermannDriveStamped of a command to a car that drives forwards.
+
+    Its acceleration is a magnitude, and the speed lies in its direction: see `ackermann.towards`.
+    Raises as control_from_command does.
+    """
     tire, accel, speed = _finite(message, speed_mps)
-    return _ackermann(message.stamp_ns, tire, accel, speed)
+    return _ackermann(message.stamp_ns, tire, *towards(accel, speed))
 
 
 def ackermann_view(message: drive.ControlCommand, _frame: LocalFrame | None) -> Any:
-    """Return the AckermannDriveStamped to look at: NaN where no tyre angle is commanded."""
+    """Return the AckermannDriveStamped to look at.
+
+    NaN where no tyre angle is commanded, and for the speed but in braking: a command tells none.
+    """
     tire = math.nan if message.tire_angle_rad is None else message.tire_angle_rad
-    return _ackermann(
-        message.stamp_ns, within_float32(tire), within_float32(message.accel_mps2), 0.0
-    )
+    speed, limit = towards(within_float32(message.accel_mps2), math.nan)
+    return _ackermann(message.stamp_ns, within_float32(tire), speed, limit)
 
 
-def _ackermann(stamp_ns: int, tire: float, accel: float, speed: float) -> Any:
+def _ackermann(stamp_ns: int, tire: float, speed: float, limit: float) -> Any:
     return ros_message(
         parts.ACKERMANN,
         header=parts.header_from(stamp_ns, parts.BASE_FRAME),
@@ -56,7 +63,7 @@ def _ackermann(stamp_ns: int, tire: float, accel: float, speed: float) -> Any:
             "ackermann_msgs/msg/AckermannDrive",
             steering_angle=tire,
             speed=speed,
-            acceleration=accel,
+            acceleration=limit,
         ),
     )
 

@@ -16,6 +16,7 @@ from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS
 from foretwin.telemetry.ros_messages import motion, objects, parts, status
+from foretwin.telemetry.ros_messages.ackermann import AckermannTarget, target_from_ros
 
 NO_FIX = "receiver without fix"
 
@@ -30,7 +31,8 @@ class Foreign(NamedTuple):
     """How messages of one type are read.
 
     Of the types and topics of one `stream` one is taken; a status has three streams, which
-    `status.StatusJoiner` joins. `read` takes the message, its stamp and the frame of
+    `status.StatusJoiner` joins, and `ackermann.AckermannCommands` makes commands of targets. `read`
+    takes the message, its stamp and the frame of
     `map`, None where unknown, returns samples of `channels` and raises UnusableError.
     """
 
@@ -105,11 +107,6 @@ def _control(ros: Any, stamp_ns: int) -> drive.ControlCommand:
     return drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle)
 
 
-def _ackermann(ros: Any, stamp_ns: int) -> drive.ControlCommand:
-    accel, angle = float(ros.drive.acceleration), float(ros.drive.steering_angle)
-    return drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle)
-
-
 def _plan(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:
     return (motion.plan_from_trajectory(ros, _placed("plan", frame)),)
 
@@ -152,7 +149,7 @@ FOREIGN: dict[str, Foreign] = {
     "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
     parts.CONTROL: _CONTROL,
     "autoware_auto_control_msgs/msg/AckermannControlCommand": _CONTROL,
-    parts.ACKERMANN: _sample("control", _ackermann),
+    parts.ACKERMANN: _sample("control", target_from_ros),
     parts.TRAJECTORY: _PLAN,
     "autoware_auto_planning_msgs/msg/Trajectory": _PLAN,
     parts.CONTROL_MODE_REPORT: _sample("status", status.mode_from_ros, "status/mode"),
@@ -169,7 +166,9 @@ FOREIGN: dict[str, Foreign] = {
 POSE = Foreign("gnss", ("gnss", "heading"), _pose)
 """How an Odometry of base_link in `map` stands in for a receiver, where that frame is placed."""
 
-_CHANNELS = {CHANNELS[name].kind: name for name in TELEMETRY_CHANNELS}
+_CHANNELS: dict[type, str] = {CHANNELS[name].kind: name for name in TELEMETRY_CHANNELS} | {
+    AckermannTarget: "control"
+}
 
 
 def channel_of(message: msgspec.Struct) -> str:

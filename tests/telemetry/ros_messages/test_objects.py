@@ -12,10 +12,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.telemetry.ros_messages.commands import (
-    ackermann_from_command,
-    control_from_command,
-)
+from foretwin.telemetry.ros_messages.commands import control_from_command
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.motion import odometry_from_state, state_from_odometry
 from foretwin.telemetry.ros_messages.objects import (
@@ -25,7 +22,6 @@ from foretwin.telemetry.ros_messages.objects import (
     users_from_predicted,
 )
 from foretwin.telemetry.ros_messages.parts import (
-    ACKERMANN,
     CONTROL,
     DETECTED_OBJECTS,
     PREDICTED_OBJECTS,
@@ -198,12 +194,10 @@ def test_a_green_arrow_beside_a_red_light_is_no_colour() -> None:
     assert signals_from_ros(message, AT)[0].colour == "unknown"
 
 
-def test_commands_come_back_from_both_kinds_of_message() -> None:
+def test_a_command_comes_back() -> None:
     command = drive.ControlCommand(stamp_ns=AT, accel_mps2=-0.5, tire_angle_rad=0.125)
     control = control_from_command(command, speed_mps=8.0)
-    ackermann = ackermann_from_command(command, speed_mps=8.0)
     assert FOREIGN[CONTROL].read(control, AT, None) == (command,)
-    assert FOREIGN[ACKERMANN].read(ackermann, AT, None) == (command,)
 
 
 @pytest.mark.parametrize("tire_rad", [None, math.nan, math.inf])
