@@ -19,6 +19,7 @@ from foretwin.telemetry.ros_messages import motion, objects, parts, status
 from foretwin.telemetry.ros_messages.ackermann import AckermannTarget, target_from_ros
 
 NO_FIX = "receiver without fix"
+ACCELERATION_UNDEFINED = "acceleration not defined"
 
 Messages = tuple[msgspec.Struct, ...]
 
@@ -103,8 +104,17 @@ def _steering(ros: Any, stamp_ns: int) -> drive.SteeringSample:
 
 
 def _control(ros: Any, stamp_ns: int) -> drive.ControlCommand:
+    # Autoware's own controller fills in accelerations and leaves them undefined: only a 0 may be
+    # one that nobody commanded.
+    if not (ros.longitudinal.acceleration or _defines_acceleration(ros.longitudinal)):
+        raise UnusableError(ACCELERATION_UNDEFINED)
     accel, angle = float(ros.longitudinal.acceleration), float(ros.lateral.steering_tire_angle)
     return drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle)
+
+
+def _defines_acceleration(longitudinal: Any) -> bool:
+    """Whether a Longitudinal says that its acceleration counts; older types say nothing of it."""
+    return bool(getattr(longitudinal, "is_defined_acceleration", True))
 
 
 def _plan(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:

@@ -13,7 +13,11 @@ from hypothesis import strategies as st
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.telemetry.ros_messages.commands import control_from_command
-from foretwin.telemetry.ros_messages.foreign import FOREIGN
+from foretwin.telemetry.ros_messages.foreign import (
+    ACCELERATION_UNDEFINED,
+    FOREIGN,
+    UnusableError,
+)
 from foretwin.telemetry.ros_messages.motion import odometry_from_state, state_from_odometry
 from foretwin.telemetry.ros_messages.objects import (
     detected_from_users,
@@ -198,6 +202,23 @@ def test_a_command_comes_back() -> None:
     command = drive.ControlCommand(stamp_ns=AT, accel_mps2=-0.5, tire_angle_rad=0.125)
     control = control_from_command(command, speed_mps=8.0)
     assert FOREIGN[CONTROL].read(control, AT, None) == (command,)
+
+
+@pytest.mark.parametrize(
+    ("accel_mps2", "defined", "taken"),
+    [(0.0, True, True), (0.0, False, False), (-0.75, False, True)],
+)
+def test_a_0_that_is_not_defined_is_no_command(
+    accel_mps2: float, defined: bool, taken: bool
+) -> None:
+    command = drive.ControlCommand(stamp_ns=AT, accel_mps2=accel_mps2, tire_angle_rad=0.125)
+    control = control_from_command(command, speed_mps=8.0)
+    control.longitudinal.is_defined_acceleration = defined
+    if taken:
+        assert FOREIGN[CONTROL].read(control, AT, None) == (command,)
+        return
+    with pytest.raises(UnusableError, match=ACCELERATION_UNDEFINED):
+        FOREIGN[CONTROL].read(control, AT, None)
 
 
 @pytest.mark.parametrize("tire_rad", [None, math.nan, math.inf])
