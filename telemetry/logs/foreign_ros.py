@@ -12,7 +12,7 @@ positions and headings, where that frame is placed.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from foretwin.contracts import drive
@@ -29,6 +29,7 @@ from foretwin.telemetry.logs.mountings import (
     static_tree,
 )
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder
+from foretwin.telemetry.logs.speed_topics import not_of_the_body
 from foretwin.telemetry.ros_messages.ackermann import (
     NO_ACCELERATION,
     AckermannCommands,
@@ -63,7 +64,8 @@ def open_foreign(
     """
     frame = declared.frame() if frame is None else frame
     path, contents = recording.path, recording.contents
-    chosen = _choose(contents, placed=frame is not None)
+    no_speeds = not_of_the_body(recording)
+    chosen = _choose(contents, no_speeds, placed=frame is not None)
     positions = next((one for one in chosen if "gnss" in one.how.channels), None)
     if positions is None:
         kinds = sorted({schema.name for schema in contents.schemas.values()})
@@ -80,9 +82,16 @@ def open_foreign(
     if not mounting.upright:
         chosen = [one for one in chosen if one.topic != imu]
 
+    speed = next((one.topic for one in chosen if one.how.stream == "speed"), "no topic")
+    left_out = {
+        f"{why} ({topic}; {speed} is taken)": contents.counts.get(topic, 0)
+        for topic, why in no_speeds.items()
+    }
+
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if contents.cut_short:
             skipped[FILE_CUT_SHORT] += 1
+        skipped.update(left_out)
         if not mounting.upright:
             skipped[NOT_UPRIGHT] += contents.counts[imu or ""]
         clock = FixClock(lag_ns, most_ahead_ns=WINDOW_NS)
@@ -124,20 +133,23 @@ class _Chosen(NamedTuple):
     how: Foreign
 
 
-def _choose(contents: Contents, *, placed: bool) -> list[_Chosen]:
-    """Return one topic for each stream; `placed` tells whether `map` has a place on Earth."""
+def _choose(contents: Contents, no_speeds: Container[str], *, placed: bool) -> list[_Chosen]:
+    """Return one topic for each stream, none of `no_speeds` for the speed.
 
-    def topic_of(kind: str) -> str | None:
+    `placed` tells whether `map` has a place on Earth.
+    """
+
+    def topic_of(kind: str, refused: Container[str] = ()) -> str | None:
         topics = [
             topic
             for topic, schema in contents.schemas.items()
-            if schema.name == kind and contents.counts.get(topic, 0) > 0
+            if schema.name == kind and contents.counts.get(topic, 0) > 0 and topic not in refused
         ]
         return max(topics, key=lambda topic: (contents.counts[topic], topic), default=None)
 
     chosen: dict[str, _Chosen] = {}
     for kind, how in FOREIGN.items():
-        topic = topic_of(kind)
+        topic = topic_of(kind, no_speeds)
         if topic is not None and how.stream not in chosen:
             chosen[how.stream] = _Chosen(topic, how)
     pose = topic_of(ODOMETRY)

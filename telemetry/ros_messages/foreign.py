@@ -152,9 +152,10 @@ FOREIGN: dict[str, Foreign] = {
     parts.IMU: _sample("imu", _imu),
     parts.VELOCITY_REPORT: _VELOCITY,
     "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
-    parts.TWIST_STAMPED: _speed_by(lambda ros: ros.twist.linear.x),
-    "geometry_msgs/msg/TwistWithCovarianceStamped": _speed_by(lambda ros: ros.twist.twist.linear.x),
+    # A twist may be a receiver's, or commanded; odometry names the body that it is of.
     parts.ODOMETRY: _speed_by(lambda ros: ros.twist.twist.linear.x),
+    parts.TWIST_STAMPED: _speed_by(lambda ros: ros.twist.linear.x),
+    parts.TWIST_WITH_COVARIANCE_STAMPED: _speed_by(lambda ros: ros.twist.twist.linear.x),
     parts.STEERING_REPORT: _STEERING,
     "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
     parts.CONTROL: _CONTROL,

@@ -125,7 +125,7 @@ def test_a_ros1_bag_is_read(tmp_path: Path) -> None:
             )
             writer.write(fixes, sec * 10**9, store.serialize_ros1(ros, NAV_SAT_FIX))
             twist = types[TWIST_STAMPED](
-                header=head,
+                header=header(seq=tick, stamp=head.stamp, frame_id="base_link"),
                 twist=types["geometry_msgs/msg/Twist"](
                     linear=vector(x=7.0, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0)
                 ),
