@@ -1,4 +1,4 @@
-"""How a recording's sensors sit on the car: by its static transforms, and by gravity.
+"""How inertial units sit on the car, recorded and live: by static transforms, and by gravity.
 
 Of a sensor that lies on its side or hangs upside down the turning rate about its own z is none of
 the car's. Where a static transform tells its axes they are turned; where none does, or gravity
@@ -52,6 +52,32 @@ class ImuMounting(NamedTuple):
         return msgspec.structs.replace(sample, accel_mps2=accel, rate_radps=rate)
 
 
+def by_gravity(mean_mps2: Array, turn: Array | None) -> ImuMounting:
+    """Return how a unit sits whose specific force is (3,) in the mean, in its own axes."""
+    up = mean_mps2 if turn is None else turn @ mean_mps2
+    size_mps2 = float(np.linalg.norm(up))
+    if abs(size_mps2 / STANDARD_GRAVITY_MPS2 - 1.0) > _GRAVITY_WITHIN:
+        return ImuMounting(turn)
+    tilt_rad = math.acos(np.clip(up[2] / size_mps2, -1.0, 1.0))
+    return ImuMounting(turn, tilt_rad < _MOST_TILT_RAD)
+
+
+class GravitySeen:
+    """Follows which way gravity is in a unit's own axes, over its first samples."""
+
+    def __init__(self) -> None:
+        self._sum_mps2, self._count = np.zeros(3), 0
+
+    def mounting(self, sample: drive.ImuSample, turn: Array | None) -> ImuMounting:
+        """Return how the unit sits after one more sample, by `turn` as far as that is known."""
+        force_mps2 = np.array(sample.accel_mps2)
+        if self._count < _MOST_LOOKED_AT and np.isfinite(force_mps2).all():
+            self._sum_mps2, self._count = self._sum_mps2 + force_mps2, self._count + 1
+        if not self._count:
+            return ImuMounting(turn)
+        return by_gravity(self._sum_mps2 / self._count, turn)
+
+
 def static_tree(recording: RosRecording) -> TransformTree | None:
     """Return a recording's static transforms, None where it has none that can be read."""
     schemas = recording.contents.schemas
@@ -94,9 +120,4 @@ def imu_mounting(
     known = known[np.isfinite(known).all(axis=1)]
     if not len(known):
         return ImuMounting(turn)
-    up = np.mean(known, axis=0) if turn is None else turn @ np.mean(known, axis=0)
-    size = float(np.linalg.norm(up)) / STANDARD_GRAVITY_MPS2
-    if abs(size - 1.0) > _GRAVITY_WITHIN:
-        return ImuMounting(turn)
-    tilt_rad = math.acos(np.clip(up[2] / float(np.linalg.norm(up)), -1.0, 1.0))
-    return ImuMounting(turn, tilt_rad < _MOST_TILT_RAD)
+    return by_gravity(np.mean(known, axis=0), turn)

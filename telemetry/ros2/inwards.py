@@ -15,8 +15,9 @@ from foretwin.contracts.guard import Refused, admit
 from foretwin.contracts.numbering import Numberings
 from foretwin.contracts.point_cloud import NO_MOUNTS, Mounts, PointCloud, base_from_mount_cloud
 from foretwin.telemetry.anchored import world_from_lot_message
-from foretwin.telemetry.logs.units import ANGLE, SPEED
+from foretwin.telemetry.logs.mountings import NOT_UPRIGHT, GravitySeen
 from foretwin.telemetry.ros2.attachment import unpack
+from foretwin.telemetry.ros2.declared_units import in_our_units
 from foretwin.telemetry.ros2.injected import Injected
 from foretwin.telemetry.ros2.lights import LightExchange
 from foretwin.telemetry.ros2.mapping import Mapping
@@ -73,7 +74,7 @@ class Inwards:
             bridge_key(row.topic, namespace=mapping.namespace): row for row in mapping.inwards
         }
         self._joiner, self._commands = StatusJoiner(), AckermannCommands()
-        self._transforms = TransformTree()
+        self._transforms, self._gravity = TransformTree(), GravitySeen()
         self._antenna_frame: str | None = None
         self.counts: Counter[str] = Counter()
         self.unused: Counter[str] = Counter()
@@ -212,7 +213,9 @@ class Inwards:
             if isinstance(message, drive.SignalState):
                 samples += self._light(self.lights.in_world(message), row, arrived)
                 continue
-            message = _in_our_units(message, row)
+            message = in_our_units(message, row)
+            if isinstance(message, drive.ImuSample):
+                message = self._in_the_cars_axes(message, row, str(ros.header.frame_id))
             message, left_out = admit(message, where=row.topic)
             if isinstance(message, drive.RoadUsers):
                 message = self._without_ours(message, row)
@@ -223,6 +226,15 @@ class Inwards:
             samples.append((channel, world_from_lot_message(self.anchor, message)))
             self.counts[channel] += 1
         return samples
+
+    def _in_the_cars_axes(self, sample: drive.ImuSample, row: InRow, frame: str) -> drive.ImuSample:
+        # Axes that the mapping declares are those of the car already.
+        declared = row.axes != "forward_left_up"
+        turn = None if declared else self._transforms.turn_of(frame, within=BASE_FRAME)
+        mounting = self._gravity.mounting(sample, turn)
+        if not mounting.upright:
+            raise UnusableError(NOT_UPRIGHT)
+        return mounting.in_the_cars_axes(sample)
 
     def _cloud(self, row: InRow, ros: Any, stamp_ns: int) -> PointCloud:
         if (mount := self._mounts.get(row.sensor)) is None:
@@ -266,22 +278,3 @@ class Inwards:
         if isinstance(message, drive.SteeringSample) and message.tire_angle_rad is not None:
             self.tire_angle_rad = message.tire_angle_rad
             self.tire_angle_mono_ns = arrived.received_mono_ns
-
-
-def _in_our_units(message: msgspec.Struct, row: InRow) -> msgspec.Struct:
-    match message:
-        case drive.SteeringSample() | drive.ControlCommand():
-            factor = ANGLE[row.angle_unit] * (1.0 if row.left_positive else -1.0)
-            angle = message.tire_angle_rad
-            if angle is None:
-                return message
-            return msgspec.structs.replace(message, tire_angle_rad=factor * angle)
-        case drive.SpeedSample():
-            speed = message.speed_mps * SPEED[row.speed_unit]
-            return msgspec.structs.replace(message, speed_mps=speed)
-        case drive.ImuSample() if row.axes == "forward_right_down":
-            a, w = message.accel_mps2, message.rate_radps
-            return msgspec.structs.replace(
-                message, accel_mps2=(a[0], -a[1], -a[2]), rate_radps=(w[0], -w[1], -w[2])
-            )
-    return message

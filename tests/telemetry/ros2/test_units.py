@@ -8,12 +8,12 @@ import pytest
 
 from foretwin.contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
 from foretwin.contracts.foreign_bus import Arrived
-from foretwin.telemetry.ros2.inwards import _in_our_units
+from foretwin.telemetry.ros2.declared_units import in_our_units
 from foretwin.telemetry.ros2.mapping import InRow
 from tests.telemetry.ros2.gateway_ground import FIX_KEY, fix
 from tests.telemetry.ros2.test_gateway import Ground
 
-COVERS = ("foretwin.telemetry.ros2.inwards",)
+COVERS = ("foretwin.telemetry.ros2.declared_units", "foretwin.telemetry.ros2.inwards")
 S = 10**9
 CLOCK_OF_OTHERS = """
 [[out]]
@@ -29,8 +29,8 @@ def row(channel: str, **said: object) -> InRow:
 
 def test_axes_that_point_forward_right_and_down_are_turned_about_the_first() -> None:
     sample = ImuSample(stamp_ns=1, accel_mps2=(1.0, 2.0, 3.0), rate_radps=(0.1, 0.2, 0.3))
-    assert _in_our_units(sample, row("imu")) == sample
-    turned = _in_our_units(sample, row("imu", axes="forward_right_down"))
+    assert in_our_units(sample, row("imu")) == sample
+    turned = in_our_units(sample, row("imu", axes="forward_right_down"))
     assert turned == ImuSample(
         stamp_ns=1, accel_mps2=(1.0, -2.0, -3.0), rate_radps=(0.1, -0.2, -0.3)
     )
@@ -45,13 +45,13 @@ def test_axes_that_point_forward_right_and_down_are_turned_about_the_first() -> 
 )  # fmt: skip
 def test_angles_become_radians_to_the_left(said: dict[str, object], angle_rad: float) -> None:
     sample = SteeringSample(stamp_ns=1, tire_angle_rad=0.2)
-    found = _in_our_units(sample, row("steering", **said))
+    found = in_our_units(sample, row("steering", **said))
     assert found.tire_angle_rad == pytest.approx(angle_rad)  # type: ignore[attr-defined]
 
 
 def test_who_measures_no_angle_has_none_in_any_unit() -> None:
     sample = ControlCommand(stamp_ns=1, tire_angle_rad=None, accel_mps2=1.0)
-    assert _in_our_units(sample, row("control", angle_unit="deg")) is sample
+    assert in_our_units(sample, row("control", angle_unit="deg")) is sample
 
 
 def test_an_attachment_that_is_none_is_counted_and_its_sample_is_taken() -> None:
@@ -66,7 +66,7 @@ def test_an_attachment_that_is_none_is_counted_and_its_sample_is_taken() -> None
 
 def test_speeds_become_metres_a_second() -> None:
     sample = SpeedSample(stamp_ns=1, speed_mps=36.0)
-    assert _in_our_units(sample, row("speed", speed_unit="km/h")).speed_mps == pytest.approx(10.0)  # type: ignore[attr-defined]
+    assert in_our_units(sample, row("speed", speed_unit="km/h")).speed_mps == pytest.approx(10.0)  # type: ignore[attr-defined]
 
 
 def test_each_sample_counts_once() -> None:
