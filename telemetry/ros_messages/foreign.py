@@ -19,6 +19,7 @@ from foretwin.telemetry.ros_messages import motion, objects, parts, status
 from foretwin.telemetry.ros_messages.ackermann import AckermannTarget, target_from_ros
 
 NO_FIX = "receiver without fix"
+NO_TIMES = "plan without times"
 ACCELERATION_UNDEFINED = "acceleration not defined"
 
 Messages = tuple[msgspec.Struct, ...]
@@ -117,8 +118,25 @@ def _defines_acceleration(longitudinal: Any) -> bool:
     return bool(getattr(longitudinal, "is_defined_acceleration", True))
 
 
+def plan_as_told(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:
+    """Return the plan of a Trajectory in `map` with its own times; raises UnusableError."""
+    return (_plan_in_map(ros, _placed("plan", frame)),)
+
+
 def _plan(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:
-    return (motion.plan_from_trajectory(ros, _placed("plan", frame)),)
+    placed = _placed("plan", frame)
+    plan = _plan_in_map(ros, placed)
+    try:
+        return (motion.with_times(plan, placed),)
+    except ValueError:
+        raise UnusableError(NO_TIMES) from None
+
+
+def _plan_in_map(ros: Any, placed: LocalFrame) -> drive.PlannedTrajectory:
+    try:
+        return motion.plan_from_trajectory(ros, placed)
+    except ValueError:
+        raise UnusableError("plan in another frame than map") from None
 
 
 def _placed(what: str, frame: LocalFrame | None) -> LocalFrame:

@@ -20,6 +20,9 @@ from foretwin.telemetry.ros_messages.parts import (
     yaw_of,
 )
 
+_ONE_PLACE_M = 0.01
+"""Points of a plan so near to each other are one place, which may be at one time."""
+
 
 def trajectory_from_plan(message: drive.PlannedTrajectory, frame: LocalFrame | None) -> Any:
     """Return the Autoware Trajectory of a plan in the local frame `frame`."""
@@ -45,8 +48,39 @@ def trajectory_from_plan(message: drive.PlannedTrajectory, frame: LocalFrame | N
     return ros_message(parts.TRAJECTORY, header=header, points=points)
 
 
+def with_times(plan: drive.PlannedTrajectory, frame: LocalFrame) -> drive.PlannedTrajectory:
+    """Return a plan whose times rise; where they do not, by the distances over the mean speeds.
+
+    Its first pose is then at its stamp, and it ends where it stands still. Raises ValueError where
+    that is at its beginning.
+    """
+    xy_m = frames.local_from_geo(frame, plan.lat_deg, plan.lon_deg)
+    distance_m = np.hypot(*np.diff(xy_m, axis=0).T)
+    moves, passed_s = distance_m > _ONE_PLACE_M, np.diff(plan.time_from_stamp_s)
+    if ((passed_s > 0.0) | ((passed_s == 0.0) & ~moves)).all():
+        return plan
+    speed_mps = np.abs(plan.speed_mps)
+    mean_mps = 0.5 * (speed_mps[:-1] + speed_mps[1:])
+    reached = int(np.argmax(np.append(moves & (mean_mps <= 0.0), True)))
+    steps_s = np.divide(distance_m, mean_mps, out=np.zeros_like(distance_m), where=mean_mps > 0.0)
+    if not steps_s[:reached].any():
+        raise ValueError("a plan without times, which stands still")
+    return drive.PlannedTrajectory(
+        stamp_ns=plan.stamp_ns,
+        time_from_stamp_s=np.append(0.0, np.cumsum(steps_s[:reached])),
+        lat_deg=plan.lat_deg[: reached + 1],
+        lon_deg=plan.lon_deg[: reached + 1],
+        yaw_rad=plan.yaw_rad[: reached + 1],
+        speed_mps=plan.speed_mps[: reached + 1],
+    )
+
+
 def plan_from_trajectory(ros: Any, frame: LocalFrame) -> drive.PlannedTrajectory:
-    """Return the plan of an Autoware Trajectory whose frame is `frame`."""
+    """Return the plan of an Autoware Trajectory in `map`, whose plane is `frame`.
+
+    Raises ValueError for another frame.
+    """
+    _check_frame("plan", ros)
     points = ros.points
     xy_m = np.array([(p.pose.position.x, p.pose.position.y) for p in points]).reshape(-1, 2)
     yaw = np.array([yaw_of(p.pose.orientation) for p in points])
@@ -115,8 +149,7 @@ def state_from_odometry(
     Standard deviations are those of its covariances, None where they are 0; acceleration is not in
     an Odometry and is named as estimated. Raises ValueError for another frame.
     """
-    if ros.header.frame_id.lstrip("/") != MAP_FRAME:
-        raise ValueError(f"odometry in frame {ros.header.frame_id!r}; readable: {MAP_FRAME!r}")
+    _check_frame("odometry", ros)
     pose, twist = ros.pose.pose, ros.twist.twist
     alt_m = frame.origin.alt_m + pose.position.z
     at = frames.geo_pose(
@@ -136,6 +169,11 @@ def state_from_odometry(
         speed_std_mps=_std(float(ros.twist.covariance[0])),
         estimated=("accel_mps2",),
     )
+
+
+def _check_frame(what: str, ros: Any) -> None:
+    if ros.header.frame_id.lstrip("/") != MAP_FRAME:
+        raise ValueError(f"{what} in frame {ros.header.frame_id!r}; readable: {MAP_FRAME!r}")
 
 
 def _std(variance: float) -> float | None:

@@ -38,7 +38,7 @@ from foretwin.telemetry.ros_messages import (
     sensed,
     sensors,
 )
-from foretwin.telemetry.ros_messages.foreign import FOREIGN, Messages, stamp_of
+from foretwin.telemetry.ros_messages.foreign import FOREIGN, Messages, plan_as_told, stamp_of
 from foretwin.telemetry.ros_messages.parts import STRING, json_string, typestore
 
 TOPIC_PREFIX = "/foretwin/"
@@ -92,7 +92,7 @@ _TOPICS: dict[str, tuple[_Topic, ...]] = {
         _Topic("control", parts.ACKERMANN, commands.ackermann_view),
         _json("control", "control_json"),
     ),
-    "plan": (_typed("plan", parts.TRAJECTORY, motion.trajectory_from_plan),),
+    "plan": (_Topic("plan", parts.TRAJECTORY, motion.trajectory_from_plan, plan_as_told),),
     "state": (
         _Topic("state", parts.ODOMETRY, motion.odometry_from_state),
         _json("state", "state_json"),

@@ -49,7 +49,6 @@ from tests.telemetry.autoware_messages import (
 
 COVERS = (
     "foretwin.telemetry.ros_messages.commands",
-    "foretwin.telemetry.ros_messages.motion",
     "foretwin.telemetry.ros_messages.shapes",
     "foretwin.telemetry.ros_messages.status",
     "foretwin.telemetry.ros_messages.transforms",
