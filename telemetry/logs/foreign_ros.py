@@ -12,7 +12,7 @@ positions and headings, where that frame is placed.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from foretwin.contracts import drive
@@ -29,7 +29,7 @@ from foretwin.telemetry.logs.mountings import (
     static_tree,
 )
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder
-from foretwin.telemetry.logs.speed_topics import not_of_the_body
+from foretwin.telemetry.logs.speed_topics import not_of_the_body, of_other_bodies
 from foretwin.telemetry.ros_messages.ackermann import (
     NO_ACCELERATION,
     AckermannCommands,
@@ -43,8 +43,10 @@ from foretwin.telemetry.ros_messages.foreign import (
     channel_of,
     stamp_of,
 )
+from foretwin.telemetry.ros_messages.odometry import is_of_base, of_base
 from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY
 from foretwin.telemetry.ros_messages.status import StatusJoiner
+from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 WINDOW_NS = 2_000_000_000
 """How late a message may lie in its file and still be put in order."""
@@ -64,8 +66,11 @@ def open_foreign(
     """
     frame = declared.frame() if frame is None else frame
     path, contents = recording.path, recording.contents
+    tree = static_tree(recording) or TransformTree()
     no_speeds = not_of_the_body(recording)
-    chosen = _choose(contents, no_speeds, placed=frame is not None)
+    chosen = _choose(
+        contents, no_speeds, of_other_bodies(recording, tree), placed=frame is not None
+    )
     positions = next((one for one in chosen if "gnss" in one.how.channels), None)
     if positions is None:
         kinds = sorted({schema.name for schema in contents.schemas.values()})
@@ -76,7 +81,8 @@ def open_foreign(
             + (hint if ODOMETRY in kinds and frame is None else "")
         )
     decode = decoder(recording, {one.topic for one in chosen})
-    tree = static_tree(recording)
+    if positions.how is POSE:
+        _place_body(recording, positions.topic, decode, tree, declared)
     imu = next((one.topic for one in chosen if "imu" in one.how.channels), None)
     mounting = ImuMounting() if imu is None else imu_mounting(recording, imu, decode, tree)
     if not mounting.upright:
@@ -95,7 +101,7 @@ def open_foreign(
         if not mounting.upright:
             skipped[NOT_UPRIGHT] += contents.counts[imu or ""]
         clock = FixClock(lag_ns, most_ahead_ns=WINDOW_NS)
-        samples = _foreign_samples(recording, chosen, decode, frame, mounting, clock, skipped)
+        samples = _foreign_samples(recording, chosen, decode, frame, tree, mounting, clock, skipped)
         return _joined(reordered(samples, window_ns=WINDOW_NS), skipped)
 
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
@@ -104,7 +110,7 @@ def open_foreign(
     antenna_m = declared.body_from_antenna_m
     if positions.how is POSE:
         antenna_m = (0.0, 0.0, 0.0)
-    elif antenna_m is None and tree is not None and antenna_frame:
+    elif antenna_m is None and antenna_frame:
         antenna_m = tree.place_of(antenna_frame, within=BASE_FRAME)
     return Log(
         info=drive.VehicleInfo(
@@ -133,13 +139,15 @@ class _Chosen(NamedTuple):
     how: Foreign
 
 
-def _choose(contents: Contents, no_speeds: Container[str], *, placed: bool) -> list[_Chosen]:
-    """Return one topic for each stream, none of `no_speeds` for the speed.
+def _choose(
+    contents: Contents, no_speeds: Collection[str], doubted: Collection[str], *, placed: bool
+) -> list[_Chosen]:
+    """Return one topic for each stream, none of `no_speeds` for the speed, `doubted` ones last.
 
     `placed` tells whether `map` has a place on Earth.
     """
 
-    def topic_of(kind: str, refused: Container[str] = ()) -> str | None:
+    def topic_of(kind: str, refused: Collection[str] = ()) -> str | None:
         topics = [
             topic
             for topic, schema in contents.schemas.items()
@@ -148,11 +156,12 @@ def _choose(contents: Contents, no_speeds: Container[str], *, placed: bool) -> l
         return max(topics, key=lambda topic: (contents.counts[topic], topic), default=None)
 
     chosen: dict[str, _Chosen] = {}
-    for kind, how in FOREIGN.items():
-        topic = topic_of(kind, no_speeds)
-        if topic is not None and how.stream not in chosen:
-            chosen[how.stream] = _Chosen(topic, how)
-    pose = topic_of(ODOMETRY)
+    for refused in ({*no_speeds, *doubted}, no_speeds):
+        for kind, how in FOREIGN.items():
+            topic = topic_of(kind, refused)
+            if topic is not None and how.stream not in chosen:
+                chosen[how.stream] = _Chosen(topic, how)
+    pose = topic_of(ODOMETRY, doubted) or topic_of(ODOMETRY)
     if POSE.stream not in chosen and placed and pose is not None:
         chosen[POSE.stream] = _Chosen(pose, POSE)
     return list(chosen.values())
@@ -170,11 +179,40 @@ def _first_fix(recording: RosRecording, topic: str, decode: Decode) -> tuple[int
     return 0, ""
 
 
+def _place_body(
+    recording: RosRecording,
+    topic: str,
+    decode: Decode,
+    tree: TransformTree,
+    declared: RecordingDeclaration,
+) -> None:
+    """Put the body of an Odometry where it is declared to be; raises LogError for an unknown one.
+
+    Of whatever point of the car the positions are, its declared place is that.
+    """
+    for record in recording.chosen({topic}, Counter()):
+        try:
+            ros = decode(record)
+        except Exception:  # an unreadable message, counted when it is read
+            continue
+        if is_of_base(of_base(ros, tree)):
+            return
+        if declared.body_from_antenna_m is None:
+            raise LogError(
+                f"{recording.path}: {topic} is odometry of {ros.child_frame_id!r}, not of"
+                f" {BASE_FRAME}, and no static transform tells its place; declare that as"
+                f" body_from_antenna_m in {recording.path.name}.toml"
+            )
+        tree.put(str(ros.child_frame_id), within=BASE_FRAME, place_m=declared.body_from_antenna_m)
+        return
+
+
 def _foreign_samples(
     recording: RosRecording,
     chosen: Sequence[_Chosen],
     decode: Decode,
     frame: LocalFrame | None,
+    tree: TransformTree,
     mounting: ImuMounting,
     clock: FixClock,
     skipped: Counter[str],
@@ -186,6 +224,8 @@ def _foreign_samples(
     for record in recording.chosen(set(readers), skipped):
         try:
             ros = decode(record)
+            if record.kind == ODOMETRY:
+                ros = of_base(ros, tree)
             stamp_ns = stamp_of(ros) or record.log_time_ns
         except Exception:  # whatever rosbags raises over broken bytes
             skipped[UNREADABLE_ROW] += 1

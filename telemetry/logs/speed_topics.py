@@ -16,6 +16,7 @@ from typing import Any
 
 from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.ros_recording import RosRecording, decoder
+from foretwin.telemetry.ros_messages.odometry import is_of_base, of_base
 from foretwin.telemetry.ros_messages.parts import (
     BASE_FRAME,
     NAV_SAT_FIX,
@@ -23,6 +24,7 @@ from foretwin.telemetry.ros_messages.parts import (
     TWIST_STAMPED,
     TWIST_WITH_COVARIANCE_STAMPED,
 )
+from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 COMMANDED = "speed that is a command by its topic's name"
 NOT_OF_THE_BODY = "speed in the receiver's frame, or in none"
@@ -63,6 +65,17 @@ def not_of_the_body(recording: RosRecording) -> dict[str, str]:
         if why is not None:
             found[topic] = why
     return found
+
+
+def of_other_bodies(recording: RosRecording, tree: TransformTree) -> set[str]:
+    """Return the topics of odometry of which it is not known that it is, or can be, base_link's."""
+    return {
+        topic
+        for topic, schema in recording.contents.schemas.items()
+        if schema.name == ODOMETRY
+        for ros in itertools.islice(_messages(recording, topic), 1)
+        if not is_of_base(of_base(ros, tree))
+    }
 
 
 def _fault_of_twist(recording: RosRecording, topic: str, others: set[str]) -> str | None:

@@ -32,10 +32,12 @@ from foretwin.telemetry.ros_messages.ackermann import (
 from foretwin.telemetry.ros_messages.clouds import cloud_of
 from foretwin.telemetry.ros_messages.foreign import FOREIGN, UnusableError, channel_of, stamp_of
 from foretwin.telemetry.ros_messages.motion import route_from_lanelets
+from foretwin.telemetry.ros_messages.odometry import of_base
 from foretwin.telemetry.ros_messages.parts import (
     BASE_FRAME,
     CLOCK,
     LANELET_ROUTE,
+    ODOMETRY,
     POINT_CLOUD2,
     STRING,
     TF,
@@ -201,6 +203,8 @@ class Inwards:
             self.objects = HeardObjects(ros)
         if "gnss" in how.channels:
             self._antenna_frame = str(ros.header.frame_id)
+        if row.type == ODOMETRY:
+            ros = of_base(ros, self._transforms)
         samples: Samples = []
         for message in how.read(ros, stamp_ns, self._mapping.map_frame):
             if isinstance(message, drive.VehicleStatus):

@@ -17,6 +17,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS
 from foretwin.telemetry.ros_messages import motion, objects, parts, status
 from foretwin.telemetry.ros_messages.ackermann import AckermannTarget, target_from_ros
+from foretwin.telemetry.ros_messages.odometry import ANOTHER_BODY, is_of_base
 
 NO_FIX = "receiver without fix"
 NO_TIMES = "plan without times"
@@ -81,6 +82,8 @@ def _imu(ros: Any, stamp_ns: int) -> drive.ImuSample:
 
 def _pose(ros: Any, stamp_ns: int, frame: LocalFrame | None) -> Messages:
     placed = _placed("odometry", frame)
+    if not is_of_base(ros):
+        raise UnusableError(ANOTHER_BODY)
     try:
         state = motion.state_from_odometry(ros, placed, vehicle_id="", stamp_ns=stamp_ns)
     except ValueError:

@@ -10,6 +10,7 @@ import numpy as np
 from foretwin.contracts import drive, frames
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.odometry import is_of_base
 from foretwin.telemetry.ros_messages.parts import (
     MAP_FRAME,
     covariance,
@@ -147,9 +148,11 @@ def state_from_odometry(
     """Return the state of an Odometry of base_link in `map`, whose plane is `frame`.
 
     Standard deviations are those of its covariances, None where they are 0; acceleration is not in
-    an Odometry and is named as estimated. Raises ValueError for another frame.
+    an Odometry and is named as estimated. Raises ValueError for another frame or body.
     """
     _check_frame("odometry", ros)
+    if not is_of_base(ros):
+        raise ValueError(f"odometry of {ros.child_frame_id!r}; readable: {parts.BASE_FRAME!r}")
     pose, twist = ros.pose.pose, ros.twist.twist
     alt_m = frame.origin.alt_m + pose.position.z
     at = frames.geo_pose(

@@ -22,9 +22,15 @@ class TransformTree:
             parent, child = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
             self._parents[child] = (parent, _parent_from_child(one.transform))
 
+    def put(self, child: str, *, within: str, place_m: Vector3) -> None:
+        """Take in that `child` stands at a place in `within`, with the same axes."""
+        matrix = np.eye(4)
+        matrix[:3, 3] = place_m
+        self._parents[child.lstrip("/")] = (within.lstrip("/"), matrix)
+
     def place_of(self, child: str, *, within: str) -> Vector3 | None:
         """Return the origin of `child` in the axes of `within`, metres; None where unconnected."""
-        found = self._within_from(child, within)
+        found = self.within_from(child, within)
         if found is None:
             return None
         x, y, z = found[:3, 3].tolist()
@@ -32,10 +38,11 @@ class TransformTree:
 
     def turn_of(self, child: str, *, within: str) -> Array | None:
         """Return the matrix (3, 3) from the axes of `child` into those of `within`, or None."""
-        found = self._within_from(child, within)
+        found = self.within_from(child, within)
         return None if found is None else found[:3, :3]
 
-    def _within_from(self, child: str, within: str) -> Array | None:
+    def within_from(self, child: str, within: str) -> Array | None:
+        """Return the matrix (4, 4) from `child` into `within`, None where unconnected."""
         child, within = child.lstrip("/"), within.lstrip("/")
         to_child, to_within = self._to_root(child), self._to_root(within)
         if child == within:
@@ -58,7 +65,12 @@ class TransformTree:
 
 
 def _parent_from_child(transform: Any) -> Array:
-    q, at = transform.rotation, transform.translation
+    return matrix_of(transform.rotation, transform.translation)
+
+
+def matrix_of(rotation: Any, place: Any) -> Array:
+    """Return the matrix (4, 4) of a quaternion, of whatever length, and a place in metres."""
+    q, at = rotation, place
     x, y, z, w = np.array([q.x, q.y, q.z, q.w]) / (np.linalg.norm([q.x, q.y, q.z, q.w]) or 1.0)
     matrix = np.eye(4)
     matrix[:3, :3] = [

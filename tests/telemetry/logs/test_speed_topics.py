@@ -71,6 +71,15 @@ def test_odometry_goes_before_a_twist(tmp_path: Path) -> None:
     assert log.skipped == {}
 
 
+def test_odometry_of_an_unknown_body_goes_after_a_twist(tmp_path: Path) -> None:
+    def odom(_: int, at: int) -> Any:
+        return odometry(at, 2.0, child="velodyne")
+
+    assert speeds(recording(tmp_path, odom=odom)) == {2.0}
+    beside = recording(tmp_path, odom=odom, other=lambda _, at: twist(at, "base_link", 7.0))
+    assert speeds(beside) == {7.0}
+
+
 @pytest.mark.parametrize(
     ("topic", "said", "why"),
     [

@@ -15,7 +15,7 @@ from foretwin.telemetry.logs.mountings import NOT_UPRIGHT
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.ackermann import NO_ACCELERATION
-from foretwin.telemetry.ros_messages.parts import ACKERMANN, VELOCITY_REPORT, typestore
+from foretwin.telemetry.ros_messages.parts import ACKERMANN, ODOMETRY, VELOCITY_REPORT, typestore
 from tests.telemetry.autoware_messages import velocity_report
 from tests.telemetry.logs.test_mountings import (
     FORCE,
@@ -30,6 +30,7 @@ from tests.telemetry.logs.test_mountings import (
     static_transform,
 )
 from tests.telemetry.ros_messages.test_ackermann import asked
+from tests.telemetry.ros_messages.test_odometry import MOUNT, SPEED_MPS, of_the_lidar
 
 COVERS = ("foretwin.telemetry.ros2.inwards",)
 S = 10**9
@@ -109,3 +110,11 @@ channel = "transforms"
     (sample,) = heard(inwards, "imu", IMU, measured(AT, down.T @ FORCE, down.T @ RATE))
     assert isinstance(sample, drive.ImuSample)
     assert sample.accel_mps2 == pytest.approx(FORCE.tolist())
+
+
+def test_the_speed_of_a_lidar_becomes_base_links() -> None:
+    inwards = listening(odom=(ODOMETRY, "speed"), tf_static=(TF, "transforms"))
+    heard(inwards, "tf_static", TF, MOUNT)
+    (sample,) = heard(inwards, "odom", ODOMETRY, of_the_lidar(AT))
+    assert isinstance(sample, drive.SpeedSample)
+    assert sample.speed_mps == pytest.approx(SPEED_MPS)
