@@ -45,7 +45,7 @@ from foretwin.telemetry.ros_messages.foreign import (
 )
 from foretwin.telemetry.ros_messages.odometry import is_of_base, of_base
 from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY
-from foretwin.telemetry.ros_messages.status import StatusJoiner
+from foretwin.telemetry.ros_messages.status import StatusJoiner, StatusPart
 from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 WINDOW_NS = 2_000_000_000
@@ -257,7 +257,7 @@ def _joined(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample
             yield "status", waiting
             waiting = None
         match message:
-            case drive.VehicleStatus():
+            case StatusPart():
                 waiting = joiner.join(message)
                 continue
             case drive.SpeedSample():

@@ -43,7 +43,7 @@ from foretwin.telemetry.ros_messages.parts import (
     TF,
     typestore,
 )
-from foretwin.telemetry.ros_messages.status import StatusJoiner
+from foretwin.telemetry.ros_messages.status import StatusJoiner, StatusPart
 from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 Samples = list[tuple[str, msgspec.Struct]]
@@ -207,7 +207,7 @@ class Inwards:
             ros = of_base(ros, self._transforms)
         samples: Samples = []
         for message in how.read(ros, stamp_ns, self._mapping.map_frame):
-            if isinstance(message, drive.VehicleStatus):
+            if isinstance(message, StatusPart):
                 message = self._joiner.join(message)
             if isinstance(message, AckermannTarget):
                 command = self._commands.command(message)

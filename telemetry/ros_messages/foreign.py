@@ -199,7 +199,8 @@ POSE = Foreign("gnss", ("gnss", "heading"), _pose)
 """How an Odometry of base_link in `map` stands in for a receiver, where that frame is placed."""
 
 _CHANNELS: dict[type, str] = {CHANNELS[name].kind: name for name in TELEMETRY_CHANNELS} | {
-    AckermannTarget: "control"
+    AckermannTarget: "control",
+    status.StatusPart: "status",
 }
 
 

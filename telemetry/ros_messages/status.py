@@ -1,12 +1,12 @@
 """What Autoware says of who drives, of gear and indicators and of signal colours.
 
-Autoware reports mode, gear and indicators in messages of their own; each becomes a VehicleStatus
-with the others unknown, and `StatusJoiner` keeps what was said last of each.
+Autoware reports mode, gear and indicators in messages of their own; each becomes a StatusPart, and
+`StatusJoiner` keeps what was said last of each.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -27,7 +27,7 @@ _GEARS: dict[int, drive.Gear] = {
 """GearReport.report."""
 _INDICATORS: dict[int, drive.Indicator] = {1: "off", 2: "left", 3: "right"}
 """TurnIndicatorsReport.report."""
-_OFF = 1
+_OFF, _FLASHING = 1, 3
 """TrafficLightElement.status."""
 _RED, _AMBER, _GREEN = 1, 2, 3
 _COLOURS: dict[frozenset[int], drive.SignalColour] = {
@@ -38,40 +38,48 @@ _COLOURS: dict[frozenset[int], drive.SignalColour] = {
 }
 
 
-def mode_from_ros(ros: Any, stamp_ns: int) -> drive.VehicleStatus:
+class StatusPart(msgspec.Struct, frozen=True, kw_only=True):
+    """What one report says: the value of one field of a VehicleStatus, which may be unknown."""
+
+    stamp_ns: int
+    field: Literal["control_mode", "gear", "indicator"]
+    value: str
+
+
+def mode_from_ros(ros: Any, stamp_ns: int) -> StatusPart:
     """Return who drives, of a ControlModeReport; partly autonomous is manual."""
-    return drive.VehicleStatus(stamp_ns=stamp_ns, control_mode=_MODES.get(ros.mode, "unknown"))
+    mode = _MODES.get(ros.mode, "unknown")
+    return StatusPart(stamp_ns=stamp_ns, field="control_mode", value=mode)
 
 
-def gear_from_ros(ros: Any, stamp_ns: int) -> drive.VehicleStatus:
+def gear_from_ros(ros: Any, stamp_ns: int) -> StatusPart:
     """Return the gear of a GearReport."""
-    return drive.VehicleStatus(stamp_ns=stamp_ns, gear=_GEARS.get(ros.report, "unknown"))
+    return StatusPart(stamp_ns=stamp_ns, field="gear", value=_GEARS.get(ros.report, "unknown"))
 
 
-def indicator_from_ros(ros: Any, stamp_ns: int) -> drive.VehicleStatus:
+def indicator_from_ros(ros: Any, stamp_ns: int) -> StatusPart:
     """Return the indicators of a TurnIndicatorsReport."""
-    return drive.VehicleStatus(stamp_ns=stamp_ns, indicator=_INDICATORS.get(ros.report, "unknown"))
+    side = _INDICATORS.get(ros.report, "unknown")
+    return StatusPart(stamp_ns=stamp_ns, field="indicator", value=side)
 
 
 class StatusJoiner:
-    """Joins reports of mode, gear and indicators: what one does not say stays as it was."""
+    """Joins reports of mode, gear and indicators: what one is not about stays as it was."""
 
     def __init__(self) -> None:
         self._known: dict[str, Any] = {}
 
-    def join(self, part: drive.VehicleStatus) -> drive.VehicleStatus:
+    def join(self, part: StatusPart) -> drive.VehicleStatus:
         """Return what is known after one more report, at its stamp."""
-        for name in ("control_mode", "gear", "indicator"):
-            if getattr(part, name) != "unknown":
-                self._known[name] = getattr(part, name)
-        return msgspec.structs.replace(part, **self._known)
+        self._known[part.field] = part.value
+        return drive.VehicleStatus(stamp_ns=part.stamp_ns, **self._known)
 
 
 def signals_from_ros(ros: Any, stamp_ns: int) -> tuple[drive.SignalState, ...]:
     """Return the colour of each group of a TrafficLightGroupArray; ids are decimal digits.
 
     Elements of several shapes count together where they agree (a green arrow beside a red light is
-    unknown); all off is dark.
+    unknown); all off is dark, and what flashes is unknown: it does not mean its colour.
     """
     return tuple(
         drive.SignalState(
@@ -87,4 +95,6 @@ def _colour(group: Any) -> drive.SignalColour:
     lit = [one for one in group.elements if one.status != _OFF]
     if not lit:
         return "dark"
+    if any(one.status == _FLASHING for one in lit):
+        return "unknown"
     return _COLOURS.get(frozenset(int(one.color) for one in lit), "unknown")

@@ -32,25 +32,17 @@ from foretwin.telemetry.ros_messages.parts import (
     TRAFFIC_LIGHTS,
     typestore,
 )
-from foretwin.telemetry.ros_messages.status import (
-    StatusJoiner,
-    gear_from_ros,
-    indicator_from_ros,
-    mode_from_ros,
-    signals_from_ros,
-)
+from foretwin.telemetry.ros_messages.status import signals_from_ros
 from foretwin.telemetry.ros_messages.transforms import TransformTree
 from tests.telemetry import drive_messages
 from tests.telemetry.autoware_messages import (
     ros_from_signals,
-    ros_from_status,
     transform_message,
 )
 
 COVERS = (
     "foretwin.telemetry.ros_messages.commands",
     "foretwin.telemetry.ros_messages.shapes",
-    "foretwin.telemetry.ros_messages.status",
     "foretwin.telemetry.ros_messages.transforms",
     "foretwin.telemetry.ros_messages.foreign",
 )
@@ -136,44 +128,6 @@ def test_what_one_may_drive_over_is_no_road_user() -> None:
     message = detected_from_users(one_car(), FRAME)
     message.objects[0].classification[0].label = 10
     assert users_from_detected(message, FRAME, stamp_ns=AT).users == ()
-
-
-def test_a_status_comes_back_from_its_reports() -> None:
-    readers = {"ControlMode": mode_from_ros, "Gear": gear_from_ros, "TurnInd": indicator_from_ros}
-    cases: tuple[tuple[drive.ControlMode, drive.Gear, drive.Indicator], ...] = (
-        ("autonomous", "drive", "left"),
-        ("manual", "reverse", "off"),
-        ("manual", "park", "right"),
-    )
-    for mode, gear, indicator in cases:
-        status = drive.VehicleStatus(stamp_ns=AT, control_mode=mode, gear=gear, indicator=indicator)
-        joiner, joined = StatusJoiner(), None
-        for kind, report in ros_from_status(status):
-            for name, read in readers.items():
-                if name in kind:
-                    joined = joiner.join(read(through_cdr(report, kind), AT))
-        assert joined == status
-
-
-@pytest.mark.parametrize(
-    ("mode", "means"),
-    [
-        (0, "unknown"),
-        (1, "autonomous"),
-        (2, "manual"),
-        (4, "manual"),
-        (5, "manual"),
-        (6, "unknown"),
-    ],
-)
-def test_who_drives(mode: int, means: str) -> None:
-    report = dict(ros_from_status(drive.VehicleStatus(stamp_ns=AT)))
-    message = report["autoware_vehicle_msgs/msg/ControlModeReport"]
-    message.mode = mode
-    assert mode_from_ros(message, 7) == drive.VehicleStatus(
-        stamp_ns=7,
-        control_mode=means,  # type: ignore[arg-type]
-    )
 
 
 @given(
