@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts import drive
-from foretwin.contracts.arrays import Array, Flags, Stamps
+from foretwin.contracts.arrays import Array, Indices, Stamps
 from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, Sample
 from foretwin.telemetry.logs.merge import merged
@@ -97,8 +98,8 @@ class Stream(NamedTuple):
     stamps_ns: Stamps
     columns: Mapping[str, Array]
 
-    def of(self, rows: Flags) -> Stream:
-        """Return those of some rows (N,)."""
+    def of(self, rows: Indices) -> Stream:
+        """Return those of some rows (K,), in their order."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Stream(self.stamps_ns[rows], columns)
 
@@ -119,7 +120,7 @@ def table_log(
     unreadable: int = 0,
     refused: Mapping[str, int] | None = None,
 ) -> Log:
-    """Return the log of streams by channel; the drive lasts from the first stamp to the latest.
+    """Return the log of streams by channel; the drive lasts from the earliest stamp to the latest.
 
     `unreadable` rows, and what a reader has `refused` by reason, are counted with what is refused,
     and so are samples whose stamps cannot be of one drive.
@@ -127,11 +128,12 @@ def table_log(
     kept = {}
     counted = Counter(refused or {})
     for channel, stream in streams.items():
-        flags, why = of_one_drive(stream.stamps_ns, time_base)
-        kept[channel] = stream if flags.all() else stream.of(flags)
+        rows, why = of_one_drive(stream.stamps_ns, time_base)
+        kept[channel] = stream.of(rows)
         counted += why
-    flags, _ = of_one_drive(stamps_ns, time_base)
-    stamps_ns = stamps_ns[flags]
+    rows, _ = of_one_drive(stamps_ns, time_base)
+    stamps_ns = stamps_ns[rows]
+    start_ns = int(stamps_ns[np.argmax(stamps_ns >= 0)])
 
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if unreadable:
@@ -143,8 +145,8 @@ def table_log(
         info=drive.VehicleInfo(
             vehicle_id="car",
             time_base=time_base,
-            start_stamp_ns=int(stamps_ns[0]),
-            end_stamp_ns=int(stamps_ns.max()),
+            start_stamp_ns=start_ns,
+            end_stamp_ns=int(stamps_ns[-1]),
             source=source,
             reference_point=reference_point,
             body_from_antenna_m=body_from_antenna_m,

@@ -21,7 +21,7 @@ from foretwin.telemetry.logs.fix_clock import OTHER_CLOCK, FixClock
 from foretwin.telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Log, LogError, Sample
 from foretwin.telemetry.logs.map_origin import RecordingDeclaration
 from foretwin.telemetry.logs.mcap_records import Contents, Record
-from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.merge import WINDOW_NS, reordered
 from foretwin.telemetry.logs.mountings import (
     NOT_UPRIGHT,
     ImuMounting,
@@ -48,8 +48,6 @@ from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY
 from foretwin.telemetry.ros_messages.status import StatusJoiner, StatusPart
 from foretwin.telemetry.ros_messages.transforms import TransformTree
 
-WINDOW_NS = 2_000_000_000
-"""How late a message may lie in its file and still be put in order."""
 _UTC_FROM_NS = 946_684_800_000_000_000
 """2000-01-01: clocks beyond it count from 1970, others from boot or start."""
 

@@ -15,6 +15,9 @@ LATE_NS = 30_000_000_000
 """What a recorder catches up on, in a part of its own, is older than the end of the part before by
 at most this."""
 
+WINDOW_NS = 2_000_000_000
+"""How late a sample may lie in its file and still be put in order."""
+
 
 def stamp_ns_of(sample: Sample) -> int:
     """Return a sample's stamp."""

@@ -33,7 +33,7 @@ from foretwin.telemetry.logs.log import (
     Sample,
 )
 from foretwin.telemetry.logs.map_origin import declaration_beside
-from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.merge import WINDOW_NS, reordered
 from foretwin.telemetry.logs.nmea_positions import (
     QUALITY_OF_MODE,
     STD_M,
@@ -58,7 +58,6 @@ NO_TIME = "sentence before any time"
 DATE_UNKNOWN = "date unknown"
 MIN_COURSE_MPS = 2.0
 """A course over ground means nothing at a standstill."""
-_WINDOW_NS = 2_000_000_000
 _MODES_WITHOUT_FIX = ("N", "E", "M", "S")
 """Mode indicators: not valid, estimated, manual, simulator."""
 
@@ -122,9 +121,7 @@ def open_nmea(path: Path, *, declaration: Path | None = None) -> Log:
             body_from_antenna_m=declared.body_from_antenna_m,
             sends=tuple(sends),
         ),
-        read=lambda skipped: joined(
-            reordered(_samples(path, found, skipped), window_ns=_WINDOW_NS)
-        ),
+        read=lambda skipped: joined(reordered(_samples(path, found, skipped), window_ns=WINDOW_NS)),
     )
 
 

@@ -13,20 +13,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from foretwin.contracts.arrays import Flags, Stamps
+from foretwin.contracts.arrays import Flags, Indices, Stamps
 from foretwin.contracts.drive import TimeBase
 from foretwin.telemetry.logs.log import CLOCK_NOT_SET, TIME_BACKWARDS
-from foretwin.telemetry.logs.merge import LATE_NS
+from foretwin.telemetry.logs.merge import WINDOW_NS
 
 _SET_SINCE_NS = round(datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC).timestamp()) * 10**9
 """Computers without a battery begin in 1970, satellite receivers in 1980."""
 
 
-def of_one_drive(stamps_ns: Stamps, time_base: TimeBase) -> tuple[Flags, Counter[str]]:
-    """Return (N,) which stamps, in the order of their rows, to keep, and how many not by reason.
+def of_one_drive(stamps_ns: Stamps, time_base: TimeBase) -> tuple[Indices, Counter[str]]:
+    """Return (K,) the places of stamps to keep, in order of time, and how many not by reason.
 
-    Where time runs back by more than what may come late, as many are kept as rise. Of UTC none are
-    kept from before the clock was set, if it ever was. Stamps below zero are left to who reads.
+    What comes late by no more than WINDOW_NS is put in order; where time runs back by more, as many
+    are kept as rise, and what is late beside them. Of UTC none are kept from before the clock was
+    set, if it ever was. Stamps below zero are left to who reads.
     """
     kept, refused = stamps_ns >= 0, Counter[str]()
     unset = kept & (stamps_ns < _SET_SINCE_NS)
@@ -35,12 +36,26 @@ def of_one_drive(stamps_ns: Stamps, time_base: TimeBase) -> tuple[Flags, Counter
         kept &= ~unset
     rows = np.flatnonzero(kept)
     known_ns = stamps_ns[rows]
-    if len(known_ns) and (np.maximum.accumulate(known_ns) - known_ns).max() > LATE_NS:
-        rising = _longest_rise(known_ns.tolist())
-        refused[TIME_BACKWARDS] = len(rows) - len(rising)
-        kept[:] = False
-        kept[rows[rising]] = True
-    return kept | (stamps_ns < 0), refused
+    if len(known_ns) and (np.maximum.accumulate(known_ns) - known_ns).max() > WINDOW_NS:
+        near = _near_the_rise(known_ns)
+        refused[TIME_BACKWARDS] = int((~near).sum())
+        rows = rows[near]
+    rows = np.sort(np.concatenate([rows, np.flatnonzero(stamps_ns < 0)]))
+    return rows[np.argsort(stamps_ns[rows], kind="stable")], refused
+
+
+def _near_the_rise(stamps_ns: Stamps) -> Flags:
+    """Return (N,) which stamps are off by no more than WINDOW_NS beside those that rise.
+
+    A clock that is ahead for one row would else cost all rows that come late by its rise as well.
+    """
+    rising = np.array(_longest_rise(stamps_ns.tolist()))
+    before = np.searchsorted(rising, np.arange(len(stamps_ns)), side="right") - 1
+    after = np.searchsorted(rising, np.arange(len(stamps_ns)), side="left")
+    earliest_ns, latest_ns = stamps_ns[rising[before]], stamps_ns[rising[after % len(rising)]]
+    late: Flags = (before >= 0) & (stamps_ns < earliest_ns - WINDOW_NS)
+    early: Flags = (after < len(rising)) & (stamps_ns > latest_ns + WINDOW_NS)
+    return ~(late | early)
 
 
 def _longest_rise(stamps_ns: Sequence[int]) -> list[int]:
