@@ -3,12 +3,13 @@
 Of each instant the position is GGA's, where it has one, else RMC's. Altitude is made ellipsoidal
 with GGA's geoid separation, and the standard deviation is what quality and HDOP promise; an RMC
 between two GGAs has the altitude and HDOP of the last GGA and the quality of its own mode. Speed is
-RMC's in knots, else VTG's. Yaw is HDT's heading; without any HDT it is RMC's course over ground
-above MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are RMC's or ZDA's, else the one
-declared in `NAME.toml` beside the log; without any of them times count from the log's first. Where
-only times are told, one that falls by half a day or more begins the next day, and one of just
-before midnight that comes after it is of the day before.
-Sentences without a time (VTG, HDT) get that of the sentence before. Lines may have something before
+RMC's in knots, else VTG's. Yaw is HDT's heading; where none has been told for some seconds it is
+the course over ground above MIN_COURSE_MPS. Degrees are clockwise from true north. Dates are RMC's
+or ZDA's, else the one declared in `NAME.toml` beside the log; without any of them times count from
+the log's first. Where only times are told, one that falls by half a day or more begins the next
+day, and one of just before midnight that comes after it is of the day before.
+Sentences without a time (VTG, HDT) get that of the sentence before; HDT that of the next, where a
+log shows that an instant begins with it. Lines may have something before
 the `$`; a wrong checksum is counted, a missing one is let pass.
 """
 
@@ -37,6 +38,7 @@ from foretwin.telemetry.logs.merge import WINDOW_NS, reordered
 from foretwin.telemetry.logs.nmea_positions import (
     QUALITY_OF_MODE,
     STD_M,
+    NmeaCourse,
     NmeaPosition,
     joined,
 )
@@ -75,12 +77,16 @@ class NmeaDeclaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
 
 class _Found(NamedTuple):
-    """What a file holds, which decides what is taken from where; `dated` where it tells days."""
+    """What a file holds, which decides what is taken from where; `dated` where it tells days.
+
+    `heading_first` where an HDT is of the instant that is told after it.
+    """
 
     formatters: frozenset[str]
     first_date: datetime.date
     first_time_ns: int
     dated: bool
+    heading_first: bool
 
 
 def is_nmea(text: str) -> bool:
@@ -132,12 +138,14 @@ def _lines(path: Path) -> Iterator[str]:
 
 def _survey(path: Path, declared: datetime.date | None) -> _Found:
     formatters, first = set(), None
+    begins, ends = "", ""
     first_time_ns: int | None = None
     for line in _lines(path):
         sentence = sentence_of(line)
         if not isinstance(sentence, Sentence):
             continue
         formatters.add(sentence.formatter)
+        begins, ends = begins or sentence.formatter, sentence.formatter
         try:
             time_ns, date = time_of_day_ns(sentence), date_of(sentence)
         except (ValueError, IndexError, OverflowError):  # counted when it is read
@@ -159,12 +167,16 @@ def _survey(path: Path, declared: datetime.date | None) -> _Found:
         first or datetime.date(1970, 1, 1),
         first_time_ns,
         dated=first is not None,
+        # Receivers pause between instants, and logs begin and end there: one of which HDT is the
+        # last word may begin with it as well, where it was begun within an instant.
+        heading_first=begins == "HDT" and ends != "HDT",
     )
 
 
 def _samples(path: Path, found: _Found, skipped: Skipped) -> Iterator[Sample]:
     date, latest_ns, stamp_ns = found.first_date, found.first_time_ns, None
     zero_ns, mixed = 0 if found.dated else found.first_time_ns, False
+    early: list[Fields] = []
     for line in _lines(path):
         if "*" not in line and not line.endswith("\n"):
             skipped[LAST_LINE_OPEN] += 1
@@ -185,15 +197,20 @@ def _samples(path: Path, found: _Found, skipped: Skipped) -> Iterator[Sample]:
                 days = datetime.timedelta(days=days_on(time_ns, latest_ns))
                 date, latest_ns = stated or date + days, time_ns
                 stamp_ns = midnight_ns(date) + time_ns - zero_ns
+            if found.heading_first and sentence.formatter == "HDT":
+                early.append(sentence.fields)
+                continue
             if stamp_ns is None:
                 skipped[NO_TIME] += 1
                 continue
+            while early and time_ns is not None:
+                yield from _hdt(early.pop(0), stamp_ns, found, skipped)
             yield from _READERS[sentence.formatter](sentence.fields, stamp_ns, found, skipped)
         except (ValueError, IndexError, OverflowError):
             skipped[UNREADABLE_ROW] += 1
 
 
-def _rmc(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iterator[Sample]:
+def _rmc(fields: Fields, stamp_ns: int, _found: _Found, skipped: Skipped) -> Iterator[Sample]:
     mode = fields[11] if len(fields) > 11 else ""
     if fields[1] != "A" or mode in _MODES_WITHOUT_FIX:
         skipped[NO_FIX] += 1
@@ -204,7 +221,7 @@ def _rmc(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iter
     quality = QUALITY_OF_MODE.get(mode, "")
     yield "gnss", NmeaPosition(stamp_ns, position, quality, None, False)
     if fields[6]:
-        yield from _velocity(stamp_ns, float(fields[6]) * units.SPEED["kn"], fields[7], found)
+        yield from _velocity(stamp_ns, float(fields[6]) * units.SPEED["kn"], fields[7])
 
 
 def _gga(fields: Fields, stamp_ns: int, _found: _Found, skipped: Skipped) -> Iterator[Sample]:
@@ -233,15 +250,14 @@ def _vtg(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iter
         return
     knots = bool(fields[4])
     speed_mps = float(fields[4 if knots else 6]) * units.SPEED["kn" if knots else "km/h"]
-    yield from _velocity(stamp_ns, speed_mps, fields[0], found)
+    yield from _velocity(stamp_ns, speed_mps, fields[0])
 
 
-def _velocity(stamp_ns: int, speed_mps: float, course: str, found: _Found) -> Iterator[Sample]:
-    """Yield a speed, and the course over ground where it is the only heading and means one."""
+def _velocity(stamp_ns: int, speed_mps: float, course: str) -> Iterator[Sample]:
+    """Yield a speed, and the course over ground where it means a heading."""
     yield "speed", drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=speed_mps)
-    if course and speed_mps >= MIN_COURSE_MPS and "HDT" not in found.formatters:
-        yaw_rad = yaw_rad_of(float(course))
-        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw_rad)
+    if course and speed_mps >= MIN_COURSE_MPS:
+        yield "heading", NmeaCourse(stamp_ns, yaw_rad_of(float(course)))
 
 
 def _hdt(fields: Fields, stamp_ns: int, _found: _Found, _skipped: Skipped) -> Iterator[Sample]:

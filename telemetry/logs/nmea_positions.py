@@ -1,4 +1,4 @@
-"""Positions of NMEA-0183: RMC and GGA of one instant joined, and how good they promise to be."""
+"""RMC, GGA and HDT of one instant joined: one position, how good it promises to be, one heading."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from foretwin.telemetry.logs.merge import stamp_ns_of
 
 _HELD_NS = 10_000_000_000
 """So long an HDOP is believed: satellites come and go by the minute, bridges by the second."""
+_HEADING_HELD_NS = 5_000_000_000
+"""Compasses tell headings each second or more often; one that has missed five has none."""
 STD_M = {"1": 2.1, "2": 1.7, "3": 2.1, "4": 0.015, "5": 0.3, "9": 1.7}
 """One standard deviation on each axis at an HDOP of 1, by GGA's quality: 2.5 m CEP alone and 2 m
 with SBAS (u-blox NEO-M8 data sheet, over 1.177), 1 cm + 1 ppm CEP with RTK (ZED-F9P data sheet);
@@ -33,14 +35,27 @@ class NmeaPosition(msgspec.Struct, frozen=True):
     is_gga: bool
 
 
+class NmeaCourse(msgspec.Struct, frozen=True):
+    """A course over ground, which is taken for the heading where no compass tells one."""
+
+    stamp_ns: int
+    yaw_rad: float
+
+
 def joined(samples: Iterable[Sample]) -> Iterator[Sample]:
-    """Give each instant's position once, and RMC's what only GGA tells."""
+    """Give each instant's position and heading once, and RMC's what only GGA tells."""
     gga: NmeaPosition | None = None
-    for _, instant in itertools.groupby(samples, key=stamp_ns_of):
+    compass_ns: int | None = None
+    for stamp_ns, instant in itertools.groupby(samples, key=stamp_ns_of):
         at_once = list(instant)
         known = any(isinstance(said, NmeaPosition) and said.is_gga for _, said in at_once)
+        if any(isinstance(said, drive.HeadingSample) for _, said in at_once):
+            compass_ns = stamp_ns
         for channel, said in at_once:
-            if not isinstance(said, NmeaPosition):
+            if isinstance(said, NmeaCourse):
+                if compass_ns is None or stamp_ns - compass_ns > _HEADING_HELD_NS:
+                    yield channel, drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=said.yaw_rad)
+            elif not isinstance(said, NmeaPosition):
                 yield channel, said
             elif said.is_gga or not known:
                 gga = said if said.is_gga else gga

@@ -206,7 +206,7 @@ def test_what_is_refused_is_counted(tmp_path: Path) -> None:
     broken = rmc("120001", "010326").replace("5230", "5231")
     log, found = opened(
         tmp_path,
-        line("HEHDT,12.0,T"),
+        line("GPVTG,90.0,T,88.0,M,10.0,N,18.5,K,A"),
         rmc("120000", "010326"),
         broken,
         line("GPRMC,120002,V,,,,,,,010326,,,N"),
