@@ -34,7 +34,10 @@ class ChannelColumns(NamedTuple):
 
 
 def _fix(stamp_ns: int, lat_deg: float, lon_deg: float, alt_m: float, std_m: float | None) -> Any:
-    return drive.GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat_deg, lon_deg, alt_m), std_m=std_m)
+    # 0, -1 and nothing stand where a receiver knows none.
+    known_m = std_m if std_m is not None and std_m > 0.0 else None
+    position = GeoPoint(lat_deg, lon_deg, alt_m)
+    return drive.GnssFix(stamp_ns=stamp_ns, position=position, std_m=known_m)
 
 
 def _speed(stamp_ns: int, forward: float) -> Any:

@@ -37,7 +37,7 @@ def geojson_lines(path: Path) -> list[GeoLine]:
     file holds instead, where it holds none.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise LogError(f"{path}: no valid JSON: {error}") from None
     seen: list[str] = []

@@ -222,8 +222,6 @@ def _add(sensors: dict[str, _Sensor], kind: str, cells: list[str]) -> None:
 def _of_fixes(fixes: list[_Fix]) -> dict[str, Stream]:
     stamps_ns = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
     rows = np.array([(*fix.place, fix.std_m) for fix in fixes])
-    if np.isnan(rows[:, 3]).any():
-        rows = rows[:, :3]
     streams = {"gnss": stream_of("gnss", stamps_ns, rows)}
     speed = np.array([fix.speed_mps for fix in fixes])
     told = np.isfinite(speed)

@@ -41,6 +41,9 @@ flags3."""
 _VEHICLE_HEADING_AT = 84
 _DATE_AND_TIME = 0b011
 _FIX_OK, _VEHICLE_HEADING_KNOWN = 0b1, 0b10_0000
+_INVALID_PLACE = 0b1
+"""invalidLlh of flags3: longitude, latitude and heights are none."""
+_UNKNOWN = 0xFFFF_FFFF
 _FIXES = (1, 2, 3, 4)
 """Dead reckoning, 2D, 3D, both; the receiver's own limits are in _FIX_OK."""
 _CHUNK_BYTES = 1 << 20
@@ -169,10 +172,12 @@ def _positions(path: Path, refused: Counter[str]) -> Iterator[bytes]:
 def _take(payload: bytes, rows: _Channels) -> str | None:
     """Add what a NAV-PVT says to the rows, or return why nothing of it is used."""
     (_, year, month, day, hour, minute, second, valid, _, nano, kind, flags, _, _, lon, lat, height,
-     _, h_acc, _, _, _, _, speed, course, *_) = _LAYOUT.unpack_from(payload)  # fmt: skip
+     _, h_acc, _, _, _, _, speed, course, *_, flags3) = _LAYOUT.unpack_from(payload)  # fmt: skip
     if valid & _DATE_AND_TIME != _DATE_AND_TIME:
         return TIME_UNKNOWN
-    if kind not in _FIXES or not flags & _FIX_OK:
+    # Before protocol 14 what stands there is reserved.
+    invalid = flags3 & _INVALID_PLACE and len(payload) > _VEHICLE_HEADING_AT
+    if kind not in _FIXES or not flags & _FIX_OK or invalid:
         return NO_FIX
     try:
         # A leap second is second 60.
@@ -180,7 +185,7 @@ def _take(payload: bytes, rows: _Channels) -> str | None:
     except ValueError:
         return TIME_UNKNOWN
     stamp_ns = round(whole.total_seconds() + second) * 10**9 + nano
-    std_m = h_acc * 1e-3
+    std_m = math.nan if h_acc == _UNKNOWN else h_acc * 1e-3
     rows["gnss"].add(stamp_ns, lat * 1e-7, lon * 1e-7, height * 1e-3, std_m)
     speed_mps, course_deg = speed * 1e-3, course * 1e-5
     if flags & _VEHICLE_HEADING_KNOWN and len(payload) > _VEHICLE_HEADING_AT:

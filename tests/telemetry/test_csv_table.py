@@ -15,7 +15,6 @@ from foretwin.telemetry.logs.log import LAST_LINE_OPEN
 COVERS = (
     "foretwin.telemetry.logs.csv_table",
     "foretwin.telemetry.logs.units",
-    "foretwin.telemetry.logs.columns",
 )
 
 DECLARATION = """

@@ -92,6 +92,11 @@ def test_geojson_line_with_times_is_a_log(tmp_path: Path, name: str, times: list
     assert line_of_log(log).lon_deg.tolist() == [13.4, 13.5]
 
 
+def test_geojson_may_begin_with_a_mark_of_its_bytes(tmp_path: Path) -> None:
+    log = open_log(write(tmp_path, "drive.geojson", "\ufeff" + feature(times=[1, 2])))
+    assert len(list(log.samples())) == 2
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

@@ -69,6 +69,14 @@ def test_the_speed_is_not_its_accuracy_and_bearings_are_clockwise(tmp_path: Path
     assert [one.yaw_rad for one in found["heading"]] == pytest.approx([0.0, -math.pi / 2])
 
 
+def test_a_fix_without_accuracy_takes_that_of_no_other(tmp_path: Path) -> None:
+    unknown = fix(1).replace("3.0192", "")
+    _, found = opened(tmp_path, V2, fix(0), unknown, fix(2).replace("3.0192", "0.0"), fix(3))
+    assert [one.std_m for one in found["gnss"]] == [
+        pytest.approx(2.0), None, None, pytest.approx(2.0),
+    ]  # fmt: skip
+
+
 def test_a_last_line_without_its_end_is_left_out_and_said(tmp_path: Path) -> None:
     """Of a time in 2026 its first digits are one in 1970, of a rate of 0.35 rad/s 0.3."""
     lines = (V2, fix(0), fix(1))

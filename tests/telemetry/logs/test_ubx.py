@@ -29,11 +29,12 @@ def frame(kind: bytes, payload: bytes) -> bytes:
 def pvt(
     second: int = 0, *, nano: int = 0, fix: int = 3, flags: int = 1, valid: int = 3,
     speed_mmps: int = 10_000, course: int = 9_000_000, vehicle: int = 0, old: bool = False,
+    h_acc: int = 1200, flags3: int = 0,
 ) -> bytes:  # fmt: skip
     payload = struct.pack(
         "<IHBBBBBBIiBBBBiiiiIIiiiiiIIHHi", 0, 2026, 3, 1, 12, 0, second, valid, 30, nano, fix,
-        flags, 0, 12, 133_900_000, 525_100_000, 79_000, 34_500, 1200, 1500, 0, 0, 0,
-        speed_mmps, course, 0, 0, 120, 0, 0,
+        flags, 0, 12, 133_900_000, 525_100_000, 79_000, 34_500, h_acc, 1500, 0, 0, 0,
+        speed_mmps, course, 0, 0, 120, flags3, 0,
     )  # fmt: skip
     return frame(b"\x01\x07", payload if old else payload + struct.pack("<ihH", vehicle, 0, 0))
 
@@ -116,6 +117,20 @@ def test_what_is_no_fix_is_counted(tmp_path: Path) -> None:
         tmp_path, pvt(0), pvt(1, fix=0), pvt(2, flags=0), pvt(3, fix=5), pvt(4, valid=1)
     )
     assert log.skipped == {"receiver without fix": 3, "receiver without time": 1}
+
+
+def test_a_place_that_the_receiver_calls_invalid_is_no_fix(tmp_path: Path) -> None:
+    log, found = opened(tmp_path, pvt(0), pvt(1, flags3=1), pvt(2, flags3=2))
+    assert [one.stamp_ns - NOON_NS for one in found["gnss"]] == [0, 2 * 10**9]
+    assert log.skipped == {"receiver without fix": 1}
+    _, found = opened(tmp_path, pvt(0, flags3=1, old=True))  # where it stood for nothing
+    assert len(found["gnss"]) == 1
+
+
+@pytest.mark.parametrize("h_acc", [0xFFFF_FFFF, 0])
+def test_an_accuracy_that_is_not_known_is_none(tmp_path: Path, h_acc: int) -> None:
+    _, found = opened(tmp_path, pvt(0, h_acc=h_acc), pvt(1))
+    assert [one.std_m for one in found["gnss"]] == [None, pytest.approx(1.2)]
 
 
 def test_a_log_without_positions_is_told_in_a_line(tmp_path: Path) -> None:
