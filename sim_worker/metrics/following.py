@@ -1,16 +1,18 @@
 """Road users ahead on the ego's course: headway, and what avoiding them would take.
 
 The course is the circle of the ego's present yaw rate and speed. Ahead on it are those that overlap
-the strip that the ego would sweep, not driven against it or across it.
+the strip that the ego would sweep, not driven against it or across it. What avoiding them takes is
+asked while there is a gap: once outlines touch, nothing avoids it any more.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics import compiled_pairs
@@ -61,8 +63,7 @@ def drac(view: RolloutView) -> Measure:
     Cooper and Ferguson (1976), Traffic studies at T-junctions; (v - v_leader)² / (2 gap) in
     Archer (2005), Indicators for traffic safety assessment and prediction, equation 4.
     """
-    ahead = view.keep(leaders)
-    return extreme(view, ahead, _drac(ahead), np.maximum, 0.0)
+    return _greatest(view, _drac)
 
 
 def required_deceleration(view: RolloutView) -> Measure:
@@ -71,8 +72,7 @@ def required_deceleration(view: RolloutView) -> Measure:
     Jansson (2005), Collision Avoidance Theory, section 5.3.5: the leader keeps its acceleration;
     0 where none is approached. Positive here, negative in the source.
     """
-    ahead = view.keep(leaders)
-    return extreme(view, ahead, _longitudinal(ahead), np.maximum, 0.0)
+    return _greatest(view, _longitudinal)
 
 
 def required_lateral_acceleration(view: RolloutView) -> Measure:
@@ -80,8 +80,7 @@ def required_lateral_acceleration(view: RolloutView) -> Measure:
 
     Jansson (2005), Collision Avoidance Theory, section 5.3.8, to the easier side.
     """
-    ahead = view.keep(leaders)
-    return extreme(view, ahead, _lateral(ahead), np.maximum, 0.0)
+    return _greatest(view, _lateral)
 
 
 def required_acceleration(view: RolloutView) -> Measure:
@@ -89,8 +88,7 @@ def required_acceleration(view: RolloutView) -> Measure:
 
     Jansson (2005), Collision Avoidance Theory, section 5.3.10.
     """
-    ahead = view.keep(leaders)
-    return extreme(view, ahead, np.hypot(_longitudinal(ahead), _lateral(ahead)), np.maximum, 0.0)
+    return _greatest(view, lambda ahead: np.hypot(_longitudinal(ahead), _lateral(ahead)))
 
 
 def leaders(view: RolloutView) -> Leaders:
@@ -148,11 +146,26 @@ def aside_to_pass(ahead: Leaders, until_s: Array) -> Array:
     return np.asarray(np.maximum(ahead.reach_m - np.abs(then_left), 0.0))
 
 
+def _greatest(view: RolloutView, needed: Callable[[Leaders], Array]) -> Measure:
+    """Return the greatest of `needed` (K,) of leaders at a gap (S,), 0 where none is approached.
+
+    Invalid where somebody is approached only after the outlines touch: at no gap, no rate avoids
+    it.
+    """
+    ahead = view.keep(leaders)
+    apart = ahead.gap_m > 0.0
+    found = extreme(view, _of(ahead, apart), needed(_of(ahead, apart)), np.maximum, 0.0)
+    too_late = np.zeros(len(view.valid), dtype=bool)
+    too_late[ahead.row[~apart & (closing_mps(ahead) > 0.0)] // view.states.shape[1]] = True
+    return view.measure(found.values, ~(too_late & (found.values == 0.0)))
+
+
+def _of(ahead: Leaders, which: Flags) -> Leaders:
+    return Leaders._make(values[which] for values in ahead)
+
+
 def _drac(ahead: Leaders) -> Array:
-    closing = closing_mps(ahead)
-    touching = ahead.gap_m <= 0.0
-    rate = closing * closing / (2.0 * np.where(touching, 1.0, ahead.gap_m))
-    return np.where(touching & (closing > 0.0), np.inf, rate)
+    return np.asarray(np.square(closing_mps(ahead)) / (2.0 * ahead.gap_m))
 
 
 def _longitudinal(ahead: Leaders) -> Array:
@@ -162,13 +175,10 @@ def _longitudinal(ahead: Leaders) -> Array:
 
 def _lateral(ahead: Leaders) -> Array:
     closing = closing_mps(ahead)
-    approaching = closing > 0.0
-    until = np.where(approaching, ahead.gap_m, 1.0) / np.where(approaching, closing, 1.0)
+    nears = closing > 0.0
+    until = ahead.gap_m / np.where(nears, closing, 1.0)
     way = aside_to_pass(ahead, until)
-    touching = until <= 0.0
-    needed = 2.0 * way / np.square(np.where(touching, 1.0, until))
-    needed = np.where(touching & (way > 0.0), np.inf, needed)
-    return np.where(approaching, needed, 0.0)
+    return np.where(nears, 2.0 * way / np.square(until), 0.0)
 
 
 def extreme(

@@ -36,7 +36,7 @@ def brake_threat_number(view: RolloutView) -> Measure:
     Theory for Vehicle Level Safety Validation, equation 9.
     """
     found = required_deceleration(view)
-    return view.measure(found.values / MAX_DECEL_MPS2)
+    return view.measure(found.values / MAX_DECEL_MPS2, found.valid)
 
 
 def steer_threat_number(view: RolloutView) -> Measure:
@@ -46,7 +46,7 @@ def steer_threat_number(view: RolloutView) -> Measure:
     Applications, equation 1.
     """
     found = required_lateral_acceleration(view)
-    return view.measure(found.values / MAX_LATERAL_MPS2)
+    return view.measure(found.values / MAX_LATERAL_MPS2, found.valid)
 
 
 def time_to_brake(view: RolloutView) -> Measure:

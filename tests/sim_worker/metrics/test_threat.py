@@ -102,3 +102,27 @@ def test_who_is_not_there_is_never_ahead(yaw: float, speed: float) -> None:
     values = {name: float(one.values[0]) for name, one in found.items()}
     assert values.pop("drac") == 0.0
     assert set(values.values()) == {math.inf}
+
+
+def test_of_a_crash_the_last_instant_before_the_touch_counts() -> None:
+    """15 m/s into 5 m/s, 30.5 m ahead: they meet after 3.05 s, and 0.5 m are left at 3 s."""
+    names = ("drac", "required_deceleration", "btn", "stn", "required_acceleration")
+    ahead = LENGTH_M / 2 + 30.5 + 2.0
+    crash = rollout(Mover(0, 0, 0, 15), Mover(ahead, 0, 0, 5), time_s=times(8.0))
+    found = evaluate(crash._replace(last=np.array([32])), names)
+
+    assert found["drac"].values == pytest.approx([100.0])
+    assert found["required_deceleration"].values == pytest.approx([100.0])
+    assert found["btn"].values == pytest.approx([100.0 / MAX_DECEL_MPS2])
+    aside = (WIDTH_M + 2.0) / 2.0
+    assert found["stn"].values == pytest.approx([2.0 * aside / 0.05**2 / MAX_LATERAL_MPS2])
+    assert np.isfinite(found["required_acceleration"].values).all()
+
+
+def test_of_whom_it_nears_only_once_they_touch_nothing_is_said() -> None:
+    inside = Mover(LENGTH_M / 2 + 1.0, 0, 0, 5)
+    found = evaluate(rollout(Mover(0, 0, 0, 15), inside, time_s=times(0.1)), ("drac", "btn", "stn"))
+
+    for measure in found.values():
+        assert not measure.valid.any()
+        assert np.isnan(measure.values).all()
