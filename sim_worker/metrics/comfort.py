@@ -24,7 +24,7 @@ BOUNDS = MappingProxyType(
 )
 """nuPlan devkit, planning/metrics, ego_is_comfortable (Caesar et al., 2021, nuPlan: A closed-loop
 ML-based planning benchmark): the extremes of its human drivers. The same in NAVSIM."""
-_ACCEL_WINDOW_S = 0.8
+ACCEL_WINDOW_S = 0.8
 _JERK_WINDOW_S = 1.4
 _ORDER = 2
 """Smoothing as there: quadratics over 8 samples of 0.1 s for accelerations, 15 for derivatives."""
@@ -54,7 +54,7 @@ def motion(view: RolloutView) -> EgoMotion:
     vx, vy = view.driven[..., 3], view.driven[..., 4]
     yaw = np.unwrap(view.driven[..., 2], axis=1)
     count, step_s = len(view.time_s), float(steps.mean())
-    slope = _operator(count, step_s, _ACCEL_WINDOW_S, 1)
+    slope = _operator(count, step_s, ACCEL_WINDOW_S, 1)
     rate = _operator(count, step_s, _JERK_WINDOW_S, 1)
     curve = _operator(count, step_s, _JERK_WINDOW_S, 2)
     turning = yaw @ rate
@@ -87,8 +87,8 @@ def scatter(view: RolloutView) -> Scatter:
     accelerations, whose quadratics use up three of its samples."""
     step_s = float(np.diff(view.time_s).mean())
     count = len(view.time_s)
-    smooth = _operator(count, step_s, _ACCEL_WINDOW_S, 0)
-    window = np.abs(np.arange(count)[:, None] - np.arange(count)) * step_s <= _ACCEL_WINDOW_S / 2
+    smooth = _operator(count, step_s, ACCEL_WINDOW_S, 0)
+    window = np.abs(np.arange(count)[:, None] - np.arange(count)) * step_s <= ACCEL_WINDOW_S / 2
     free = np.maximum(window.sum(axis=0) - _ORDER - 1, 1)
     sides = view.driven[..., 3], np.unwrap(view.driven[..., 2], axis=1)
     return Scatter(*(np.sqrt(np.square(x - x @ smooth) @ window / free) for x in sides))
@@ -134,7 +134,7 @@ class _Squares(NamedTuple):
 
 @functools.lru_cache(maxsize=32)
 def _squares(count: int, step_s: float) -> _Squares:
-    slope = _operator(count, step_s, _ACCEL_WINDOW_S, 1)
+    slope = _operator(count, step_s, ACCEL_WINDOW_S, 1)
     rate = _operator(count, step_s, _JERK_WINDOW_S, 1)
     curve = _operator(count, step_s, _JERK_WINDOW_S, 2)
     return _Squares(*(np.square(one) for one in (slope, rate, curve, slope @ rate, rate @ rate)))

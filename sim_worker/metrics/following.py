@@ -16,6 +16,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.comfort import ACCEL_WINDOW_S
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _SLOW_MPS = 1.0
@@ -69,8 +70,8 @@ def drac(view: RolloutView) -> Measure:
 def required_deceleration(view: RolloutView) -> Measure:
     """Greatest deceleration (S,) that matches the leader's speed just before touching it.
 
-    Jansson (2005), Collision Avoidance Theory, section 5.3.5: the leader keeps its acceleration;
-    0 where none is approached. Positive here, negative in the source.
+    Jansson (2005), Collision Avoidance Theory, section 5.3.5: the leader keeps its acceleration,
+    who brakes until it stands; 0 where none is approached. Positive here, negative in the source.
     """
     return _greatest(view, _longitudinal)
 
@@ -125,13 +126,34 @@ def leaders(view: RolloutView) -> Leaders:
 
 
 def _user_acceleration(view: RolloutView, row: Indices, user: Indices) -> Array:
-    """Return the accelerations (K,) of road users, 0 where they come or go."""
-    instants = len(view.time_s)
+    """Return the accelerations (K,) of road users, 0 for who stands or is there but once.
+
+    The slope of the line through the speeds within half a window, which in its middle is that of
+    the quadratic of `comfort.motion`: differences of two instants would multiply their noise.
+    """
+    speed, time_s = view.rollout.user_speed_mps, view.time_s
+    instants = len(time_s)
     future, instant = np.divmod(row, instants)
-    before, after = np.maximum(instant - 1, 0), np.minimum(instant + 1, instants - 1)
-    speed = view.rollout.user_speed_mps
-    gain = speed[future, after, user] - speed[future, before, user]
-    return np.asarray(np.nan_to_num(gain / (view.time_s[after] - view.time_s[before])))
+    reach = min(max(round(ACCEL_WINDOW_S / 2.0 / float(np.diff(time_s).mean())), 1), instants - 1)
+    count, sum_s, sum_mps, sum_ss, sum_m = np.zeros((5, len(row)))
+    now_mps = speed[future, instant, user]
+    for step in range(-reach, reach + 1):
+        at = np.clip(instant + step, 0, instants - 1)
+        gain = speed[future, at, user] - now_mps
+        counts = np.isfinite(gain) & (at == instant + step)
+        later_s, gain = (
+            np.where(counts, time_s[at] - time_s[instant], 0.0),
+            np.where(counts, gain, 0.0),
+        )
+        count += counts
+        sum_s += later_s
+        sum_mps += gain
+        sum_ss += later_s * later_s
+        sum_m += later_s * gain
+    spread = count * sum_ss - sum_s * sum_s
+    sloping = (spread > 0.0) & (np.abs(now_mps) >= STANDING_MPS)
+    slope = (count * sum_m - sum_s * sum_mps) / np.where(sloping, spread, 1.0)
+    return np.where(sloping, slope, 0.0)
 
 
 def closing_mps(ahead: Leaders) -> Array:
@@ -169,8 +191,16 @@ def _drac(ahead: Leaders) -> Array:
 
 
 def _longitudinal(ahead: Leaders) -> Array:
-    needed = _drac(ahead) - ahead.accel_mps2
-    return np.where(closing_mps(ahead) > 0.0, np.maximum(needed, 0.0), 0.0)
+    closing = closing_mps(ahead)
+    nears, other = closing > 0.0, np.maximum(ahead.other_mps, 0.0)
+    brakes = np.maximum(-ahead.accel_mps2, 0.0)
+    # Speeds match after 2 gap / closing, if the leader still drives then.
+    stands_first = brakes * 2.0 * ahead.gap_m > other * closing
+    matching = _drac(ahead) - ahead.accel_mps2
+    to_stand_m = np.square(other) / (2.0 * np.where(brakes > 0.0, brakes, 1.0))
+    stopping = np.square(ahead.ego_mps) / (2.0 * (ahead.gap_m + to_stand_m))
+    needed = np.where(stands_first, stopping, matching)
+    return np.where(nears, np.maximum(needed, 0.0), 0.0)
 
 
 def _lateral(ahead: Leaders) -> Array:
