@@ -122,13 +122,12 @@ def stays(view: RolloutView) -> Stays:
 
 
 def _met(view: RolloutView) -> Indices:
-    """Return the futures (K,) that end as the ego hits a road user whose way it crosses."""
-    if view.counts is None:
-        return np.zeros(0, dtype=np.intp)
-    found, last = view.keep(impacts), view.counts.sum(axis=1) - 1
-    future = np.flatnonzero(found.collided & (last < len(view.time_s) - 1))
-    turned = view.users[2][future, last[future], found.user[future]]
-    turned = turned - view.states[future, last[future], 2]
+    """Return the futures (K,) in which the ego hits a road user whose way it crosses."""
+    found = view.keep(impacts)
+    future = np.flatnonzero(np.isfinite(found.time_s))
+    at_s = view.time_s[0] + found.time_s[future]
+    before = np.maximum(np.searchsorted(view.time_s, at_s, side="right") - 1, 0)
+    turned = view.users[2][future, before, found.user[future]] - view.states[future, before, 2]
     crossing: Indices = future[np.abs(np.sin(turned)) >= _PARALLEL_SIN]
     return crossing
 

@@ -16,7 +16,6 @@ from foretwin.sim_worker.metrics.rollout import Rollout
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
 COVERS = (
-    "foretwin.sim_worker.metrics.encroachment",
     "foretwin.sim_worker.metrics.following",
     "foretwin.sim_worker.metrics.rollout",
     "foretwin.sim_worker.metrics.time_to_collision",
