@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 
-from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.compiled import REAL, WHOLE, given, kernel, types
 
 _ALL, _ROWS, _LINE = given(3, "C"), given(2), given(1)
 _SIZES, _HALF = types.UniTuple(given(3), 2), types.UniTuple(REAL, 2)
+_THERE = types.Array(types.boolean, 3, "A", readonly=True)
 _PICKED, _STEPS = (types.Array(WHOLE, 1, kind, readonly=True) for kind in "AC")
 _OUT_ROWS = REAL[:, ::1]
 
@@ -81,12 +82,14 @@ def find_leaders(
     types.UniTuple(given(3), 3),
     types.UniTuple(_LINE, 2),
     types.UniTuple(_PICKED, 3),
-    *(_ROWS, _ROWS, _LINE, _LINE, _OUT_ROWS),
+    *(_THERE, _PICKED, _ROWS, _ROWS, _LINE, _LINE, _OUT_ROWS),
 )
 def stays_on_strips(
     poses: tuple[Array, ...],
     half_m: tuple[Array, ...],
     picked: tuple[Indices, ...],
+    there: Flags,
+    lasts: Indices,
     point_m: Array,
     way: Array,
     strip_half_m: Array,
@@ -98,11 +101,10 @@ def stays_on_strips(
     `poses` are x, y, yaw (S, N, R), `half_m` half lengths and widths (K,), `strip_half_m` (K,) half
     widths of strips. `picked` are future, user and step (K,) of box k: only the stay that includes
     the instant after that step counts; a box that is on the strip at the first instant came at that
-    time, one that is at the last never leaves. Between instants, what a corner lies off the strip
-    changes evenly.
+    time, one that is at the last, `lasts` (S,), never leaves. NaN is when one came or left that is
+    not `there` (S, N, R) then. Between instants, what a corner lies off the strip changes evenly.
     """
     x, y, yaw = poses
-    last = len(time_s) - 1
     half_length_m, half_width_m = half_m
     future, user, step = picked
     for k in range(len(step)):
@@ -114,7 +116,10 @@ def stays_on_strips(
             outward = 2 * end - 1
             within = at = step[k] + 1 - end
             inside_aside = inside_reach = 0.0
-            while 0 <= at <= last:
+            while 0 <= at <= lasts[row]:
+                if not there[row, at, other]:
+                    found[end, k] = math.nan
+                    break
                 aside = (x[row, at, other] - point_m[k, 0]) * normal_x
                 aside += (y[row, at, other] - point_m[k, 1]) * normal_y
                 cos, sin = math.cos(yaw[row, at, other]), math.sin(yaw[row, at, other])

@@ -40,8 +40,9 @@ class Crossings(NamedTuple):
 class Stays(NamedTuple):
     """When each is on the other's strip at K crossings (K,): from when until when.
 
-    Who is on it at the first instant came then, who is at the last leaves never. A strip is as
-    wide as the road user, straight around the crossing; the oriented outlines say who is on it.
+    Who is on it at the first instant came then, who is at the last leaves never; NaN for somebody
+    whose track begins or ends on it. A strip is as wide as the road user, straight around the
+    crossing; the oriented outlines say who is on it.
     """
 
     ego_from_s: Array
@@ -55,14 +56,19 @@ def post_encroachment_time(view: RolloutView) -> Measure:
 
     From the moment the first leaves the other's path until that other reaches the first one's:
     Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. A path is the strip
-    of `Stays`. Both must pass within the rollout.
+    of `Stays`. Both must pass within the rollout. Invalid where all that could tell are lost from
+    sight on the ego's path.
     """
-    at = view.keep(stays)
-    between = np.maximum(at.user_from_s - at.ego_until_s, at.ego_from_s - at.user_until_s)
+    at, future = view.keep(stays), view.keep(crossings).future
+    after, before = at.user_from_s - at.ego_until_s, at.ego_from_s - at.user_until_s
+    between = np.maximum(np.fmax(after, before), 0.0)
+    said = (between > 0.0) | ~np.isnan(after + before)
     least = np.full(len(view.valid), np.inf)
-    np.minimum.at(least, view.keep(crossings).future, np.maximum(between, 0.0))
+    np.minimum.at(least, future[said], between[said])
     least[_met(view)] = 0.0
-    return view.measure(least)
+    unsaid = np.zeros(len(least), dtype=bool)
+    unsaid[future[~said]] = True
+    return view.measure(least, ~(unsaid & np.isinf(least)))
 
 
 def encroachment_time(view: RolloutView) -> Measure:
@@ -111,12 +117,16 @@ def stays(view: RolloutView) -> Stays:
     own_picked = (future, np.zeros_like(user), found.ego_step)
     picked = (future, user, found.user_step)
     stay_s = np.empty((4, len(future)))
-    for poses, half, which, way, strip_half, stay in (
-        ((x, y, yaw), own_half_m, own_picked, found.user_way, half_m[1], stay_s[:2]),
-        (view.users[:3], half_m, picked, found.ego_way, own_half_m[1], stay_s[2:]),
+    lasts = np.full(len(view.valid), len(view.time_s) - 1)
+    if view.counts is not None:
+        lasts = view.counts.sum(axis=1) - 1
+    always = np.ones(x.shape, dtype=bool)
+    for poses, half, which, there, way, strip_half, stay in (
+        ((x, y, yaw), own_half_m, own_picked, always, found.user_way, half_m[1], stay_s[:2]),
+        (view.users[:3], half_m, picked, view.there, found.ego_way, own_half_m[1], stay_s[2:]),
     ):
         compiled_pairs.stays_on_strips(
-            poses, half, which, found.point_m, way, strip_half, view.time_s, stay
+            poses, half, which, there, lasts, found.point_m, way, strip_half, view.time_s, stay
         )
     return Stays(*stay_s)
 
