@@ -133,7 +133,8 @@ def line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices,
 
 def _own_passage(view: RolloutView, conflict: PriorityConflict) -> tuple[Array, Array]:
     """Return when (S,) the ego enters shared ground, NaN where it does not or was there already,
-    and when it has left it, infinite where it stays."""
+    and when it has left it, infinite where it stays: where the rollout ends before and it moves, it
+    goes on as fast."""
     offset = view.centre_m - conflict.point_m
     way = conflict.own_way
     along = offset @ way
@@ -142,8 +143,15 @@ def _own_passage(view: RolloutView, conflict: PriorityConflict) -> tuple[Array, 
         cos * way[0] + sin * way[1] > ALONG_COS
     )
     enters = _first_above(along + view.half_length_m, conflict.own_from_m, view.time_s, on_way)
-    leaves = _first_above(along - view.half_length_m, conflict.own_until_m, view.time_s, on_way)
-    return enters, np.where(np.isnan(leaves), np.inf, leaves)
+    rear = along - view.half_length_m
+    leaves = _first_above(rear, conflict.own_until_m, view.time_s, on_way)
+    along_mps = (view.speed_mps * (cos * way[0] + sin * way[1]))[:, -1]
+    goes_on = on_way[:, -1] & (along_mps > STANDING_MPS)
+    if view.counts is not None:
+        goes_on &= view.counts[:, -1]
+    left_s = (conflict.own_until_m - rear[:, -1]) / np.where(goes_on, along_mps, 1.0)
+    later = np.where(goes_on & (left_s >= 0.0), view.time_s[-1] + left_s, np.inf)
+    return enters, np.where(np.isnan(leaves), later, leaves)
 
 
 def _first_above(values: Array, level: float, time_s: Array, counts: Flags) -> Array:
@@ -197,8 +205,9 @@ def _needed_deceleration(distance_m: Array, speed_mps: Array, within_s: Array) -
 def _arrival(
     view: RolloutView, conflict: PriorityConflict, future: Indices, user: Indices
 ) -> Array:
-    """Return when (K,) the fronts of road users reach shared ground, infinite where never."""
-    x, y, _, _ = view.users
+    """Return when (K,) the fronts of road users reach shared ground, infinite where never: who is
+    on its way there as the rollout ends goes on as fast."""
+    x, y, _, speeds = view.users
     half = view.user_half_m[0][future, 0, user]
     start = conflict.way.point_at(np.array([conflict.way_from_m]))[0]
     yaw = float(conflict.way.pose_at(np.array([conflict.way_from_m])).yaw_rad[0])
@@ -207,4 +216,7 @@ def _arrival(
     aside = np.abs(np.cos(yaw) * dy - np.sin(yaw) * dx)
     counts = (aside < _AT_POINT_M) & view.there[future, :, user]
     arrived = _first_above(along, 0.0, view.time_s, counts)
-    return np.where(np.isnan(arrived), np.inf, arrived)
+    left_m, at_mps = -along[:, -1], speeds[future, -1, user]
+    goes_on = counts[:, -1] & (left_m >= 0.0) & (at_mps > STANDING_MPS)
+    later = np.where(goes_on, view.time_s[-1] + left_m / np.where(goes_on, at_mps, 1.0), np.inf)
+    return np.where(np.isnan(arrived), later, arrived)

@@ -33,7 +33,6 @@ COVERS = (
     "foretwin.sim_worker.metrics.progress",
     "foretwin.sim_worker.metrics.score",
     "foretwin.sim_worker.metrics.table",
-    "foretwin.sim_worker.metrics.violations",
 )
 
 HALF_M = LENGTH_M / 2
@@ -207,26 +206,6 @@ def test_a_path_takes_the_connection_it_runs_along() -> None:
     assert [c.other_id for c in rules.conflicts] == ["north", "south"]
 
 
-def test_forcing_who_has_priority_to_brake_is_a_violation() -> None:
-    """The ego is on the shared ground from 2.5 to 2.5 s + (length + 2 m) / 8."""
-    given = context()
-    ego = Mover(0.5 - HALF_M - 8.0 * 2.5, -1.5, 0.0, 8.0)
-
-    def from_south(seconds: float, speed: float = 10.0) -> Mover:
-        """Whose front is at the shared ground at that time."""
-        return Mover(1.5, -2.5 - 2.0 - speed * seconds, math.pi / 2, speed)
-
-    near = rollout(ego, from_south(2.9))
-    far = rollout(ego, from_south(6.0))
-    gone = rollout(ego, from_south(1.0))
-    both = rollout(ego, from_south(2.9), Mover(-1.5, -0.5 + 2.0 + 30.0, -math.pi / 2, 10.0))
-
-    assert value(near, "right_of_way_violations", given) == 1.0
-    assert value(far, "right_of_way_violations", given) == 0.0
-    assert value(gone, "right_of_way_violations", given) == 0.0
-    assert value(both, "right_of_way_violations", given) == 2.0
-
-
 def test_nothing_after_the_end_of_a_future_counts() -> None:
     """At 4 s the ego is at 8 m/s on its lane; half a second later it leaves the road and brakes."""
     time_s = times()
@@ -246,21 +225,6 @@ def test_nothing_after_the_end_of_a_future_counts() -> None:
     assert found["max_deceleration"] == pytest.approx([0.0, 6.0], abs=0.9)
     assert found["comfortable"].tolist() == [1.0, 0.0]
     assert found["min_clearance"][0] > found["min_clearance"][1] + 3.0
-
-
-def test_one_that_stands_is_not_forced_to_brake_by_an_ego_that_stays_in_its_way() -> None:
-    slow = rollout(Mover(0.5 - HALF_M - 0.5 * 2.5, -1.5, 0.0, 0.5), Mover(1.5, -8.0, math.pi / 2))
-
-    assert value(slow, "right_of_way_violations", context()) == 0.0
-
-
-def test_who_has_red_has_no_priority() -> None:
-    given = context(lights=True, start_s=0.0)
-    ego = Mover(0.5 - HALF_M - 8.0 * 2.5, -1.5, 0.0, 8.0)
-    late = rollout(ego, Mover(1.5, -33.0, math.pi / 2, 10.0))
-
-    assert value(late, "right_of_way_violations", given) == 0.0
-    assert value(late, "right_of_way_violations", context()) == 1.0
 
 
 def test_the_score_weighs_progress_and_is_closed_by_a_collision() -> None:
