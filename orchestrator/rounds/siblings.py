@@ -98,7 +98,8 @@ class SiblingRounds:
         if why := self._against(done, now_s):
             self.count.dropped[why] += 1
             return
-        worst = int(np.argmax(np.where(futures.valid, futures.criticality, -1.0)))
+        known = futures.valid & ~np.isnan(futures.criticality)
+        worst = int(np.argmax(np.where(known, futures.criticality, -1.0)))
         places = [0] if worst == 0 else [0, worst]
         job = sibling_job(done, places, self._config.engine)
         named = job_bytes(job)

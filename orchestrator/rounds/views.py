@@ -46,7 +46,8 @@ def round_view(
     clearance = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)
     criticality = futures.criticality
     nearest = float(clearance.min()) if count else np.inf
-    met = _met(done, criticality, kept)
+    # How grave is not known counts as grave, as in the viewer's colours.
+    met = _met(done, np.nan_to_num(criticality, nan=1.0), kept)
     return RoundView(
         round_id=done.order.round_id,
         stamp_ns=done.order.stamp_ns,

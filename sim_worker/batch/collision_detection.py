@@ -180,7 +180,7 @@ def _near(
         return (np.zeros(0, dtype=np.intp),) * 3
     radius = np.hypot(user_size_m[..., 0], user_size_m[..., 1]) / 2.0
     reach = radius + math.hypot(vehicle.length_m.value, vehicle.width_m.value) / 2.0
-    reach += MAX_CLOSING_MPS * tick_s / 2.0
+    reach += MAX_CLOSING_MPS * tick_s
     reach_square = np.square(reach)
     centre = ego_rectangles(vehicle, states).centre_m
     near = []

@@ -33,7 +33,7 @@ _KMH = 3.6
 class FutureRisk(NamedTuple):
     """Of S played futures: likelihood, severity and their product; all (S,) from 0 to 1.
 
-    NaN is the severity of a collision with a road user in a job that runs no accidents on.
+    NaN is the severity of a collision with a road user of which no accident was computed.
     """
 
     likelihood: Array
@@ -58,7 +58,7 @@ def risks(job: Job, result: FuturesResult) -> FutureRisk:
     valid = np.asarray(result.outcome.valid, dtype=bool)
     return FutureRisk(
         np.where(valid, priors * _progress_part(job, result), 0.0),
-        np.where(valid, _severity(job, result), 0.0),
+        np.where(valid, _severity(result), 0.0),
     )
 
 
@@ -117,15 +117,15 @@ def relative_density(forecast: ProgressForecast, distance_m: Array, instants: li
     return np.asarray(np.clip(within[:, own:] / most, LEAST_DENSITY, 1.0))
 
 
-def _severity(job: Job, result: FuturesResult) -> Array:
+def _severity(result: FuturesResult) -> Array:
     """Return (S,) the risk that somebody dies."""
     outcome, states = result.outcome, result.trajectory.states
     clearance = np.where(np.isfinite(outcome.min_clearance_m), outcome.min_clearance_m, np.inf)
     found = NEAR_MISS * np.clip(1.0 - clearance / NEAR_MISS_M, 0.0, 1.0)
     speed = np.hypot(states[:, :, 3].astype(np.float64), states[:, :, 4])
     step_s = float(result.trajectory.time_s[1])
-    static = outcome.collided & (outcome.collision_with == _STATIC)
-    for row in np.flatnonzero(static).tolist():
+    told = outcome.collided & (outcome.collision_with == _STATIC)
+    for row in np.flatnonzero(told).tolist():
         # Between two instants the physics may have stopped it: the one before says how fast.
         before = int(max(np.ceil(outcome.collision_time_s[row] / step_s - 1e-6) - 1, 0))
         at_mps = float(speed[row, min(before, speed.shape[1] - 1)])
@@ -143,9 +143,10 @@ def _severity(job: Job, result: FuturesResult) -> Array:
             most = max(accident.ego_delta_v_mps, accident.user_delta_v_mps)
             risk = occupant_risk(most)
         found[accident.future] = max(found[accident.future], risk)
+        told[accident.future] = True
     # Any collision is graver than any near miss; how much graver, accidents alone tell.
     found = np.where(outcome.collided, np.maximum(found, NEAR_MISS), found)
-    return np.where(outcome.collided & ~static & (not job.accidents), np.nan, found)
+    return np.where(outcome.collided & ~told, np.nan, found)
 
 
 def pedestrian_risk(impact_mps: float) -> float:

@@ -119,12 +119,14 @@ def view_of(**outcome: np.ndarray):
 def test_criticality_grows_as_clearance_shrinks_and_is_most_in_a_collision() -> None:
     view = view_of(
         collided=np.array([False, False, False, True]),
+        collision_with=np.array([0, 0, 0, 2]),
+        collision_time_s=np.array([math.nan, math.nan, math.nan, 2.0]),
         min_clearance_m=np.array([math.nan, 20.0, 1.0, 0.0]),
     )
 
     nothing, far, near, hit = view.criticality.tolist()
     assert (nothing, far, near) == pytest.approx((0.0, 0.0, 0.5 * NEAR_MISS))
-    assert hit == pytest.approx(NEAR_MISS)
+    assert hit >= NEAR_MISS
     assert (view.collided, view.min_clearance_m) == (1, 0.0)
 
 

@@ -102,6 +102,7 @@ def test_nominal_and_worst_future_are_played_a_second_time(house: SiblingHouse) 
         ([0.1, 0.2, 0.3, 0.9, 0.4, 0.5], 1, [0, 3]),
         ([0.9, 0.2, 0.3, 0.8, 0.4, 0.5], 1, [0]),
         ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1, [0]),
+        ([0.1, np.nan, 0.3, 0.9, 0.4, 0.5], 3, [0, 5]),
     ],
 )
 def test_the_worst_is_the_most_critical_that_is_whole(

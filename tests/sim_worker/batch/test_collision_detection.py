@@ -98,6 +98,18 @@ def test_a_touch_between_two_ticks_is_found() -> None:
     assert touch.time_s == pytest.approx([(edge - (0.9 - 2.5)) / 50.0], abs=1e-4)
 
 
+@pytest.mark.parametrize("closing_mps", [58.0, 70.0, 80.0, 99.0])
+def test_a_fast_head_on_touch_is_an_impact_wherever_in_a_tick_it_falls(closing_mps: float) -> None:
+    """Two cars that come from 40 m apart are not in each other from the start."""
+    ticks, speed = 30, closing_mps / 2.0
+    for share in np.arange(0.05, 1.0, 0.1):
+        gap_m = 40.0 + share * closing_mps * TICK_S
+        oncoming = moving(gap_m + 2.0, 0.0, np.pi, -speed, 0.0, ticks=ticks)
+        touch = search(straight(1, ticks, speed=speed), oncoming)
+        assert not touch.from_start[0]
+        assert touch.time_s == pytest.approx([gap_m / closing_mps], abs=1e-4)
+
+
 @settings(max_examples=80, deadline=None)
 @given(
     st.floats(0.0, 15.0), st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-4.0, 4.0),

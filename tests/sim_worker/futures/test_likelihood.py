@@ -134,15 +134,27 @@ def test_who_is_hit_on_foot_is_worse_off_than_who_sits_in_a_car() -> None:
 
 
 def test_a_near_miss_is_less_than_any_collision_and_far_away_is_nothing() -> None:
-    _, result = played(
-        10.0, 10.0, 10.0, collided=np.array([False, False, True]),
-        collision_with=np.array([0, 0, 1]), collision_time_s=np.array([np.nan, np.nan, 2.0]),
+    """The wall is touched by a car that stands, all but."""
+    job, result = played(
+        10.0, 10.0, 1e-3, collided=np.array([False, False, True]),
+        collision_with=np.array([0, 0, 2]), collision_time_s=np.array([np.nan, np.nan, 2.0]),
         min_clearance_m=np.array([2.5, 0.1, 0.0]),
     )  # fmt: skip
-    far, near, hit = risks(played(10.0, 10.0, 10.0)[0], result).severity.tolist()
+    far, near, hit = risks(job, result).severity.tolist()
 
     assert far == 0.0
     assert 0.9 * NEAR_MISS < near < hit
+
+
+def test_a_collision_without_an_accident_is_not_taken_for_a_near_miss() -> None:
+    """As one of who overlapped from the start: there is no impact to compute."""
+    job, result = played(
+        30.0, 30.0, collided=np.array([True, False]), collision_with=np.array([1, 0]),
+        collision_time_s=np.array([0.7, np.nan]), min_clearance_m=np.array([0.0, 9.0]),
+    )  # fmt: skip
+
+    assert job.accidents
+    assert np.isnan(risks(job, result).severity).tolist() == [True, False]
 
 
 def test_how_grave_a_collision_is_that_was_not_run_on_nobody_knows() -> None:
