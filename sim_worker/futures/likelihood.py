@@ -26,7 +26,9 @@ NEAR_MISS_M, NEAR_MISS = 2.0, 1e-4
 """Who passes nobody at so much is not near; who just does not touch counts as a bump at walking
 pace. Chosen: it ranks near misses below collisions."""
 _STATIC = COLLISION_WITH.index("static")
-_ON_FOOT = ("pedestrian", "bicycle")
+_UNPROTECTED = ("pedestrian", "bicycle", "motorcycle")
+"""Whom no belt and no body of a car holds: hit, they are thrown, whatever their vehicle weighs.
+Riders are taken to die as pedestrians do; that curve is not measured of them."""
 _KMH = 3.6
 
 
@@ -137,7 +139,7 @@ def _severity(result: FuturesResult) -> Array:
         kind = result.road_users.kind_names[
             int(result.road_users.kinds[accident.future, accident.road_user])
         ]
-        if kind in _ON_FOOT:
+        if kind in _UNPROTECTED:
             risk = pedestrian_risk(accident.closing_mps)
         else:
             most = max(accident.ego_delta_v_mps, accident.user_delta_v_mps)

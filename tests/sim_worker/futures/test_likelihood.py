@@ -108,7 +108,8 @@ def test_after_a_collision_how_far_it_got_says_nothing() -> None:
     assert found.criticality == pytest.approx([occupant_risk(10.0)], rel=0.02)
 
 
-def test_who_is_hit_on_foot_is_worse_off_than_who_sits_in_a_car() -> None:
+@pytest.mark.parametrize("kind", ["pedestrian", "bicycle", "motorcycle"])
+def test_who_is_hit_without_a_car_around_is_worse_off_than_who_sits_in_one(kind: str) -> None:
     job, result = played(
         10.0, 10.0, collided=np.array([True, True]), collision_time_s=np.array([4.0, 4.0]),
         collision_with=np.array([1, 1]),
@@ -118,7 +119,7 @@ def test_who_is_hit_on_foot_is_worse_off_than_who_sits_in_a_car() -> None:
         speed_mps=np.zeros((2, 81, 1), np.float32),
         size_m=np.ones((2, 1, 2), np.float32),
         kinds=np.array([[0], [1]]),
-        kind_names=("car", "pedestrian"),
+        kind_names=("car", kind),
     )
     accidents = tuple(
         Accident(
