@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
-from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.contracts.frames import wrap_angle
+from foretwin.geometry.rectangles import Rectangles, clearance, corners
 from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.time_to_collision import meeting
@@ -36,8 +37,8 @@ def minimum_clearance(view: RolloutView) -> Measure:
     """Least distance (S,) between the ego's outline and any other, infinite where there is none.
 
     Boxes are at least as far apart as their centres less the half diagonals, and at most as their
-    centres less the half widths: only pairs that can be the nearest are measured. 0 where they
-    touch, be it between instants.
+    centres less the half widths: only pairs that can be the nearest are measured. Between instants
+    both move straight and evenly. 0 where they touch.
     """
     distance = view.centre_distance_m
     half_length, half_width = view.user_half_m
@@ -60,7 +61,60 @@ def minimum_clearance(view: RolloutView) -> Measure:
     )
     found = np.where(touched, 0.0, np.inf)
     np.minimum.at(found, future, apart)
+    np.minimum.at(found, *_passing(view, found))
     return view.measure(found)
+
+
+def _passing(view: RolloutView, least_m: Array) -> tuple[Indices, Array]:
+    """Return futures (K,) and how near (K,) somebody passes between two instants, of all that may
+    come nearer there than `least_m` (S,).
+
+    With outlines turned as before, the nearest points of two that pass include a corner of each:
+    where that is, the outlines are measured as they are turned then.
+    """
+    reach = np.hypot(*view.user_half_m) + np.hypot(view.half_length_m, view.half_width_m)
+    # Within a step nobody comes nearer than at its ends by more than half of the way.
+    nearer_m = MAX_CLOSING_MPS * float(np.diff(view.time_s).max()) / 2.0
+    limit = np.where(least_m > 0.0, least_m + nearer_m, -np.inf)[:, None, None]
+    close = (
+        (view.centre_distance_m < reach + limit)[:, :-1] & view.there[:, :-1] & view.there[:, 1:]
+    )
+    future, instant, user = np.nonzero(close)
+    at, then = (future, instant, user), (future, instant + 1, user)
+    x, y, other_yaw, _ = view.users
+    away = np.stack([x[at], y[at]], axis=-1) - view.centre_m[at[:2]]
+    move = np.stack([x[then], y[then]], axis=-1) - view.centre_m[then[:2]] - away
+    share = _nearest_share(away, move)
+    middles_m = np.hypot(*(away + share[:, None] * move).T)
+    may = np.flatnonzero(middles_m < reach[future, 0, user] + least_m[future])
+    future, instant, user = future[may], instant[may], user[may]
+    at, then = (future, instant, user), (future, instant + 1, user)
+    away, move = away[may], move[may]
+    size = tuple(2.0 * half[future, 0, user] for half in view.user_half_m)
+    own_size = 2.0 * view.half_length_m, 2.0 * view.half_width_m
+    own_yaw = view.states[..., 2]
+    own = corners(Rectangles(np.zeros_like(away), own_yaw[at[:2]], *own_size))
+    other = corners(Rectangles(away, other_yaw[at], *size))
+    between = (other[:, :, None] - own[:, None]).reshape(len(may), 16, 2)
+    shares = _nearest_share(between, move[:, None])
+    square = np.square(between + shares[..., None] * move[:, None]).sum(axis=-1)
+    share = shares[np.arange(len(may)), square.argmin(axis=1)]
+    own_turned, other_turned = (
+        begin + share * wrap_angle(end - begin)
+        for begin, end in ((own_yaw[at[:2]], own_yaw[then[:2]]), (other_yaw[at], other_yaw[then]))
+    )
+    there = away + share[:, None] * move
+    return future, clearance(
+        Rectangles(np.zeros_like(away), own_turned, *own_size),
+        Rectangles(there, other_turned, *size),
+    )
+
+
+def _nearest_share(from_m: Array, move_m: Array) -> Array:
+    """Return where (…) on the ways `move_m` (…, 2) from points (…, 2) the origin is nearest."""
+    square = np.square(move_m).sum(axis=-1)
+    along = -(from_m * move_m).sum(axis=-1)
+    return np.asarray(np.clip(along / np.where(square > 0.0, square, 1.0), 0.0, 1.0))
 
 
 def collided(view: RolloutView) -> Measure:

@@ -119,27 +119,53 @@ def test_an_invalid_future_has_no_values_and_spoils_no_other() -> None:
 
 @settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
-def test_least_clearance_is_that_of_all_pairs(seed: int) -> None:
+def test_least_clearance_is_that_of_all_pairs_at_all_times(seed: int) -> None:
     random = np.random.default_rng(seed)
     movers = [
-        Mover(*random.uniform(-40, 40, 2), random.uniform(-3, 3), random.uniform(0, 8))
+        Mover(*random.uniform(-40, 40, 2), random.uniform(-3, 3), random.uniform(0, 20))
         for _ in range(4)
     ]
-    driven = rollout(Mover(0, 0, 0.4, 3), *movers, time_s=times(3.0))
-    found = values(driven)
+    found = values(rollout(Mover(0, 0, 0.4, 3), *movers, time_s=times(3.0)))
+    fine = rollout(Mover(0, 0, 0.4, 3), *movers, time_s=times(3.0, 0.002))
     ahead = LENGTH_M / 2 - VEHICLE.rear_overhang_m.value
-    state = driven.states[0]
+    state = fine.states[0]
     centre = state[:, :2] + ahead * np.column_stack([np.cos(state[:, 2]), np.sin(state[:, 2])])
     apart = clearance(
         Rectangles(centre[:, None], state[:, None, 2], LENGTH_M, WIDTH_M),
-        Rectangles(driven.users[0, ..., :2], driven.users[0, ..., 2], 4.0, 2.0),
+        Rectangles(fine.users[0, ..., :2], fine.users[0, ..., 2], 4.0, 2.0),
     ).min()
 
     if found["collided"]:
         assert found["min_clearance"] == 0.0
     else:
-        assert found["min_clearance"] == pytest.approx(apart, abs=1e-9)
-        assert apart > 0.0
+        assert found["min_clearance"] == pytest.approx(apart, abs=0.025)
+        assert 0.0 < found["min_clearance"] <= apart + 1e-9
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5, 0.75])
+@pytest.mark.parametrize(("speed", "length", "width"), [(14.0, 4.5, 1.8), (1.4, 0.5, 0.5)])
+def test_who_passes_between_two_instants_is_as_near_as_it_comes(
+    phase: float, speed: float, length: float, width: float
+) -> None:
+    """A car of 14 m/s whose corner passes that of somebody who crosses, 0.4 m behind it."""
+    ego = Mover(-20 - phase * 1.4, 0, 0, 14)
+    ready_s = (20 + phase * 1.4 + LENGTH_M / 2 + width / 2) / 14
+    # Its front reaches the side of the car's strip 0.4 m after the rear has left its own.
+    late_m = 0.4 * math.hypot(14, speed) / 14
+    other = Mover(
+        0, -WIDTH_M / 2 - length / 2 - late_m - speed * ready_s, math.pi / 2, speed, length, width
+    )
+
+    assert values(rollout(ego, other))["min_clearance"] == pytest.approx(0.4, abs=1e-6)
+
+
+def test_who_turns_while_it_passes_is_measured_as_it_is_turned_then() -> None:
+    """A car comes nearer as it straightens: turned as before, its corner comes 0.2 m nearer."""
+    driven = rollout(Mover(0, 0), Mover(0.0, 5.0, 0.3), time_s=times(0.1))
+    driven.users[0, 1, 0, 1:] = 4.8, 0.0
+
+    corner_m = 5.0 - 2.0 * math.sin(0.3) - math.cos(0.3)
+    assert values(driven)["min_clearance"] == pytest.approx(corner_m - WIDTH_M / 2)
 
 
 def test_shapes_that_do_not_fit_are_named() -> None:
