@@ -34,8 +34,8 @@ _LANE_HALF_M = 0.9
 
 class Overlaps(NamedTuple):
     """First overlaps of pairs of a future and a road user (K,) each: at which instant of the ego,
-    how many steps later, and where the other is then: `angle_rad` off the ego's heading, as seen
-    from base_link."""
+    how many steps later, and where the other is then: `angle_rad` off the way the ego drives, as
+    seen from its trailing axle: from base_link, unless it drives backwards."""
 
     future: Indices
     instant: Indices
@@ -158,9 +158,8 @@ def _overlaps_ahead(view: RolloutView) -> Overlaps:
 
 def _first_overlaps(view: RolloutView, later: Indices, moves_mps: float) -> Overlaps:
     """Return each pair's first overlap; who overlaps as the rollout begins never counts."""
-    speed = np.hypot(view.states[..., 3], view.states[..., 4])
     centre, yaw = view.centre_m, view.states[..., 2]
-    ego = centre[..., 0], centre[..., 1], yaw, speed
+    ego = centre[..., 0], centre[..., 1], yaw, view.speed_mps
     futures, _, users = view.there.shape
     found = np.empty((4, futures * users), dtype=np.intp)
     step_s = _step_s(view)
@@ -170,21 +169,26 @@ def _first_overlaps(view: RolloutView, later: Indices, moves_mps: float) -> Over
     future, instant, user, steps = found[:, :count]
     base, at = view.states[future, instant, :3], instant + steps
     x, y = (values[future, at, user] for values in view.users[:2])
-    away_x, away_y = x - base[:, 0], y - base[:, 1]
+    heading_x, heading_y = (values[future, instant] for values in view.heading)
+    axle_m = view.trailing_axle_m[future, instant]
+    away_x = x - base[:, 0] - axle_m * heading_x
+    away_y = y - base[:, 1] - axle_m * heading_y
     away = np.maximum(np.hypot(away_x, away_y), 1e-12)
-    cos = (np.cos(base[:, 2]) * away_x + np.sin(base[:, 2]) * away_y) / away
+    cos = (heading_x * away_x + heading_y * away_y) / away
+    cos = np.where(view.backs[future, instant], -cos, cos)
     found_now = Overlaps(future, instant, user, steps, np.arccos(np.clip(cos, -1.0, 1.0)))
     begins = (instant == 0) & (steps == 0)
     return Overlaps._make(values[~begins] for values in found_now)
 
 
 def _front_touches(view: RolloutView, at: Overlaps) -> Flags:
-    """Return whether the line between the ego's front corners touches the other's box (K,)."""
+    """Return whether the line between the ego's leading corners touches the other's box (K,)."""
     there = at.future, at.instant, at.user
     seen = view.relative
     ahead, left, cos, sin = (v[there] for v in (seen.ahead_m, seen.left_m, seen.cos, seen.sin))
     half_length, half_width = (v[at.future, 0, at.user] for v in view.user_half_m)
-    front, side = view.half_length_m - ahead, view.half_width_m
+    leading = np.where(view.backs[at.future, at.instant], -view.half_length_m, view.half_length_m)
+    front, side = leading - ahead, view.half_width_m
     # The separating axes of a line across the ego and a box.
     off = np.abs(front) <= np.abs(cos) * half_length + np.abs(sin) * half_width
     off &= np.abs(left) <= side + np.abs(sin) * half_length + np.abs(cos) * half_width

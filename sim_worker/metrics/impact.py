@@ -22,7 +22,7 @@ class Impacts(NamedTuple):
 
     `time_s` since the first instant; `impact_mps` the ego's speed; `closing_mps` the speed of one
     relative to the other; `at_fault` false where the ego stands, or the other's middle is behind
-    its rear axle.
+    its rear axle; where it drives backwards, ahead of its front axle.
     """
 
     collided: Flags
@@ -221,6 +221,8 @@ def _first(
     relative = other_mps[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=-1) - motion
     impact = np.hypot(motion[:, 0], motion[:, 1])
     ahead = view.relative.ahead_m[hit_rows, instant, user] + view.centre_ahead_m
+    ahead = ahead - view.trailing_axle_m[hit_rows, instant]
+    leads = np.where(view.backs[hit_rows, instant], ahead < 0.0, ahead > 0.0)
 
     def spread(values: Array, without: float) -> Array:
         found = np.full(futures, without)
@@ -233,5 +235,5 @@ def _first(
         user=spread(user.astype(np.float64), -1.0).astype(np.intp),
         impact_mps=spread(impact, np.nan),
         closing_mps=spread(np.hypot(relative[:, 0], relative[:, 1]), np.nan),
-        at_fault=spread(((impact > _STANDS_MPS) & (ahead > 0.0)).astype(np.float64), 0.0) > 0.0,
+        at_fault=spread(((impact > _STANDS_MPS) & leads).astype(np.float64), 0.0) > 0.0,
     )

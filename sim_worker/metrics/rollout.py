@@ -24,6 +24,8 @@ from foretwin.world_gen.rules.signal_state import HeardCycle, LiveColour
 
 _Kept = TypeVar("_Kept")
 _FUTURES_AT_ONCE = 8
+_BACKS_MPS = 0.05
+"""An ego that goes backwards more slowly stands: nuPlan, no_ego_at_fault_collisions."""
 _FAR_M = 1e6
 """Where an absent road user is put: out of reach of every metric, yet a number."""
 
@@ -175,6 +177,16 @@ class RolloutView:
         """(S, N) speed of the ego over ground, negative in reverse."""
         vx, vy = self.states[..., 3], self.states[..., 4]
         return np.asarray(np.copysign(np.hypot(vx, vy), vx))
+
+    @functools.cached_property
+    def backs(self) -> Flags:
+        """(S, N) whether the ego drives backwards, so that its rear leads."""
+        return np.asarray(self.states[..., 3] < -_BACKS_MPS)
+
+    @functools.cached_property
+    def trailing_axle_m(self) -> Array:
+        """(S, N) how far ahead of base_link its trailing axle is: 0 where it drives forwards."""
+        return np.where(self.backs, self.rollout.vehicle.wheelbase_m.value, 0.0)
 
     @functools.cached_property
     def there(self) -> Flags:

@@ -33,8 +33,8 @@ ALL_KEPT = dict.fromkeys(("nc", "dac", "ddc", "tlc", "ttc", "lk", "hc"), 1.0)
 
 
 class Scored(NamedTuple):
-    """One scene: poses (N, 3) of the ego's middle, others, when it begins by the lights' plan, and
-    the parts that are not 1.
+    """One scene: poses (N, 3) of the ego's middle, others, when it begins by the lights' plan,
+    the parts that are not 1, and what the published scorer says instead.
 
     Where the other is as it will be touched is looked up from where the ego is now, so that who
     hits it from behind may be ahead for `ttc`: so the published scorer has it too.
@@ -44,6 +44,7 @@ class Scored(NamedTuple):
     others: tuple[Mover, ...] = ()
     start_s: float = 0.0
     parts: dict[str, float] = {}  # noqa: RUF012
+    theirs: dict[str, float] = {}  # noqa: RUF012
 
 
 def along(x: float, speed: float, y: float = -1.5, accel: float = 0.0) -> Array:
@@ -90,7 +91,10 @@ SCENES = {
     "slowly_on_the_wrong_side": Scored(along(-50, 1.9, y=1.5), parts={"ddc": 0.5, "lk": 0.0}),
     "beside_the_middle_before_and_behind": Scored(along(-14, 7, y=-0.9), parts={"lk": 0.0}),
     "backwards_into_who_stands": Scored(
-        along(-50, -3), (Mover(-58, -1.5, 0, 0),), parts={"nc": 0.0}
+        along(-50, -3),
+        (Mover(-58, -1.5, 0, 0),),
+        parts={"nc": 0.0, "ttc": 0.0},
+        theirs={"ttc": 1.0},
     ),
     "off_the_road": Scored(
         swerving(-50, 8, -4.2), parts={"dac": 0.0, "ddc": 0.0, "lk": 0.0}

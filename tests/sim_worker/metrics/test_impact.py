@@ -58,6 +58,18 @@ def test_being_hit_while_standing_is_no_fault() -> None:
     assert found["impact_speed"] == 0.0
 
 
+def test_who_backs_is_at_fault_for_whom_its_rear_hits_and_not_for_who_hits_its_front() -> None:
+    """It backs at 2 m/s into somebody who walks behind it; one of 8 m/s drives into its front."""
+    walks = Mover(-HALF_M - 4.25, -2.0, math.pi / 2, 1.0, 0.5, 0.5)
+    into = values(rollout(Mover(0, 0, 0, -2), walks))
+    caught = values(rollout(Mover(0, 0, 0, -2), Mover(20, 0, math.pi, 8)))
+
+    assert into["collision_time"] == pytest.approx(2.0, abs=0.01)
+    assert into["collided"] == into["at_fault_collision"] == 1.0
+    assert caught["collided"] == 1.0
+    assert caught["at_fault_collision"] == 0.0
+
+
 def test_head_on_speeds_add_and_across_they_do_so_at_right_angles() -> None:
     head_on = values(rollout(Mover(0, 0, 0, 10), Mover(50, 0, math.pi, 8)))
     across = values(rollout(Mover(-20, 0, 0, 8), Mover(0, -15, math.pi / 2, 6)))
