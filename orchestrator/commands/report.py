@@ -31,7 +31,7 @@ class ReportWritten(msgspec.Struct, frozen=True, kw_only=True):
     size_bytes: int
     verdict: str
     unread: tuple[str, ...] = ()
-    """What there should be of the folders and could not be read."""
+    """What there should be of the folders and is missing or could not be read."""
     indicators: msgspec.Struct | None = None
 
 

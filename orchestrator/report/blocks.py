@@ -118,7 +118,7 @@ class Report(NamedTuple):
     counted: msgspec.Struct | None = None
     """Its figures as a message, where it has some that a program would ask for; without places."""
     unread: tuple[str, ...] = ()
-    """What there should be of the folders and could not be read, in words."""
+    """What there should be of the folders and is missing or could not be read, in words."""
 
 
 def row(*cells: TableCell | str) -> tuple[TableCell, ...]:

@@ -45,6 +45,7 @@ _OF_THE_REST = (
     "A future that failed is not among those played: whether it would have collided is not known, "
     "and it has no score. Those that were played may be the easier cases."
 )
+_MISSING = "jobs that were not played"
 
 
 def sweep_report(
@@ -79,6 +80,7 @@ def sweep_report(
         front=(_outcomes(sweep),),
         parts=tuple(parts),
         attribution=(attribution,) if attribution else (),
+        unread=() if sweep.record.get("complete") else (_MISSING,),
     )
 
 

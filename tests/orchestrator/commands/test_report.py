@@ -57,6 +57,17 @@ def test_what_could_not_be_read_is_said_last_and_by_the_exit_code(
     assert capsys.readouterr().out.endswith("left out: the table of futures is missing\n")
 
 
+@pytest.mark.parametrize(("complete", "code"), [(True, 0), (False, 3)])
+def test_a_sweep_whose_jobs_were_not_all_played_is_a_part(
+    complete: bool, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    swept = sweep_of(tmp_path / "swept", [case(0)], complete=complete)
+
+    assert run(["report", str(swept), "--out", str(tmp_path / "swept.html")]) == code
+    left_out = "left out: jobs that were not played\n"
+    assert capsys.readouterr().out.endswith(left_out) == (not complete)
+
+
 @pytest.mark.parametrize("of", ["a run", "two runs", "a sweep"])
 def test_how_far_it_is_is_counted_section_by_section_to_the_last(
     of: str,
