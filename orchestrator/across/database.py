@@ -31,7 +31,7 @@ _TABLE = re.compile(r'Table with name "?([^"]+?)"? does not exist')
 
 
 class AskedRows(NamedTuple):
-    """Rows of a question, and the names of their columns."""
+    """Rows of a question, and the names of their columns, each another one."""
 
     columns: list[str]
     rows: list[tuple[Any, ...]]
@@ -89,7 +89,8 @@ def _answered(tables: RunTables, names: Sequence[str], sql: str) -> AskedRows:
     with _database(tables, names) as database:
         try:
             result = database.execute(sql)
-            return AskedRows([one[0] for one in result.description], result.fetchall())
+            names_told = [one[0] for one in result.description]
+            return AskedRows(_each_another(names_told), result.fetchall())
         except duckdb.BinderException as error:
             columns = {
                 name: [row[0] for row in database.execute(f'DESCRIBE "{name}"').fetchall()]
@@ -98,6 +99,18 @@ def _answered(tables: RunTables, names: Sequence[str], sql: str) -> AskedRows:
             raise UserError(f"query: {_with_columns(error, columns)}") from error
         except duckdb.InterruptException as error:
             raise KeyboardInterrupt from error
+
+
+def _each_another(names: Sequence[str]) -> list[str]:
+    """Return names of columns with those that came before numbered, as DuckDB does in a view."""
+    found: dict[str, None] = {}
+    for name in names:
+        number, told = 0, name
+        while told in found or (number and told in names):
+            number += 1
+            told = f"{name}_{number}"
+        found[told] = None
+    return list(found)
 
 
 def _database(tables: RunTables, names: Sequence[str]) -> duckdb.DuckDBPyConnection:

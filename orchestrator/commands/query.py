@@ -8,6 +8,7 @@ from typing import Any
 from foretwin.contracts.terminal import console, say
 from foretwin.orchestrator.across.database import AskedRows, ask, columns_in
 from foretwin.orchestrator.across.places import found_in
+from foretwin.orchestrator.across.plain_cells import csv_cell, json_cell
 from foretwin.orchestrator.across.tables import RunTables
 from foretwin.orchestrator.commands.output import print_csv, print_table
 from foretwin.orchestrator.commands.told import CommandResult
@@ -29,13 +30,15 @@ def ask_runs(sql: str | None, places: Sequence[str], *, as_csv: bool) -> Command
 
 
 def _objects(answer: AskedRows) -> list[dict[str, Any]]:
-    named = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
-    return [{name: _plain(cell) for name, cell in row.items()} for row in named]
+    return [
+        {name: json_cell(cell) for name, cell in zip(answer.columns, row, strict=True)}
+        for row in answer.rows
+    ]
 
 
 def _print(answer: AskedRows, *, as_csv: bool) -> None:
     if as_csv:
-        print_csv(answer.columns, answer.rows)
+        print_csv(answer.columns, ([csv_cell(cell) for cell in row] for row in answer.rows))
         return
     fit = max(console().width // LEAST_WIDTH, 1)
     shown = [[_text(cell) for cell in row[:fit]] for row in answer.rows[:MOST_SHOWN]]
@@ -55,16 +58,9 @@ def _views(tables: RunTables) -> AskedRows:
     )
 
 
-def _plain(cell: Any) -> Any:
-    """Return what JSON can hold: lists and maps stay what they are."""
-    if isinstance(cell, dict):
-        return {str(name): _plain(value) for name, value in cell.items()}
-    if isinstance(cell, list | tuple):
-        return [_plain(value) for value in cell]
-    return cell if cell is None or isinstance(cell, bool | int | float | str) else str(cell)
-
-
 def _text(cell: Any) -> str:
     if isinstance(cell, float):
         return f"{cell:.6g}"
-    return "" if cell is None else str(cell)
+    if isinstance(cell, bytes):
+        return f"{len(cell)} bytes"
+    return "" if cell is None else str(csv_cell(cell))

@@ -29,7 +29,35 @@ def test_an_answer_is_a_table_json_or_csv(
     assert command(["query", sql, str(tmp_path / "runs"), "--csv"]) == 0
     header, *rows = csv.reader(capsys.readouterr().out.splitlines())
     assert header == ["run", "index", "values", "end_x_m", "nothing"]
-    assert rows[1] == [run.name, "1", "{'gap_s': 1.0}", "3.125", ""]
+    assert rows[1] == [run.name, "1", '{"gap_s":1.0}', "3.125", ""]
+
+
+def test_columns_of_one_name_are_all_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = made_run(tmp_path, futures=1)
+    sql = "SELECT index, 7 AS index, 8 AS index, 9 AS index_1 FROM futures"
+
+    assert command(["query", sql, str(run), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == [
+        {"index": 0, "index_2": 7, "index_3": 8, "index_1": 9}
+    ]
+    assert command(["query", sql, str(run), "--csv"]) == 0
+    assert capsys.readouterr().out == "index,index_2,index_3,index_1\n0,7,8,9\n"
+
+
+def test_blobs_intervals_and_infinities_are_as_documented(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = made_run(tmp_path, futures=1)
+    sql = r"SELECT '\xFF'::BLOB AS job, INTERVAL 90 MINUTE AS lasted, 1.0 / 0 AS share FROM runs"
+
+    assert command(["query", sql, str(run), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == [{"job": "/w==", "lasted": 5400, "share": None}]
+    assert command(["query", sql, str(run), "--csv"]) == 0
+    assert capsys.readouterr().out == "job,lasted,share\n/w==,5400.0,inf\n"
+    assert command(["query", sql, str(run)]) == 0
+    assert "1 bytes" in capsys.readouterr().out
 
 
 def test_what_does_not_fit_a_terminal_is_told(
