@@ -11,7 +11,7 @@ import os
 import re
 import shlex
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,8 +44,22 @@ def command_line(*words: object) -> str:
 
 
 def say(text: object, *, error: bool = False) -> None:
-    """Print a line, or several; to stderr, at once, where it is an `error` or tells of progress."""
-    print(visible(str(text)), file=sys.stderr if error else sys.stdout, flush=error)
+    """Print a line, or several; to stderr, at once, where it is an `error` or tells of progress.
+
+    Where nobody reads it any more, as behind `| head`, what is printed goes nowhere from then on.
+    """
+    stream = sys.stderr if error else sys.stdout
+    try:
+        print(visible(str(text)), file=stream, flush=error)
+    except BrokenPipeError:
+        write_nowhere(stream)
+
+
+def write_nowhere(stream: TextIO) -> None:
+    """Let go nowhere what waits to be written and all that follows: Python tries it at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 def console(*, error: bool = False) -> Console:
@@ -55,7 +69,12 @@ def console(*, error: bool = False) -> Console:
     """
     from rich.console import Console
 
-    made = Console(stderr=error, markup=False, emoji=False, highlight=False)
+    class Piped(Console):
+        def on_broken_pipe(self) -> None:
+            """Say nothing more; the command goes on, which rich would end with code 1."""
+            write_nowhere(sys.stderr if self.stderr else sys.stdout)
+
+    made = Piped(stderr=error, markup=False, emoji=False, highlight=False)
     if not made.is_terminal and "COLUMNS" not in os.environ:
         made.width = PLAIN_WIDTH
     return made

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.exit_codes import INTERRUPTED, USER
+from foretwin.contracts.exit_codes import DONE, INTERRUPTED, USER
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_config import config as config_files
 from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, WholeSentences
@@ -53,6 +51,7 @@ from foretwin.orchestrator.commands.cli_worker import worker
 from foretwin.orchestrator.commands.error_lines import (
     NO_PLACE,
     drop_output,
+    flush_output,
     one_line,
     report,
     usage_line,
@@ -269,8 +268,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; returns 0 done, 1 internal error, 2 the user's input, 130 Ctrl-C."""
     try:
         result = app(arguments, prog_name="foretwin", standalone_mode=False)
-        with contextlib.suppress(BrokenPipeError):  # whoever read it has seen enough
-            sys.stdout.flush()
+        flush_output()
     except (UserError, *PATH_ERRORS) as error:
         say(f"foretwin: {one_line(error)}", error=True)
         return EXIT_USER
@@ -282,6 +280,11 @@ def run(arguments: list[str]) -> int:
         return EXIT_USER
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
+    except SystemExit as left:  # of typer, where nobody reads the help to its end
+        if not isinstance(left.__context__, BrokenPipeError):
+            raise
+        drop_output()
+        return DONE
     except Exception as error:
         if hasattr(error, "format_message") and hasattr(error, "exit_code"):  # of typer's own
             if line := usage_line(error, arguments):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import errno
-import os
 import sys
 from collections.abc import Sequence
 from typing import Any
 
 from foretwin.contracts.did_you_mean import meant
 from foretwin.contracts.exit_codes import INTERNAL
-from foretwin.contracts.terminal import say
+from foretwin.contracts.terminal import say, write_nowhere
 
 NO_PLACE = (
     errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.ELOOP,
@@ -69,11 +68,19 @@ def report(error: Exception) -> int:
 
 
 def drop_output() -> None:
-    """Forget what cannot be written to a full disk, which Python would try again at its end."""
+    """Forget what cannot be written to a full disk, or what nobody reads any more."""
     try:
         sys.stdout.flush()
     except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        write_nowhere(sys.stdout)
+
+
+def flush_output() -> None:
+    """Write out what waits; where nobody reads it any more, whoever did has seen enough."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        write_nowhere(sys.stdout)
 
 
 def one_line(error: BaseException) -> str:
