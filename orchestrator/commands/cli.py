@@ -11,7 +11,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.exit_codes import DONE, INTERRUPTED, USER
 from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.cli_config import config as config_files
-from foretwin.orchestrator.commands.cli_help import SETTINGS, VersionOption, WholeSentences
+from foretwin.orchestrator.commands.cli_help import SETTINGS, CommandGroup, VersionOption
 from foretwin.orchestrator.commands.cli_join import join
 from foretwin.orchestrator.commands.cli_logs import ABOUT_LOGS
 from foretwin.orchestrator.commands.cli_maps import maps
@@ -63,9 +63,8 @@ _NO_FOLDER = IsADirectoryError, NotADirectoryError
 PATH_ERRORS = (FileNotFoundError, FileExistsError, *_NO_FOLDER, PermissionError)
 """What is wrong with a path is the user's to mend."""
 
-app = typer.Typer(
+app = CommandGroup(
     name="foretwin",
-    cls=WholeSentences,
     no_args_is_help=True,
     rich_markup_mode=None,  # Else [default: 2] is taken for markup, and not shown.
     context_settings=SETTINGS,

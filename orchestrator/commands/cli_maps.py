@@ -7,13 +7,11 @@ from typing import Annotated
 
 import typer
 
-from foretwin.orchestrator.commands.cli_help import WholeSentences
+from foretwin.orchestrator.commands.cli_help import CommandGroup
 from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption
 from foretwin.orchestrator.commands.told import CommandResult, told
 
-maps = typer.Typer(
-    name="map", cls=WholeSentences, help="Fetch maps and prepare them.", no_args_is_help=True
-)
+maps = CommandGroup(name="map", help="Fetch maps and prepare them.", no_args_is_help=True)
 
 
 @maps.command("get", context_settings={"ignore_unknown_options": True})

@@ -7,13 +7,11 @@ from typing import Annotated
 
 import typer
 
-from foretwin.orchestrator.commands.cli_help import WholeSentences
+from foretwin.orchestrator.commands.cli_help import CommandGroup
 from foretwin.orchestrator.commands.cli_options import MapArgument, ServiceRoadsOption
 from foretwin.orchestrator.commands.told import CommandResult, told
 
-scenarios = typer.Typer(
-    name="scenarios", cls=WholeSentences, help="List, check, place, draw and export scenarios."
-)
+scenarios = CommandGroup(name="scenarios", help="List, check, place, draw and export scenarios.")
 
 
 @scenarios.callback(invoke_without_command=True)

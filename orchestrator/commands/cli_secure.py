@@ -7,11 +7,10 @@ from typing import Annotated
 
 import typer
 
-from foretwin.orchestrator.commands.cli_help import WholeSentences
+from foretwin.orchestrator.commands.cli_help import CommandGroup
 from foretwin.orchestrator.commands.told import CommandResult, told
 
-secure = typer.Typer(
-    cls=WholeSentences,
+secure = CommandGroup(
     help="Certificates for a bus over a network: who may join, and as what (docs/security.md).",
     no_args_is_help=True,
 )

@@ -7,12 +7,11 @@ from typing import Annotated
 
 import typer
 
-from foretwin.orchestrator.commands.cli_help import WholeSentences
+from foretwin.orchestrator.commands.cli_help import CommandGroup
 from foretwin.orchestrator.commands.cli_options import DeclarationOption
 from foretwin.orchestrator.commands.told import CommandResult, told
 
-tracks = typer.Typer(
-    cls=WholeSentences,
+tracks = CommandGroup(
     help="Where your car drove, to correct lanes by (docs/tracks.md): yours to list and delete.",
     no_args_is_help=True,
 )

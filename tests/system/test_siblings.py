@@ -45,7 +45,7 @@ def test_in_lock_step_the_drive_is_the_same_with_and_without(tmp_path: Path) -> 
 
 def test_a_sibling_that_is_killed_is_started_again_and_the_drive_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, "--siblings", "multibody", "--futures", "12", "--view", "none") as process:
+    with started(out, "--siblings", "multibody", "--futures", "12") as process:
         run = under_way(out)
         victim = child_pids(run)["sibling"]
         os.kill(victim, signal.SIGKILL)

@@ -22,15 +22,27 @@ from foretwin.orchestrator.embedded import MAP_FILE
         (["drive", "-x"], "foretwin drive: No such option: -x"),
         (["map", "foo"], "foretwin map: No such command 'foo'"),
         (["sweep"], "foretwin sweep: Missing argument 'SPEC'"),
+        (["report", "R", "--out", "a.html", "--out=b.html"],
+         "foretwin report: --out: takes one value, and is given 2 times"),
+        (["map", "town", "--out", "a.osm", "--out", "b.osm"],
+         "foretwin map town: --out: takes one value, and is given 2 times"),
         (["doctor", "extra"], "foretwin doctor: Got unexpected extra argument(s) (extra)"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_call_is_told_in_one_line(
     arguments: list[str], line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(arguments) == 2
     command = line.split(":")[0]
     assert capsys.readouterr().err == f"{line} (see {command} --help)\n"
+
+
+def test_flags_and_options_of_several_values_may_stand_twice(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    several = ["--scenario", "ccftap", "--scenario", "no_such"]
+    assert run(["scenarios", "place", str(MAP_FILE), *several, "--json", "--json"]) == 2
+    assert "no_such" in capsys.readouterr().err
 
 
 def test_no_command_at_all_shows_the_help(capsys: pytest.CaptureFixture[str]) -> None:
