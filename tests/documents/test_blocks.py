@@ -7,12 +7,14 @@ import builtins
 import re
 import tomllib
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
 
 from foretwin.orchestrator.commands.cli import app
+from foretwin.orchestrator.commands.config import check
 from tests.documents.blocks import (
     COMMANDS,
     ROOT,
@@ -24,6 +26,8 @@ from tests.documents.blocks import (
 )
 
 NOT_RUN_AT_MOST = 10
+OTHERS = "planners.toml"
+"""Names a planner that its page installs before: only the page as a whole can be tried."""
 LANGUAGES = {*COMMANDS, "python", "toml", "sql", "text", "ini", "yaml", "json5", "dockerfile"}
 COMMAND = re.compile(r"^(\$ )?(\S*/)?(foretwin|pip3?|python3?|make|docker) ", re.MULTILINE)
 IN_TEXT = re.compile(r"`(foretwin [^`]+)`")
@@ -143,6 +147,19 @@ def test_what_does_not_exist_is_seen() -> None:
 )
 def test_a_block_of_toml_can_be_read(block: Block) -> None:
     assert tomllib.loads(block.text)
+
+
+@pytest.mark.parametrize(
+    "block",
+    [b for b in all_blocks() if b.language == "toml" and b.marks.get("file", OTHERS) != OTHERS],
+    ids=lambda block: block.place,
+)
+def test_a_file_of_a_page_is_one_that_foretwin_takes(block: Block, tmp_path: Path) -> None:
+    """Without what the page asks of a network; the other blocks of TOML are parts of files."""
+    file = tmp_path / block.marks["file"]
+    file.write_text(block.text, encoding="utf-8")
+
+    check(file, kind=None)
 
 
 @pytest.mark.parametrize(
