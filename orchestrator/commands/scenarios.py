@@ -10,7 +10,9 @@ from typing import NamedTuple
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.exit_codes import DONE, PARTLY
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.output import print_table
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
@@ -90,14 +92,21 @@ def check_scenario_file(file: Path) -> CommandResult:
 def place_scenarios(request: PlacesAsked) -> CommandResult:
     """Return where scenarios take place on a map's junctions, and why not elsewhere.
 
-    Its code is 0, or 3 where a junction that a scenario applies to has no place for it.
+    Its code is 3 where one takes place nowhere though it was named, or applies to a junction.
     """
     chosen = [find_scenario(name) for name in request.scenarios] or list(catalogue().values())
     opened, junctions = asked_junctions(request)
     with progress_bar(len(junctions), "junctions") as (advance, _):
         found = placed_on(opened, junctions, chosen, advance=advance)
-    code = 3 if any(scenario.unplaced for scenario in found) else 0
-    return CommandResult(found, lambda: _print_table(request.map_file, found), code)
+    named = bool(request.scenarios)
+    nowhere = [row.id for row in found if not row.placed and (row.applies or named)]
+
+    def words() -> None:
+        _print_table(request.map_file, found)
+        if nowhere:
+            say(f"placed nowhere: {', '.join(nowhere)}")
+
+    return CommandResult(found, words, PARTLY if nowhere else DONE)
 
 
 def asked_junctions(request: PlacesAsked) -> tuple[OpenMap, tuple[Junction, ...]]:

@@ -115,7 +115,26 @@ def test_junctions_without_a_place_are_told_with_the_reason(
     assert (row["placed"], row["applies"]) == (0, 1)
     assert "parked_van would be 30.0 m beside the ego's path" in row["unplaced"][junction]
     assert run(place) == 3
-    assert "1 unplaced" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "1 unplaced" in said
+    assert said.endswith("placed nowhere: occluded_pedestrian\n")
+
+
+@pytest.mark.parametrize(
+    ("named", "code"),
+    [(["race_track_lap"], 3), (["lead_stopping"], 0), (["lead_stopping", "race_track_lap"], 3)],
+)
+def test_a_scenario_that_was_named_and_takes_place_nowhere_is_a_part_that_is_missing(
+    named: list[str], code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = [word for name in named for word in ("--scenario", name)]
+    assert run(["scenarios", "place", MAP, *asked, "--json"]) == code
+    rows = json.loads(capsys.readouterr().out)
+    assert rows[0]["id"] != "lead_stopping" or rows[0]["unplaced"]
+
+
+def test_of_the_whole_catalogue_what_a_place_is_not_for_is_not_missing() -> None:
+    assert run(["scenarios", "place", MAP, "--id", "n57"]) == 0
 
 
 def test_unknown_scenarios_are_refused_before_the_map_is_read(
