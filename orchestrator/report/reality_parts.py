@@ -21,6 +21,7 @@ from foretwin.orchestrator.report.blocks import (
 from foretwin.orchestrator.report.gap_rows import HumanRow, gaps_of
 from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.plots import calibration_plot, gap_plot, rank_plot
+from foretwin.sim_worker.analysis.agreement.tally import NOT_ASKED, OUTCOMES
 from foretwin.sim_worker.analysis.gap.errors import GapRow
 
 _DEG = 57.29578
@@ -31,6 +32,16 @@ _WORDS = {
     "stop_line": "stop lines",
     "comfort": "comfort",
 }
+
+_NOT_ASKED = (
+    "Not observable: between pass and fail, as near as map and positions are known. Not asked: the "
+    "recording has not what it takes to ask, or nothing that the criterion is about is there; such "
+    "criteria count for nothing in the first row, where not observable are also windows of which "
+    "none is asked."
+)
+_ASKED_OR_NOT = (
+    "Not observable: asked in vain, or not asked; the run's record does not tell these apart."
+)
 
 
 def prediction_part(run: RunMaterial) -> Chapter:
@@ -169,12 +180,12 @@ def agreement_part(run: RunMaterial) -> Chapter:
     title = "Simulation against reality: the same seconds judged"
     if not told:
         return Chapter("agreement", title, (Prose("No seconds were both simulated and driven."),))
-    names = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic", "not_observable")
     counts = {"all criteria": told["overall"], **told["by_criterion"]}
     rows = tuple(
-        row(_WORDS.get(name, name), *(_outcome(count, key) for key in names))
+        row(_WORDS.get(name, name), *(_outcome(count, key) for key in (*OUTCOMES, NOT_ASKED)))
         for name, count in counts.items()
     )
+    parted = all(NOT_ASKED in count for count in told["by_criterion"].values())
     blocks: list[Block] = [
         Listed(
             f"Verdicts in {plural(told['windows'], 'window')} of some seconds",
@@ -185,11 +196,12 @@ def agreement_part(run: RunMaterial) -> Chapter:
                 "too pessimistic",
                 "too optimistic",
                 "not observable",
+                "not asked",
             ),
             rows,
-            frozenset({1, 2, 3, 4, 5}),
-            note="Too optimistic: the simulation passes where the drive failed. Not observable: "
-            "the recording has not what it takes to say.",
+            frozenset({1, 2, 3, 4, 5, 6}),
+            note="Too optimistic: the simulation passes where the drive failed. "
+            + (_NOT_ASKED if parted else _ASKED_OR_NOT),
         ),
         *(
             Prose(_flip(direction, flip))
@@ -202,7 +214,8 @@ def agreement_part(run: RunMaterial) -> Chapter:
 
 def _outcome(count: dict[str, int], key: str) -> TableCell:
     wrong = key in ("too_pessimistic", "too_optimistic") and count[key]
-    return number(float(count[key]), 0, tone="bad" if wrong else "")
+    found = count.get(key)
+    return number(None if found is None else float(found), 0, tone="bad" if wrong else "")
 
 
 def _flip(direction: str, flip: dict[str, Any]) -> str:

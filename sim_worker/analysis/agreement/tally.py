@@ -21,6 +21,8 @@ from foretwin.sim_worker.analysis.agreement.window import Window
 OUTCOMES = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic", "not_observable")
 """Too pessimistic: the simulation fails, the drive passed; too optimistic the other way round. Not
 observable: of one side it cannot be said."""
+NOT_ASKED = "not_asked"
+"""Of a criterion that reality has no means to answer, beside `OUTCOMES`."""
 
 
 class Judged(NamedTuple):
@@ -71,11 +73,8 @@ def tally(windows: Sequence[Judged], *, start_stamp_ns: int) -> dict[str, Any]:
     driven = Counter(one.verdicts.driven_word for one in windows)
     by_criterion = {}
     for place, name in enumerate(CRITERIA):
-        sides = [(one.verdicts.simulated, one.verdicts.driven) for one in windows]
-        found = Counter(
-            outcome(_at(simulated, place), _at(real, place)) for simulated, real in sides
-        )
-        by_criterion[name] = {key: found[key] for key in OUTCOMES}
+        found = Counter(_outcome_of(one.verdicts, place) for one in windows)
+        by_criterion[name] = {key: found[key] for key in (*OUTCOMES, NOT_ASKED)}
     return {
         "windows": len(windows),
         "overall": {key: overall[key] for key in OUTCOMES},
@@ -86,6 +85,12 @@ def tally(windows: Sequence[Judged], *, start_stamp_ns: int) -> dict[str, Any]:
             for place, name in enumerate(DIRECTIONS)
         },
     }
+
+
+def _outcome_of(both: Verdicts, place: int) -> str:
+    if not both.asked[place]:
+        return NOT_ASKED
+    return outcome(_at(both.simulated, place), _at(both.driven, place))
 
 
 def _at(side: Judgement, place: int) -> VerdictWord:

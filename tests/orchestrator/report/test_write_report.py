@@ -33,7 +33,6 @@ COVERS = (
     "foretwin.orchestrator.report.material",
     "foretwin.orchestrator.report.page",
     "foretwin.orchestrator.report.plots",
-    "foretwin.orchestrator.report.reality_parts",
     "foretwin.orchestrator.report.replayed",
     "foretwin.orchestrator.report.run_report",
     "foretwin.orchestrator.report.vehicle_parts",

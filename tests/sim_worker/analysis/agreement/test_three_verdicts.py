@@ -27,6 +27,8 @@ def test_between_the_drawn_edge_and_the_farthest_nothing_can_be_said() -> None:
     told = tally(windows, start_stamp_ns=0)
     assert told["driven"] == {"passed": 2, "failed": 0, "not_observable": 1}
     assert told["by_criterion"]["drivable_area"]["not_observable"] == 1
+    assert told["by_criterion"]["drivable_area"]["not_asked"] == 0
+    assert told["by_criterion"]["red_light"] == dict.fromkeys(OUTCOMES, 0) | {"not_asked": 3}
     assert sum(told["overall"].values()) == sum(told["by_criterion"]["comfort"].values()) == 3
     assert judge(simulated=inside, driven=beside).outcome == "too_optimistic"  # the very place
 
