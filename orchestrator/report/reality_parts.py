@@ -23,6 +23,7 @@ from foretwin.orchestrator.report.material import RunMaterial
 from foretwin.orchestrator.report.plots import calibration_plot, gap_plot, rank_plot
 from foretwin.sim_worker.analysis.agreement.tally import NOT_ASKED, OUTCOMES
 from foretwin.sim_worker.analysis.gap.errors import GapRow
+from foretwin.sim_worker.analysis.gap.monitor import LONG_EVERY, SHORT_S
 
 _DEG = 57.29578
 _WORDS = {
@@ -33,6 +34,9 @@ _WORDS = {
     "comfort": "comfort",
 }
 
+_RARER = (
+    f"Runs of up to {SHORT_S:g} s were measured once a second, longer ones once in {LONG_EVERY} s. "
+)
 _NOT_ASKED = (
     "Not observable: between pass and fail, as near as map and positions are known. Not asked: the "
     "recording has not what it takes to ask, or nothing that the criterion is about is there; such "
@@ -117,10 +121,13 @@ def gap_part(run: RunMaterial, people: Sequence[HumanRow] = ()) -> Chapter:
             ),
             tuple(_gap_row(one) for one in found),
             frozenset({0, 2, 3, 4, 5, 6, 7, 8}),
-            note="The model was driven by commands that were recorded."
-            if all(one.independent for one in found)
-            else "Commands were not recorded and are estimated from the motion that the model is "
-            "compared with: such gaps accuse nobody, and no limits hold for them.",
+            note=_RARER
+            + (
+                "The model was driven by commands that were recorded."
+                if all(one.independent for one in found)
+                else "Commands were not recorded and are estimated from the motion that the model "
+                "is compared with: such gaps accuse nobody, and no limits hold for them."
+            ),
         ),
         Plotted(
             gap_plot(found, people),

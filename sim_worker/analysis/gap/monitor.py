@@ -19,7 +19,7 @@ from foretwin.sim_worker.analysis.gap.verdict import KEPT_S, FaultDetector, with
 _SECOND_NS = 1_000_000_000
 _MOST_STATES_HZ = 120.0
 _STATE = "state"
-_SHORT_S, _LONG_EVERY = 2.0, 4
+SHORT_S, LONG_EVERY = 2.0, 4
 """Longer runs overlap by most of their length: every fourth says the same at half the cost."""
 
 
@@ -81,7 +81,7 @@ class GapMonitor:
             horizon
             for horizon in HORIZONS_S
             if now_ns - round(horizon * 1e9) >= first_ns
-            and (horizon <= _SHORT_S or self._measured % _LONG_EVERY == 0)
+            and (horizon <= SHORT_S or self._measured % LONG_EVERY == 0)
         ]
         if not horizons:
             return []
