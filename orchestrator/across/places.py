@@ -52,8 +52,9 @@ def found_in(given: Sequence[str]) -> FoundRuns:
             continue
         for folder in folders_of_runs(Path(place)):
             row = row_of_folder(folder)
-            first = seen.setdefault(row.run, row.folder)
-            if first == row.folder:
+            first = seen.get(row.run)
+            if first is None:
+                seen[row.run] = row.folder
                 found.rows.append(row)
             elif Path(first).resolve() != folder.resolve():
                 same = f"is called {row.run} as {first} is: only the first is asked"

@@ -31,7 +31,9 @@ def list_runs(places: Sequence[str], *, as_csv: bool) -> CommandResult:
     """
     found = found_in(places)
     rows = [_looked_into(row) for row in found.rows]
-    rows += [row for lake in found.lakes for row in lake_rows(lake)]
+    for lake in found.lakes:
+        there = {row.run for row in rows}
+        rows += [row for row in lake_rows(lake) if row.run not in there]
     told = [_told(row) for row in rows]
     if as_csv:
         return CommandResult(

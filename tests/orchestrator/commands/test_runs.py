@@ -87,6 +87,18 @@ def test_the_runs_of_a_lake_are_listed(tmp_path: Path, capsys: pytest.CaptureFix
     assert (row["run"], row["state"], row["folder"]) == (run.name, "completed", str(run))
 
 
+def test_a_run_that_is_named_twice_or_lies_in_a_lake_too_is_listed_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = made_run(tmp_path / "runs")
+    collect(FolderStore(tmp_path / "lake"), [run])
+    places = [str(run.parent), str(run), str(tmp_path / "lake"), str(tmp_path / "lake")]
+
+    assert command(["runs", *places, "--json"]) == 0
+
+    assert [row["run"] for row in json.loads(capsys.readouterr().out)] == [run.name]
+
+
 def test_a_place_without_runs_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
