@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import typer
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
 
 _JSON = "as_json"
+_WRITTEN = {"out": "--out", "target": "TARGET"}
+"""What names a file or folder to write, and how it is called."""
 JsonOption = Annotated[
     bool, typer.Option("--json", help="say what it came to as JSON, and nothing else on stdout")
 ]
@@ -38,6 +41,7 @@ def told(command: Callable[..., CommandResult | None]) -> Callable[..., None]:
     @functools.wraps(command)
     def saying(**asked: Any) -> None:
         as_json = asked.pop(_JSON)
+        _refuse(asked, as_json=as_json)
         came_to = command(**asked)
         if came_to is not None:
             print_told(came_to, as_json=as_json)
@@ -49,6 +53,15 @@ def told(command: Callable[..., CommandResult | None]) -> Callable[..., None]:
     saying.__signature__ = taken.replace(parameters=parameters)  # type: ignore[attr-defined]
     saying.__annotations__ = {one.name: one.annotation for one in parameters}
     return saying
+
+
+def _refuse(asked: Mapping[str, object], *, as_json: bool) -> None:
+    """Raise UserError for what no command can do with what is asked for on its line."""
+    if as_json and asked.get("as_csv"):
+        raise UserError("--csv and --json: name one of them")
+    for name, option in _WRITTEN.items():
+        if str(asked.get(name)) == "-":
+            raise UserError(f"{option} -: a name is needed; no file is written to stdout")
 
 
 def print_told(came_to: CommandResult, *, as_json: bool) -> None:

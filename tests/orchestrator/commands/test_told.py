@@ -30,6 +30,7 @@ from tests.orchestrator.commands.test_cli_help import COMMANDS, LEAVES
 from tests.orchestrator.commands.test_declare import table, two_recordings
 from tests.orchestrator.commands.test_map_get import BOX, MAP, Endpoint, Reply
 from tests.orchestrator.commands.test_standin import EXAMPLE
+from tests.orchestrator.lake.made_runs import made_run
 from tests.orchestrator.sweeps import small_sweep
 from tests.orchestrator.trip import town_world
 from tests.system.foretwin_command import environment, run_folder
@@ -212,6 +213,38 @@ def test_a_drive_and_a_change_to_it_are_told_as_json(driven: ShortDrive) -> None
 def test_all_that_config_explains_is_json_too(how: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["config", how, "--json"]) == 0
     assert json.loads(capfd.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ["convert", "DRIVE.mcap", "-"],
+        ["declare", "DRIVE.csv", "--out", "-"],
+        ["gap", "DRIVE.mcap", "--out", "-"],
+        ["drive", "--out", "-"],
+    ],
+)
+def test_a_dash_is_no_name_of_what_is_written(
+    asked: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(asked) == 2
+    assert " -: a name is needed" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("asked", [["runs"], ["query", "FROM runs"]])
+def test_an_answer_is_json_or_csv(
+    asked: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = made_run(tmp_path / "runs")
+
+    assert run([*asked, str(folder), "--csv", "--json"]) == 2
+
+    assert capsys.readouterr().err == "foretwin: --csv and --json: name one of them\n"
 
 
 def test_words_are_lines_or_print_themselves(capsys: pytest.CaptureFixture[str]) -> None:
