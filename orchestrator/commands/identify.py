@@ -25,6 +25,7 @@ from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecor
 from foretwin.sim_worker.vehicle.parameters import load_vehicle, scale_of
 from foretwin.telemetry.logs import open_log
 
+_ESTIMATES, _STEERING = "estimates.png", "steering.png"
 _FINE_S, _COARSE_S = 0.01, 0.02
 _LONG_S = 600.0
 _MOST_S = 2.0 * 3600.0
@@ -61,21 +62,24 @@ def identify_log(
     vehicle = load_vehicle(vehicle_file)
     record, vehicle_id = read_record(log_file, declaration=declaration)
     told = identify(record, vehicle, vehicle_id=vehicle_id)
+    written = ["vehicle.toml", "identification.json"]
     if out is not None:
         changed, _ = accepted(told, vehicle, source=f"identified from {log_file.name}")
         body = msgspec.json.encode(told)
         with named_in_errors(f"--out {out}"), new_files(out):
-            (out / "vehicle.toml").write_text(
+            (out / written[0]).write_text(
                 vehicle_toml(changed, scale=scale_of(vehicle_file)), encoding="utf-8"
             )
-            (out / "identification.json").write_bytes(msgspec.json.format(body, indent=1) + b"\n")
-            draw_estimates(told, out / "estimates.png")
+            (out / written[1]).write_bytes(msgspec.json.format(body, indent=1) + b"\n")
+            if draw_estimates(told, out / _ESTIMATES):
+                written.append(_ESTIMATES)
             # A drive without steering, yaw rate or speed has no such picture: the table says so.
             with contextlib.suppress(ValueError):
-                draw_steering(record, vehicle, out / "steering.png")
+                draw_steering(record, vehicle, out / _STEERING)
+                written.append(_STEERING)
     lines = as_lines(told, vehicle)
     if out is not None:
-        lines.append(f"{out}: vehicle.toml, identification.json and plots")
+        lines.append(f"{out}: {', '.join(written)}")
     return CommandResult(as_object(told), "\n".join(lines))
 
 

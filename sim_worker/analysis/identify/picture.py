@@ -17,11 +17,14 @@ from foretwin.sim_worker.analysis.motion_record import MotionRecord
 _TAKEN, _LEFT = "#1f77b4", "#b0b0b0"
 
 
-def draw_estimates(result: Identification, file: Path) -> None:
-    """Write a PNG: each parameter's interval, blue where it is taken, and the value in force."""
+def draw_estimates(result: Identification, file: Path) -> bool:
+    """Write a PNG: each parameter's interval, blue where it is taken, and the value in force.
+
+    Returns whether there is one; none is drawn where no parameter was estimated.
+    """
     shown = [found for found in result.estimates if found.value is not None]
     if not shown:
-        return
+        return False
     columns = min(4, len(shown))
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(3.2 * columns, 2.0 * rows), layout="constrained")
@@ -42,6 +45,7 @@ def draw_estimates(result: Identification, file: Path) -> None:
         axes.locator_params(axis="x", nbins=4)
     figure.suptitle("estimates with 95 % intervals (grey: not taken), x the value in force")
     figure.savefig(file, dpi=110)
+    return True
 
 
 def draw_steering(record: MotionRecord, vehicle: VehicleParameters, file: Path) -> None:

@@ -54,6 +54,23 @@ def test_json_holds_each_parameter_with_its_interval_and_reason(
     assert tuned.steering_delay_s.source.startswith("identified from drive.mcap")
 
 
+def test_what_was_written_is_named_and_no_plot_that_was_not(
+    log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blind = tmp_path / "drive.mcap"
+    drive = whole_drive()
+    with create(blind, info=drive.source.info) as writer:
+        for channel, message in drive.samples:
+            if isinstance(message, SpeedSample):
+                writer.add(channel, message)
+    for log, plots in ((log_file, ", estimates.png, steering.png"), (blind, "")):
+        out = tmp_path / f"of {log.parent.name}"
+        assert run(["identify", str(log), "--out", str(out)]) == 0
+        named = f"{out}: vehicle.toml, identification.json{plots}"
+        assert capsys.readouterr().out.splitlines()[-1] == named
+        assert {one.name for one in out.iterdir()} == set(named.partition(": ")[2].split(", "))
+
+
 def test_the_table_is_read_at_80_columns(
     log_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
