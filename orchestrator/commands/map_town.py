@@ -18,6 +18,8 @@ def write_town(out: Path) -> CommandResult:
     """
     if out.suffix != ".osm":
         raise UserError(f"--out {out}: a file named .osm")
+    if not out.parent.is_dir():
+        raise UserError(f"--out {out}: folder {out.parent} does not exist")
     route = out.with_suffix(".geojson")
     for source, target in ((MAP_FILE, out), (ROUTE_FILE, route)):
         shutil.copyfile(source, target)

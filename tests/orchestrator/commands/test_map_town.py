@@ -21,9 +21,15 @@ def test_map_and_route_are_those_of_the_town(
     assert "invented town" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["town.pbf", "nowhere/town.osm"])
-def test_a_wrong_name_is_told(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("town.pbf", "a file named .osm"), ("nowhere/town.osm", "/nowhere does not exist")],
+)
+def test_a_wrong_name_is_told(
+    name: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(["map", "town", "--out", str(tmp_path / name)]) == 2
+    assert capsys.readouterr().err.endswith(f"{told}\n")
     assert list(tmp_path.iterdir()) == []
     assert write_town(tmp_path / "a.osm").body == {
         "map": tmp_path / "a.osm",
