@@ -12,7 +12,7 @@ from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.lake.collect import collect, damaged
-from foretwin.orchestrator.lake.manifest import MANIFEST
+from foretwin.orchestrator.lake.manifest import MANIFEST, read_manifest
 from foretwin.orchestrator.lake.store import FolderStore, LakeStore, store_at
 from foretwin.orchestrator.record.folders_of_runs import folders_of_runs
 
@@ -47,6 +47,7 @@ def _collect(
         for line in done.refused:
             tell(f"refused: {line}")
     wrong = damaged(store) if verify else []
+    files = len(read_manifest(store).files) if verify else None
     for line in wrong:
         say(f"damaged: {line}", error=True)
     counts = len(done.added), len(done.replaced), len(done.there), len(done.refused)
@@ -55,8 +56,11 @@ def _collect(
     code = SOME_REFUSED if done.refused or wrong else 0
     if done.refused and not (done.added or done.replaced or done.there):
         code = NONE_USABLE
+    said = [f"{told}; {done.rows} rows added"] if folders else []
+    if files is not None:
+        said.append(f"{files - len(wrong)} of {files} files hold, {len(wrong)} are damaged")
     return CommandResult(
-        {"lake": store.where, "damaged": wrong, "collected": done},
-        f"{store.where}: {told or 'no runs given'}; {done.rows} rows added",
+        {"lake": store.where, "files_checked": files, "damaged": wrong, "collected": done},
+        f"{store.where}: {'; '.join(said)}",
         code,
     )

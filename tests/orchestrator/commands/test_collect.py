@@ -20,7 +20,11 @@ def test_a_folder_of_runs_is_collected_and_said_in_a_line(
     assert command(asked) == 0
     assert capsys.readouterr().out == f"{tmp_path}/lake: 3 collected; 25 rows added\n"
     assert command([*asked, "--verify"]) == 0
-    assert capsys.readouterr().out == f"{tmp_path}/lake: 3 were there; 0 rows added\n"
+    files = len(list((tmp_path / "lake").rglob("*.parquet")))
+    holds = f"{files} of {files} files hold, 0 are damaged"
+    assert capsys.readouterr().out == f"{tmp_path}/lake: 3 were there; 0 rows added; {holds}\n"
+    assert command(["collect", "--into", str(tmp_path / "lake"), "--verify"]) == 0
+    assert capsys.readouterr().out == f"{tmp_path}/lake: {holds}\n"
 
 
 def test_what_is_refused_is_said_and_the_others_are_collected(
@@ -49,7 +53,9 @@ def test_a_damaged_file_of_the_lake_is_named(
     assert command(["collect", "--into", str(lake), "--verify", "--json"]) == 3
 
     said = capsys.readouterr()
-    assert json.loads(said.out)["damaged"] == [f"{file}: is not what was written"]
+    told = json.loads(said.out)
+    assert told["damaged"] == [f"{file}: is not what was written"]
+    assert told["files_checked"] == len(list(lake.rglob("*.parquet")))
     assert "damaged: " in said.err
 
 
