@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from foretwin.contracts.drive import RoadUsers
+from foretwin.contracts.segments import DRIVE_FILE, segments_of
 from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
 from foretwin.telemetry.logs.comma_log import is_comma_log, open_comma_log
 from foretwin.telemetry.logs.geojson import open_geojson
@@ -66,6 +67,8 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         if smartloc_texts(path):
             check_undeclared(path, declaration, "a smartLoc drive")
             return open_smartloc(path)
+        if recorded := segments_of(path / DRIVE_FILE):
+            raise LogError(f"{path}: the folder of a run; its recorded drive is {recorded[0]}")
         raise LogError(
             f"{path}: a folder that is no comma2k19 segment, no drive of KITTI, nuScenes or"
             f" smartLoc and no ROS 2 bag (it has no metadata.yaml); known logs: {KINDS}"

@@ -143,6 +143,11 @@ def test_files_that_are_no_log(tmp_path: Path) -> None:
         read_line(tmp_path)
     with pytest.raises(LogError, match="no comma2k19 segment"):
         open_log(tmp_path)
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "drive-002.mcap").touch()  # as --keep leaves it
+    with pytest.raises(LogError, match=r"the folder of a run; .* drive is .*run/drive-002\.mcap$"):
+        open_log(run)
     with pytest.raises(LogError, match="is empty"):
         open_log(write(tmp_path, "empty.gpx", ""))
     with pytest.raises(LogError, match="no valid XML"):
