@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from foretwin.orchestrator.commands.output import size_words
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.worlds.indexing import open_index
 
@@ -20,7 +21,7 @@ def index_map_file(map_file: Path, *, folder: Path | None) -> CommandResult:
     store.close()
     lines = [
         f"{store.path}: {meta.ways} ways, {meta.nodes} nodes of {map_file} "
-        f"({size_bytes / 1e6:.1f} MB, {took_s:.1f} s). {meta.attribution}",
+        f"({size_words(size_bytes)}, {took_s:.1f} s). {meta.attribution}",
         *(f"note: {note}" for note in meta.notes[:_SHOWN_NOTES]),
     ]
     if len(meta.notes) > _SHOWN_NOTES:

@@ -30,6 +30,11 @@ def check_html_file(path: Path, option: str, what: str) -> None:
         raise UserError(f"{option} {path}: {trouble}")
 
 
+def size_words(size_bytes: int) -> str:
+    """Return the size of a file in words: kB below a megabyte, each of 1,000 bytes."""
+    return f"{size_bytes / 1e6:.1f} MB" if size_bytes >= 1e6 else f"{size_bytes / 1e3:.0f} kB"
+
+
 def print_json(body: object) -> None:
     """Print a message, or what holds messages and paths, as indented JSON."""
     say(msgspec.json.format(msgspec.json.encode(body, enc_hook=os.fspath), indent=1).decode())

@@ -12,7 +12,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.exit_codes import DONE, PARTLY
 from foretwin.contracts.new_folder import named_in_errors
 from foretwin.contracts.segments import DRIVE_FILE, first_left
-from foretwin.orchestrator.commands.output import check_html_file
+from foretwin.orchestrator.commands.output import check_html_file, size_words
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.report.gap_rows import HumanRow
@@ -62,8 +62,7 @@ def report(
         unread=told.unread,
         indicators=told.counted,
     )
-    size = f"{written.size_bytes / 1e6:.1f} MB"
-    words = [written.verdict, f"wrote {written.file} ({size})"]
+    words = [written.verdict, f"wrote {written.file} ({size_words(written.size_bytes)})"]
     words += [f"left out: {one}" for one in written.unread]
     return CommandResult(written, "\n".join(words), PARTLY if written.unread else DONE)
 

@@ -120,19 +120,19 @@ def _verdict(seen: Sequence[_Seen]) -> str:
                 f"what {other.name} foresaw lies {abs(b - a):.2f} m {nearer} what was driven than "
                 f"{first.name} after 4 s ({b:.2f} against {a:.2f} m)"
             )
-        same = {str(p.place["id"]) for p in first.passed} ^ {
-            str(p.place["id"]) for p in other.passed
-        }
-        if same:
-            said.append(
-                f"{first.name} and {other.name} met {plural(len(same), 'junction')} that "
-                "the other did not"
-            )
+        for one, beside in ((first, other), (other, first)):
+            if alone := _met(one) - _met(beside):
+                met = plural(len(alone), "junction")
+                said.append(f"{one.name} met {met} that {beside.name} did not")
     if not said:
         return "Too little is known of these drives to say what changed."
     text = "; ".join(said)
     chance = "Whether that is more than chance, one drive each cannot tell."
     return f"{text[0].upper()}{text[1:]}. {chance}"
+
+
+def _met(one: _Seen) -> set[str]:
+    return {str(passed.place["id"]) for passed in one.passed}
 
 
 def _figure(one: _Seen) -> KeyFigure:

@@ -12,6 +12,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.segments import DRIVE_FILE, segment_file
 from foretwin.orchestrator.commands import compare, progress_bar
 from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.commands.output import size_words
 from tests.orchestrator.across.test_changes import case, sweep_of
 from tests.orchestrator.report.told_runs import NAME, told_run
 
@@ -25,8 +26,14 @@ def test_it_writes_the_file_and_says_the_verdict(
 
     said = capsys.readouterr().out
     assert said.startswith("The car passed 1 junction")
-    assert f"wrote {out} (" in said
+    assert f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)" in said
     assert out.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_a_size_below_a_megabyte_is_no_zero() -> None:
+    assert [size_words(size) for size in (41_234, 999_400, 1_000_000)] == [
+        "41 kB", "999 kB", "1.0 MB",
+    ]  # fmt: skip
 
 
 def test_json_holds_the_indicators_over_several_runs_and_nothing_else_is_printed(

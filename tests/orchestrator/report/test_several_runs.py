@@ -10,7 +10,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.write_report import report_of_folders
 from tests.orchestrator.report.read_page import ReadPage
-from tests.orchestrator.report.told_runs import told_run
+from tests.orchestrator.report.told_runs import run_without_junctions, told_run
 
 
 def test_two_runs_stand_side_by_side(tmp_path: Path) -> None:
@@ -26,6 +26,13 @@ def test_two_runs_stand_side_by_side(tmp_path: Path) -> None:
     assert "last minus first" in page
     read = ReadPage(page)
     assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
+
+
+def test_who_met_a_junction_that_the_other_did_not_is_named(tmp_path: Path) -> None:
+    one, none = told_run(tmp_path / "one"), run_without_junctions(tmp_path / "other")
+
+    assert "; A met 1 junction that B did not. " in report_of_folders([one, none]).verdict
+    assert "; B met 1 junction that A did not. " in report_of_folders([none, one]).verdict
 
 
 def test_the_same_run_twice_changes_nothing(tmp_path: Path) -> None:
