@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import console, say
 from foretwin.orchestrator.across.database import AskedRows, ask, columns_in
-from foretwin.orchestrator.across.places import found_in
+from foretwin.orchestrator.across.places import FoundRuns, found_in
 from foretwin.orchestrator.across.plain_cells import csv_cell, json_cell
 from foretwin.orchestrator.across.tables import RunTables
 from foretwin.orchestrator.commands.output import print_csv, print_table
@@ -24,8 +25,15 @@ def ask_runs(sql: str | None, places: Sequence[str], *, as_csv: bool) -> Command
 
     Raises UserError in one line where the SQL is wrong, or nothing is found to ask.
     """
-    tables = RunTables(found_in(places), lambda line: say(f"foretwin: {line}", error=True))
-    answer = _views(tables) if sql is None else ask(tables, sql)
+    try:
+        found = found_in(places)
+    except (UserError, FileNotFoundError):
+        if sql is not None or places:
+            raise
+        answer = _views_of_any()
+    else:
+        tables = RunTables(found, lambda line: say(f"foretwin: {line}", error=True))
+        answer = _rows_of(columns_in(tables, tables.names)) if sql is None else ask(tables, sql)
     return CommandResult(lambda: _objects(answer), lambda: _print(answer, as_csv=as_csv))
 
 
@@ -50,8 +58,16 @@ def _print(answer: AskedRows, *, as_csv: bool) -> None:
         say(f"{MOST_SHOWN} of {len(answer.rows)} rows; --csv and --json give all", error=True)
 
 
-def _views(tables: RunTables) -> AskedRows:
-    columns = columns_in(tables, tables.names)
+def _views_of_any() -> AskedRows:
+    """Return the views that runs have; no run is here."""
+    from foretwin.orchestrator.record.results import TABLES  # takes a second, and is seldom wanted
+
+    tables = RunTables(FoundRuns([], [], []), lambda line: None)
+    say("foretwin: no runs are here; these are the views of any run", error=True)
+    return _rows_of(columns_in(tables, sorted({*tables.names, *TABLES})))
+
+
+def _rows_of(columns: Mapping[str, Mapping[str, str]]) -> AskedRows:
     return AskedRows(
         ["view", "column", "type"],
         [(view, name, kind) for view, of in columns.items() for name, kind in of.items()],

@@ -86,6 +86,22 @@ def test_without_sql_the_views_and_their_columns_are_listed(
     assert {"view": "runs", "column": "verdict", "type": "VARCHAR"} in told
 
 
+def test_where_no_run_is_the_views_are_listed_all_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    assert command(["query", "--json"]) == 0
+
+    said = capsys.readouterr()
+    assert said.err == "foretwin: no runs are here; these are the views of any run\n"
+    told = json.loads(said.out)
+    assert {"view": "futures", "column": "collided", "type": "BOOLEAN"} in told
+    assert {"view": "runs", "column": "verdict", "type": "VARCHAR"} in told
+    assert command(["query", "FROM futures"]) == 2
+    assert "neither runs nor sweeps is here" in capsys.readouterr().err
+
+
 def test_a_wrong_question_is_one_line_and_exit_code_2(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
