@@ -130,12 +130,12 @@ def test_the_worst_is_the_most_critical_that_is_whole(
 
 
 def test_what_the_drive_shows_is_laid_beside_how_far_engines_are_apart(house: SiblingHouse) -> None:
-    for aside_m in (4.0, 1.0, 2.0, 3.0):
+    for number, aside_m in enumerate((4.0, 1.0, 2.0, 3.0)):
+        house.drive(21 + number)
         house.aside_m = aside_m
         house.round()
         house.answer()
         house.now_s += 10.0
-        house.drive(10)
     house.drive(120)
     house.end()
     count = house.siblings.count

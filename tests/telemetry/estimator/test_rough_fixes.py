@@ -12,8 +12,6 @@ from foretwin.contracts.drive import HeadingSample, SpeedSample
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import fix, info, xy
 
-COVERS = ("foretwin.telemetry.estimator.position_noise",)
-
 SPEED_MPS, SECONDS = 10.0, 120
 
 
