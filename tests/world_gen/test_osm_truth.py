@@ -34,7 +34,7 @@ LIGHTS_ASKED = 160
 BETWEEN_JUNCTIONS = {
     "berlin-mitte": 7,
     "moritzplatz": 6,
-    "kingsway": 1,
+    "kingsway": 2,
     "monaco": 1,
     "badhersfeld": 6,
     "liechtenstein": 3,
