@@ -177,8 +177,7 @@ class MotionCorrections:
         if self._stands:
             filter_.stand(0.01, 0.05)
         else:
-            own = filter_.covariance.item(SPEED, SPEED)
-            std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]), own)
+            std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]))
             scale_std = 0.005 * abs(speed_mps)
             self._surprises.take_line(
                 "speed",

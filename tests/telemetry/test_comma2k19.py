@@ -35,11 +35,11 @@ def test_bad_values_are_counted(segment: Path) -> None:
     assert found == [
         ("speed", 10_000_000_000),
         ("gnss", 10_000_000_000),
+        ("gnss", 10_100_000_000),  # it came late, and is put in order
         ("gnss", 10_200_000_000),
     ]
     assert log.skipped == {
         "time before zero": 1,
-        "time backwards": 1,
         "position not finite": 1,
         "value not finite": 1,
     }

@@ -54,13 +54,14 @@ def test_in_whatever_order_parts_come_they_add_up_to_the_same(tmp_path: Path) ->
 
 
 def test_what_failed_is_not_among_those_played(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sixty of a hundred fail, fifteen of them where others collide: 9 of 40, not 9 of 100."""
     summary = Summary(load_spec(small_sweep(tmp_path)).spec)
     of_rest = {"placed": 100, "played": 40, "collided": 9, "failed": 60, "scores": (0.5,) * 38}
     summary.add(replace(COUNT, cases=100, **of_rest))
     (entry,) = summary.table()
+    monkeypatch.setenv("COLUMNS", "160")
 
     assert {name: entry[name] for name in ("placed", "played", "collided", "scored")} == {
         "placed": 100, "played": 40, "collided": 9, "scored": 38,

@@ -58,4 +58,4 @@ def test_headings_beside_them_are_believed(rough_m: float) -> None:
     errors = straight_on(rough_m=rough_m, stated_m=rough_m, seed=1, headings=True)
 
     assert errors.yaw_deg < 3.0
-    assert errors.position_m < 1.5 * rough_m
+    assert errors.position_m < 2.5 * rough_m  # no farther than the fixes

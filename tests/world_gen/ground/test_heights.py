@@ -134,7 +134,8 @@ def test_what_the_map_joins_at_different_heights_is_named_and_has_no_heights() -
         NODES,
         [
             (1, [6, 3], STREET),
-            (2, [3, 0, 1], tunnel),
+            (2, [3, 0], tunnel),
+            (7, [0, 1], tunnel),
             (3, [1, 5], STREET),
             (4, [2, 0, 4], STREET),
         ],
