@@ -53,11 +53,19 @@ class GnssFix(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ImuSample(msgspec.Struct, frozen=True, kw_only=True):
-    """Specific force and angular rate in body axes (x forward, y left, z up)."""
+    """Specific force and angular rate in body axes (x forward, y left, z up).
+
+    A gyro without an accelerometer says 0, 0, 0: on Earth none with one does.
+    """
 
     stamp_ns: int
     accel_mps2: Vector3
     rate_radps: Vector3
+
+    @property
+    def tells_force(self) -> bool:
+        """Whether an accelerometer speaks."""
+        return any(self.accel_mps2)
 
 
 class SpeedSample(msgspec.Struct, frozen=True, kw_only=True):

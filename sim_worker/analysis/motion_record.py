@@ -130,7 +130,7 @@ class MotionRecorder:
             case SpeedSample(speed_mps=speed):
                 return (speed,)
             case ImuSample(rate_radps=rate, accel_mps2=accel):
-                return rate[2], accel[0]
+                return rate[2], accel[0] if message.tells_force else math.nan
             case SteeringSample(steering_wheel_rad=wheel, tire_angle_rad=tire):
                 return _or_nan(wheel), _or_nan(tire)
             case ControlCommand(accel_mps2=accel, steering_wheel_rad=wheel, tire_angle_rad=tire):

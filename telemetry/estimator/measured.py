@@ -80,7 +80,8 @@ class MotionSamples:
             return False
         self._sample_ns[channel] = stamp_ns
         for name in fields:
-            self._field_ns[name] = stamp_ns
+            if name != "accel_mps2" or message.tells_force:
+                self._field_ns[name] = stamp_ns
         if getattr(message, "yaw_rate_radps", None) is not None:
             self._field_ns["yaw_rate_radps"] = stamp_ns
         if isinstance(message, SpeedSample):

@@ -144,6 +144,8 @@ class MotionCorrections:
             case ImuSample(accel_mps2=accel, rate_radps=rate):
                 if "imu" not in self.trust.left_out:
                     self._correct_turning(filter_, rate[2])
+                if not message.tells_force:
+                    return
                 expected = filter_.mean.item(ACCEL) + filter_.mean.item(ACCEL_BIAS)
                 filter_.correct_accel(accel[0], self._accel_doubt.std(abs(accel[0] - expected)))
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):

@@ -39,6 +39,7 @@ from foretwin.telemetry.logs.table_times import days_counted, is_of_day, stamp_r
 
 _MANY_ROWS = 20_000
 """From so many on another parser is worth its import."""
+_FORCES = ("accel_x", "accel_y", "accel_z")
 _AT_REST = {"accel_y": 0.0, "accel_z": units.STANDARD_GRAVITY_MPS2, "rate_x": 0.0, "rate_y": 0.0}
 """What a unit that measures forwards and about the vertical alone is taken to say besides: nothing
 of ours reads it."""
@@ -285,5 +286,7 @@ def _turn_axes(imu: ImuSection, columns: dict[str, Array]) -> None:
     if imu.axes == "forward-right-down":
         for name in {"accel_y", "accel_z", "rate_y", "rate_z"} & columns.keys():
             columns[name] = -columns[name]
+    if "accel_x" not in columns:
+        columns |= dict.fromkeys(_FORCES, np.zeros(len(columns["rate_z"])))
     for name, at_rest in _AT_REST.items():
-        columns.setdefault(name, np.full(len(columns["accel_x"]), at_rest))
+        columns.setdefault(name, np.full(len(columns["rate_z"]), at_rest))

@@ -140,15 +140,16 @@ class HeadingSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=T
 class ImuSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Specific force (+9.8 m/s² upwards at rest) and rates along the named body axes.
 
-    Of a unit that measures in the plane alone what is missing is taken as at rest.
+    Of a unit that measures in the plane alone what is missing is taken as at rest. Without
+    `accel_x` it is a gyro without an accelerometer.
     """
 
     axes: Literal["forward-left-up", "forward-right-down"]
     """Which way x, y and z point."""
-    accel_x: Column
-    """Specific force along x."""
     rate_z: Column
     """About z."""
+    accel_x: Column | None = None
+    """Specific force along x."""
     accel_y: Column | None = None
     """Along y."""
     accel_z: Column | None = None

@@ -70,12 +70,13 @@ def _fix(ros: Any, stamp_ns: int) -> drive.GnssFix:
 
 
 def _imu(ros: Any, stamp_ns: int) -> drive.ImuSample:
-    if ros.angular_velocity_covariance[0] == -1 or ros.linear_acceleration_covariance[0] == -1:
-        raise UnusableError("imu without values")
+    if ros.angular_velocity_covariance[0] == -1:
+        raise UnusableError("imu without turning rates")
     accel, rate = ros.linear_acceleration, ros.angular_velocity
+    felt = ros.linear_acceleration_covariance[0] != -1
     return drive.ImuSample(
         stamp_ns=stamp_ns,
-        accel_mps2=(accel.x, accel.y, accel.z),
+        accel_mps2=(accel.x, accel.y, accel.z) if felt else (0.0, 0.0, 0.0),
         rate_radps=(rate.x, rate.y, rate.z),
     )
 

@@ -50,6 +50,7 @@ def ros_from_imu(message: drive.ImuSample, _frame: LocalFrame | None) -> Any:
         orientation_covariance=covariance(3, d0=_ABSENT),
         angular_velocity=parts.vector_from(*message.rate_radps),
         linear_acceleration=parts.vector_from(*message.accel_mps2),
+        linear_acceleration_covariance=covariance(3, d0=0.0 if message.tells_force else _ABSENT),
     )
 
 

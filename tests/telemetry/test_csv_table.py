@@ -253,13 +253,14 @@ def test_metres_in_a_plane_around_an_origin(tmp_path: Path) -> None:
 
 
 def test_an_inertial_unit_of_the_plane_is_at_rest_besides(tmp_path: Path) -> None:
-    imu = (
-        '[imu]\naxes = "forward-right-down"\naccel_x = { column = "v", unit = "g" }\n'
-        'rate_z = { column = "wheel", unit = "deg/s" }\n'
-    )
-    found = channels(drive(tmp_path, declaration=DECLARATION + imu))["imu"]
+    imu = '[imu]\naxes = "forward-right-down"\nrate_z = { column = "wheel", unit = "deg/s" }\n'
+    force = 'accel_x = { column = "v", unit = "g" }\n'
+    found = channels(drive(tmp_path, declaration=DECLARATION + imu + force))["imu"]
     assert found[0].accel_mps2 == pytest.approx((98.0665, 0.0, 9.80665))
     assert found[0].rate_radps == pytest.approx((0.0, 0.0, -math.pi / 2))
+    (gyro, *_) = channels(drive(tmp_path, declaration=DECLARATION + imu))["imu"]
+    assert (gyro.accel_mps2, gyro.tells_force) == ((0.0, 0.0, 0.0), False)
+    assert gyro.rate_radps == found[0].rate_radps
 
 
 def test_a_table_without_positions_is_read(tmp_path: Path) -> None:

@@ -144,16 +144,29 @@ def test_no_fix_zero_stamp_and_imu_without_values(tmp_path: Path) -> None:
     imu = drive.ImuSample(stamp_ns=START_NS, accel_mps2=(0.0, 0.0, 9.8), rate_radps=(0.0, 0.0, 0.0))
     part = messages_from("imu", imu, None)[0]
     message: Any = typestore().deserialize_cdr(part.data, part.kind)
-    message.linear_acceleration_covariance = np.full(9, -1.0)
+    message.angular_velocity_covariance = np.full(9, -1.0)
     file.add("/imu", part.kind, message, START_NS)
     log = open_log(file.close())
     found = list(log.samples())
     assert [(channel, m.stamp_ns) for channel, m in found] == [("gnss", START_NS + 10**9)]  # type: ignore[attr-defined]
     assert log.skipped == {
         "receiver without fix": 1,
-        "imu without values": 1,
+        "imu without turning rates": 1,
         "position not finite": 1,
     }
+
+
+def test_a_gyro_without_an_accelerometer_is_read_and_written_so(tmp_path: Path) -> None:
+    """Imu.msg: "set element 0 of the associated covariance matrix to -1"."""
+    file = ForeignFile(tmp_path / "bag.mcap")
+    file.add("/fix", "sensor_msgs/msg/NavSatFix", fix(START_NS, 52.5), START_NS)
+    imu = drive.ImuSample(stamp_ns=START_NS, accel_mps2=(0.0, 0.0, 0.0), rate_radps=(0.0, 0.0, 0.2))
+    part = messages_from("imu", imu, None)[0]
+    message: Any = typestore().deserialize_cdr(part.data, part.kind)
+    assert message.linear_acceleration_covariance[0] == -1.0
+    message.linear_acceleration.x = 3.0  # whatever stands there
+    file.add("/imu", part.kind, message, START_NS)
+    assert dict(open_log(file.close()).samples())["imu"] == imu
 
 
 @pytest.mark.parametrize("variance", [float("nan"), 0.0, -1.0])

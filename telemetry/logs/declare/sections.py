@@ -96,14 +96,15 @@ class Sections:
         fits = sensors.fits
         wanted = ("accel_x", "rate_z", "accel_y")
         found = {name: fits[f"imu.{name}"] for name in wanted if f"imu.{name}" in fits}
-        if not {"accel_x", "rate_z"} <= found.keys():
-            for name, fit in found.items():
-                if name != "rate_z" or sensors.heading is None:
-                    unknown.append(
-                        f"{fit.column}: {_said(fit)}; an inertial unit needs acceleration ahead"
-                        " and turning rate: left out"
-                    )
+        if "rate_z" not in found:
+            for fit in found.values():
+                unknown.append(
+                    f"{fit.column}: {_said(fit)}; an inertial unit needs a turning rate: left out"
+                )
             return {}
+        if "accel_x" not in found:
+            # Beside a heading the rate is the heading's.
+            return {} if sensors.heading is not None else {"rate_z": found["rate_z"]}
         if not self.together([found["rate_z"].column, found["accel_x"].column]):
             unknown.append("imu: acceleration and turning rate stand in different rows: left out")
             return {}
@@ -123,7 +124,7 @@ class Sections:
         if sensors.gravity is None:
             return {}
         name, mean_g = sensors.gravity
-        if not self.together([given["accel_x"].column, name]):
+        if "accel_x" not in given or not self.together([given["accel_x"].column, name]):
             return {}
         said.append(f"accel_z is {name}: gravity, {mean_g:+z.3f} g in the mean")
         return {"accel_z": col(name, given["accel_x"].unit, negate=mean_g < 0.0)}

@@ -113,3 +113,12 @@ def test_what_is_kept_is_bounded_and_what_is_not_finite_passed_over() -> None:
 def test_an_empty_recorder_says_so() -> None:
     with pytest.raises(ValueError, match="no sample"):
         recorder().record()
+
+
+def test_a_gyro_alone_tells_of_no_force() -> None:
+    taken = recorder()
+    for k in range(10):
+        told = ImuSample(stamp_ns=at(0.02 * k), accel_mps2=(0, 0, 0), rate_radps=(0, 0, 1))
+        taken.handle("imu", told)
+    assert not taken.record().has("accel_x_mps2")
+    assert taken.record().has("yaw_rate_radps")

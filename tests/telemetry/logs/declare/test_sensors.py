@@ -36,3 +36,13 @@ def test_what_was_measured_is_taken_before_what_was_wanted(tmp_path: Path, wante
 
     alone = propose(one_table(tmp_path, **{wanted: at_fixes}))
     assert f"{wanted}: by its name this is what was wanted" in "\n".join(alone.unknown)
+
+
+def test_a_gyro_alone_is_an_inertial_unit_without_forces(tmp_path: Path) -> None:
+    drive = drawn_drive()
+    imu = drive["imu"]
+    rate = np.interp(drive["gnss"].stamps_ns, imu.stamps_ns, imu.columns["rate_z"])
+    found = propose(one_table(tmp_path, r=rate)).declaration
+    assert found is not None
+    assert found.imu is not None
+    assert (found.imu.rate_z.column, found.imu.accel_x) == ("r", None)
