@@ -39,6 +39,8 @@ _MAX_STEP_S = 0.05
 _HARDEST_MPS2 = 10.0
 """No car on tyres turns harder (1 g)."""
 _STANDING_CURVATURE_PM = 0.1
+_STRAIGHT_DEVIATIONS = 3.0
+"""A gyro that reads less of its noise tells of no turn."""
 
 
 class KinematicFilter:
@@ -252,12 +254,18 @@ class KinematicFilter:
         `biased` for a gyro, whose bias is estimated.
         """
         row = np.zeros(len(self.mean))
-        row[SPEED], row[CURVATURE] = self.mean[CURVATURE], self.mean[SPEED]
-        expected = self.yaw_rate_radps
+        speed, curvature = self.mean.item(SPEED), self.mean.item(CURVATURE)
+        row[SPEED], row[CURVATURE] = curvature, speed
+        expected = speed * curvature
         if biased:
             self._know_slip()
             row[GYRO_BIAS] = 1.0
             expected += self.mean[GYRO_BIAS]
+            if abs(rate_radps - self.mean[GYRO_BIAS]) < _STRAIGHT_DEVIATIONS * std_radps:
+                # Who pulls away straight on after a bend does not stand.
+                by_speed, by_curvature = (self.covariance[i, i] for i in (SPEED, CURVATURE))
+                if by_speed * curvature**2 > by_curvature * speed**2:
+                    row[SPEED] = 0.0
         return self.correct(row, rate_radps - expected, std_radps)
 
     def _know_slip(self) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.drive import ImuSample, SpeedSample
-from foretwin.telemetry.estimator.filter_state import YAW, X
+from foretwin.telemetry.estimator.filter_state import CURVATURE, SPEED, YAW, X
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.motion_track import MotionTrack
@@ -79,6 +79,31 @@ def test_what_was_learnt_before_the_heading_was_known_is_used() -> None:
             found.append(track.gyro_bias_radps)
     assert len(found) > 50
     assert np.abs(np.array(found) - 0.003).max() < 6e-4
+
+
+def stood_in_a_bend() -> KinematicFilter:
+    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=0.0, yaw_std_rad=0.1)
+    filter_.mean[CURVATURE] = 0.14
+    filter_.stand(0.1, 1.0)
+    filter_.mean[CURVATURE] = 0.14
+    return filter_
+
+
+def speed_std_mps(filter_: KinematicFilter, *, rate_radps: float | None) -> float:
+    for _ in range(50):
+        filter_.predict(0.02)
+        if rate_radps is not None:
+            filter_.correct_yaw_rate(rate_radps, 0.003, biased=True)
+    return math.sqrt(filter_.covariance[SPEED, SPEED])
+
+
+def test_who_pulls_away_straight_on_after_a_bend_does_not_stand_by_the_gyro() -> None:
+    """By the bend in which it stopped a rate of nought would mean that it still stands."""
+    alone = speed_std_mps(stood_in_a_bend(), rate_radps=None)
+    assert speed_std_mps(stood_in_a_bend(), rate_radps=0.0) > 0.9 * alone
+    turning = stood_in_a_bend()
+    speed_std_mps(turning, rate_radps=0.3)
+    assert turning.mean[SPEED] > 0.5  # who turns does move
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.01, 5.0), st.booleans())
