@@ -16,6 +16,7 @@ _LIKELY = {
     "imu": "is its z axis up, are its yaw rates in rad/s, to the left positive?",
     "steering": "is its angle in rad, to the left positive?",
     "speed": "is it in m/s, forwards positive?",
+    "forces": "is the imu's x axis ahead, are its accelerations in m/s², to the front positive?",
     "heading": "is it in rad, counter-clockwise from east?",
 }
 

@@ -57,11 +57,15 @@ class Trail(NamedTuple):
     rate: float = 0.0
     value: float = 0.0
 
+    def joins(self, time_s: float) -> bool:
+        """Whether a sample of `time_s` follows the latest without a gap."""
+        return 0.0 <= time_s - self.time_s <= _GAP_S
+
     def gone_on(self, time_s: float, rate: float) -> Trail:
         """Return the trail gone on by a rate, evenly from the one before."""
-        step_s, value = time_s - self.time_s, self.value
-        if 0.0 <= step_s <= _GAP_S:
-            value += 0.5 * (self.rate + rate) * step_s
+        value = self.value
+        if self.joins(time_s):
+            value += 0.5 * (self.rate + rate) * (time_s - self.time_s)
         return Trail(self._marked(time_s, value), time_s, rate, value)
 
     def turned_to(self, time_s: float, angle_rad: float) -> Trail:
@@ -71,7 +75,7 @@ class Trail(NamedTuple):
 
     def _marked(self, time_s: float, value: float) -> tuple[tuple[float, float], ...]:
         marks = self.marks
-        if not 0.0 <= time_s - self.time_s <= _GAP_S:
+        if not self.joins(time_s):
             return ((time_s, value),)
         if time_s - marks[-1][0] < _MARK_S:
             return marks

@@ -1,4 +1,4 @@
-"""Whether a sensor beside positions tells what the car does: its turning, its way, its heading.
+"""Whether a sensor beside positions tells what the car does: turning, way, heading and pushing.
 
 The filter cannot tell: a gyro that is upside down or wheels in km/h lead it along, so that they
 surprise nobody. The courses of fixes know nothing of them, but are rough and may come late, so that
@@ -10,6 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from foretwin.contracts.arrays import Array
 from foretwin.telemetry.estimator.chords import Chord
 from foretwin.telemetry.estimator.facing import FASTEST_REVERSE_MPS
 
@@ -34,6 +37,11 @@ _MOST_TIMES = 1.9
 setting out make 1.8 (Dresden, 14 February), slip and tight turns less."""
 _OFF_RAD = math.radians(45.0)
 """An antenna far ahead of the axle goes so far beside the heading in no but the tightest turn."""
+_LEAST_SWING_MPS, _SWING_DEVIATIONS, _LEAST_SPEEDS, _LONGEST_SWING_S = 1.5, 6.0, 6, 12.0
+"""So much, and so many times what they are good to, must speeds vary about a steady change, in a
+root mean square: that may be a bias or a grade. Over a longer time grades change, too. Chosen."""
+_FORCE_ASTRAY = 0.5
+"""Of the larger of two swings: half or twice as much, or late by a second. Chosen."""
 
 
 class Credibility:
@@ -176,3 +184,62 @@ class HeadingCredibility(Credibility):
             return
         self._lengths_m = ()
         self.weigh(fits)
+
+
+class _SpeedTold(NamedTuple):
+    """A speed, and the sum of what a sensor felt until then by each lateness (m/s)."""
+
+    time_s: float
+    speed_mps: float
+    std_mps: float
+    felt_mps: tuple[float, ...]
+
+
+class ForceCredibility(Credibility):
+    """Of a sensor that tells how hard the car is pushed ahead or held back."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._speeds: tuple[_SpeedTold, ...] = ()
+
+    def part(self) -> None:
+        """Take that nobody knows what was between the speeds so far and the next."""
+        self._speeds = ()
+
+    def take(
+        self, time_s: float, speed_mps: float, felt_mps: tuple[float, ...] | None, *, std_mps: float
+    ) -> None:
+        """Compare a speed good to `std_mps`, negative in reverse, with the sum felt until then by
+        each lateness, None if unknown; it says something once all of them are known."""
+        if felt_mps is None or len(felt_mps) < len(LATE_S):
+            self.part()
+            return
+        since_s = time_s - _LONGEST_SWING_S
+        kept = (one for one in self._speeds if one.time_s >= since_s)
+        self._speeds = (*kept, _SpeedTold(time_s, speed_mps, std_mps, felt_mps))
+        if len(self._speeds) >= _LEAST_SPEEDS:
+            self._compare()
+
+    def _compare(self) -> None:
+        times_s = np.array([one.time_s for one in self._speeds])
+        speeds_mps = np.array([one.speed_mps for one in self._speeds])
+        swing, swing_mps = _about_a_steady_change(times_s, speeds_mps)
+        std_mps = max(one.std_mps for one in self._speeds)
+        if swing_mps < max(_LEAST_SWING_MPS, _SWING_DEVIATIONS * std_mps):
+            return
+        fits = []
+        for sums_mps in zip(*(one.felt_mps for one in self._speeds), strict=False):
+            felt, felt_mps = _about_a_steady_change(times_s, np.array(sums_mps))
+            off_mps = math.sqrt(float(np.mean((swing - felt) ** 2)))
+            fits.append(off_mps <= _FORCE_ASTRAY * max(swing_mps, felt_mps))
+        if fits[0] or not any(fits):
+            self._speeds = self._speeds[-1:]
+            self.weigh(fits)
+
+
+def _about_a_steady_change(times_s: Array, values: Array) -> tuple[Array, float]:
+    """Return how values (N,) differ from a straight line through them, and its mean root square."""
+    since_s = times_s - times_s.mean()
+    off = values - values.mean()
+    off = off - since_s * float(since_s @ off) / float(since_s @ since_s)
+    return off, math.sqrt(float(np.mean(off * off)))

@@ -85,12 +85,14 @@ class MotionCorrections:
             self._measured.disbelieve(*LEFT_OUT[channel])
         if not isinstance(message, ImuSample):
             return believed
+        if "forces" in self.trust.left_out and message.tells_force:
+            self._measured.disbelieve(*LEFT_OUT["forces"])
         moving = self._measured.fresh("speed_mps", stamp_ns)
         self._gyro.take(stamp_ns, message.rate_radps[2], standing=standing and moving)
         if believed and moving:
             rate = message.rate_radps[2] - self.gyro_bias_radps
             self.mounting.turn(stamp_ns, rate, self._measured.speed_mps)
-        return True  # its forces are
+        return True  # its forces are apart
 
     def stands(self, sample: SpeedSample, filter_: KinematicFilter | None) -> bool:
         """Whether the wheels say, believably, that the car stands; takes each of their samples."""
@@ -144,7 +146,7 @@ class MotionCorrections:
             case ImuSample(accel_mps2=accel, rate_radps=rate):
                 if "imu" not in self.trust.left_out:
                     self._correct_turning(filter_, rate[2])
-                if not message.tells_force:
+                if "forces" in self.trust.left_out or not message.tells_force:
                     return
                 expected = filter_.mean.item(ACCEL) + filter_.mean.item(ACCEL_BIAS)
                 filter_.correct_accel(accel[0], self._accel_doubt.std(abs(accel[0] - expected)))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 
 from foretwin.telemetry.estimator.chords import Chord
 from foretwin.telemetry.estimator.credibility import (
     Credibility,
+    ForceCredibility,
     HeadingCredibility,
     TurningCredibility,
     WayCredibility,
@@ -128,4 +130,59 @@ def test_out_of_a_parking_space_a_car_backs_for_some_metres() -> None:
         credibility.take(
             chord(number, length_m=5.0), (math.pi if number < 4 else 0.0,), backs=False
         )
+    assert credibility.holds
+
+
+def speed_mps(time_s: float) -> float:
+    """From a standstill up to 10 m/s in five seconds, on for five, and down again in five."""
+    return 2.0 * min(max(time_s, 0.0), 5.0) - 2.0 * min(max(time_s - 10.0, 0.0), 5.0)
+
+
+def pushed(felt_mps: Callable[[float], float], *, std_mps: float = 0.0, swing: float = 1.0) -> bool:
+    """Whether forces that sum up so are believed beside speeds that vary `swing` times as much."""
+    credibility = ForceCredibility()
+    for k in range(40):
+        time_s = 0.5 * k
+        late = tuple(felt_mps(time_s - late_s) for late_s in (0.0, 1.0, 2.0, 3.0))
+        credibility.take(time_s, swing * speed_mps(time_s), late, std_mps=std_mps)
+    return credibility.holds
+
+
+@pytest.mark.parametrize(
+    ("told", "felt_mps", "holds"),
+    [
+        ("truly", speed_mps, True),
+        ("with a bias, or up a hill", lambda time_s: speed_mps(time_s) - 1.5 * time_s, True),
+        ("a fifth too much", lambda time_s: 1.2 * speed_mps(time_s), True),
+        ("before positions that are late", lambda time_s: speed_mps(time_s + 2.0), True),
+        ("stuck", lambda _: 0.0, False),
+        ("in g", lambda time_s: speed_mps(time_s) / 9.8, False),
+        ("backwards", lambda time_s: -speed_mps(time_s), False),
+        ("late", lambda time_s: speed_mps(time_s - 2.0), False),
+    ],
+)
+def test_forces_sum_up_to_speeds(
+    told: str, felt_mps: Callable[[float], float], holds: bool
+) -> None:
+    assert pushed(felt_mps) == holds, told
+
+
+def test_speeds_that_hardly_vary_or_are_rough_say_nothing_of_forces() -> None:
+    assert pushed(lambda _: 0.0, swing=0.3)
+    assert pushed(lambda _: 0.0, std_mps=2.0)
+
+
+def test_what_was_felt_over_a_gap_is_not_known() -> None:
+    credibility = ForceCredibility()
+    for k in range(40):
+        if k % 5 == 0:
+            credibility.part()
+        credibility.take(0.5 * k, speed_mps(0.5 * k), 4 * (0.0,), std_mps=0.0)
+    assert credibility.holds
+
+
+def test_how_late_speeds_are_is_not_known_as_a_drive_begins() -> None:
+    credibility = ForceCredibility()
+    for k in range(40):
+        credibility.take(0.5 * k, speed_mps(0.5 * k), (0.0, 0.0), std_mps=0.0)
     assert credibility.holds

@@ -21,7 +21,7 @@ from tests.telemetry.winding_drive import (
     measured,
     truly,
 )
-from tests.telemetry.wrong_sensor_figures import CHANNEL, PRECISE, ROUGH, WRONG, errors
+from tests.telemetry.wrong_sensor_figures import CHANNEL, PRECISE, ROUGH, WRONG, errors, way_for
 
 NOISE = np.random.default_rng(7).normal(0.0, 1.0, (TICKS, 2))
 
@@ -37,11 +37,11 @@ NOISE = np.random.default_rng(7).normal(0.0, 1.0, (TICKS, 2))
 def test_a_wrong_sensor_does_not_lead_the_car(wrong: str, fixes: dict[str, Any]) -> None:
     name, told = WRONG[wrong]
     sensors = {"gyro": truly, "wheels": truly, "heading": truly} | {name: told}
-    estimator, states = driven(**sensors, **fixes)
+    estimator, states = driven(**sensors, **fixes, way=way_for(name))
     field, reason = LEFT_OUT[CHANNEL[name]]
     assert estimator.skipped[reason] > 0.8 * TICKS
     assert field in states[-1][1].estimated
-    speed_mps, yaw_rad = errors(states, from_s=30.0)
+    speed_mps, yaw_rad = errors(states, from_s=30.0, way=way_for(name))
     assert speed_mps < (1.7 if name == "wheels" else 0.2)
     assert yaw_rad < math.radians(10.0)
 
