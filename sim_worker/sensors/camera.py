@@ -69,18 +69,20 @@ class CameraWorld:
         """Return what is seen at the instant of `motion` and `bodies`."""
         with drawing():
             geoms = self._look(motion, bodies)
-            rgb, depth_m = self._drawn_now()
+            rgb = self._drawn_now()
             flags = self._scene.flags
             flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
-            numbers, _ = self._read()
+            # Segments are drawn without smooth edges: of the colours, a pixel at an edge has the
+            # depth of whatever lies anywhere in it.
+            numbers, far = self._read()
             flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 0
-        return CameraView(self.sensor, rgb, depth_m, self._bodies(numbers, geoms))
+        return CameraView(self.sensor, rgb, _depths_m(far), self._bodies(numbers, geoms))
 
     def picture(self, motion: BaseMotion, bodies: MovingBoxes) -> Picture:
         """Return the colours alone (H, W, 3): half the work."""
         with drawing():
             self._look(motion, bodies)
-            return self._drawn_now()[0]
+            return self._drawn_now()
 
     def _standing(self) -> mujoco.MjSpec:
         spec = mujoco.MjSpec() if self._world is None else world_spec(self._world)
@@ -120,13 +122,11 @@ class CameraWorld:
             eye.frustum_bottom = -eye.frustum_top
         return geoms
 
-    def _drawn_now(self) -> tuple[Picture, Array32]:
-        """Return the picture and the distances along the view, infinite where the sky is."""
+    def _drawn_now(self) -> Picture:
+        """Return the picture, with a sky."""
         rgb, far = self._read()
-        depth_m = _NEAR_M * _FAR_M / (_FAR_M - far * np.float32(_FAR_M - _NEAR_M))
-        sky = depth_m >= 0.999 * _FAR_M
-        rgb[sky], depth_m[sky] = _SKY, np.inf
-        return rgb, depth_m
+        rgb[np.isinf(_depths_m(far))] = _SKY
+        return rgb
 
     def _read(self) -> tuple[Picture, Array32]:
         shape = self._camera.height_px, self._camera.width_px
@@ -143,6 +143,13 @@ class CameraWorld:
             within = geoms.start <= one.objid < geoms.stop
             whose[one.segid] = one.objid - geoms.start if within else -1
         return np.asarray(whose[np.where(found < self._scene.ngeom, found, -1)])
+
+
+def _depths_m(far: Array32) -> Array32:
+    """Return the distances along the view, infinite where the sky is."""
+    depth_m = _NEAR_M * _FAR_M / (_FAR_M - far * np.float32(_FAR_M - _NEAR_M))
+    depth_m[depth_m >= 0.999 * _FAR_M] = np.inf
+    return depth_m
 
 
 def message_of(rgb: Picture, sensor: SensorFile, *, stamp_ns: int) -> CameraImage:

@@ -103,6 +103,25 @@ def test_behind_a_wall_it_is_hidden_and_before_it_not() -> None:
     assert hidden.rgb[100, 160, 0] - hidden.rgb[100, 160, 1].astype(int) < 40
 
 
+def test_a_pixel_at_an_edge_is_as_far_away_as_the_body_that_it_shows() -> None:
+    """A turned box before the sky, whose near edge is 10 m off and whose far ones are 14 m off."""
+    post = bodies((12.0, 0.0, 0.785, 2.83, 2.83, 3.0, 0.0))
+    drawn = CameraWorld(None, camera(Mount(forward_m=0.0, up_m=1.5, roll_deg=7.0)))
+    try:
+        view = drawn.view(HERE, post)
+    finally:
+        drawn.close()
+
+    assert (np.isinf(view.depth_m) == (view.body == -2)).all()
+    assert (view.depth_m[view.body == 0] < 14.01).all()
+    rows, columns = np.nonzero(view.body == 0)
+    focal_px = camera().measures(Camera).focal_px
+    aside, up = (columns + 0.5 - 160.0) / focal_px, (rows + 0.5 - 100.0) / focal_px
+    # Of a place at depth d seen from 1.5 m up and 7 degrees askew: its y, and the side it lies on.
+    turned = np.abs(np.cos(np.radians(7.0)) * aside - np.sin(np.radians(7.0)) * up)
+    assert view.depth_m[rows, columns] == pytest.approx(10.0 / (1.0 - turned), abs=0.01)
+
+
 def test_depths_are_along_the_view_and_nothing_is_far() -> None:
     view = seen(bodies((12.0, 0.0, 0.0, 2.0, 6.0, 2.0, 0.0)), house=40.0)
 
