@@ -30,6 +30,8 @@ class _Codes(NamedTuple):
     on: int
 
 
+_SOURCE = "SIMULATION"
+"""PredictedTrafficLightState.information_source, one of the words that it names."""
 _ELEMENT = _Codes("autoware_perception_msgs/msg/TrafficLightElement", 1, 1, 2)
 _LIGHT = _Codes("autoware_auto_perception_msgs/msg/TrafficLight", 5, 15, 16)
 
@@ -104,6 +106,6 @@ def _predictions(light: ShownLight, stamp_ns: int) -> list[Any]:
             predicted_stamp=parts.time_from(at_ns),
             simultaneous_elements=_lamps(light.next_colour, _ELEMENT),
             reliability=1.0,
-            information_source="foretwin",
+            information_source=_SOURCE,
         )
     ]

@@ -41,6 +41,7 @@ def test_the_next_colour_is_a_prediction_where_it_is_known() -> None:
     (prediction,) = group.predictions
     assert stamp_ns_of(prediction.predicted_stamp) == 7_500_000_000
     assert [one.color for one in prediction.simultaneous_elements] == [2]
+    assert prediction.information_source == "SIMULATION"  # a word of the message's own list
 
 
 def test_what_is_unknown_or_has_no_number_is_not_told() -> None:
