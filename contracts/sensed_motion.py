@@ -6,8 +6,10 @@ from foretwin.contracts.drive import GnssFix, ImuSample
 
 
 class SensedFix(GnssFix, frozen=True, kw_only=True):
-    """A position that a virtual receiver measures."""
+    """A position that a virtual receiver measures; `std_m` is of its whole error."""
 
+    up_std_m: float = 0.0
+    """One standard deviation of its height."""
     sensor: str = ""
 
 

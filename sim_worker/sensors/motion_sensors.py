@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,6 +30,7 @@ class MotionSensor:
 
     def __init__(self, sensor: SensorFile, *, seed: int | Sequence[int] = 0) -> None:
         self.sensor = sensor
+        self._begun_ns: int | None = None
         streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(5))
         self._up, *rest = streams
         kind = sensor.kind if isinstance(sensor.kind, Gnss) else sensor.measures(Imu)
@@ -61,9 +63,16 @@ class MotionSensor:
         at_m = sensor_motion(motion, self.sensor.mount).at_m
         lat_deg, lon_deg = geo_from_local(frame, at_m[:2] + self._errors[0].at(stamp_ns)).tolist()
         up_m = float(at_m[2] + self._up.normal(0.0, gnss.up_std_m))
-        position = GeoPoint(lat_deg, lon_deg, state.position.alt_m + up_m)
+        if self._begun_ns is None:
+            self._begun_ns = stamp_ns
+        walked_s = max(stamp_ns - self._begun_ns, 0) * 1e-9
+        walk_m = gnss.drift.walk_per_sqrt_s * math.sqrt(walked_s)
         return SensedFix(
-            stamp_ns=stamp_ns, position=position, std_m=gnss.std_m, sensor=self.sensor.name
+            stamp_ns=stamp_ns,
+            position=GeoPoint(lat_deg, lon_deg, state.position.alt_m + up_m),
+            std_m=math.hypot(gnss.std_m, gnss.drift.std, walk_m),
+            up_std_m=gnss.up_std_m,
+            sensor=self.sensor.name,
         )
 
     def _inertial(self, imu: Imu, state: VehicleState, stamp_ns: int) -> SensedImu:

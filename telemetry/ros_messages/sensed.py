@@ -11,7 +11,9 @@ from foretwin.telemetry.ros_messages.sensors import ros_from_gnss, ros_from_imu
 
 def sensed_fix_from(message: SensedFix, frame: LocalFrame | None = None) -> Any:
     """Return the NavSatFix of a virtual receiver."""
-    return _of(message, ros_from_gnss(message, frame))
+    ros = ros_from_gnss(message, frame)
+    ros.position_covariance[8] = message.up_std_m**2
+    return _of(message, ros)
 
 
 def sensed_imu_from(message: SensedImu, frame: LocalFrame | None = None) -> Any:

@@ -76,6 +76,23 @@ def test_a_receivers_error_is_white_and_wanders() -> None:
     assert np.std(heights) == pytest.approx(0.7, rel=0.08)
 
 
+def test_a_receiver_tells_how_large_its_whole_error_is() -> None:
+    """What is spread over many of them, white, wandering and walking, as each of them says."""
+    drift = Drift(std=1.2, time_s=100.0, walk_per_sqrt_s=0.4)
+    errs = gnss(std_m=0.3, up_std_m=0.7, drift=drift)
+    state, antenna = state_at(0.0, 0.0, speed=0.0), np.array([1.4, 0.0])
+    for stamp_ns in (0, 9 * 10**9):
+        off = []
+        for seed in range(800):
+            one = MotionSensor(errs, seed=seed)
+            one.sample(replace(state, stamp_ns=0))
+            fix = one.sample(replace(state, stamp_ns=stamp_ns))
+            off.append(place(fix) - antenna)
+        assert isinstance(fix, SensedFix)
+        assert fix.std_m == pytest.approx(np.std(off), rel=0.06)
+        assert fix.up_std_m == 0.7
+
+
 def test_an_imu_feels_gravity_speeding_up_and_bends_where_it_sits() -> None:
     """In a bend of yaw rate w at v: v w across at the rear axle, w² r towards it beside."""
     still = inertial(imu(), speed_mps=0.0)
