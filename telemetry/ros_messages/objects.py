@@ -89,18 +89,24 @@ def _users(ros: Any, boxes: Iterable[_Box], frame: LocalFrame, stamp_ns: int) ->
 
 
 def _user(box: _Box, one: Any, frame: LocalFrame) -> drive.RoadUser:
-    place = box.pose.position
-    alt_m = frame.origin.alt_m + place.z - 0.5 * one.shape.dimensions.z
-    at = frames.geo_pose(frame, place.x, place.y, parts.yaw_of(box.pose.orientation), alt_m=alt_m)
-    length_m, width_m = shapes.size_m(one.shape)
+    place, yaw_rad = box.pose.position, parts.yaw_of(box.pose.orientation)
+    outline = shapes.outline_of(one.shape)
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    at = frames.geo_pose(
+        frame,
+        place.x + cos * outline.ahead_m - sin * outline.left_m,
+        place.y + sin * outline.ahead_m + cos * outline.left_m,
+        yaw_rad,
+        alt_m=frame.origin.alt_m + place.z - 0.5 * one.shape.dimensions.z,
+    )
     return drive.RoadUser(
         user_id=box.user_id,
         kind=shapes.kind_of(one.classification),
         position=at.position,
         yaw_rad=at.yaw_rad,
         speed_mps=float(box.twist.linear.x),
-        length_m=length_m,
-        width_m=width_m,
+        length_m=outline.length_m,
+        width_m=outline.width_m,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,14 +51,23 @@ def _label(classes: Any) -> int:
     return int(max(classes, key=lambda one: one.probability).label) if len(classes) else 0
 
 
-def size_m(shape: Any) -> tuple[float, float]:
-    """Return length and width of a Shape in metres."""
+class Outline(NamedTuple):
+    """A box in an object's own axes: its size, and where its middle is from the object's pose."""
+
+    length_m: float
+    width_m: float
+    ahead_m: float = 0.0
+    left_m: float = 0.0
+
+
+def outline_of(shape: Any) -> Outline:
+    """Return the box of a Shape; of a polygon that around it, which need not lie about the pose."""
     if shape.type == _POLYGON and len(shape.footprint.points):
         corners = np.array([(p.x, p.y) for p in shape.footprint.points], dtype=np.float64)
-        extent = np.ptp(corners, axis=0)
-        return float(extent[0]), float(extent[1])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        return Outline(*(high - low).tolist(), *((low + high) / 2.0).tolist())
     width = shape.dimensions.x if shape.type == _CYLINDER else shape.dimensions.y
-    return float(shape.dimensions.x), float(width)
+    return Outline(float(shape.dimensions.x), float(width))
 
 
 def height_m(user: drive.RoadUser) -> float:

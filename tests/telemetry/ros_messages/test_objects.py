@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts import drive
-from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.telemetry.ros_messages.commands import control_from_command
 from foretwin.telemetry.ros_messages.foreign import (
     ACCELERATION_UNDEFINED,
@@ -30,6 +30,7 @@ from foretwin.telemetry.ros_messages.parts import (
     DETECTED_OBJECTS,
     PREDICTED_OBJECTS,
     TRAFFIC_LIGHTS,
+    ros_type,
     typestore,
 )
 from foretwin.telemetry.ros_messages.status import signals_from_ros
@@ -115,6 +116,24 @@ def test_a_predicted_object_goes_straight_on_and_keeps_its_identity() -> None:
     assert [round(pose.position.y, 6) for pose in path.path[:5]] == [0.0, 2.5, 5.0, 7.5, 10.0]
     assert (len(path.path), round(path.path[-1].position.y, 6)) == (17, 40.0)
     assert (path.time_step.sec, path.time_step.nanosec) == (0, 500_000_000)
+
+
+def test_of_a_polygon_the_box_around_it_is_meant_wherever_its_pose_lies() -> None:
+    """Perception puts the pose of a hull at the mean of its corners, of which one end has more."""
+    message = through_cdr(predicted_from_users(one_car(), FRAME), PREDICTED_OBJECTS)
+    shape = message.objects[0].shape
+    shape.type = 2
+    point = ros_type("geometry_msgs/msg/Point32")
+    shape.footprint.points = [
+        point(x, y, 0.0) for x, y in ((-0.5, -1.0), (3.5, -1.0), (3.5, 0.5), (-0.5, 0.5))
+    ]
+    (found,) = users_from_predicted(
+        through_cdr(message, PREDICTED_OBJECTS), FRAME, stamp_ns=AT
+    ).users
+    # It points to the north: 1.5 m ahead is north, 0.25 m to the right east.
+    there = local_from_geo(FRAME, found.position.lat_deg, found.position.lon_deg)
+    assert there == pytest.approx([0.25, 1.5], abs=1e-6)
+    assert (found.length_m, found.width_m) == (4.0, 1.5)
 
 
 def test_objects_in_the_axes_of_the_car_are_refused() -> None:
