@@ -100,14 +100,14 @@ class Outwards:
 
     def objects(self, message: drive.RoadUsers, kind: str) -> bytes:
         """Return DetectedObjects, TrackedObjects or PredictedObjects."""
-        convert = FROM_USERS[kind]
-        ros = convert(self.on_lot(message), self._map or self._car_frame, CERTAIN)
+        frame = self._map or self._car_frame
+        ros = FROM_USERS[kind](self._users(message, frame), frame, CERTAIN)
         return _cdr(self._framed(ros), kind)
 
     def merged(self, one: MergedList, kind: str) -> bytes:
         """Return the car's own list, of the type `kind`, with what is added to it."""
         assert self._map is not None  # the mapping asks for it
-        ours = FROM_USERS[kind](self.on_lot(one.virtual), self._map, one.spread)
+        ours = FROM_USERS[kind](self._users(one.virtual, self._map), self._map, one.spread)
         return _cdr(joined(one.real.ros, ours, without=one.without), kind)
 
     def rows_of(self, one: PointCloud | RadarList) -> list[OutRow]:
@@ -161,10 +161,25 @@ class Outwards:
         convert = control_from_command if kind == parts.CONTROL else ackermann_from_command
         return _cdr(convert(command, speed_mps=message.speed_mps), kind)
 
+    def _users(self, message: drive.RoadUsers, frame: LocalFrame) -> drive.RoadUsers:
+        """Return where the car is who is there, on the ground of `frame` whose altitude is not
+        known."""
+        ground_m = frame.origin.alt_m
+        users = tuple(
+            one if said.position.alt_m else _at_altitude(one, ground_m)
+            for said, one in zip(message.users, self.on_lot(message).users, strict=True)
+        )
+        return msgspec.structs.replace(message, users=users)
+
     def _framed(self, ros: Any) -> Any:
         if self._map is None:
             ros.header.frame_id = DRIVE_FRAME
         return ros
+
+
+def _at_altitude(user: drive.RoadUser, alt_m: float) -> drive.RoadUser:
+    position = msgspec.structs.replace(user.position, alt_m=alt_m)
+    return msgspec.structs.replace(user, position=position)
 
 
 def _cdr(ros: Any, kind: str) -> bytes:

@@ -38,7 +38,7 @@ class PlacedObject(
     lon_deg: float
     """Of its centre."""
     alt_m: float = 0.0
-    """Above the ellipsoid."""
+    """Above the ellipsoid; 0: on the ground of `map`."""
     yaw_deg: float = 0.0
     """Counter-clockwise from east."""
     speed_mps: float = 0.0

@@ -5,11 +5,20 @@ from __future__ import annotations
 import msgspec
 import pytest
 
+from foretwin.contracts.anchor import Anchor, AnchorPose
+from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros2.outwards import Outwards
-from foretwin.telemetry.ros_messages.parts import ACKERMANN, CONTROL, ODOMETRY, typestore
+from foretwin.telemetry.ros2.virtual_objects import PlacedObject
+from foretwin.telemetry.ros_messages.parts import (
+    ACKERMANN,
+    CONTROL,
+    ODOMETRY,
+    PREDICTED_OBJECTS,
+    typestore,
+)
 from tests.telemetry.ros2.gateway_ground import FRAME, STEERING_KEY, mapping_text, steering
 from tests.telemetry.ros2.test_gateway import Ground, S, state
 
@@ -99,6 +108,27 @@ def test_a_state_lies_in_the_map_where_the_mapping_places_it_else_in_the_drives_
     assert odometry.pose.pose.position.y == pytest.approx(north_m, abs=0.1)
     clock = typestore().deserialize_cdr(out.clock(5 * S + 7), "rosgraph_msgs/msg/Clock")
     assert (clock.clock.sec, clock.clock.nanosec) == (5, 7)
+
+
+@pytest.mark.parametrize(("alt_m", "z_m"), [(0.0, 0.0), (75.5, 1.5)])
+@pytest.mark.parametrize("lot_alt_m", [None, 0.0, 74.0])
+def test_who_has_no_altitude_stands_on_the_ground_of_a_map_that_has_one(
+    alt_m: float, z_m: float, lot_alt_m: float | None
+) -> None:
+    """Virtual traffic and whoever is placed without `alt_m`; 0 is an altitude that is unknown."""
+    text = mapping_text(enabled=True).replace("lon_deg = 13.4", "lon_deg = 13.4\nalt_m = 74.0", 1)
+    anchor = None
+    if lot_alt_m is not None:
+        pose = AnchorPose(lat_deg=52.5, lon_deg=13.4, yaw_deg=0.0, alt_m=lot_alt_m)
+        anchor = Anchor(lot=pose, world=pose)
+    out = Outwards(
+        parse_mapping(text, name="m.toml"), drive_frame=FRAME, vehicle_id="ego", anchor=anchor
+    )
+    placed = PlacedObject(user_id="p", kind="pedestrian", lat_deg=52.5, lon_deg=13.4, alt_m=alt_m)
+    data = out.objects(RoadUsers(stamp_ns=5 * S, users=(placed.at(0.0),)), PREDICTED_OBJECTS)
+    (told,) = typestore().deserialize_cdr(data, PREDICTED_OBJECTS).objects
+    middle_m = told.kinematics.initial_pose_with_covariance.pose.position.z
+    assert middle_m == pytest.approx(z_m + told.shape.dimensions.z / 2.0)
 
 
 @pytest.mark.parametrize("kind", [CONTROL, ACKERMANN])
