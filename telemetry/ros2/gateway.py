@@ -278,7 +278,7 @@ class Gateway:
     def _measured(self, one: PointCloud | RadarList, row: OutRow) -> bytes:
         if row.towards_vehicle:
             within = self._virtual.at(one.stamp_ns, now_ns=self._mono_ns())
-            self.inwards.injected.note_measured(one.stamp_ns, self._out.on_lot(within))
+            self.inwards.injected.note_measured(one, self._out.on_lot(within))
         return self._out.measured(one, row)
 
     def _send_merged(self, real: drive.RoadUsers) -> None:

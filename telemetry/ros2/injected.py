@@ -10,6 +10,8 @@ from msgspec.structs import replace
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.point_cloud import PointCloud
+from foretwin.contracts.radar_list import RadarList
 from foretwin.telemetry.ros2.virtual_objects import moved
 from foretwin.telemetry.ros_messages.parts import DETECTED_OBJECTS
 from foretwin.telemetry.ros_messages.shapes import uuid_from
@@ -44,18 +46,21 @@ class Injected:
     def __init__(self) -> None:
         self._uuids: dict[str, str] = {}
         self._shown: dict[str, _Shown] = {}
-        self._clouds: dict[int, None] = {}
+        self._clouds: dict[tuple[str, int], None] = {}
 
-    def note_measured(self, sent_stamp_ns: int, within: RoadUsers) -> None:
+    def note_measured(self, sent: PointCloud | RadarList, within: RoadUsers) -> None:
         """Take a cloud or a radar's list that goes out, and who is in it."""
         self.note(within, how="measured")
-        self._clouds[sent_stamp_ns] = None
+        self._clouds[sent.sensor, sent.stamp_ns] = None
         if len(self._clouds) > _MOST_CLOUDS:
             del self._clouds[next(iter(self._clouds))]
 
-    def is_shown_cloud(self, stamp_ns: int) -> bool:
-        """Whether a cloud comes back: stacks keep the stamp, whatever they do with the points."""
-        return stamp_ns in self._clouds
+    def is_shown_cloud(self, cloud: PointCloud) -> bool:
+        """Whether a cloud comes back: stacks keep the stamp, whatever they do with the points.
+
+        Only one of the same sensor does: lidars of one car may all have the same stamps.
+        """
+        return (cloud.sensor, cloud.stamp_ns) in self._clouds
 
     def note(self, sent: RoadUsers, *, how: How = "named") -> None:
         """Take what goes out; who went out in several ways is looked for as in the vaguest."""

@@ -244,7 +244,7 @@ class Inwards:
         if (mount := self._mounts.get(row.sensor)) is None:
             raise UnusableError(f"no sensor {row.sensor!r} in the drive")
         cloud = cloud_of(ros, stamp_ns, sensor=row.sensor)
-        if self.injected.is_shown_cloud(cloud.stamp_ns):
+        if self.injected.is_shown_cloud(cloud):
             raise UnusableError("a cloud that we have sent")
         cloud = world_from_lot_message(self.anchor, cloud)
         self.counts[REAL_CLOUD] += 1

@@ -40,6 +40,11 @@ topic = "/foretwin/points"
 type = "sensor_msgs/msg/PointCloud2"
 source = "point_cloud"
 sensor = "top"
+[[out]]
+topic = "/lidar/users"
+type = "sensor_msgs/msg/PointCloud2"
+source = "point_cloud"
+sensor = "users_only"
 """
 MOUNT = Mount(forward_m=1.0, left_m=0.2, up_m=2.0, yaw_deg=90.0)
 POINTS = np.array([[6.0, 0.2, 2.0, 40.0, 3.0, 0.01], [1.0, 5.2, 1.0, 7.0, 9.0, 0.05]], np.float32)
@@ -133,6 +138,14 @@ def test_a_cloud_that_was_sent_does_not_come_back_as_real() -> None:
     assert ground.real.take() is None
     assert ground.gateway.inwards.unused["/lidar/raw: a cloud that we have sent"] == 1
     ground.hears(POINTS, stamp_ns=5 * S + 1)
+    assert ground.real.take() is not None
+
+
+def test_a_cloud_that_went_out_for_another_lidar_keeps_no_real_one_out() -> None:
+    """All sensors of a simulated car say one stamp."""
+    ground = Passing()
+    ground.told(stamp_ns=5 * S, sensor="users_only")
+    ground.hears(POINTS, stamp_ns=5 * S)
     assert ground.real.take() is not None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -12,6 +13,7 @@ from msgspec.structs import replace
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.point_cloud import PointCloud
 from foretwin.telemetry.ros2.injected import Injected
 from foretwin.telemetry.ros2.virtual_objects import moved
 from foretwin.telemetry.ros_messages import parts
@@ -89,6 +91,10 @@ def test_sizes_and_speeds_are_the_same_within_a_centimetre_and_a_tenth(
     assert is_left(2.0 * most - getattr(walker(), field))
 
 
+def cloud(stamp_ns: int, sensor: str = "top") -> PointCloud:
+    return PointCloud(stamp_ns=stamp_ns, points=np.zeros((0, 6), np.float32), sensor=sensor)
+
+
 @given(way_rad=st.floats(-math.pi, math.pi), away_m=st.floats(0.0, 1.5), after_s=st.floats(-3, 3))
 def test_places_are_the_same_within_half_a_metre_and_two_seconds(
     way_rad: float, away_m: float, after_s: float
@@ -115,7 +121,7 @@ def test_a_sensor_sees_it_within_half_a_metre_of_its_outline(
     assume(abs(abs(aside_m) - 1.5) > 1e-3)
     wide = walker(length_m=4.0, width_m=2.0, speed_mps=0.0, yaw_rad=yaw_rad)
     injected = Injected()
-    injected.note_measured(5 * S, RoadUsers(stamp_ns=5 * S, users=(wide,)))
+    injected.note_measured(cloud(5 * S), RoadUsers(stamp_ns=5 * S, users=(wide,)))
     aside = moved(replace(wide, yaw_rad=yaw_rad + math.pi / 2), aside_m)
     there = moved(replace(aside, yaw_rad=yaw_rad, user_id="7", width_m=1.1), ahead_m)
     is_it = abs(ahead_m) < 2.5 and abs(aside_m) < 1.5
@@ -158,8 +164,17 @@ def test_the_newest_thousands_are_remembered():
 def test_the_newest_clouds_are_remembered():
     injected = Injected()
     for stamp_ns in range(1, 101):
-        injected.note_measured(stamp_ns, RoadUsers(stamp_ns=stamp_ns, users=()))
-    assert [injected.is_shown_cloud(n) for n in (36, 37, 100, 101)] == [False, True, True, False]
+        injected.note_measured(cloud(stamp_ns), RoadUsers(stamp_ns=stamp_ns, users=()))
+    shown_ones = [injected.is_shown_cloud(cloud(n)) for n in (36, 37, 100, 101)]
+    assert shown_ones == [False, True, True, False]
+
+
+def test_a_cloud_of_another_lidar_with_the_same_stamp_was_not_sent():
+    """Lidars that one clock fires, as those of simulators all are, say the same stamps."""
+    injected = Injected()
+    injected.note_measured(cloud(5 * S, "left"), RoadUsers(stamp_ns=5 * S, users=()))
+    assert injected.is_shown_cloud(cloud(5 * S, "left"))
+    assert not injected.is_shown_cloud(cloud(5 * S, "right"))
 
 
 def test_one_that_is_shown_again_and_again_is_not_forgotten_for_new_ones():
