@@ -16,7 +16,7 @@ from foretwin.sim_worker.driver_model import DECIDE_EVERY_S
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.law_abiding import LawAbiding, Now
 from foretwin.sim_worker.road_users.paces import Paces, WayMade
-from foretwin.sim_worker.road_users.path_table import PathTable
+from foretwin.sim_worker.road_users.path_table import OnPaths, PathTable
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.road_users.right_of_way import PathRules
 
@@ -153,6 +153,21 @@ class Traffic:
         brakes_by = self.crowd.brakes_by_mps2[self._paced]
         clock_s = self._clock_s + now_s
         return self._paces.braked(self._motion, clock_s, self._brakes_at_s, brakes_by)
+
+    @property
+    def motion(self) -> tuple[Array, Array, Array]:
+        """Arc lengths, speeds and what was decided last of accelerations, each (S, R)."""
+        return self.arc_m, self.speed_mps, self._accel
+
+    def poses_at(self, arc_m: Array) -> Array:
+        """Return (…, R, T, 3) where road users of the one future would be at places (…, R, T) of
+        their paths."""
+        on = OnPaths._make(column[0][:, None] for column in self._on)
+        return self.table.poses(self.table.place(on, arc_m))
+
+    def brake(self, who: Flags, decel_mps2: Array) -> None:
+        """Let those (R,) brake so hard (R,) until they decide again."""
+        self._accel[:, who] = -decel_mps2[who]
 
     def brake_at_most(self, decel_mps2: Array) -> None:
         """Let nobody brake harder than so (R,) by what was decided last."""

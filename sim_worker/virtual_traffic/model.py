@@ -1,6 +1,7 @@
 """The traffic model as a going simulation: law-abiding drivers who flow along the lanes of Worlds.
 
-They follow, stop and give way as those of futures do (`road_users`), to each other and to the car.
+They follow, stop and give way as those of futures do (`road_users`), to each other and to the car;
+who would drive into somebody all the same brakes in time (`apart`).
 Who gets far away from the car goes, and another comes where the car cannot see it come.
 """
 
@@ -29,6 +30,7 @@ from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.seen import LaneSearch
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+from foretwin.sim_worker.virtual_traffic.apart import who_must_brake
 from foretwin.sim_worker.virtual_traffic.rider import Rider, RoadsInForce
 from foretwin.sim_worker.virtual_traffic.source import STEP_S, VirtualUser
 
@@ -124,17 +126,19 @@ class ModelTraffic:
         # Who sees a light change decides at once; so the first step after it is another one. The
         # reaction time of these drivers is for what moves: a red light that the real car is shown
         # must find nobody driving on who could still stop.
+        boxes = EgoBoxes(
+            np.array([[*middle.tolist(), yaw]]),
+            np.array([speed]),
+            0,
+            path.locate(middle[None]).arc_m,
+            *self._size_m,
+        )
+        grip_mps2 = self._grip_left()
         if self._steps % _EVERY == 0 or colours != self._colours:
             self._colours = dict(colours)
-            boxes = EgoBoxes(
-                np.array([[*middle.tolist(), yaw]]),
-                np.array([speed]),
-                0,
-                path.locate(middle[None]).arc_m,
-                *self._size_m,
-            )
             traffic.decide(boxes, self._rules.red(colours), watch_lights=True)
-            traffic.brake_at_most(self._grip_left())
+            traffic.brake_at_most(grip_mps2)
+        traffic.brake(who_must_brake(traffic, boxes, grip_mps2), grip_mps2)
         traffic.step(time_s=time_s - STEP_S, dt_s=STEP_S)
         self._steps += 1
         for rider in self._riders:
