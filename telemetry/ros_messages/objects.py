@@ -1,9 +1,10 @@
 """Road users as Autoware's DetectedObjects, TrackedObjects and PredictedObjects, and back.
 
 Poses are box centres in the frame `map`, which a LocalFrame places on Earth. Twists are in the
-object's own axes. A detected object has no identity: its id is its place in the message. Boxes have
-no height in ours: going out it is usual for the kind, coming in it is dropped. Anything that one
-may drive over or under is left out.
+object's own axes: who goes sideways there, of whom perception knows no heading, comes in as a box
+along its way. A detected object has no identity: its id is its place in the message. Boxes have no
+height in ours: going out it is usual for the kind, coming in it is dropped. Anything that one may
+drive over or under is left out.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ _HEADING_KNOWN = 2
 """orientation_availability of DetectedObjectKinematics and TrackedObjectKinematics: AVAILABLE."""
 _STANDS_MPS = 0.1
 """Slower than this a tracked object is told to stand; chosen."""
+_SIDEWAYS_MPS, _SIDEWAYS = 0.5, 0.3
+"""Who goes to its side faster than so, and than this share of its speed ahead, does not drive where
+it points; vehicles slip by less. Chosen."""
 _HORIZON_S, _STEP_S = 8.0, 0.5
 """Of predicted paths, as Autoware's own prediction has them."""
 
@@ -89,8 +93,13 @@ def _users(ros: Any, boxes: Iterable[_Box], frame: LocalFrame, stamp_ns: int) ->
 
 
 def _user(box: _Box, one: Any, frame: LocalFrame) -> drive.RoadUser:
-    place, yaw_rad = box.pose.position, parts.yaw_of(box.pose.orientation)
-    outline = shapes.outline_of(one.shape)
+    place, ahead_mps, left_mps = box.pose.position, box.twist.linear.x, box.twist.linear.y
+    speed_mps, turned_rad = float(ahead_mps), 0.0
+    if abs(left_mps) > max(_SIDEWAYS_MPS, _SIDEWAYS * abs(ahead_mps)):
+        # Which way it points is not known, but which way it goes: that is its yaw here.
+        speed_mps, turned_rad = math.hypot(ahead_mps, left_mps), math.atan2(left_mps, ahead_mps)
+    yaw_rad = parts.yaw_of(box.pose.orientation) + turned_rad
+    outline = shapes.outline_of(one.shape, turned_rad=turned_rad)
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     at = frames.geo_pose(
         frame,
@@ -104,7 +113,7 @@ def _user(box: _Box, one: Any, frame: LocalFrame) -> drive.RoadUser:
         kind=shapes.kind_of(one.classification),
         position=at.position,
         yaw_rad=at.yaw_rad,
-        speed_mps=float(box.twist.linear.x),
+        speed_mps=speed_mps,
         length_m=outline.length_m,
         width_m=outline.width_m,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import uuid
 from typing import Any, NamedTuple
 
@@ -52,7 +53,7 @@ def _label(classes: Any) -> int:
 
 
 class Outline(NamedTuple):
-    """A box in an object's own axes: its size, and where its middle is from the object's pose."""
+    """A box: its size, and where its middle is from the object's pose, ahead and to the left."""
 
     length_m: float
     width_m: float
@@ -60,14 +61,22 @@ class Outline(NamedTuple):
     left_m: float = 0.0
 
 
-def outline_of(shape: Any) -> Outline:
-    """Return the box of a Shape; of a polygon that around it, which need not lie about the pose."""
+def outline_of(shape: Any, *, turned_rad: float = 0.0) -> Outline:
+    """Return the box around a Shape, in axes that are turned from the object's own to the left.
+
+    Of a polygon it need not lie about the object's pose.
+    """
+    half_m = 0.5 * np.array([shape.dimensions.x, shape.dimensions.y])
+    if shape.type == _CYLINDER:
+        return Outline(float(shape.dimensions.x), float(shape.dimensions.x))
+    corners = half_m * [[1, 1], [1, -1], [-1, 1], [-1, -1]]
     if shape.type == _POLYGON and len(shape.footprint.points):
         corners = np.array([(p.x, p.y) for p in shape.footprint.points], dtype=np.float64)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        return Outline(*(high - low).tolist(), *((low + high) / 2.0).tolist())
-    width = shape.dimensions.x if shape.type == _CYLINDER else shape.dimensions.y
-    return Outline(float(shape.dimensions.x), float(width))
+    if turned_rad:
+        cos, sin = math.cos(turned_rad), math.sin(turned_rad)
+        corners = corners @ np.array([[cos, -sin], [sin, cos]])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return Outline(*(high - low).tolist(), *((low + high) / 2.0).tolist())
 
 
 def height_m(user: drive.RoadUser) -> float:

@@ -136,6 +136,29 @@ def test_of_a_polygon_the_box_around_it_is_meant_wherever_its_pose_lies() -> Non
     assert (found.length_m, found.width_m) == (4.0, 1.5)
 
 
+@pytest.mark.parametrize(
+    ("ahead_mps", "left_mps", "speed_mps", "yaw_rad", "size_m"),
+    [
+        (0.0, 5.0, 5.0, math.pi, (1.8, 4.5)),
+        (3.0, -4.0, 5.0, 0.5 * math.pi - math.atan2(4.0, 3.0), (4.14, 4.68)),
+        (5.0, 1.0, 5.0, 0.5 * math.pi, (4.5, 1.8)),  # slips, as vehicles do
+        (-5.0, 0.4, -5.0, 0.5 * math.pi, (4.5, 1.8)),
+        (0.0, 0.4, 0.0, 0.5 * math.pi, (4.5, 1.8)),  # noise of one that stands
+    ],
+)
+def test_who_goes_sideways_points_where_it_goes(
+    ahead_mps: float, left_mps: float, speed_mps: float, yaw_rad: float, size_m: tuple[float, ...]
+) -> None:
+    """Tracks of what has no heading keep the one that they began with: here north."""
+    message = through_cdr(predicted_from_users(one_car(), FRAME), PREDICTED_OBJECTS)
+    twist = message.objects[0].kinematics.initial_twist_with_covariance.twist
+    twist.linear.x, twist.linear.y = ahead_mps, left_mps
+    (found,) = users_from_predicted(message, FRAME, stamp_ns=AT).users
+    assert found.speed_mps == pytest.approx(speed_mps)
+    assert math.cos(found.yaw_rad - yaw_rad) == pytest.approx(1.0)
+    assert (found.length_m, found.width_m) == pytest.approx(size_m, abs=0.01)
+
+
 def test_objects_in_the_axes_of_the_car_are_refused() -> None:
     message = detected_from_users(one_car(), FRAME)
     message.header.frame_id = "base_link"
