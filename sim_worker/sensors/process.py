@@ -41,7 +41,7 @@ class SensorsProcess:
 
     def __init__(self, setup: SensorsSetup, bus: Bus, *, refusals: Refusals | None = None) -> None:
         self._bus, self._run_id = bus, setup.run_id
-        self._worlds_dir = Path(setup.worlds_dir)
+        self._worlds_dir, self._lossless = Path(setup.worlds_dir), setup.bus.lossless
         self._refusals = Refusals() if refusals is None else refusals
         sensors = [(sensor_of(one.text, one.name), one.sees) for one in setup.sensors]
         self._sensors = VirtualSensors(sensors, seed=setup.seed)
@@ -62,20 +62,26 @@ class SensorsProcess:
         """Take all that has come, or wait a moment for it, and measure what is due; never raises.
 
         Of turns that are over by now the newest is measured, the others are passed over. What has
-        come meanwhile is taken after each of them.
+        come meanwhile is taken after each of them. In lock step all are measured: states that come
+        meanwhile wait, and the drive with them.
         """
         self._take_all(0.0 if self._left else wait_s)
         for _ in self._names:  # then who calls may look at its clock
-            one = self._sensors.next_measured()
-            self._left = one is not None
-            if one is None:
+            self._left = self._tell()
+            if not self._left:
                 break
-            self._bus.publish(CHANNEL_OF[type(one)], one, run=self._run_id)
             self._take_all(0.0)
         for place in self._sensors.lost.keys() - self._told_lost:
             self._told_lost.add(place)
             name, why = self._names[place], self._sensors.lost[place]
             log.warning("sensor %s gives nothing any more, the others go on: %s", name, why)
+
+    def _tell(self) -> bool:
+        """Measure one thing that is due and say it; returns whether there was any."""
+        one = self._sensors.next_measured()
+        if one is not None:
+            self._bus.publish(CHANNEL_OF[type(one)], one, run=self._run_id)
+        return one is not None
 
     def _take_all(self, wait_s: float) -> None:
         item = self.mailbox.take(wait_s)
@@ -83,6 +89,8 @@ class SensorsProcess:
             self._handle(one)
         while item is not None:
             self._handle(item)
+            while self._lossless and self._tell():
+                pass
             item = self.mailbox.take()
 
     @property

@@ -96,6 +96,32 @@ def test_what_a_radar_lists_goes_out_on_a_channel_of_its_own(tmp_path: Path) -> 
     assert process.turns == {"short_range_radar": SensorTurns(told=1)}
 
 
+@pytest.mark.parametrize("lossless", [True, False])
+def test_in_lock_step_no_turn_is_passed_over_however_states_come(
+    tmp_path: Path, lossless: bool
+) -> None:
+    """Those of a round come at once, while who measures looks once in a while."""
+    bus, heard = MemoryBus(), Mailbox(64)
+    text, name = sensor_text("short_range_radar")
+    setup = replace(
+        setup_in(tmp_path),
+        sensors=(SensorSetup(text=text, name=name, sees="users"),),
+        bus=BusSetup(endpoint="tcp/x:1", lossless=lossless),
+    )
+    process = SensorsProcess(setup, bus)
+    bus.subscribe("radar_list", heard, **RUN)
+    for stamp_ms in range(0, 621, 20):
+        bus.publish("state", state_at(0.0, 0.0, speed=0.0, stamp_ns=stamp_ms * 1_000_000), **CAR)
+    process.step(0.0)
+    stamps_ms = [item.message().stamp_ns // 1_000_000 for item in iter(heard.take, None)]
+
+    assert stamps_ms == (list(range(0, 551, 50)) if lossless else [550])
+    passed_over = 0 if lossless else 11
+    assert process.turns["short_range_radar"] == SensorTurns(
+        told=len(stamps_ms), passed_over=passed_over
+    )
+
+
 class BrokenDriver:
     """A camera's, which draws one picture and no more."""
 
