@@ -185,6 +185,7 @@ class SumoTraffic:
         vehicles.setSpeed(_CAR, max(speed, 0.0))
         self._lights.show(colours)
         self._sumo.simulationStep()
+        self._leave_out_who_waits()
         self._steps += 1
         found = vehicles.getAllSubscriptionResults()
         there = {name: told for name, told in sorted(found.items()) if told[_PLACE][0] > _NOWHERE}
@@ -236,6 +237,13 @@ class SumoTraffic:
             )  # fmt: skip
             sumo.vehicle.subscribe(name, [_SPEED, _PLACE, _ANGLE, _INDEX, _TYPE, _ROAD])
             missing -= 1
+
+    def _leave_out_who_waits(self) -> None:
+        """Take back for whom there was no room: by the time there is, the car may be near."""
+        for name in self._sumo.simulation.getPendingVehicles():
+            if name != _CAR:
+                self._sumo.vehicle.unsubscribe(name)
+                self._sumo.vehicle.remove(name)
 
     def _lead_on(self) -> None:
         """Give those who are nearly there somewhere else to go: nobody vanishes on the road."""

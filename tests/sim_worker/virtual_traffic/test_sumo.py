@@ -50,6 +50,31 @@ def test_vehicles_drive_on_the_network_of_our_own_export(tmp_path: Path) -> None
 
 
 @pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
+def test_for_whom_there_was_no_room_comes_out_of_sight_later(tmp_path: Path) -> None:
+    """More than the roads have room for at once, and a car that drives on meanwhile."""
+    network = tmp_path / "a.xodr"
+    write_opendrive(town_world("n11"), network)
+    traffic = SumoTraffic(load_vehicle(), net_of(network, tmp_path), count=40, seed=0)
+
+    def car(time_s: float) -> tuple[float, float, float, float]:
+        return -100.0 + 8.0 * time_s, -1.5, 0.0, 8.0
+
+    try:
+        scenes = list(played(traffic, car, from_s=0.0, to_s=20.0))
+    finally:
+        traffic.close()
+    known = {user.user_id for user in scenes[0]}
+    came_m = []
+    for k, scene in enumerate(scenes):
+        x, y, *_ = car(k * 0.05)
+        new = [user for user in scene if user.user_id not in known]
+        came_m += [float(np.hypot(user.x_m - x, user.y_m - y)) for user in new]
+        known |= {user.user_id for user in new}
+    assert len(came_m) > 5
+    assert min(came_m) > 95.0
+
+
+@pytest.mark.skipif(not is_there(), reason="needs the extra sumo")
 def test_who_is_close_to_a_light_brakes_in_the_step_in_which_it_turns_red(tmp_path: Path) -> None:
     network = tmp_path / "a.xodr"
     write_opendrive(town_world("n44"), network)
