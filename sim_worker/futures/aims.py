@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import SPEED_AHEAD_STEP_S, Job
@@ -28,18 +29,29 @@ class Aims(NamedTuple):
     offset_m: Array
     speed_ahead_mps: Array | None = None
 
-    def at(self, time_s: float) -> tuple[Array, Array | None]:
+    def at(self, time_s: float | npt.NDArray[np.floating]) -> tuple[Array, Array | None]:
         """Return the speeds (S,) aimed at, and the accelerations (S,) with which these change,
-        None where they stay."""
+        None where they stay. `time_s` is one, or (S,) of futures that began at different times."""
         ahead = self.speed_ahead_mps
         if ahead is None:
             return self.target_speed_mps, None
+        if isinstance(time_s, np.ndarray):
+            return _by_row(ahead, time_s)
         place = time_s / SPEED_AHEAD_STEP_S
         node = int(place + 1e-9)  # ticks come a hair before their instants
         if node >= len(ahead) - 1:
             return ahead[-1], None
         rise = ahead[node + 1] - ahead[node]
         return ahead[node] + (place - node) * rise, rise / SPEED_AHEAD_STEP_S
+
+
+def _by_row(ahead_mps: Array, time_s: npt.NDArray[np.floating]) -> tuple[Array, Array]:
+    """Return what `Aims.at` does for each of S futures at a time of its own."""
+    place = time_s / SPEED_AHEAD_STEP_S
+    node = np.minimum((place + 1e-9).astype(np.intp), len(ahead_mps) - 1)
+    after, rows = np.minimum(node + 1, len(ahead_mps) - 1), np.arange(len(time_s))
+    rise = ahead_mps[after, rows] - ahead_mps[node, rows]
+    return ahead_mps[node, rows] + (place - node) * rise, rise / SPEED_AHEAD_STEP_S
 
 
 def aims_of(job: Job, present_offset_m: Array, numbers: NumberColumns) -> Aims:

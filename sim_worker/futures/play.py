@@ -130,7 +130,7 @@ class Play:
         heading: Array | None = None,
     ) -> PlannerView:
         scene = self.scene
-        (target, rising), stop, seen = scene.aims.at(time_s), None, None
+        (target, rising), stop, seen = scene.aims.at(tick * self.stage.control_dt_s), None, None
         if scene.sight is not None and scene.traffic is not None:
             eyes = now[:, :2]
             if scene.sight.needs_eyes:

@@ -123,6 +123,28 @@ def test_faults_of_a_future_act_in_its_row_alone() -> None:
     assert min(by_case[1]) > max(by_case[0]) + 1.0
 
 
+def test_cars_that_began_at_different_times_aim_at_the_speeds_ahead_of_their_own() -> None:
+    nodes = np.array([8.0, 9.0, 7.0, 6.0])
+    question = msgspec.structs.replace(
+        job((Future(index=0, name="nominal"),)), speed_ahead_mps=nodes
+    )
+    envs = JunctionVectorEnv(
+        2, crossroads(), job=question, control="along_path", autoreset_mode="Disabled"
+    )
+    aimed = envs.course.features.index("target_speed")
+
+    envs.reset(seed=1)
+    for _ in range(7):
+        envs.step(np.zeros((2, 1), np.float32))
+    told = [envs.reset(options={"reset_mask": np.array([False, True])})[0]]
+    told += [envs.step(np.zeros((2, 1), np.float32))[0] for _ in range(13)]
+
+    at_s, knots_s = 0.1 * np.arange(14), 0.5 * np.arange(4)
+    first, second = 20.0 * np.stack(told)[:, :, aimed].T
+    assert first == pytest.approx(np.interp(at_s + 0.7, knots_s, nodes), abs=1e-5)
+    assert second == pytest.approx(np.interp(at_s, knots_s, nodes), abs=1e-5)
+
+
 def test_a_row_among_law_abiding_road_users_is_an_environment_alone() -> None:
     seen = tuple(
         SeenRoadUser(
