@@ -20,7 +20,7 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 
 class Begun(NamedTuple):
-    """How one episode begins: the future of the job, and how much later by the lights' plans."""
+    """How one episode begins: which of the playable cases, and how much later by the lights' plans."""
 
     case: int
     lights_s: float
@@ -85,19 +85,20 @@ class Course:
 
     def draw(self, rng: np.random.Generator, case: int | None = None) -> Begun:
         """Draw how an episode begins; `case` chooses among the playable ones."""
-        playable = self.rows.playable
-        drawn = int(rng.integers(len(playable)))
+        count = len(self.rows.playable)
+        drawn = int(rng.integers(count))
         lights_s = float(rng.uniform(0.0, self.rows.light_cycle_s))
         if case is not None:
-            if not 0 <= case < len(playable):
-                raise UserError(f"there are {len(playable)} cases; there is no number {case}")
+            if not 0 <= case < count:
+                raise UserError(f"there are {count} cases; there is no number {case}")
             drawn = case
-        return Begun(int(playable[drawn]), lights_s)
+        return Begun(drawn, lights_s)
 
     def begin(self, rows: Indices, begun: Sequence[Begun], *, looked: bool = False) -> None:
         """Let some rows begin; see `EpisodeRows.begin`."""
         cases, lights_s = zip(*begun, strict=True)
-        self.rows.begin(rows, np.array(cases), np.array(lights_s), looked=looked)
+        futures = self.rows.playable[np.array(cases)]
+        self.rows.begin(rows, futures, np.array(lights_s), looked=looked)
 
     def look(self) -> Observation:
         """Return what all see now (S, D)."""

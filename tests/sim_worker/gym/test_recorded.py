@@ -145,6 +145,25 @@ def test_cars_that_began_at_different_times_aim_at_the_speeds_ahead_of_their_own
     assert second == pytest.approx(np.interp(at_s, knots_s, nodes), abs=1e-5)
 
 
+def test_the_case_that_is_told_begins_the_same_episode_again() -> None:
+    nowhere, fast = happening(0, "roundabout_entry"), {"brake_gain": 0.5}
+    futures = (nowhere, Future(index=1, name="nominal"), Future(index=2, name="weak", numbers=fast))
+    env = JunctionEnv(crossroads(), job=job(futures), control="along_path")
+    assert env.course.rows.playable.tolist() == [1, 2]
+    told = set()
+    for seed in range(8):
+        speeds = []
+        _, info = env.reset(seed=seed)
+        for options in (None, {"case": info["case"]}):
+            env.reset(seed=seed, options=options)
+            for _ in range(10):
+                env.step(-0.5 * np.ones(1, np.float32))
+            speeds.append(env.course.rows.stage.states[0, 3])
+        assert speeds[0] == speeds[1]
+        told.add(info["case"])
+    assert told == {0, 1}
+
+
 def test_a_row_among_law_abiding_road_users_is_an_environment_alone() -> None:
     seen = tuple(
         SeenRoadUser(
