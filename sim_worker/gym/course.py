@@ -64,12 +64,10 @@ class Course:
         if not isinstance(vehicle, VehicleParameters):
             vehicle = load_vehicle(vehicle)
         self._vehicle = vehicle
-        self._seen: Sighting | None = None
-        """None until episodes begin."""
         self._load(source)
 
     def _load(self, source: Source) -> None:
-        self.source = source
+        # What cannot be played leaves the source as it was, for the next options to change.
         self.rows = EpisodeRows(
             source.episodes(self._vehicle),
             self._vehicle,
@@ -77,6 +75,9 @@ class Course:
             control_hz=self.control_hz,
             threads=self._threads,
         )
+        self.source = source
+        self._seen: Sighting | None = None
+        """None until episodes begin."""
 
     def alter(self, options: Mapping[str, Any]) -> None:
         """Take episodes from elsewhere, if options say so; raises UserError where they cannot."""

@@ -251,6 +251,18 @@ def test_options_that_do_not_fit_say_so(options: dict[str, Any], says: str) -> N
         env.reset(options=options)
 
 
+def test_options_that_did_not_fit_are_forgotten() -> None:
+    env = JunctionEnv(ring(), cases=4)
+    for options in ({"scenario": "nothing"}, {"cases": 5, "case": 5}):
+        with pytest.raises(UserError):
+            env.reset(options=options)
+
+    with pytest.raises(UserError, match="reset comes before step"):
+        env.step(np.zeros(2, np.float32))
+    env.reset(options={"early_or_late_s": 1.0})
+    assert len(env.course.rows.playable) == 5
+
+
 def test_make_vec_makes_one_stage() -> None:
     envs = gymnasium.make_vec(ID, num_envs=3, world=ring(), cases=4)
 
