@@ -30,19 +30,18 @@ class CarTrack(NamedTuple):
         )
 
 
-def driven_track(states: Sequence[VehicleState], *, start_stamp_ns: int | None) -> CarTrack | None:
+def driven_track(states: Sequence[VehicleState], *, start_stamp_ns: int) -> CarTrack | None:
     """Return the track of recorded states; None where there are none.
 
-    Drive time begins at `start_stamp_ns`, or with the first state.
+    Drive time begins at `start_stamp_ns`.
     """
     if len(states) < 2:
         return None
     stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)
     order = np.argsort(stamps, kind="stable")
-    start_ns = int(stamps[order[0]]) if start_stamp_ns is None else start_stamp_ns
     return CarTrack(
         stamps[order],
         np.array([(s.position.lat_deg, s.position.lon_deg) for s in states])[order],
         np.array([s.speed_mps for s in states])[order],
-        (stamps[order] - start_ns) / 1e9,
+        (stamps[order] - start_stamp_ns) / 1e9,
     )

@@ -156,14 +156,18 @@ class RunMaterial:
             said.append(f"the recording of the car, {DRIVE_FILE}, cannot be read")
         return tuple(said)
 
-    @property
+    @cached_property
     def start_stamp_ns(self) -> int:
-        """Return the stamp at which drive time begins, as the rounds tell it; else 0."""
+        """Return the stamp at which drive time begins, as the rounds tell it, else as the first
+        recorded state does; 0 without either."""
         if self.rounds:
             first = self.rounds[0]
             start_ns: int = first["stamp_ns"] - round(first["drive_time_s"] * 1e9)
             return start_ns
-        return 0
+        if not self.recorded.states:
+            return 0
+        began_s = part_of(self.record, "config", "start_s") or 0.0
+        return min(state.stamp_ns for state in self.recorded.states) - round(began_s * 1e9)
 
     def world(self, world_id: str | None) -> World | None:
         """Return a World of the run, None where its file is gone or of another foretwin."""
@@ -181,7 +185,7 @@ class RunMaterial:
     @cached_property
     def track(self) -> CarTrack | None:
         """Return where the car was as it was estimated then, None where nothing is recorded."""
-        return driven_track(self.recorded.states, start_stamp_ns=self.start_stamp_ns or None)
+        return driven_track(self.recorded.states, start_stamp_ns=self.start_stamp_ns)
 
     @property
     def attribution(self) -> str:
