@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -120,19 +121,21 @@ def _named_in(run: RunMaterial, rounds: Sequence[TableRow]) -> Mapping[str, Any]
 def _by_passage(
     rounds: Iterable[TableRow], reached: Sequence[Mapping[str, Any]]
 ) -> dict[tuple[str, int | None], list[TableRow]]:
-    """Return rounds by junction and passage: of several, the first that the car came to after."""
+    """Return rounds by junction and passage: the next one, and rounds that go on while the car is
+    about to leave a junction those of the passage that they began for."""
     arrivals: dict[str, list[tuple[float, int]]] = defaultdict(list)
     for place, one in enumerate(reached):
         arrivals[one["id"]].append((one.get("arrived_at_s") or 0.0, place))
     found: dict[tuple[str, int | None], list[TableRow]] = defaultdict(list)
-    for row in rounds:
-        junction_id = row["intersection_id"]
-        after = [place for at_s, place in arrivals[junction_id] if at_s >= row["drive_time_s"]]
-        found[junction_id, after[0] if after else None].append(row)
-    # Rounds of a junction behind the car belong to its last passage.
-    for junction_id, told in arrivals.items():
-        if told and (late := found.pop((junction_id, None), None)):
-            found[junction_id, told[-1][1]] += late
+    for junction_id, on_end in itertools.groupby(rounds, key=lambda row: row["intersection_id"]):
+        block, told = list(on_end), arrivals[junction_id]
+        first_s, last_s = block[0]["drive_time_s"], block[-1]["drive_time_s"]
+        during = [one for one in told if first_s <= one[0] <= last_s]
+        meant = during or [one for one in told if one[0] > last_s][:1] or told[-1:]
+        for row in block:
+            after = [place for at_s, place in meant if at_s >= row["drive_time_s"]]
+            which = after[0] if after else meant[-1][1] if meant else None
+            found[junction_id, which].append(row)
     return found
 
 

@@ -37,6 +37,28 @@ def test_rounds_go_to_the_first_passage_after_them(tmp_path: Path) -> None:
     assert (len(first.rounds), len(second.rounds)) == (0, 1)
 
 
+def test_rounds_that_go_on_behind_a_junction_are_of_the_passage_just_made(tmp_path: Path) -> None:
+    run = RunMaterial(told_run(tmp_path))
+    place = run.record["intersections"][0]
+    run.record["intersections"] = [place | {"arrived_at_s": at_s} for at_s in (15.0, 59.0, 80.0)]
+    seconds = {"here": (10.0, 14.5, 16.0), "else": (17.0, 30.0), "again": (38.0, 58.0, 70.0, 81.0)}
+    run.rounds = [
+        run.rounds[0] | {"drive_time_s": at_s, "intersection_id": where}
+        for name, times in seconds.items()
+        for at_s in times
+        for where in ["elsewhere" if name == "else" else place["id"]]
+    ]
+
+    first, second, third, elsewhere = (
+        [row["drive_time_s"] for row in one.rounds] for one in passages(run)
+    )
+
+    assert first == [10.0, 14.5, 16.0]
+    assert second == [38.0, 58.0]
+    assert third == [70.0, 81.0]
+    assert elsewhere == [17.0, 30.0]
+
+
 def test_a_junction_that_was_not_reached_comes_last(tmp_path: Path) -> None:
     run = RunMaterial(told_run(tmp_path))
     run.record["intersections"] = []
