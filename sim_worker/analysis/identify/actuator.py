@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.regression import (
     Fit,
@@ -66,6 +66,14 @@ def delays() -> Array:
     return np.asarray(np.arange(round(MAX_DELAY_S / _GRID_S) + 1) * _GRID_S, dtype=np.float64)
 
 
+def known_back(values: Array, *, period_s: float) -> Flags:
+    """Return where (N,) is known, and has been for all the dead times that are searched."""
+    back = round(MAX_DELAY_S / period_s) + 1
+    unknown = np.concatenate([np.ones(back, dtype=bool), ~np.isfinite(values)])
+    counted = np.concatenate([[0], np.cumsum(unknown)])
+    return np.asarray(counted[back + 1 :] == counted[: -back - 1])
+
+
 def _blur_s(values: Array, *, period_s: float) -> float:
     """Return by how much lines drawn between samples blur a signal, as a standard deviation.
 
@@ -104,8 +112,7 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     free = np.isfinite(angle) & np.isfinite(rate) & driving & ~record.manual
     free &= np.abs(rate) < _RATE_SHARE * fastest
     free[: round((MAX_DELAY_S + 0.2) / period_s)] = False
-    for delay_s in delays()[[0, -1]]:
-        free &= np.isfinite(delayed(asked, period_s=period_s, delay_s=delay_s))
+    free &= known_back(asking, period_s=period_s)
     used = np.flatnonzero(free)
     moving_s = float(np.sum(np.abs(asking[used]) > 0.1 * fastest / 4.0) * period_s)
     if len(used) < 100:

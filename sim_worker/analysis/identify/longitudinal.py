@@ -16,7 +16,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.actuator import best_delay, delays
+from foretwin.sim_worker.analysis.identify.actuator import MAX_DELAY_S, best_delay, known_back
 from foretwin.sim_worker.analysis.identify.regression import (
     Fit,
     delayed,
@@ -111,8 +111,8 @@ def fit_longitudinal(
     usable &= np.isfinite(bends)
     # The smoothing must not reach into standstill, where brakes hold rather than slow.
     usable &= speed > SLOWEST_MPS
-    reach = delayed(parts[0] + parts[1], period_s=period_s, delay_s=float(delays()[-1]))
-    usable &= np.isfinite(reach) & np.isfinite(parts[0])
+    slopes = [np.gradient(part, period_s) for part in parts]
+    usable &= known_back(slopes[0] + slopes[1], period_s=period_s)
     used = np.flatnonzero(usable)
     if len(used) < 100:
         raise ValueError("the car did not drive by command")
@@ -124,7 +124,6 @@ def fit_longitudinal(
     effective = vehicle.wheel_inertia_mass_factor.value
     target = effective * accel[used] + bends[used] + GRAVITY_MPS2 * climbing[used]
     v = speed[used]
-    slopes = [np.gradient(part, period_s) for part in parts]
     slow_s = _spinning_s(vehicle, v)
 
     def acting(delay_s: float) -> Array:
@@ -156,7 +155,7 @@ def fit_longitudinal(
             columns, target, record.time_s[used], prior=centre, prior_std=spread, brief=True
         )
         gains = fit.values[:2]
-        delay_s = max(delay_s + float(fit.values[DELAY]), 0.0)
+        delay_s = float(np.clip(delay_s + fit.values[DELAY], 0.0, MAX_DELAY_S))
     assert fit is not None
     values = fit.values.copy()
     values[DELAY] = delay_s

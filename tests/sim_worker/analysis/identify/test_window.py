@@ -78,6 +78,22 @@ def test_intervals_hold_a_good_part_of_how_the_two_wheels_are_steered() -> None:
         assert 0.55 * moved < one.half_widths[index] < 1.2 * moved
 
 
+def test_a_stretch_that_begins_in_motion_or_with_gaps_tells_as_much() -> None:
+    whole = city_minute()
+    moving = np.flatnonzero(whole.speed_mps > 5.0)[0]
+    in_motion = MotionRecord._make(column[moving:] for column in whole)
+    silent = (np.arange(len(whole.time_s)) % 1500) // 30 == 40
+    with_gaps = whole._replace(
+        command_accel_mps2=np.where(silent, np.nan, whole.command_accel_mps2),
+        command_wheel_rad=np.where(silent, np.nan, whole.command_wheel_rad),
+    )
+    for record in (in_motion, with_gaps):
+        told = identify(record, load_vehicle(), vehicle_id="standin")
+        for name in ("steering_delay_s", "drive_gain", "brake_gain", "accel_delay_s"):
+            found, best = estimate(told, name), estimate(city(), name)
+            assert found.value == pytest.approx(best.value, rel=0.1), name
+
+
 def test_the_wheelbase_is_not_told_without_a_tyre_angle() -> None:
     found = estimate(city(), "wheelbase_m")
     assert found.value is None
