@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from foretwin.contracts.errors import UserError
@@ -52,8 +53,7 @@ def told_of(found: Occurred, start_ns: int, passed: Sequence[JunctionPassed]) ->
         ),
     )
     if found.scenarios:
-        places = {str(one.place["id"]): one for one in passed}
-        rows = tuple(_row(one, start_ns, places) for one in found.scenarios[:_MOST_LISTED])
+        rows = tuple(_row(one, start_ns, passed) for one in found.scenarios[:_MOST_LISTED])
         columns = (
             "from",
             "to",
@@ -78,10 +78,22 @@ def _chapter(blocks: tuple[Block, ...]) -> Chapter:
     return Chapter("occurred", "What really occurred", blocks)
 
 
+def _passage(
+    one: OccurredScenario, start_ns: int, passed: Sequence[JunctionPassed]
+) -> JunctionPassed | None:
+    """Return the passage of its junction that was nearest in time."""
+    middle_s = ((one.begin_ns + one.end_ns) / 2 - start_ns) / 1e9
+    return min(
+        (at for at in passed if str(at.place["id"]) == one.junction_id),
+        key=lambda at: math.inf if at.arrived_s is None else abs(at.arrived_s - middle_s),
+        default=None,
+    )
+
+
 def _row(
-    one: OccurredScenario, start_ns: int, places: dict[str, JunctionPassed]
+    one: OccurredScenario, start_ns: int, passed: Sequence[JunctionPassed]
 ) -> tuple[TableCell, ...]:
-    at = places.get(one.junction_id)
+    at = _passage(one, start_ns, passed)
     return row(
         number((one.begin_ns - start_ns) / 1e9, 1, "s"),
         number((one.end_ns - start_ns) / 1e9, 1, "s"),

@@ -46,6 +46,27 @@ def test_scenarios_stand_by_time_with_their_junction(tmp_path: Path) -> None:
     assert cells[8].tone == "watch"
 
 
+def test_of_a_junction_passed_twice_each_passage_has_what_occurred_in_it(tmp_path: Path) -> None:
+    run = RunMaterial(told_run(tmp_path))
+    place = run.record["intersections"][0]
+    run.record["intersections"] = [place, place | {"arrived_at_s": 60.0}]
+    occurred = [
+        OccurredScenario(
+            kind="through_straight",
+            begin_ns=START_NS + second * 10**9,
+            end_ns=START_NS + (second + 3) * 10**9,
+            junction_id=str(place["id"]),
+        )
+        for second in (14, 58)
+    ]
+
+    told = Occurred(scenarios=tuple(occurred), sees_others=True)
+    table = told_of(told, START_NS, passages(run)).blocks[1]
+
+    assert isinstance(table, Listed)
+    assert [cells[4].to for cells in table.rows] == ["junction-1", "junction-2"]
+
+
 @pytest.mark.parametrize(
     ("kind", "side", "said"),
     [
