@@ -17,7 +17,7 @@ from foretwin.orchestrator.report.material import RunMaterial, in_lock_step, par
 from foretwin.orchestrator.report.passages import JunctionPassed, tone_of
 
 _LATE_SHARE = 0.1
-"""Of the rounds that were due, when more are not there in time the first page says so in amber."""
+"""Of the rounds that could begin, when more are not in time the first page says so in amber."""
 
 
 def verdict_of(run: RunMaterial, passed: Sequence[JunctionPassed]) -> tuple[str, Tone]:
@@ -150,8 +150,9 @@ def _pace_figure(run: RunMaterial) -> KeyFigure:
     found = rounds_in_time(run)
     if found is None or not found[1]:
         return KeyFigure(UNKNOWN, name, "no round was due, or it is not known")
-    in_time, due = found
-    tone: Tone = "watch" if in_time < (1.0 - _LATE_SHARE) * due else "good"
+    in_time, asked = found
+    tone: Tone = "watch" if in_time < (1.0 - _LATE_SHARE) * asked else "good"
     p95 = run.record.get("state_to_result_ms_p95")
     took = "" if p95 is None else f"; 95 % within {p95:.0f} ms"
-    return KeyFigure(f"{in_time / due:.0%}", name, f"{in_time} of {due} due{took}", tone)
+    note = f"{in_time} of {asked} that could begin{took}"
+    return KeyFigure(f"{in_time / asked:.0%}", name, note, tone)

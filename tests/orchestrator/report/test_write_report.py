@@ -71,7 +71,7 @@ def test_it_says_what_was_foreseen_and_what_came(page: str) -> None:
         f"{NAME}. Simulation and reality agree in 3 of 4 judged windows."
     ) in page
     assert "too optimistic" in page
-    assert "1 of 2 due" in page
+    assert "1 of 2 that could begin" in page
     assert OSM in page
 
 

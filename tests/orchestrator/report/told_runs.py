@@ -129,11 +129,11 @@ def _record(folder: Path, **more: Any) -> None:
         "ledger": {
             "telemetry": {"published": 40, "recorded": 40, "lost": 0},
             "rounds": {
-                "due": 2,
+                "due": 5,
                 "run": 1,
                 "missed": 1,
                 "spared": 0,
-                "unseeded": 0,
+                "unseeded": 3,
                 "given_up": 0,
             },
             "jobs": {"given": 1, "results": 1, "refused": 0, "lost": 0},
