@@ -121,7 +121,8 @@ def change_lines(found: dict[str, Any], *, every: bool = False) -> Iterator[str]
 
 def _share_lines(change: dict[str, Any]) -> Iterator[str]:
     """Yield how the share of collisions changed, and whether the choice of places explains it."""
-    said, p_value = f"change of the share: {_interval(change, 100.0)} %", change["p_value"]
+    said = f"change of the share, in percentage points: {_interval(change, 100.0)}"
+    p_value = change["p_value"]
     if p_value is not None:
         sure = "significant" if p_value < LEVEL else "not significant"
         yield f"{said}, p = {p_value:.3g}, {sure}"

@@ -29,7 +29,7 @@ def test_what_changed_is_said_with_how_sure_it_is_and_how_to_see_it(
 
     said = capsys.readouterr().out
     assert "collided: 0 → 7: 7 newly failing, 0 fixed\n" in said
-    assert "change of the share: +25 [+25, +25] (7 places) %, p = 0.0156, significant\n" in said
+    assert "in percentage points: +25 [+25, +25] (7 places), p = 0.0156, significant\n" in said
     assert "min_clearance_m (m)" in said
     assert "worse" in said
     assert f"newly failing: scp at n0: scp 0: foretwin repeat '{sweeps[1]}' mine-0" in said
@@ -89,7 +89,7 @@ def test_at_one_place_counts_are_told_and_nothing_is_called_significant(
     whole = capsys.readouterr().out
 
     assert "collided: 0 → 12: 12 newly failing, 0 fixed\n" in short
-    assert "change of the share: +42.9 (too few to tell: 1 place) %\nfewer than 6 places" in short
+    assert "in percentage points: +42.9 (too few to tell: 1 place)\nfewer than 6 places" in short
     assert "1 measure changed at too few places to tell: --all" in short
     (clearance,) = (line for line in whole.splitlines() if line.startswith("min_clearance_m"))
     assert clearance.split("(too few to tell: 1 place)")[1].strip() == "too few places"
