@@ -125,6 +125,13 @@ class SweepMaterial:
         """Return the Worlds of the sweep that can be read."""
         return self._worlds.those_of(pc.unique(self.futures["world_id"]).to_pylist())
 
+    @property
+    def map(self) -> dict[str, str]:
+        """Return the map's file and hash, named as in a drive's record; none of given Worlds."""
+        file = (self.record.get("spec") or {}).get("map")
+        hashes = dict.fromkeys(world.map_sha256 for world in self.worlds()) if file else ()
+        return {"file": str(file), "sha256": ", ".join(hashes)} if hashes else {}
+
     def junction_name(self, junction_id: str | None) -> str:
         """Return what a driver calls a junction of the sweep; its id where that is not known."""
         return self._names.get(junction_id or "", "") or junction_id or "no junction"

@@ -63,7 +63,7 @@ def sweep_report(
         lambda: metrics_chapter(sweep),
         lambda: left_out_chapter(sweep),
         lambda: losses_chapter(sweep),
-        lambda: provenance_part(sweep.folder, sweep.record, places=places),
+        lambda: provenance_part(sweep.folder, {**sweep.record, "map": sweep.map}, places=places),
     )
     parts = []
     with progress(len(makers) + _PICTURES, "sections") as (advance, _):

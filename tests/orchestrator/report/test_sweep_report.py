@@ -13,11 +13,14 @@ import pytest
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.repeat import repeat
+from foretwin.orchestrator.report.blocks import Facts
 from foretwin.orchestrator.report.material import most_critical
 from foretwin.orchestrator.report.page import html_of
+from foretwin.orchestrator.report.sweep_material import SweepMaterial
 from foretwin.orchestrator.report.write_report import report_of_folders
 from tests.orchestrator.report.read_page import MOST_BYTES, ReadPage
 from tests.orchestrator.sweeps import small_sweep
+from tests.sim_worker.scenarios.worlds import cross
 
 COVERS = (
     "foretwin.orchestrator.report.sweep_details",
@@ -57,6 +60,20 @@ def test_worst_cases_play_again_to_the_same_hash(swept: Path, page: str) -> None
     assert commands
     for command in commands[::3]:
         assert repeat(swept, command[3], view=False).code == 0
+
+
+def test_it_says_of_which_map_it_is_as_its_worlds_know(swept: Path, tmp_path: Path) -> None:
+    assert SweepMaterial(swept).map == {}  # given Worlds may be of several maps
+    of_map = shutil.copytree(swept, tmp_path / "of_map")
+    record = json.loads((of_map / "sweep.json").read_text())
+    record["spec"] |= {"map": "maps/town.osm", "worlds": None}
+    (of_map / "sweep.json").write_text(json.dumps(record))
+
+    provenance = report_of_folders([of_map]).parts[-1]
+
+    told = next(dict(block.pairs) for block in provenance.blocks if isinstance(block, Facts))
+    assert told["map"] == "town.osm"
+    assert told["map, sha256"] == cross().map_sha256
 
 
 def test_a_sweep_that_played_nothing_says_so(tmp_path: Path) -> None:
