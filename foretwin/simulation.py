@@ -125,7 +125,7 @@ def run_futures(
     state: VehicleState,
     *,
     count: int | None = None,
-    futures: Sequence[Future] = (),
+    futures: Sequence[Future] | Future = (),
     scenarios: Sequence[Scenario | Path | str] | Scenario | Path | str = (),
     planner: str | None = None,
     vehicle: VehicleParameters | Path | str | None = None,
@@ -148,6 +148,8 @@ def run_futures(
     if not isinstance(vehicle, VehicleParameters):
         vehicle = load_vehicle(None if vehicle is None else path_of("vehicle", vehicle))
     seed = whole_number("seed", seed, 0, MAX_SEED)
+    if isinstance(futures, Future):
+        futures = (futures,)
     given = tuple(expect("a future", future, Future) for future in futures)
     _check_cases(given, known)
     for name, value in {"count": count, "planner": planner}.items():

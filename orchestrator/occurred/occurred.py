@@ -45,12 +45,13 @@ class Occurred(msgspec.Struct, frozen=True, kw_only=True):
     """What could not be looked at, in words."""
 
 
-def occurred_in(run: Path, *, recorded: CarRecorded | None = None) -> Occurred:
+def occurred_in(run: Path | str, *, recorded: CarRecorded | None = None) -> Occurred:
     """Return what occurred in a run's drive; `recorded` where that was read before.
 
     Raises FileNotFoundError for a folder that is none of a run, UserError for a run that goes on
     or holds no motion.
     """
+    run = Path(run)
     gaps, segments = (kept_rows(run / RESULTS, name) for name in ("gaps", "driven_segments"))
     return occurred_of(read_run(run, recorded), gaps=gaps, segments=segments)
 

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.driver_model import MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import pure_pursuit
@@ -20,9 +21,9 @@ MAX_ACCEL_MPS2 = 3.0
 
 
 def action_size(control: Control) -> int:
-    """Return how many numbers an action has; raises ValueError for an unknown kind of control."""
+    """Return how many numbers an action has; raises UserError for an unknown kind of control."""
     if control not in get_args(Control):
-        raise ValueError(f"control {control!r} is none of {', '.join(get_args(Control))}")
+        raise UserError(f"control {control!r} is none of {', '.join(get_args(Control))}")
     return 2 if control == "free" else 1
 
 

@@ -20,7 +20,7 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 
 class Begun(NamedTuple):
-    """How one episode begins: which of the playable cases, and how much later by the lights' plans."""
+    """How an episode begins: which of the playable cases, how much later by the lights' plans."""
 
     case: int
     lights_s: float
@@ -90,8 +90,8 @@ class Course:
         drawn = int(rng.integers(count))
         lights_s = float(rng.uniform(0.0, self.rows.light_cycle_s))
         if case is not None:
-            if not 0 <= case < count:
-                raise UserError(f"there are {count} cases; there is no number {case}")
+            if not isinstance(case, int | np.integer) or not 0 <= case < count:
+                raise UserError(f"there are {count} cases; there is no number {case!r}")
             drawn = case
         return Begun(drawn, lights_s)
 

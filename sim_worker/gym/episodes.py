@@ -75,8 +75,8 @@ class Source(NamedTuple):
 
     def episodes(self, vehicle: VehicleParameters) -> Episodes:
         """Return the episodes; raises UserError where the fields do not fit, or none can begin."""
-        if self.cases < 1:
-            raise UserError(f"cases {self.cases}: at least 1")
+        if not isinstance(self.cases, int | np.integer) or self.cases < 1:
+            raise UserError(f"cases {self.cases!r}: a whole number from 1")
         if not 0.0 <= self.early_or_late_s < np.inf:
             raise UserError(f"early_or_late_s {self.early_or_late_s:g}: from 0")
         world = self.world

@@ -95,6 +95,8 @@ def test_values_that_are_no_case_are_refused(
         wrong = msgspec.structs.replace(case, values={**case.values, **values})
         with pytest.raises(foretwin.UserError, match=said):
             foretwin.run_futures(world, way, car, futures=[wrong], scenarios="scp")
+    alone = foretwin.run_futures(world, way, car, futures=case, scenarios="scp", horizon_s=0.1)
+    assert [row["index"] for row in alone.rows] == [case.index]
 
 
 @pytest.mark.parametrize(

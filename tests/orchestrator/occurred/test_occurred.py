@@ -75,7 +75,7 @@ def test_virtual_road_users_are_nobody_that_the_car_met(tmp_path: Path) -> None:
 
 
 def test_a_car_that_tells_of_nobody_is_said_to(tmp_path: Path) -> None:
-    found = occurred_in(_run(tmp_path))
+    found = occurred_in(str(_run(tmp_path)))
 
     assert not found.sees_others
     assert "told of no road users" in found.notes[0]

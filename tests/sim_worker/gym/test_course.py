@@ -23,10 +23,11 @@ from tests.sim_worker.scenarios.worlds import ring
         ({"control_hz": 0.0}, "control_hz 0: above 0"),
         ({"reward": 3}, "reward 3: a function of StepFacts"),
         ({"vehicle": "tank"}, "tank"),
+        ({"control": "steer"}, "control 'steer' is none of free, along_path"),
     ],
 )
 def test_settings_that_do_not_fit_say_so(settings: dict[str, Any], says: str) -> None:
-    with pytest.raises((UserError, FileNotFoundError), match=says):
+    with pytest.raises(UserError, match=says):
         JunctionEnv(ring(), cases=4, **settings)
 
 

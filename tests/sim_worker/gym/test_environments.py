@@ -241,7 +241,10 @@ def test_options_choose_the_scenario_its_values_and_the_case() -> None:
         ({"place": 99}, "there is no number 99"),
         ({"place": "here"}, "has no place 'here'; known: "),
         ({"case": 1000}, "there is no number 1000"),
-        ({"cases": 0}, "cases 0: at least 1"),
+        ({"case": "2"}, "there is no number '2'"),
+        ({"case": 1.5}, "there is no number 1.5"),
+        ({"cases": 0}, "cases 0: a whole number from 1"),
+        ({"cases": 2.5}, "cases 2.5: a whole number from 1"),
         ({"early_or_late_s": -1.0}, "early_or_late_s -1: from 0"),
     ],
 )
