@@ -6,15 +6,21 @@ import datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import PathPose
 from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, asked_junctions
 from foretwin.orchestrator.commands.told import CommandResult
-from foretwin.sim_worker.futures.playable import places
+from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
+from foretwin.sim_worker.futures.playable import ego_alone, places
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import EXPORT_MARK, write_openscenario
+from foretwin.sim_worker.scenarios.openscenario_motion import instants
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -32,11 +38,17 @@ class CaseRequest(NamedTuple):
 
 
 class PlacedCase(NamedTuple):
-    """A case as it was cast in a World."""
+    """A case as it was cast in a World; `scenes` and `stage` are what it was found with."""
 
     scenario: Scenario
     world: World
     played: StagedCase
+    scenes: SceneMaker
+    stage: BatchSimulation
+
+    def ego_alone(self, time_s: Array) -> PathPose:
+        """Return where its ego really drives."""
+        return ego_alone(self.played, self.scenario, self.scenes, self.stage, time_s)
 
 
 def export_scenario(request: CaseRequest, out: Path) -> CommandResult:
@@ -52,7 +64,8 @@ def export_scenario(request: CaseRequest, out: Path) -> CommandResult:
     found = placed_case(request)
     out.parent.mkdir(parents=True, exist_ok=True)
     now, case = datetime.datetime.now(datetime.UTC), (found.played, found.scenario, found.world)
-    roads = write_openscenario(*case, out, vehicle=vehicle, written_at=now)
+    alone = found.ego_alone(instants(found.scenario.horizon_s))
+    roads = write_openscenario(*case, out, vehicle=vehicle, alone=alone, written_at=now)
     return _written(request, found, out, roads=roads)
 
 
@@ -80,8 +93,8 @@ def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> CommandRe
     check_planner(planner, in_drive=False)
     vehicle = load_vehicle(request.vehicle)
     found = placed_case(request)
-    scenario, world, played = found
-    heedless = heedless_run(played, vehicle, horizon_s=scenario.horizon_s)
+    scenario, world, played, *_ = found
+    heedless = heedless_run(played, vehicle, found.ego_alone, horizon_s=scenario.horizon_s)
     try:
         planned = planned_run(played, scenario, world, vehicle, planner=planner)
     except ValueError as error:
@@ -114,10 +127,11 @@ def placed_case(request: CaseRequest) -> PlacedCase:
     index = index_map(opened.osm, opened.graph, opened.junctions)
     world = build_world(opened.osm, opened.graph, junctions[0], radius_m=RADIUS_M, index=index)
     asked = cases[request.case - 1]
-    found = places(scenario, world, vehicle=vehicle, cases=[asked], most=1)
+    scenes, stage = SceneMaker(world), rehearsal_stage(vehicle, nsim=1)
+    found = places(scenario, world, scenes=scenes, stage=stage, cases=[asked], most=1)
     if found.unplaced:
         where, reason = junctions[0].summary, found.unplaced[0].reason
         raise UserError(f"{scenario.id} has no place at {where.id} {where.name}: {reason}")
     played = found.cases[0][0]
     assert isinstance(played, StagedCase)
-    return PlacedCase(scenario, world, played)
+    return PlacedCase(scenario, world, played, scenes, stage)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +13,12 @@ from foretwin.contracts.futures import RESULT_STEP_S, FuturesResult
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath, PathPose
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.playable import job_at
 from foretwin.sim_worker.futures.run_job import run_job
-from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.roles import StagedCase
 
 
@@ -39,20 +39,26 @@ class Run(NamedTuple):
     collision_with: str
 
 
-def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
+def heedless_run(
+    played: StagedCase,
+    vehicle: VehicleParameters,
+    alone: Callable[[Array], PathPose],
+    *,
+    horizon_s: float,
+) -> Run:
     """Drive a case as planned: the ego keeps its speed, and so do all heedless road users.
 
-    It ends with the planned impact, where one is planned.
+    `alone` says where that ego drives at times (N,). It ends with the planned impact, where one is
+    planned.
     """
     end_s = played.impact_time_s if played.impact_with else horizon_s
     time = np.linspace(0.0, end_s, max(2, math.ceil(end_s / RESULT_STEP_S) + 1))
-    path, reverse = FrenetPath(played.place.ego.xy_m), played.place.reverse
-    ego = ego_box(vehicle, path, played.ego_speed_mps, played.ego_lateral_m, reverse=reverse)
     others = []
     for actor in played.actors:
         moving = actor.moving(FrenetPath(actor.xy_m))
         others.append(moving.rectangles(moving.arc_after(actor.start_arc_m, time)))
-    boxes = ego.rectangles(ego.arc_after(played.ego_arc_m, time))
+    xy, yaw = alone(time)
+    boxes = ego_rectangles(vehicle, np.column_stack([xy, yaw]))
     return _run(time, boxes, tuple(others), played.impact_time_s, played.impact_with)
 
 

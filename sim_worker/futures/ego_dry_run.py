@@ -10,21 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.futures import Future, Job
-from foretwin.contracts.numbers import FUTURE_NUMBERS
-from foretwin.contracts.scenario import EGO, FAULTS
+from foretwin.contracts.futures import Job
+from foretwin.contracts.scenario import EGO
 from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.closed_loop import drive
 from foretwin.sim_worker.futures.driven_line import (
     KEEPS_SPEED,
     DrivenLine,
@@ -34,15 +31,14 @@ from foretwin.sim_worker.futures.driven_line import (
     time_at,
 )
 from foretwin.sim_worker.futures.driven_touch import AFTER_S, met_as_driven
+from foretwin.sim_worker.futures.ego_alone import drive_alone, felt_faults
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.swept_ground import met_on_the_way
 from foretwin.sim_worker.scenarios.fitting import ill_timed, unfit
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
-from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.scenarios.ways import Way
 
-_FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
 _STRAIGHT_PM = 1e-3
 """On a line that bends no more, a car is where its path is."""
 _RUN_UP_M = 10.0
@@ -181,22 +177,8 @@ def _ego(case: StagedCase) -> _Ego:
     in_time = case.ego_arc_m < first_bend - _RUN_UP_M
     shift = case.values[f"{EGO}.lateral_shift_m"]
     start = first_bend - _RUN_UP_M if in_time else case.ego_arc_m
-    faults = _faults(case.values)
+    faults = felt_faults(case.values)
     return _Ego(case.ego_speed_mps, shift, case.place.reverse, faults, in_time, start)
-
-
-def _faults(values: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
-    """Return what is wrong with a car or the ground that one who drives alone feels, by name."""
-    return tuple(
-        (name, values.get(f"{FAULTS}.{name}", FUTURE_NUMBERS[name].neutral)) for name in _FELT
-    )
-
-
-_FELT = tuple(
-    name
-    for name, row in FUTURE_NUMBERS.items()
-    if row.part == "fault" and not row.acts_on.startswith("perception.")
-)
 
 
 def _bends(case: StagedCase) -> bool:
@@ -224,40 +206,12 @@ def _lines(
     key = (way.name, stage.vehicle.name, stage.control_dt_s, ticks, *egos)
     if key not in maker.rehearsed:
         cases = [first[ego] for ego in egos]
-        states = _drive_alone(job, cases, stage, maker, ticks)
+        states = drive_alone(job, cases, stage, maker, ticks)
         maker.rehearsed[key] = dict(
             zip(egos, driven_lines(cases, states, tick_s=stage.control_dt_s), strict=True)
         )
     lines: dict[_Ego, DrivenLine] = maker.rehearsed[key]
     return lines
-
-
-def _drive_alone(
-    job: Job, cases: list[StagedCase], stage: BatchSimulation, maker: SceneMaker, ticks: int
-) -> Array:
-    """Return states (S, T, 8) of egos without other road users."""
-    futures = tuple(
-        Future(
-            index=index,
-            name="alone",
-            planner=_BACKWARDS if case.place.reverse else _FORWARDS,
-            numbers=dict(_faults(case.values)),
-            values={f"{EGO}.speed_mps": case.ego_speed_mps},
-        )
-        for index, case in enumerate(cases)
-    )
-    same = ("round_id", "job_index", "world_id", "state", "path", "step_s", "seed")
-    given: dict[str, Any] = {name: getattr(job, name) for name in same}
-    alone = Job(
-        **given,
-        futures=futures,
-        horizon_s=ticks * stage.control_dt_s,
-        cruise_speed_mps=0.0,
-        starts=np.stack([staged_start(case, stage.vehicle) for case in cases]),
-    )
-    near = np.array([case.ego_arc_m for case in cases])
-    scene = maker.scene(alone, stage.vehicle, tick_s=stage.control_dt_s, start_arc_m=near)
-    return drive(scene._replace(limit_share=None), stage, ticks=ticks).states
 
 
 def _on_time(case: StagedCase, line: DrivenLine, way: Way, *, tick_s: float) -> StagedCase:

@@ -10,13 +10,19 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.futures import RESULT_STEP_S, Future, Job, PathAhead
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import PathPose
+from foretwin.geometry.slopes import slopes_of
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.driver_model import LEAST_START_MPS
+from foretwin.sim_worker.futures.ego_alone import drive_alone
 from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage, staged_cases
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
@@ -140,3 +146,22 @@ def job_at(
         cruise_speed_mps=cases[0][f"{EGO}.speed_mps"] or LEAST_START_MPS,
         scenarios=(scenario,),
     )
+
+
+def ego_alone(
+    played: StagedCase,
+    scenario: Scenario,
+    scenes: SceneMaker,
+    stage: BatchSimulation,
+    time_s: Array,
+) -> PathPose:
+    """Return base_link of a case's ego at times (N,) since it began, as a car that keeps its speed
+    and minds nobody really drives: what the planned impact was timed to."""
+    stage.slopes = slopes_of(scenes.world)
+    ticks = math.ceil(float(time_s.max()) / stage.control_dt_s)
+    job = job_at(played.place, scenario, [played.values], scenes.world)
+    (states,) = drive_alone(job, [played], stage, scenes, ticks)
+    at_s = np.arange(ticks + 1) * stage.control_dt_s
+    columns = states[:, 0], states[:, 1], np.unwrap(states[:, 2])
+    x, y, yaw = (np.interp(time_s, at_s, column) for column in columns)
+    return PathPose(np.stack([x, y], axis=-1), yaw)

@@ -17,6 +17,7 @@ from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import FAULTS, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.geometry.frenet_path import PathPose
 from foretwin.sim_worker.scenarios.openscenario_entities import (
     actor_object,
     ego_object,
@@ -48,15 +49,23 @@ def write_openscenario(
     path: Path,
     *,
     vehicle: VehicleParameters,
+    alone: PathPose | None = None,
     written_at: datetime.datetime = UNSAID,
 ) -> Path:
     """Write a case, and the roads it refers to beside it as OpenDRIVE; returns that file.
 
-    Both in metres in the World's frame. Raises ValueError where the World has no road with lanes.
+    Both in metres in the World's frame. `alone` is where the ego really drives at the `instants` of
+    trajectories, if that is known. Raises ValueError where the World has no road with lanes.
     """
     roads = path.with_suffix(".xodr")
     root = openscenario_element(
-        played, scenario, world, vehicle=vehicle, logic_file=roads.name, written_at=written_at
+        played,
+        scenario,
+        world,
+        vehicle=vehicle,
+        logic_file=roads.name,
+        alone=alone,
+        written_at=written_at,
     )
     write_opendrive(world, roads)
     with path.open("wb") as file:  # lxml would not say which file cannot be written
@@ -73,13 +82,14 @@ def openscenario_element(
     *,
     vehicle: VehicleParameters,
     logic_file: str,
+    alone: PathPose | None = None,
     written_at: datetime.datetime = UNSAID,
 ) -> etree._Element:
     """Return the `<OpenSCENARIO>` element that `write_openscenario` writes.
 
     `logic_file` is where the OpenDRIVE file lies, as seen from this one.
     """
-    motions = [ego_motion(played, horizon_s=scenario.horizon_s)]
+    motions = [ego_motion(played, horizon_s=scenario.horizon_s, alone=alone)]
     motions += [actor_motion(actor, horizon_s=scenario.horizon_s) for actor in played.actors]
     parameters = {"horizon_s": scenario.horizon_s}
     if (friction := _friction_factor(played)) != 1.0:

@@ -23,6 +23,8 @@ from foretwin.world_gen.export.xml_tree import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
 _MOST_DRIFT_M = 0.06
+_NEAR_IMPACT_M = 0.1
+"""Planned impacts happen so near their point."""
 _BEYOND_M = 20.0
 """Paths that are not timed go on so far, for whoever drives them faster."""
 
@@ -50,12 +52,18 @@ class EntityMotion(NamedTuple):
         return len(self.time_s) > 1
 
 
-def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
+def ego_motion(
+    played: StagedCase, *, horizon_s: float, alone: PathPose | None = None
+) -> EntityMotion:
     """Return the ego's motion along its path.
 
     It is timed backwards, as speeds have no sign there, and where the path has kinks, along which
-    no car moves as fast as an arc length says.
+    no car moves as fast as an arc length says. `alone` is where it really drives at `instants`, if
+    that is known: timed like this where its path would miss the planned impact.
     """
+    if alone is not None and played.impact_with and _off_path_m(played, alone) > _NEAR_IMPACT_M:
+        speed = -played.ego_speed_mps if played.place.reverse else played.ego_speed_mps
+        return EntityMotion(EGO, alone, instants(horizon_s), True, number(speed), {})
     path, speed = FrenetPath(played.place.ego.xy_m), played.ego_speed_mps
     along = _spaced(speed * horizon_s)
     pose = path.pose_at(played.ego_arc_m + along, played.ego_lateral_m)
@@ -63,7 +71,7 @@ def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
     if not played.place.reverse and float(drift_m.max()) <= _MOST_DRIFT_M:
         name = f"{EGO}_speed_mps"
         return EntityMotion(EGO, pose, along / speed, False, f"${name}", {name: speed})
-    time = _instants(horizon_s)
+    time = instants(horizon_s)
     pose = path.pose_at(played.ego_arc_m + speed * time, played.ego_lateral_m)
     if not played.place.reverse:
         return EntityMotion(EGO, pose, time, True, number(speed), {})
@@ -78,7 +86,7 @@ def actor_motion(actor: StagedActor, *, horizon_s: float) -> EntityMotion:
     """
     moving, speed = actor.moving(FrenetPath(actor.xy_m)), actor.speed_mps
     behind = reference_behind_centre_m(actor.kind)
-    time, steady = _instants(horizon_s), moving._replace(paces=None)
+    time, steady = instants(horizon_s), moving._replace(paces=None)
     slower_m = np.abs(
         moving.arc_after(actor.start_arc_m, time) - steady.arc_after(actor.start_arc_m, time)
     )
@@ -100,7 +108,17 @@ def actor_motion(actor: StagedActor, *, horizon_s: float) -> EntityMotion:
     return EntityMotion(actor.name, pose, time, False, said, numbers, brakes_after, brakes_by)
 
 
-def _instants(horizon_s: float) -> Array:
+def _off_path_m(played: StagedCase, alone: PathPose) -> float:
+    """Return how far an ego comes to be, until its impact, from where its path has it then."""
+    time_s = np.arange(len(alone.xy_m)) * _STEP_S
+    time_s = time_s[time_s < played.impact_time_s + _STEP_S]
+    along = played.ego_arc_m + played.ego_speed_mps * time_s
+    pose = FrenetPath(played.place.ego.xy_m).pose_at(along, played.ego_lateral_m)
+    return float(np.hypot(*(alone.xy_m[: len(time_s)] - pose.xy_m).T).max())
+
+
+def instants(horizon_s: float) -> Array:
+    """Return the times (N,) of timed trajectories, from the beginning of a case on."""
     return np.asarray(np.arange(math.ceil(horizon_s / _STEP_S - 1e-9) + 1) * _STEP_S)
 
 

@@ -34,6 +34,7 @@ from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
 
 COVERS = (
     "foretwin.sim_worker.futures.driven_touch",
+    "foretwin.sim_worker.futures.ego_alone",
     "foretwin.sim_worker.futures.driven_line",
     "foretwin.sim_worker.futures.planned_impacts",
     "foretwin.sim_worker.scenarios.staged",

@@ -8,6 +8,7 @@ and of others where it does not; what no map holds is shown in a drawn World.
 from __future__ import annotations
 
 import argparse
+import functools
 import io
 import random
 import textwrap
@@ -54,7 +55,7 @@ from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from tests.sim_worker.scenarios.worlds import motorway, race_track
+from tests.sim_worker.scenarios.worlds import ego_alone, motorway, race_track
 
 SEED = 11
 MAPS = {
@@ -187,7 +188,8 @@ def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]], usual: str) -
             left = (0.1 + column * (wide + 0.1)) / width
             bottom = top - (_HEAD_IN + high) / height
             axes = figure.add_axes((left, bottom, wide / width, high / height))
-            heedless = heedless_run(tile.played, vehicle, horizon_s=scenario.horizon_s)
+            alone = functools.partial(ego_alone, tile.played, scenario, tile.world)
+            heedless = heedless_run(tile.played, vehicle, alone, horizon_s=scenario.horizon_s)
             planned = planned_run(tile.played, scenario, tile.world, vehicle, planner=planner)
             draw_case(
                 axes, tile.played, tile.world, heedless, planned, aspect=wide / high,

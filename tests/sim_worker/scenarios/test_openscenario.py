@@ -14,16 +14,18 @@ from lxml import etree
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import overlapping, separations
+from foretwin.sim_worker.futures.driven_touch import off_plan_m
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
 from foretwin.sim_worker.scenarios.openscenario_entities import AXLES
+from foretwin.sim_worker.scenarios.openscenario_motion import instants
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.sim_worker.scenarios.read_openscenario import ScenarioFile
-from tests.sim_worker.scenarios.worlds import cross, motorway, places, race_track, ring
+from tests.sim_worker.scenarios.worlds import cross, ego_alone, motorway, places, race_track, ring
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import judges_python
 from tests.world_gen.export.read_opendrive import OpenDriveFile
@@ -54,6 +56,14 @@ def cases_in(id_: str, world: World, *, most: int = 1) -> list[StagedCase]:
 
 def written(played: StagedCase, world: World, file: Path) -> ScenarioFile:
     write_openscenario(played, catalogue()[played.place.scenario_id], world, file, vehicle=VEHICLE)
+    return ScenarioFile.read(file)
+
+
+def exported(played: StagedCase, world: World, file: Path) -> ScenarioFile:
+    """Write a case that was placed, as the command does."""
+    scenario = catalogue()[played.place.scenario_id]
+    alone = ego_alone(played, scenario, world, instants(scenario.horizon_s))
+    write_openscenario(played, scenario, world, file, vehicle=VEHICLE, alone=alone)
     return ScenarioFile.read(file)
 
 
@@ -94,6 +104,31 @@ def test_the_planned_impact_happens_in_the_file(id_: str, tmp_path: Path) -> Non
             assert abs(time_s - played.impact_time_s) <= 0.1
             assert float(file.properties["impact_time_s"]) == pytest.approx(played.impact_time_s)
         assert set(file.entities) == {"ego", *(actor.name for actor in played.actors)}
+
+
+@pytest.mark.parametrize("id_", ["latency", "cbta", "cpta", "ltip", "roundabout_exit"])
+def test_the_planned_impact_happens_in_the_file_of_a_case_that_was_placed(
+    id_: str, tmp_path: Path
+) -> None:
+    scenario, world = catalogue()[id_], WORLDS["ring" if id_ == "roundabout_exit" else "cross"]
+    found = [c for c in places(scenario, world, most=1).cases[0] if isinstance(c, StagedCase)]
+    assert found
+    for played in found:
+        file = exported(played, world, tmp_path / "case.xosc")
+        name, time_s = first_touch(file)
+        assert name == played.impact_with
+        assert time_s == pytest.approx(played.impact_time_s, abs=0.05)
+        assert off_m(file, played) <= 0.1
+        ego, at = file.entities["ego"], played.impact_time_s
+        columns = (*ego.xy_m.T, np.unwrap(ego.yaw_rad))
+        state = np.array([np.interp(at, ego.time_s, column) for column in columns])
+        assert off_plan_m(played, state, VEHICLE) <= 0.1
+
+
+def test_an_ego_that_keeps_to_its_path_has_a_speed_that_may_be_changed(tmp_path: Path) -> None:
+    scenario, world = catalogue()["cccscp"], WORLDS["cross"]
+    played = next(c for c in places(scenario, world, most=1).cases[0] if isinstance(c, StagedCase))
+    assert "ego_speed_mps" in exported(played, world, tmp_path / "case.xosc").parameters
 
 
 def test_entities_are_boxes_of_their_kind_about_their_rear_axle(tmp_path: Path) -> None:

@@ -6,14 +6,17 @@ import functools
 import math
 from collections.abc import Sequence
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import PathPose
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures import playable
 from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.roads.build_graph import build_road_graph
@@ -44,8 +47,17 @@ def places(
 ) -> playable.Placement:
     """Place a scenario for the usual vehicle; what is made of a World and a vehicle is made once,
     as where the whole catalogue is placed."""
-    _, scenes = _SCENES.setdefault(id(world), (world, SceneMaker(world)))
+    scenes = _scenes(world)
     return playable.places(scenario, world, scenes=scenes, stage=_stage(), cases=cases, most=most)
+
+
+def ego_alone(played: StagedCase, scenario: Scenario, world: World, time_s: Array) -> PathPose:
+    """Where the ego of a case drives if it keeps its speed, for the usual vehicle."""
+    return playable.ego_alone(played, scenario, _scenes(world), _stage(), time_s)
+
+
+def _scenes(world: World) -> SceneMaker:
+    return _SCENES.setdefault(id(world), (world, SceneMaker(world)))[1]
 
 
 @functools.cache
