@@ -59,9 +59,9 @@ def driven_lines(
 
 
 def drives_as_cast(case: StagedCase, line: DrivenLine, path: FrenetPath) -> bool:
-    """Return whether a car drives as a case cast on its line has it, until the impact: about at
-    the case's speed, and along its `path`."""
-    until_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    """Return whether a car drives as a case cast on its line has it, until it meets somebody: about
+    at the case's speed, and along its `path`."""
+    until_m = case.ego_arc_m + case.ego_speed_mps * case.meets_s
     if until_m > line.arc_m[-1]:
         return False
     before = (line.arc_m[:-1] >= case.ego_arc_m) & (line.arc_m[:-1] < until_m)

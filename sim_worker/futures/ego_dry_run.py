@@ -110,7 +110,7 @@ def staged_cases(
     bent = {
         row: case
         for row, case in played.items()
-        if isinstance(case, StagedCase) and math.isfinite(case.impact_time_s) and _bends(case)
+        if isinstance(case, StagedCase) and math.isfinite(case.meets_s) and _bends(case)
     }
     lines = _lines(job, bent, stage, maker) if bent else {}
     played |= _on_lines(job, bent, lines, stage, maker)
@@ -158,9 +158,11 @@ def _on_lines(
                 found[row] = _refused(case, f"no car drives the ego's bends with {speed}")
             else:
                 on_time[row] = _on_time(met, line, case.place.ego, tick_s=stage.control_dt_s)
-    driven = {row: (case, lines[_ego(bent[row])]) for row, case in on_time.items()}
+    promised = {row: case for row, case in on_time.items() if case.impact_with}
+    driven = {row: (case, lines[_ego(bent[row])]) for row, case in promised.items()}
     as_driven = met_as_driven(driven, stage)
-    for row, case in on_time.items():
+    found |= on_time
+    for row, case in promised.items():
         reason = f"driven, {case.impact_with} is not met by the point of the front that was planned"
         found[row] = as_driven.get(row) or _refused(case, reason)
     return found
@@ -182,9 +184,9 @@ def _ego(case: StagedCase) -> _Ego:
 
 
 def _bends(case: StagedCase) -> bool:
-    """Return whether the ego's path bends before the impact."""
+    """Return whether the ego's path bends before it meets somebody."""
     path = case.place.ego.path
-    until = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    until = case.ego_arc_m + case.ego_speed_mps * case.meets_s
     inside = (path.arc_m >= case.ego_arc_m - 1.0) & (path.arc_m <= until + 1.0)
     return bool(np.abs(path.curvature_pm[inside]).max(initial=0.0) > _STRAIGHT_PM)
 
@@ -198,7 +200,7 @@ def _lines(
     for case in bent.values():
         ego = _ego(case)
         first.setdefault(ego, case._replace(ego_arc_m=ego.start_m))
-        until_s = case.impact_time_s + (case.ego_arc_m - ego.start_m) / case.ego_speed_mps
+        until_s = case.meets_s + (case.ego_arc_m - ego.start_m) / case.ego_speed_mps
         last_s = max(last_s, until_s / (1.0 - KEEPS_SPEED))
     egos = sorted(first)
     ticks = math.ceil((last_s + AFTER_S) / stage.control_dt_s)
@@ -221,16 +223,17 @@ def _on_time(case: StagedCase, line: DrivenLine, way: Way, *, tick_s: float) -> 
     It begins whole control ticks from its line: a car steers into a sharp bend some centimetres
     elsewhere where its ticks fall otherwise.
     """
-    speed, met_m = case.ego_speed_mps, case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    speed, met_m = case.ego_speed_mps, case.ego_arc_m + case.ego_speed_mps * case.meets_s
     from_s = round(time_at(line, case.ego_arc_m, speed) / tick_s) * tick_s
     start_m = arc_at(line, from_s, speed)
-    later_s = time_at(line, met_m, speed) - from_s - case.impact_time_s
+    later_s = time_at(line, met_m, speed) - from_s - case.meets_s
     ahead_m = start_m - case.ego_arc_m
     return case._replace(
         place=case.place._replace(ego=way),
         actors=tuple(_from_line(actor, later_s, ahead_m, line, way) for actor in case.actors),
         ego_arc_m=start_m,
         impact_time_s=case.impact_time_s + later_s,
+        meets_s=case.meets_s + later_s,
     )
 
 

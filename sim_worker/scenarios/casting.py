@@ -132,6 +132,7 @@ def _cast(
         impact_share=touched.share,
         impact_with=other,
         off_lanes_m=max(off),
+        meets_s=touched.time_s if other else _meets_s(staging, meetings),
     )
 
 
@@ -182,6 +183,14 @@ def _first_touched(
             if found is not None:
                 return found, actor.name
     return Touched(math.nan, np.full(2, math.nan), math.nan), ""
+
+
+def _meets_s(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
+    """Return when the ego is where it would meet the first of those who are early or late."""
+    for part in staging.scenario.actors:
+        if part.name in meetings:
+            return (meetings[part.name].impact.ego_arc_m - staging.start_m) / staging.ego.speed_mps
+    return math.nan
 
 
 def _in_the_way(staging: Staging, actors: tuple[StagedActor, ...], met: str) -> str:

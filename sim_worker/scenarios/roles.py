@@ -86,6 +86,9 @@ class StagedCase(NamedTuple):
     impact_with: str
     off_lanes_m: float
     """How far beyond the World's lanes the ego or an actor starts, on a road prolonged."""
+    meets_s: float
+    """When the ego is where it touches the first road user, or would if that came on time; NaN
+    where it meets nobody."""
 
 
 @functools.lru_cache(maxsize=64)

@@ -153,9 +153,9 @@ class ScenarioTraffic:
             return
         for place in known.places(self._scenario, passage):
             for played in known.cast(self._scenario, self._cases, place, self._vehicle):
-                if not isinstance(played, StagedCase) or not math.isfinite(played.impact_time_s):
+                if not isinstance(played, StagedCase) or not math.isfinite(played.meets_s):
                     continue
-                met = np.array([played.ego_arc_m + played.ego_speed_mps * played.impact_time_s])
+                met = np.array([played.ego_arc_m + played.ego_speed_mps * played.meets_s])
                 meets = place.ego.path.point_at(met, played.ego_lateral_m)
                 ahead_m = float(path.locate(meets).arc_m[0]) - arc_m
                 if ahead_m < _LEAST_AHEAD_M:
@@ -176,7 +176,7 @@ class ScenarioTraffic:
             return _Performer(
                 name, actor.kind, way.xy_m, path, actor.lateral_m, 0.0, math.nan, start_m
             )
-        meets_m = float(moving.arc_after(start_m, played.impact_time_s))
+        meets_m = float(moving.arc_after(start_m, played.meets_s))
         walks = not actor.traits.keeps_lane
         back_s = _WAITS_BACK_S if walks else min(eta_s, _COMES_BACK_S)
         arc_m = float(moving.arc_after(meets_m, -back_s))

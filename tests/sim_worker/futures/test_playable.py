@@ -8,11 +8,14 @@ import pytest
 
 from foretwin.contracts.futures import Job
 from foretwin.contracts.world import Area, World
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.batch.collision_detection import ego_rectangles
-from foretwin.sim_worker.futures.playable import job_at, places
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
+from foretwin.sim_worker.futures.playable import job_at, places, playable
 from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.futures.swept_ground import met_on_the_way
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.fitting import LEAST_RUN_UP_S
@@ -46,6 +49,27 @@ def test_a_job_plays_what_was_placed_and_meets_what_was_promised(id_: str) -> No
     assert result.planned.met == tuple(case.impact_with for case in played)
     assert np.nanmax(result.planned.off_m) <= 0.1
     assert not np.isnan(result.planned.off_m).any()
+
+
+@pytest.mark.parametrize("late_s", [-0.3, 0.01, 2.0])
+def test_who_is_early_or_late_is_so_by_the_line_that_a_car_really_drives(late_s: float) -> None:
+    scenario, world = catalogue()["latency"], cross()
+    found = places(scenario, world, vehicle=CAR, most=1)
+    on_time = found.cases[0][-1]
+    assert isinstance(on_time, StagedCase)
+    values = on_time.values | {"walker.arrives_after_s": late_s}
+    (late,) = playable(scenario, [values], found.places[0], SceneMaker(world), rehearsal_stage(CAR))
+    assert isinstance(late, StagedCase)
+    assert late.impact_with == ""
+    there = [
+        case.actors[0]
+        .moving(FrenetPath(case.actors[0].xy_m))
+        .rectangles(np.array([case.actors[0].start_arc_m + case.actors[0].speed_mps * after_s]))
+        for case, after_s in ((on_time, on_time.meets_s), (late, late.meets_s + late_s))
+    ]
+    np.testing.assert_allclose(there[0].centre_m, there[1].centre_m, atol=0.05)
+    ego_m = [case.ego_arc_m + case.ego_speed_mps * case.meets_s for case in (on_time, late)]
+    assert ego_m[0] == pytest.approx(ego_m[1], abs=0.05)
 
 
 def test_what_becomes_of_a_case_does_not_depend_on_those_beside_it() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from foretwin.contracts.errors import UserError
 from foretwin.sim_worker.scenarios.reading import find_scenario
@@ -14,9 +15,11 @@ from tests.sim_worker.places import crossroads, straight_path
 from tests.sim_worker.virtual_traffic.motions import G_MPS2, Scene, tracks
 
 
-def met(speed_mps: float) -> tuple[list[Scene], float]:
+def met(speed_mps: float, *, late_s: float = 0.0) -> tuple[list[Scene], float]:
     """A car drives east through the crossing; returns the scenes and the least distance."""
-    traffic = ScenarioTraffic(load_vehicle(), find_scenario("scp"), seed=1)
+    scenario = find_scenario("scp")
+    actor = replace(scenario.actors[0], arrives_after_s=late_s)
+    traffic = ScenarioTraffic(load_vehicle(), replace(scenario, actors=(actor,)), seed=1)
     traffic.use_world(crossroads())
     traffic.use_path(straight_path(from_x=-140.0, to_x=140.0).xy_m)
     scenes, least_m = [], np.inf
@@ -36,6 +39,12 @@ def test_who_crosses_meets_the_car_at_its_speed(speed_mps: float) -> None:
     for track in tracks(scenes).values():
         assert track.worst_jump_m() < 0.03
         assert track.worst_mps2() < 0.8 * G_MPS2
+
+
+def test_who_is_meant_to_come_late_comes_behind_the_car() -> None:
+    scenes, least_m = met(10.0, late_s=2.0)
+    assert 6.0 < least_m < 16.0
+    assert any(scenes)
 
 
 def test_the_same_motion_gives_the_same_bits() -> None:
