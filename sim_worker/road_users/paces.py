@@ -126,6 +126,7 @@ class Paces:
         both on their own clocks."""
         free = self.at(motion, np.minimum(time_s, brakes_at_s))
         brakes_for = np.maximum(time_s - brakes_at_s, 0.0)
-        brakes_for = np.minimum(brakes_for, free.speed_mps / decel_mps2)
+        with np.errstate(divide="ignore"):  # who brakes by nothing does so for good
+            brakes_for = np.minimum(brakes_for, free.speed_mps / decel_mps2)
         speed = free.speed_mps - decel_mps2 * brakes_for
         return WayMade(free.arc_m + brakes_for * (free.speed_mps + speed) / 2.0, speed)

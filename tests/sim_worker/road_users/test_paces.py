@@ -108,3 +108,11 @@ def test_who_stops_gently_never_needs_its_brakes_harder_before_a_bend() -> None:
     along, _, _ = driven(alone(HOOK, 13.6, brisk), HOOK)
     assert along.min() >= -2.0 - 0.02
     assert briskness("heedless", 2.0) == briskness("stops", 6.0) == driver.HEEDLESS_BRISKNESS
+
+
+def test_who_brakes_by_nothing_keeps_its_speed() -> None:
+    paces = alone(STRAIGHT, 12.0)
+    begin = paces.time_at(0, np.array(0.0))
+    at = paces.braked(0, begin + np.array([1.0, 9.0]), begin + 1.0, np.array([0.0, 0.0]))
+    np.testing.assert_allclose(at.arc_m, [12.0, 108.0])
+    np.testing.assert_allclose(at.speed_mps, 12.0)
