@@ -136,7 +136,7 @@ def _header(
     }
     if played.impact_with:
         x, y = played.impact_point_m
-        impact = {"time_s": played.impact_time_s, "x_m": x, "y_m": y}
+        impact = {"time_s": played.impact_time_s, "x_m": x, "y_m": y, "share": played.impact_share}
         said["impact_with"] = played.impact_with
         said |= {f"impact_{name}": value for name, value in impact.items()}
     return make.FileHeader(

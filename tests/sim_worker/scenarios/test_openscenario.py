@@ -123,6 +123,7 @@ def test_the_planned_impact_happens_in_the_file_of_a_case_that_was_placed(
         columns = (*ego.xy_m.T, np.unwrap(ego.yaw_rad))
         state = np.array([np.interp(at, ego.time_s, column) for column in columns])
         assert off_plan_m(played, state, VEHICLE) <= 0.1
+        assert float(file.properties["impact_share"]) == pytest.approx(played.impact_share)
 
 
 def test_an_ego_that_keeps_to_its_path_has_a_speed_that_may_be_changed(tmp_path: Path) -> None:
