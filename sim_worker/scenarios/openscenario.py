@@ -106,7 +106,10 @@ def openscenario_element(
         make.ParameterDeclarations(*declared),
         make.CatalogLocations(),
         make.RoadNetwork(make.LogicFile(filepath=logic_file)),
-        make.Entities(ego_object(vehicle), *(actor_object(actor) for actor in played.actors)),
+        make.Entities(
+            ego_object(vehicle, speed_mps=played.ego_speed_mps),
+            *(actor_object(actor) for actor in played.actors),
+        ),
         _storyboard(played, motions),
     )
 

@@ -72,13 +72,13 @@ def reference_behind_centre_m(kind: RoadUserKind) -> float:
     return (0.5 - AXLES[kind].rear_overhang_share) * KINDS[kind].length_m
 
 
-def ego_object(vehicle: VehicleParameters) -> etree._Element:
-    """Return the ego, whose reference point is base_link."""
+def ego_object(vehicle: VehicleParameters, *, speed_mps: float) -> etree._Element:
+    """Return the ego, whose reference point is base_link; it may be as fast as the case has it."""
     length, width = vehicle.length_m.value, vehicle.width_m.value
     entity = make.Vehicle(
         _box(length, width, vehicle.height_m.value, length / 2.0 - vehicle.rear_overhang_m.value),
         make.Performance(
-            maxSpeed=KINDS["car"].speed_mps,
+            maxSpeed=max(KINDS["car"].speed_mps, speed_mps),
             maxAcceleration=vehicle.max_drive_accel_mps2.value,
             maxDeceleration=vehicle.max_brake_decel_mps2.value,
         ),
@@ -91,18 +91,19 @@ def ego_object(vehicle: VehicleParameters) -> etree._Element:
 
 
 def actor_object(actor: StagedActor) -> etree._Element:
-    """Return another road user with the size and limits of its kind."""
+    """Return another road user with the size and limits of its kind, but for what the case asks."""
     traits, length, width = actor.traits, actor.traits.length_m, actor.traits.width_m
     box = _box(length, width, traits.height_m, reference_behind_centre_m(actor.kind))
     if traits.keeps_lane:
         axles = AXLES[actor.kind]
         wheelbase_m, wheel_m = axles.wheelbase_share * length, axles.wheel_diameter_m
+        brakes_by = actor.decel_mps2 if actor.conduct == "stops" else 0.0
         entity = make.Vehicle(
             box,
             make.Performance(
-                maxSpeed=traits.speed_mps,
+                maxSpeed=max(traits.speed_mps, actor.speed_mps),
                 maxAcceleration=traits.accel_mps2,
-                maxDeceleration=traits.hard_decel_mps2,
+                maxDeceleration=max(traits.hard_decel_mps2, brakes_by),
             ),
             _axles(wheelbase_m, width, wheel_m, axles.max_steering_rad),
             name=actor.name,

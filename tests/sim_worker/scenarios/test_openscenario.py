@@ -193,6 +193,15 @@ def test_parameters_are_those_that_may_be_changed(tmp_path: Path) -> None:
     assert numbers == pytest.approx(dict(played.values))
 
 
+def test_limits_of_a_kind_do_not_hold_back_what_the_case_asks(tmp_path: Path) -> None:
+    (played,) = cases_in("lead_stopping", WORLDS["cross"])
+    fast = played.actors[0]._replace(kind="bicycle", speed_mps=11.0, decel_mps2=9.5)
+    file = written(played._replace(actors=(fast,)), WORLDS["cross"], tmp_path / "case.xosc")
+    limits = file.entities["lead"].element.find("Performance")
+    assert (float(limits.get("maxSpeed")), float(limits.get("maxDeceleration"))) == (11.0, 9.5)
+    assert file.parameters["lead_decel_mps2"] == 9.5
+
+
 def test_who_backs_into_a_bay_looks_ahead(tmp_path: Path) -> None:
     (played,) = cases_in("reversing_parking", WORLDS["cross"])
     ego = written(played, WORLDS["cross"], tmp_path / "case.xosc").entities["ego"]
