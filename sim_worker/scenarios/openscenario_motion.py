@@ -23,8 +23,8 @@ from foretwin.world_gen.export.xml_tree import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
 _MOST_DRIFT_M = 0.06
-_NEAR_IMPACT_M = 0.1
-"""Planned impacts happen so near their point."""
+_NEAR_IMPACT_M, _FRONT_M = 0.1, 3.7
+"""Planned impacts happen so near their point, which lies about so far ahead of base_link."""
 _BEYOND_M = 20.0
 """Paths that are not timed go on so far, for whoever drives them faster."""
 
@@ -109,12 +109,16 @@ def actor_motion(actor: StagedActor, *, horizon_s: float) -> EntityMotion:
 
 
 def _off_path_m(played: StagedCase, alone: PathPose) -> float:
-    """Return how far an ego comes to be, until its impact, from where its path has it then."""
-    time_s = np.arange(len(alone.xy_m)) * _STEP_S
+    """Return how far an ego's front comes to be, until its impact, from where its path has it."""
+    time_s: Array = np.arange(float(len(alone.xy_m))) * _STEP_S
     time_s = time_s[time_s < played.impact_time_s + _STEP_S]
     along = played.ego_arc_m + played.ego_speed_mps * time_s
-    pose = FrenetPath(played.place.ego.xy_m).pose_at(along, played.ego_lateral_m)
-    return float(np.hypot(*(alone.xy_m[: len(time_s)] - pose.xy_m).T).max())
+    on_path = FrenetPath(played.place.ego.xy_m).pose_at(along, played.ego_lateral_m)
+    driven = PathPose(*(column[: len(time_s)] for column in alone))
+    if played.place.reverse:
+        on_path = on_path._replace(yaw_rad=on_path.yaw_rad + math.pi)
+    apart = _reference(driven, -_FRONT_M).xy_m - _reference(on_path, -_FRONT_M).xy_m
+    return float(np.hypot(*apart.T).max())
 
 
 def instants(horizon_s: float) -> Array:

@@ -15,12 +15,11 @@ from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import overlapping, separations
 from foretwin.sim_worker.futures.driven_touch import off_plan_m
-from foretwin.sim_worker.scenarios.casting import StagedCase, cast
-from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
 from foretwin.sim_worker.scenarios.openscenario_entities import AXLES
 from foretwin.sim_worker.scenarios.openscenario_motion import instants
 from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.world_gen.export.opendrive import write_opendrive
@@ -44,23 +43,17 @@ WORLDS = {
 
 def cases_in(id_: str, world: World, *, most: int = 1) -> list[StagedCase]:
     """Return cases of a scenario at its first place in a World, evenly chosen of all."""
-    scenario = catalogue()[id_]
-    cases = draw_cases(scenario)
-    found = (
-        cast(scenario, values, place, vehicle=VEHICLE)
-        for place in places(scenario, world, most=1).places
-        for values in cases[:: -(-len(cases) // most)]
-    )
-    return [played for played in found if isinstance(played, StagedCase)]
+    found = [
+        case
+        for cases in places(catalogue()[id_], world, most=1).cases
+        for case in cases
+        if isinstance(case, StagedCase)
+    ]
+    return found[:: max(1, -(-len(found) // most))]
 
 
 def written(played: StagedCase, world: World, file: Path) -> ScenarioFile:
-    write_openscenario(played, catalogue()[played.place.scenario_id], world, file, vehicle=VEHICLE)
-    return ScenarioFile.read(file)
-
-
-def exported(played: StagedCase, world: World, file: Path) -> ScenarioFile:
-    """Write a case that was placed, as the command does."""
+    """Write a case as the command does."""
     scenario = catalogue()[played.place.scenario_id]
     alone = ego_alone(played, scenario, world, instants(scenario.horizon_s))
     write_openscenario(played, scenario, world, file, vehicle=VEHICLE, alone=alone)
@@ -86,11 +79,6 @@ def off_m(file: ScenarioFile, played: StagedCase) -> float:
     return abs(float(separations(ego, other).max()))
 
 
-def may_be_off_m(played: StagedCase) -> float:
-    """Who brakes has its rear axle's speed, not its box's, which differ in bends."""
-    return 0.4 if any(actor.conduct == "stops" for actor in played.actors) else 0.1
-
-
 @pytest.mark.parametrize("id_", list(catalogue()))
 def test_the_planned_impact_happens_in_the_file(id_: str, tmp_path: Path) -> None:
     found = [(p, world) for world in WORLDS.values() for p in cases_in(id_, world, most=2)]
@@ -100,36 +88,22 @@ def test_the_planned_impact_happens_in_the_file(id_: str, tmp_path: Path) -> Non
         name, time_s = first_touch(file)
         assert name == played.impact_with
         if name:
-            assert off_m(file, played) <= may_be_off_m(played)
-            assert abs(time_s - played.impact_time_s) <= 0.1
-            assert float(file.properties["impact_time_s"]) == pytest.approx(played.impact_time_s)
+            assert off_m(file, played) <= 0.1
+            assert time_s == pytest.approx(played.impact_time_s, abs=0.05)
+            ego, at = file.entities["ego"], played.impact_time_s
+            columns = (*ego.xy_m.T, np.unwrap(ego.yaw_rad))
+            state = np.array([np.interp(at, ego.time_s, column) for column in columns])
+            assert off_plan_m(played, state, VEHICLE) <= 0.1
+            said = [float(file.properties[f"impact_{name}"]) for name in ("time_s", "share")]
+            assert said == pytest.approx([played.impact_time_s, played.impact_share])
         assert set(file.entities) == {"ego", *(actor.name for actor in played.actors)}
 
 
-@pytest.mark.parametrize("id_", ["latency", "cbta", "cpta", "ltip", "roundabout_exit"])
-def test_the_planned_impact_happens_in_the_file_of_a_case_that_was_placed(
-    id_: str, tmp_path: Path
-) -> None:
-    scenario, world = catalogue()[id_], WORLDS["ring" if id_ == "roundabout_exit" else "cross"]
-    found = [c for c in places(scenario, world, most=1).cases[0] if isinstance(c, StagedCase)]
-    assert found
-    for played in found:
-        file = exported(played, world, tmp_path / "case.xosc")
-        name, time_s = first_touch(file)
-        assert name == played.impact_with
-        assert time_s == pytest.approx(played.impact_time_s, abs=0.05)
-        assert off_m(file, played) <= 0.1
-        ego, at = file.entities["ego"], played.impact_time_s
-        columns = (*ego.xy_m.T, np.unwrap(ego.yaw_rad))
-        state = np.array([np.interp(at, ego.time_s, column) for column in columns])
-        assert off_plan_m(played, state, VEHICLE) <= 0.1
-        assert float(file.properties["impact_share"]) == pytest.approx(played.impact_share)
-
-
 def test_an_ego_that_keeps_to_its_path_has_a_speed_that_may_be_changed(tmp_path: Path) -> None:
-    scenario, world = catalogue()["cccscp"], WORLDS["cross"]
-    played = next(c for c in places(scenario, world, most=1).cases[0] if isinstance(c, StagedCase))
-    assert "ego_speed_mps" in exported(played, world, tmp_path / "case.xosc").parameters
+    for id_, may in (("cccscp", True), ("latency", False)):
+        (played,) = cases_in(id_, WORLDS["cross"])
+        file = written(played, WORLDS["cross"], tmp_path / "case.xosc")
+        assert ("ego_speed_mps" in file.parameters) is may
 
 
 def test_entities_are_boxes_of_their_kind_about_their_rear_axle(tmp_path: Path) -> None:
@@ -207,7 +181,8 @@ def test_who_backs_into_a_bay_looks_ahead(tmp_path: Path) -> None:
     ego = written(played, WORLDS["cross"], tmp_path / "case.xosc").entities["ego"]
     step = np.diff(ego.xy_m, axis=0)
     forward = step[:, 0] * np.cos(ego.yaw_rad[:-1]) + step[:, 1] * np.sin(ego.yaw_rad[:-1])
-    assert (forward < 0.0).all()
+    assert (forward[:30] < 0.0).all()
+    assert (forward < 0.001).all()
     assert ego.speed_mps == -played.ego_speed_mps
 
 
@@ -269,8 +244,9 @@ def test_the_judge_finds_no_fault_in_any_scenario_on_sixty_real_junctions(
         write_opendrive(world, roads)
         for id_, scenario in catalogue().items():
             for played in cases_in(id_, world):
+                alone = ego_alone(played, scenario, world, instants(scenario.horizon_s))
                 root = openscenario_element(
-                    played, scenario, world, vehicle=VEHICLE, logic_file=roads.name
+                    played, scenario, world, vehicle=VEHICLE, logic_file=roads.name, alone=alone
                 )
                 files.append(tmp_path / f"{name}-{id_}.xosc")
                 files[-1].write_bytes(etree.tostring(root))
@@ -278,7 +254,7 @@ def test_the_judge_finds_no_fault_in_any_scenario_on_sixty_real_junctions(
                 if played.impact_with:
                     file = ScenarioFile.read(files[-1])
                     assert first_touch(file)[0] == played.impact_with, files[-1].name
-                    if off_m(file, played) > may_be_off_m(played):
+                    if off_m(file, played) > 0.1:
                         off[files[-1].name] = off_m(file, played)
     for id_ in set(catalogue()) - set(seen):  # no extract has a race track
         world = WORLDS["race track" if id_ == "race_track_lap" else "motorway"]
