@@ -22,10 +22,17 @@ class UpcomingJunction(NamedTuple):
 
 
 class PassedJunction(NamedTuple):
-    """A junction whose centre the car has passed, at position `centre_s_m` of the route."""
+    """A junction on the route: where its centre is passed, its first node and its last."""
 
     junction: Junction
     centre_s_m: float
+    from_m: float
+    to_m: float
+
+
+def same_passage_m(junction: Junction) -> float:
+    """Return how far apart two of a junction's nodes may lie on a way that passes it once."""
+    return max(40.0, 2.0 * junction.radius_m)
 
 
 def encounters(route: Route, junction_at: Mapping[int, Junction]) -> Iterator[PassedJunction]:
@@ -40,13 +47,18 @@ def encounters(route: Route, junction_at: Mapping[int, Junction]) -> Iterator[Pa
         if current is not None:
             gap_m = float(route.start_m[number] - route.start_m[last])
             same = junction.summary.id == current.summary.id
-            if same and gap_m <= max(40.0, 2.0 * current.radius_m):
+            if same and gap_m <= same_passage_m(current):
                 last = number
                 continue
-            yield PassedJunction(current, _centre_s(route, current, first, last))
+            yield _passage(route, current, first, last)
         current, first, last = junction, number, number
     if current is not None:
-        yield PassedJunction(current, _centre_s(route, current, first, last))
+        yield _passage(route, current, first, last)
+
+
+def _passage(route: Route, junction: Junction, first: int, last: int) -> PassedJunction:
+    from_m, to_m = float(route.start_m[first]), float(route.start_m[last])
+    return PassedJunction(junction, _centre_s(route, junction, first, last), from_m, to_m)
 
 
 def _centre_s(route: Route, junction: Junction, first: int, last: int) -> float:

@@ -13,6 +13,7 @@ from foretwin.orchestrator.routing.junctions_ahead import (
 )
 from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.other_turns import OtherTurns
+from foretwin.orchestrator.routing.passages import Passages
 from foretwin.orchestrator.routing.place_on_route import FoundOnRoute, as_likely, locate
 from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
 from foretwin.orchestrator.routing.route import Route, extend_most_probable
@@ -75,7 +76,7 @@ class RouteFollower:
         self._looked_for_from = 0
         self._doubt: Match | None = None
         self._encounters: tuple[PassedJunction, ...] = ()
-        self._passed_at: dict[str, float] = {}
+        self._passages = Passages()
 
     def give(self, routes: Sequence[Route]) -> None:
         """Follow these from the next match on; what is driven on now is kept until they are met."""
@@ -124,7 +125,7 @@ class RouteFollower:
         return tuple(
             UpcomingJunction(met.junction, met.centre_s_m - self._s_m)
             for met in self._encounters
-            if self._s_m < met.centre_s_m <= self._s_m + horizon_m and not self._is_passed(met)
+            if self._s_m < met.centre_s_m <= self._s_m + horizon_m and met not in self._passages
         )
 
     def alternatives(self, horizon_m: float) -> tuple[UpcomingJunction, ...]:
@@ -144,7 +145,7 @@ class RouteFollower:
         nearest: dict[str, UpcomingJunction] = {}
         for met in self._other_turns.junctions(starts, horizon_m=horizon_m):
             name = met.junction.summary.id
-            if name in known or self._near_passed(name, self._s_m, met.junction.radius_m):
+            if name in known or self._passages.has_near(met.junction, self._s_m):
                 continue
             if name not in nearest or met.distance_m < nearest[name].distance_m:
                 nearest[name] = met
@@ -271,18 +272,16 @@ class RouteFollower:
             self._route = grown
             self._encounters = tuple(encounters(grown, self._junction_at))
 
-    def _near_passed(self, name: str, s_m: float, radius_m: float) -> bool:
-        passed = self._passed_at.get(name)
-        return passed is not None and abs(s_m - passed) < 2.0 * radius_m + 50.0
-
-    def _is_passed(self, met: PassedJunction) -> bool:
-        # A route that changes moves a centre a little; it is still the same passage.
-        return self._near_passed(met.junction.summary.id, met.centre_s_m, met.junction.radius_m)
-
     def _take_passed(self) -> tuple[PassedJunction, ...]:
         passed: list[PassedJunction] = []
         for met in self._encounters:
-            if self._begun_m < met.centre_s_m <= self._s_m and not self._is_passed(met):
+            if met.from_m > self._s_m:
+                break
+            known = met in self._passages
+            if not known and self._begun_m < met.centre_s_m <= self._s_m:
                 passed.append(met)
-                self._passed_at[met.junction.summary.id] = met.centre_s_m
+                known = True
+            # Who begins within a junction, past its centre, has passed it already.
+            if known or met.centre_s_m <= self._begun_m < met.to_m:
+                self._passages.add(met, driven_to_m=self._s_m)
         return tuple(passed)
