@@ -71,9 +71,9 @@ class RouteFollower:
         self._direction_known = False
         self._turning = False
         self._given_from = 0
+        """From where on the given routes the car is looked for, while it is not on them."""
         self._given_at = 0
         """Where on the given routes the first edge of the present one lies, while on them."""
-        self._looked_for_from = 0
         self._doubt: Match | None = None
         self._encounters: tuple[PassedJunction, ...] = ()
         self._passages = Passages()
@@ -85,11 +85,12 @@ class RouteFollower:
     @property
     def place(self) -> PlaceOnRoute:
         """Where the car was last; a route that crosses itself is not begun anew from it."""
-        return PlaceOnRoute(self._s_m, self._given_at + (self._place if self._on_given else 0))
+        given_place = self._given_at + self._place if self._on_given else self._given_from
+        return PlaceOnRoute(self._s_m, given_place)
 
     def go_on(self, place: PlaceOnRoute) -> None:
         """Look for the car from here on the routes given, and count metres on; before it is met."""
-        self._s_m, self._looked_for_from = place.s_m, place.given_place
+        self._s_m, self._given_from = place.s_m, place.given_place
 
     @property
     def route(self) -> Route:
@@ -155,14 +156,16 @@ class RouteFollower:
 
     def _begin(self, match: Match) -> None:
         edge = match.directed_edge
-        start = max(self._looked_for_from, self.place.given_place)
-        place = self._given.find(edge, direction_matters=match.direction_known, start=start)
+        self._given_from = self.place.given_place
+        place = self._given.find(
+            edge, direction_matters=match.direction_known, start=self._given_from
+        )
         s_on_edge = match.s_on_edge_m
         if place is not None:
             edges = self._given.edges_from(place)
             if edges[0].reverse != edge.reverse:
                 s_on_edge = edge.edge.length_m - s_on_edge
-            self._given_from = self._given_at = place
+            self._given_at = place
         else:
             edges = (edge,)
         self._on_given = place is not None
@@ -201,6 +204,8 @@ class RouteFollower:
     def _leave(self, match: Match) -> None:
         """Cut the route where the car left it, and predict from its new road."""
         assert self._route is not None
+        # That it was left shows late: the edge where it was is the one before.
+        self._given_from = max(0, self.place.given_place - self._on_given)
         key = key_of(match.directed_edge)
         best: tuple[float, int, tuple[DirectedEdge, ...]] | None = None
         for place in range(max(0, self._place - 3), min(self._place + 3, len(self._route.edges))):
@@ -246,7 +251,7 @@ class RouteFollower:
         assert self._route is not None
         rest = self._given.edges_from(place)[1:]
         self._on_given = True
-        self._given_from, self._given_at = place, place - self._place
+        self._given_at = place - self._place
         self._set_route(Route((*self._route.edges[: self._place + 1], *rest), self._route.origin_m))
 
     # --- what lies ahead --------------------------------------------------------------------

@@ -240,6 +240,16 @@ def test_of_a_road_driven_three_times_the_next_time_is_foreseen() -> None:
     assert [name for name, _ in driver.ahead(330.0)] == ["n102", "n103", "n104", "n204"]
 
 
+def test_who_leaves_a_route_and_comes_back_to_a_road_of_two_laps_is_on_the_one_not_driven_yet() -> (
+    None
+):
+    lap = [(0, 100), (300, 100), (300, 200), (0, 200)]
+    driver = Driver(route_of([*lap, (0, 100), (200, 100), (200, 0), (400, 0)]))
+    driver.go([*lap[:3], (100, 200), (100, 100), (180, 100)])
+
+    assert [name for name, _ in driver.ahead(330.0)] == ["n103", "n3", "n4"]
+
+
 def test_other_turns_within_reach_are_told_for_building_worlds_ahead() -> None:
     driver = Driver().go([(120, 100), (160, 100)])
     others = [
