@@ -18,6 +18,7 @@ from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_to_goal import FoundWay, WayFinder, away_m
+from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
 
 LOOK_EVERY_NS = 1_000_000_000
 PLAN_AWAY_M = 25.0
@@ -34,7 +35,7 @@ class RouteHandler:
         self, plan: DrivePlan, *, use: Callable[[Route], None], tell: Callable[[Notice], None]
     ) -> None:
         """`use` takes each route that was found; without `--route live` there is nothing to do."""
-        self._graph, self._vehicle_id = plan.graph, plan.config.vehicle_id
+        self._osm, self._graph, self._vehicle_id = plan.osm, plan.graph, plan.config.vehicle_id
         self._use, self._tell = use, tell
         self._live = plan.config.route == "live"
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="route")
@@ -50,7 +51,10 @@ class RouteHandler:
         if self._live:
             bus.subscribe("route", mailbox, vehicle=self._vehicle_id)
             # An index of its own: its memory of what is reachable is not for two threads.
-            self._finder = self._thread.submit(lambda: WayFinder(RoadIndex(self._graph)))
+            self._finder = self._thread.submit(self._make_finder)
+
+    def _make_finder(self) -> WayFinder:
+        return WayFinder(RoadIndex(self._graph), read_turn_restrictions(self._osm, self._graph))
 
     def take(self, item: Received) -> None:
         """Take what the vehicle says; the same again changes nothing.

@@ -160,7 +160,7 @@ def _join(graph: RoadGraph, pieces: Sequence[_Piece]) -> tuple[tuple[Route, ...]
         bridge = None
         if routes and gap_m <= BRIDGE_UP_TO_M:
             network = network or ShortestWays(graph)
-            bridge = network.between(routes[-1][-1].end_node, piece.edges[0].start_node)
+            bridge = network.between(routes[-1][-1], piece.edges[0])
         length = sum(directed.edge.length_m for directed in bridge or ())
         # A way much longer than the line's own gap is not the one that was driven.
         if bridge is not None and length <= 1.3 * gap_m + 50.0:

@@ -12,10 +12,17 @@ from foretwin.contracts.drive import RoutePose
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
 from foretwin.geometry.polyline import locate, points_at
 from foretwin.orchestrator.routing.line_matching import match_line
-from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, key_of, legality
+from foretwin.orchestrator.routing.road_index import (
+    NearEdge,
+    RoadIndex,
+    key_of,
+    legality,
+    project,
+)
 from foretwin.orchestrator.routing.route import Route, RouteError
 from foretwin.orchestrator.routing.shortest_paths import ShortestWays
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
 NEAR_M = 30.0
 """A pose farther from every road is on none: yards and car parks are often not in the map."""
@@ -30,11 +37,11 @@ class FoundWay(NamedTuple):
 
 
 class WayFinder:
-    """Finds ways on one map; made once, since a large map's network takes a while."""
+    """Finds ways on one map that keep to its rules, where such ones lead to the goal."""
 
-    def __init__(self, index: RoadIndex) -> None:
+    def __init__(self, index: RoadIndex, restrictions: TurnRestrictions) -> None:
         self._index = index
-        self._ways = ShortestWays(index.graph)
+        self._ways = ShortestWays(index.graph, lawful=restrictions)
 
     def find(self, start: RoutePose, goal: RoutePose, *, planned_deg: Array | None) -> FoundWay:
         """Return the way from start to goal, at first along `planned_deg` (N, 2) where given.
@@ -45,26 +52,27 @@ class WayFinder:
         at_goal = self._on_road(goal, "goal")
         edges = self._along(planned_deg)
         planned_m = sum(float(one.edge.length_m) for one in edges)
-        if not edges:
-            at_start = self._on_road(start, "start")
-            edges = (at_start.directed_edge,)
-            if key_of(edges[0]) == key_of(at_goal.directed_edge) and at_start.s_m <= at_goal.s_m:
-                return FoundWay(Route(edges), 0.0)
+        if planned_deg is not None and edges:
+            from_m = project(edges[0], self._xy_m(*planned_deg[0])).s_m
         else:
-            passed = [key_of(one) for one in edges]
-            if key_of(at_goal.directed_edge) in passed:
-                last = passed.index(key_of(at_goal.directed_edge))
-                return FoundWay(Route(edges[: last + 1]), planned_m)
-        rest = self._ways.between(edges[-1].end_node, at_goal.directed_edge.start_node)
+            at_start = self._on_road(start, "start")
+            edges, from_m = (at_start.directed_edge,), at_start.s_m
+        passed = [key_of(one) for one in edges]
+        # A goal behind on the first road is come to by driving round.
+        behind = int(passed[0] == key_of(at_goal.directed_edge) and at_goal.s_m < from_m)
+        if key_of(at_goal.directed_edge) in passed[behind:]:
+            last = passed.index(key_of(at_goal.directed_edge), behind)
+            return FoundWay(Route(edges[: last + 1]), planned_m)
+        rest = self._ways.between(edges[-1], at_goal.directed_edge)
         if rest is None:
             raise RouteError(f"no road leads from {_text(start)} to its goal {_text(goal)}")
         return FoundWay(Route((*edges, *rest, at_goal.directed_edge)).validate(), planned_m)
 
     def _on_road(self, pose: RoutePose, what: str) -> NearEdge:
-        graph = self._index.graph
         lat, lon = pose.position.lat_deg, pose.position.lon_deg
-        xy_m = local_from_geo(graph.frame, lat, lon)
-        yaw_rad = float(local_from_geo_yaw(graph.frame, pose.yaw_rad, lat, lon))
+        xy_m = self._xy_m(lat, lon)
+        frame = self._index.graph.frame
+        yaw_rad = float(local_from_geo_yaw(frame, pose.yaw_rad, lat, lon))
         near = self._index.near(xy_m, NEAR_M)
         if not near:
             raise RouteError(f"its {what} {_text(pose)} lies within {NEAR_M:g} m of no road")
@@ -77,6 +85,9 @@ class WayFinder:
         if not fit:
             raise RouteError(f"its {what} {_text(pose)} lies on no road that leads its way")
         return min(fit, key=lambda one: (legality(one.directed_edge) != "car", one.distance_m))
+
+    def _xy_m(self, lat_deg: float, lon_deg: float) -> Array:
+        return local_from_geo(self._index.graph.frame, lat_deg, lon_deg)
 
     def _along(self, planned_deg: Array | None) -> tuple[DirectedEdge, ...]:
         if planned_deg is None or len(planned_deg) < 2:

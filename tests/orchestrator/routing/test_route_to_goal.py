@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
 from foretwin.orchestrator.routing.route import Route, RouteError
 from foretwin.orchestrator.routing.route_to_goal import WayFinder, away_m
 from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, TurnRule
 from tests.orchestrator.grid_map import BLOCK_M, FRAME, graph_of, grid, node, road
 
 COVERS = ("foretwin.orchestrator.routing.shortest_paths",)
@@ -30,8 +32,13 @@ def degrees(*points_m: tuple[float, float]) -> np.ndarray:
     return geo_from_local(FRAME, np.asarray(points_m, dtype=np.float64))
 
 
-def finder(graph: RoadGraph = TOWN) -> WayFinder:
-    return WayFinder(RoadIndex(graph))
+def finder(graph: RoadGraph = TOWN, *rules: TurnRule) -> WayFinder:
+    """Rules are of the node one block to the east."""
+    return WayFinder(RoadIndex(graph), TurnRestrictions({node(1, 0): rules}, ()))
+
+
+def turns_back(route: Route) -> bool:
+    return any(one.edge.index == other.edge.index for one, other in pairwise(route.edges))
 
 
 def names(route: Route) -> list[str]:
@@ -73,6 +80,42 @@ def test_a_goal_behind_on_the_same_road_is_come_to_by_driving_round() -> None:
     found = finder().find(pose(80.0, 0.0, EAST), pose(20.0, 0.0, EAST), planned_deg=None)
     assert key_of(found.route.edges[0]) == key_of(found.route.edges[-1]) == (0, False)
     assert len(found.route.edges) > 2
+
+
+def test_a_goal_that_lies_the_other_way_is_come_to_round_the_block_not_by_turning_back() -> None:
+    found = finder().find(pose(20.0, 0.0, EAST), pose(150.0, 2.0, WEST), planned_deg=None)
+    assert names(found.route) == ["Row 0", "Column 1", "Row 1", "Column 2", "Row 0"]
+
+
+def test_who_can_only_turn_back_does_so() -> None:
+    street = [
+        road(0, 1, 2, [(0.0, 0.0), (100.0, 0.0)]),
+        road(1, 2, 3, [(100.0, 0.0), (200.0, 0.0)]),
+    ]
+    found = finder(graph_of(street)).find(
+        pose(20.0, 0.0, EAST), pose(20.0, 2.0, WEST), planned_deg=None
+    )
+    assert [key_of(one) for one in found.route.edges] == [(0, False), (0, True)]
+
+
+def test_the_way_keeps_to_turn_restrictions() -> None:
+    goal = pose(100.0, 50.0, NORTH)
+    free = finder().find(pose(20.0, 0.0, EAST), goal, planned_deg=None).route
+    first, left = free.edges
+    no_left = TurnRule(1, first.edge.way_id, (), frozenset({left.edge.way_id}), False, False)
+    kept = finder(TOWN, no_left).find(pose(20.0, 0.0, EAST), goal, planned_deg=None).route
+    assert key_of(kept.edges[-1]) == key_of(left)
+    assert kept.edges[-2].edge.name == "Row 0"
+    assert kept.edges[-2].reverse
+    assert not turns_back(kept)
+
+
+def test_a_goal_behind_the_car_on_the_plans_first_road_is_not_there_yet() -> None:
+    plan = degrees((60.0, 0.0), (100.0, 0.0), (200.0, 0.0))
+    found = finder().find(pose(60.0, 0.0, EAST), pose(20.0, 0.0, EAST), planned_deg=plan)
+    assert [key_of(one) for one in found.route.edges[:2]] == [(0, False), (1, False)]
+    assert key_of(found.route.edges[-1]) == (0, False)
+    assert not turns_back(found.route)
 
 
 @pytest.mark.parametrize(
