@@ -15,9 +15,10 @@ from foretwin.orchestrator.routing.road_hypotheses import (
     first_hypotheses,
     next_hypotheses,
 )
-from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
+from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, key_of
 from foretwin.orchestrator.routing.route import Route, RouteError
 from foretwin.orchestrator.routing.shortest_paths import ShortestWays
+from foretwin.orchestrator.routing.spurs import EdgeVisit, without_spurs
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
 NEAR_ROAD_M = 30.0
@@ -134,20 +135,36 @@ def _trace(layers: Sequence[list[Hypothesis]], first: int) -> list[_Piece]:
         place = layer[place].parent
     chain.reverse()
     pieces: list[_Piece] = []
-    edges = [chain[0].near.directed_edge]
+    visits = [_visit(chain[0].near)]
     start = first
     for number, hypothesis in enumerate(chain[1:], start=first + 1):
-        step = hypothesis.near.directed_edge
+        step, last = hypothesis.near, visits[-1]
         if not hypothesis.connected:
-            pieces.append(_Piece(tuple(edges), start, number - 1))
-            edges, start = [step], number
-        elif hypothesis.via or key_of(step) != key_of(edges[-1]):
-            edges += [*hypothesis.via, step]
+            pieces.append(_Piece(tuple(without_spurs(visits)), start, number - 1))
+            visits, start = [_visit(step)], number
+        elif hypothesis.via or key_of(step.directed_edge) != key_of(last.edge):
+            visits += _driven_onto(last, hypothesis)
+        last = visits[-1]
+        last.to_m = max(last.to_m, step.s_m)
     # A line that ends on a node may have stepped onto the next road by nothing.
-    if len(edges) > 1 and chain[-1].near.s_m < 2.0:
-        edges.pop()
-    pieces.append(_Piece(tuple(edges), start, first + len(chain) - 1))
+    if len(visits) > 1 and chain[-1].near.s_m < 2.0:
+        visits.pop()
+    pieces.append(_Piece(tuple(without_spurs(visits)), start, first + len(chain) - 1))
     return pieces
+
+
+def _visit(near: NearEdge) -> EdgeVisit:
+    return EdgeVisit(near.directed_edge, near.s_m, near.s_m)
+
+
+def _driven_onto(last: EdgeVisit, hypothesis: Hypothesis) -> list[EdgeVisit]:
+    """Return the visits after the last one, which is at its end unless the road was turned in."""
+    step = hypothesis.near
+    if not hypothesis.via and key_of(last.edge.back) == key_of(step.directed_edge):
+        return [EdgeVisit(step.directed_edge, last.edge.edge.length_m - last.to_m, step.s_m)]
+    last.to_m = last.edge.edge.length_m
+    through = [EdgeVisit(edge, 0.0, edge.edge.length_m) for edge in hypothesis.via]
+    return [*through, EdgeVisit(step.directed_edge, 0.0, step.s_m)]
 
 
 def _join(graph: RoadGraph, pieces: Sequence[_Piece]) -> tuple[tuple[Route, ...], float]:
