@@ -30,7 +30,7 @@ from foretwin.orchestrator.rounds.news import RoundNews
 from foretwin.orchestrator.rounds.pace import Pace, Played, RoundPace
 from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
 from foretwin.orchestrator.rounds.siblings import SIBLING, SiblingRounds
-from foretwin.orchestrator.rounds.views import place_of, round_view
+from foretwin.orchestrator.rounds.views import round_view
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
 from foretwin.orchestrator.runner.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.sim_worker.futures.columns import row_of
@@ -265,7 +265,7 @@ class RoundRunner:
             cruise_speed_mps=seed.intent.cruise_speed_mps,
         )
         self._tables.add("rounds", [row])
-        view = round_view(done, futures, world.frame, self._plan.drive_frame, place_of(done, world))
+        view = round_view(done, futures, world, self._plan.vehicle, self._plan.drive_frame)
         self._context.publish("round", view)
         self._planner.take_worst(order.futures, view.criticality)
         self._news.planners(done)

@@ -9,13 +9,16 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
-from foretwin.contracts.futures import COLLISION_WITH, RoadUserTracks
+from foretwin.contracts.futures import COLLISION_WITH, FuturesResult, RoadUserTracks
 from foretwin.contracts.simulation import FutureHit, MetRoadUser, RoundView
 from foretwin.contracts.trace import traced
+from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.orchestrator.record.result_rows import RoundFutures
 from foretwin.orchestrator.rounds.future_titles import future_title
 from foretwin.orchestrator.runner.open_rounds import RoundDone
+from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 
 VIEW_POINTS = 25
 _SHOWN = 16
@@ -27,32 +30,29 @@ _ROAD_USER, _STATIC = COLLISION_WITH.index("road_user"), COLLISION_WITH.index("s
 def round_view(
     done: RoundDone,
     futures: RoundFutures,
-    world_frame: LocalFrame,
+    world: World,
+    vehicle: VehicleParameters,
     drive_frame: LocalFrame,
-    place: str = "",
 ) -> RoundView:
-    """Return a round for those who watch: fewer points, in the drive's frame, with criticality.
-
-    `place` is the junction's name.
-    """
+    """Return a round for those who watch: fewer points, in the drive's frame, with criticality."""
     count, instants = futures.states.shape[:2]
     kept = np.unique(np.linspace(0, instants - 1, VIEW_POINTS).round().astype(int))
 
     def in_drive(xy_m: Array) -> Array32:
         flat = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
-        moved = target_from_source_m(drive_frame, world_frame, flat)
+        moved = target_from_source_m(drive_frame, world.frame, flat)
         return moved.reshape(xy_m.shape).astype(np.float32)
 
-    clearance = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)
+    least_m = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)
     criticality = futures.criticality
-    nearest = float(clearance.min()) if count else np.inf
+    nearest = float(least_m.min()) if count else np.inf
     # How grave is not known counts as grave, as in the viewer's colours.
-    met = _met(done, np.nan_to_num(criticality, nan=1.0), kept)
+    met = _met(done, np.nan_to_num(criticality, nan=1.0), kept, vehicle)
     return RoundView(
         round_id=done.order.round_id,
         stamp_ns=done.order.stamp_ns,
         intersection_id=done.order.junction_id,
-        place=place,
+        place=place_of(done, world),
         world_id=done.order.world_id,
         xy_m=in_drive(futures.states[:, kept, :2]),
         criticality=criticality.astype(np.float32),
@@ -99,16 +99,18 @@ class _Met(NamedTuple):
     hits: tuple[FutureHit, ...]
 
 
-def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Met:
-    """Return the nearest road user of each of the worst futures, and where cars touch theirs."""
+def _met(
+    done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any], vehicle: VehicleParameters
+) -> _Met:
+    """Return whom each of the worst futures hits or comes nearest to, and where cars touch."""
     tracks, touches, names = [], [], []
     road_users: list[MetRoadUser] = []
     hits: list[FutureHit] = []
     worst = {int(i) for i in np.argsort(-criticality, kind="stable")[:_SHOWN]}
     number = -1
     for result in done.results:
-        poses, states = result.road_users.poses, result.trajectory.states
-        times_s, outcome = result.trajectory.time_s, result.outcome
+        poses, outcome = result.road_users.poses, result.outcome
+        times_s = result.trajectory.time_s
         for place in range(len(result.future_indices)):
             number += 1
             shown = number in worst and criticality[number] > 0.0
@@ -116,17 +118,17 @@ def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Me
             hit_s = float(outcome.collision_time_s[place]) if outcome.collided[place] else None
             if hit_s is not None and outcome.collision_with[place] == _STATIC:
                 hits.append(FutureHit(future=number, time_s=hit_s, what="static"))
-            there = np.flatnonzero(np.isfinite(poses[place, 0, :, 0]))
-            if not len(there):
+            hits_user = hit_s is not None and outcome.collision_with[place] == _ROAD_USER
+            if not (shown or hits_user):
                 continue
-            away = poses[place][:, there, :2] - states[place, :, None, :2]
-            far_m = np.hypot(away[..., 0], away[..., 1])
-            who = int(far_m.min(axis=0).argmin())
-            nearest = int(there[who])
+            one = _whom(result, place, vehicle, hit_s if hits_user else None)
+            if one is None:
+                continue
+            nearest = one.road_user
             kind = _kind(result.road_users, place, nearest)
-            if shown:
+            if shown and np.isfinite(poses[place, 0, nearest, 0]):
                 tracks.append(poses[place, kept, nearest, :2])
-                nearest_s = float(times_s[int(far_m[:, who].argmin())])
+                nearest_s = float(times_s[one.instant])
                 road_users.append(
                     MetRoadUser(
                         future=number,
@@ -135,7 +137,7 @@ def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Me
                         scenario_id=future.scenario_id,
                     )
                 )
-            if hit_s is not None and outcome.collision_with[place] == _ROAD_USER:
+            if hit_s is not None and hits_user:
                 hits.append(FutureHit(future=number, time_s=hit_s, what=kind))
                 instant = int(np.searchsorted(times_s, hit_s))
                 touches.append(poses[place, min(instant, poses.shape[1] - 1), nearest, :2])
@@ -143,6 +145,47 @@ def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Me
     found = np.array(tracks, dtype=np.float64).reshape(-1, len(kept), 2)
     touched = np.array(touches, dtype=np.float64).reshape(-1, 2)
     return _Met(found, touched, tuple(names), tuple(road_users), tuple(hits))
+
+
+class _Whom(NamedTuple):
+    """A road user by its number, and the instant at which a future comes nearest to it."""
+
+    road_user: int
+    instant: int
+
+
+def _whom(
+    result: FuturesResult, place: int, vehicle: VehicleParameters, hit_s: float | None
+) -> _Whom | None:
+    """Return whom a future hits at `hit_s`, else whom its outline comes nearest to; None where
+    nobody is there from the beginning until then."""
+    users, times_s = result.road_users, result.trajectory.time_s
+    first, last = 0, len(times_s)
+    if hit_s is not None:
+        first = min(max(int(np.searchsorted(times_s, hit_s)) - 1, 0), last - 1)
+        last = first + 2
+        partner = next((one.road_user for one in result.accidents if one.future == place), None)
+        if partner is not None:
+            return _Whom(partner, first)
+    poses = users.poses[place, first:last].astype(np.float64)
+    known = np.isfinite(users.poses[place, 0, :, 0]) & np.isfinite(poses[..., 0])
+    if not known.any():
+        return None
+    car = ego_rectangles(vehicle, result.trajectory.states[place, first:last].astype(np.float64))
+    length_m, width_m = users.size_m[place].astype(np.float64).T
+    away_m = np.hypot(*np.moveaxis(poses[..., :2] - car.centre_m[:, None], -1, 0))
+    away_m = np.where(known, away_m, np.inf)
+    # Outlines are nearer than centres by half of both widths at least, of both diagonals at most.
+    most_m = (np.hypot(length_m, width_m) + np.hypot(car.length_m, car.width_m)) / 2.0
+    least_m = (np.minimum(length_m, width_m) + min(car.length_m, car.width_m)) / 2.0
+    at, who = np.nonzero(known & (away_m - most_m <= (away_m - least_m).min()))
+    apart_m = clearance(
+        Rectangles(car.centre_m[at], car.yaw_rad[at], car.length_m, car.width_m),
+        Rectangles(poses[at, who, :2], poses[at, who, 2], length_m[who], width_m[who]),
+    )
+    # Of instants side by side the one in their middle.
+    nearest = int(np.lexsort((away_m[at, who], apart_m.round(2)))[0])
+    return _Whom(int(who[nearest]), first + int(at[nearest]))
 
 
 def _kind(users: RoadUserTracks, place: int, number: int) -> RoadUserKind:

@@ -18,13 +18,14 @@ from foretwin.orchestrator.record.results import MIRROR, MIRRORED, TABLES
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.sim_worker.futures.columns import columns, columns_of, row_of
 from foretwin.sim_worker.futures.likelihood import NEAR_MISS
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.mirror_samples import mirror_sample
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, town_world
 from tests.viewer.scene import drive
 
 COVERS = ("foretwin.sim_worker.futures.columns",)
-FRAME = town_world("n4").frame
+WORLD = town_world("n4")
 
 
 def test_each_future_is_a_row_with_its_difference_from_the_nominal() -> None:
@@ -113,7 +114,7 @@ def test_columns_are_those_of_a_message_and_of_what_is_in_it() -> None:
 def view_of(**outcome: np.ndarray):
     states = np.concatenate([straight((0.0, float(y))) for y in range(4)])
     done = round_done(states, outcome=outcome)
-    return round_view(done, round_futures(done).futures, FRAME, FRAME)
+    return round_view(done, round_futures(done).futures, WORLD, load_vehicle(), WORLD.frame)
 
 
 def test_criticality_grows_as_clearance_shrinks_and_is_most_in_a_collision() -> None:
