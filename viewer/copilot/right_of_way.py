@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ CONTROL_WORDS: dict[Control, tuple[Sign, str]] = {
 """Of a whole junction, where it is not known yet by which lane the car comes."""
 NEAR_M = 4.0
 """A path that keeps so near to a connection takes it."""
+_TOGETHER_M = 2.0
+"""Connections that begin so near to each other along a path begin at one place, side by side."""
 _SAME_WAY_RAD = 0.6
 
 
@@ -49,10 +52,13 @@ def right_of_way(world: World, junction_id: str, path_m: Array) -> RightOfWay | 
     if not mine or len(path_m) < 2:
         return None
     path_m = _dense(path_m)
-    taken = [(_farthest_m(one.centerline, path_m), one) for one in mine]
-    nearest_m, connection = min(taken, key=lambda pair: pair[0])
-    if nearest_m <= NEAR_M:
-        return _asked(world, connection)
+    along = [(_followed(one.centerline, path_m), one) for one in mine]
+    taken = [(it, one) for it, one in along if it.away_m <= NEAR_M]
+    if taken:
+        # Through a roundabout there are several in a row; who waits, waits at the first.
+        until_m = min(it.from_m for it, _ in taken) + _TOGETHER_M
+        first = [(it.away_m, one) for it, one in taken if it.from_m <= until_m]
+        return _asked(world, min(first, key=lambda pair: pair[0])[1])
     lanes = {lane.id: lane for lane in world.lanes}
     ahead = [
         one
@@ -89,6 +95,13 @@ def _asked(world: World, connection: Connection) -> RightOfWay:
     return RightOfWay("priority", "right of way")
 
 
+class _Followed(NamedTuple):
+    """How far a line leaves a path at most, and where along the path it begins."""
+
+    away_m: float
+    from_m: float
+
+
 def _dense(path_m: Array) -> Array:
     """Return a line with points about half a metre apart."""
     steps = np.hypot(*np.diff(path_m, axis=0).T)
@@ -97,12 +110,12 @@ def _dense(path_m: Array) -> Array:
     return np.column_stack([np.interp(at, along, path_m[:, axis]) for axis in (0, 1)])
 
 
-def _farthest_m(line_m: Array, path_m: Array) -> float:
-    """Return how far a line leaves a path, infinite where they go opposite ways."""
+def _followed(line_m: Array, path_m: Array) -> _Followed:
+    """Return how a line goes along a dense path, infinitely far where they go opposite ways."""
     away = np.hypot(*np.moveaxis(line_m[:, None] - path_m[None], -1, 0))
-    if int(away[0].argmin()) > int(away[-1].argmin()):
-        return float("inf")
-    return float(away.min(axis=1).max())
+    first, last = int(away[0].argmin()), int(away[-1].argmin())
+    away_m = math.inf if first > last else float(away.min(axis=1).max())
+    return _Followed(away_m, 0.5 * first)
 
 
 def _ends_on(line_m: Array, path_m: Array) -> bool:

@@ -70,6 +70,18 @@ def test_a_light_has_its_group_by_which_its_colour_is_known() -> None:
     assert found == RightOfWay("signals", "signals", "g1")
 
 
+def test_before_a_roundabout_counts_the_way_in_not_the_ring_that_follows() -> None:
+    world = drawn("give_way", "stop")
+    way_in = msgspec.structs.replace(
+        world.connections[0], centerline=np.array([[-12.0, -2.5], [-8.0, -1.0], [-4.0, -1.75]])
+    )
+    ring = msgspec.structs.replace(
+        way_in, id="ring", control="none", centerline=np.array([[-4.0, -1.75], [12.0, -1.75]])
+    )
+    round_it = msgspec.structs.replace(world, connections=(ring, way_in, world.connections[1]))
+    assert right_of_way(round_it, ID, STRAIGHT) == RightOfWay("give_way", "give way")
+
+
 def test_before_the_path_reaches_the_junction_it_counts_what_all_ways_on_have_in_common() -> None:
     assert right_of_way(drawn("stop", "stop"), ID, SHORT) == RightOfWay("stop", "stop")
     assert right_of_way(drawn("stop", "give_way"), ID, SHORT) is None
