@@ -66,9 +66,9 @@ def area_filter(area: str, *, margin_m: float) -> str:
     """Return the Overpass filter of a box W,S,E,N, or of the surroundings of a file's line."""
     if not _is_route(area):
         return box_filter(parse_bbox(area))
-    from foretwin.telemetry.logs import read_line
+    from foretwin.orchestrator.worlds.choice import read_route
 
-    return line_filter(read_line(Path(area)).lat_lon_deg, margin_m)
+    return line_filter(read_route(Path(area)), margin_m)
 
 
 def _is_route(area: str) -> bool:

@@ -39,13 +39,14 @@ from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.roads_shown import roads_shown
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.standin_path import standin_path
+from foretwin.orchestrator.worlds.choice import read_route
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
 from foretwin.orchestrator.worlds.heights import profiles_of, slopes_in
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.orchestrator.worlds.track_store import tracks_for
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.vehicle.parameters import DEFAULT_FILE, load_vehicle, scale_of
-from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
+from foretwin.telemetry.logs import LogError, line_of_log, open_log
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.world_gen.opening import Clip
 from foretwin.world_gen.roads.road_graph import RoadGraph
@@ -242,7 +243,7 @@ def _given_line(config: DriveConfig, positions: Array | None) -> Array | None:
         route_file = str(ROUTE_FILE)
     if route_file is None:
         return None
-    return read_line(Path(route_file)).lat_lon_deg
+    return read_route(Path(route_file))
 
 
 def _routes(

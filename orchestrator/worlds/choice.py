@@ -11,7 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, local_from_geo
-from foretwin.contracts.terminal import command_line
+from foretwin.contracts.terminal import command_line, say
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.opening import Clip, NodeClip, OpenMap
@@ -75,10 +75,17 @@ def parse_place(at: str) -> tuple[float, float]:
 
 
 def read_route(route: Path) -> Array:
-    """Return a GPX or GeoJSON line as (N, 2) latitudes and longitudes in degrees."""
+    """Return a GPX or GeoJSON line as (N, 2) latitudes and longitudes in degrees.
+
+    Where its file holds others, and none was chosen, a line on stderr says so.
+    """
     from foretwin.telemetry.logs import read_line
 
-    return read_line(route).lat_lon_deg
+    line = read_line(route)
+    if line.passed_over:
+        text = f"{route} holds {1 + line.passed_over} lines: the first is the route"
+        say(f"{text}; {route.name}#1 would be the second", error=True)
+    return line.lat_lon_deg
 
 
 class ChosenJunctions(NamedTuple):

@@ -19,6 +19,8 @@ class RouteLine(msgspec.Struct, frozen=True, kw_only=True):
 
     lat_deg: Array
     lon_deg: Array
+    passed_over: int = 0
+    """Other lines of its file, where nobody said which of them is meant."""
 
     @property
     def lat_lon_deg(self) -> Array:
@@ -50,7 +52,9 @@ def read_line(path: Path) -> RouteLine:
         raise LogError(f"{file}: holds no track and no route")
     if index >= len(lines):
         raise LogError(f"{file}: has no line {index}; it holds {len(lines)}, counted from 0")
-    return _line(lines[index], where=f"{file}: line {index}")
+    found = _line(lines[index], where=f"{file}: line {index}")
+    chosen = file != Path(path)
+    return msgspec.structs.replace(found, passed_over=0 if chosen else len(lines) - 1)
 
 
 def line_of_log(log: Log, *, start_s: float = 0.0, end_s: float | None = None) -> RouteLine:

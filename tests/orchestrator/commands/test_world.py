@@ -28,7 +28,6 @@ from foretwin.world_gen.osm.osm_map import LatLonBounds
 from tests.world_gen.sketch import Sketch
 
 COVERS = (
-    "foretwin.orchestrator.worlds.choice",
     "foretwin.orchestrator.worlds.opening",
     "foretwin.world_gen.opening",
 )
