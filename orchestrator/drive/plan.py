@@ -23,6 +23,7 @@ from foretwin.contracts.new_folder import trouble_with_folder
 from foretwin.contracts.page_address import USUAL_PORT
 from foretwin.contracts.ports import WEB_PORT, free_or
 from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.terminal import say
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.campaign.joining import check_campaign
 from foretwin.orchestrator.config import ConfigError, DriveConfig, OtherVehicleConfig, has_display
@@ -119,6 +120,9 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     heights = profiles_of(opened, None if config.dem is None else Path(config.dem))
     standin = None
     if source == "standin":
+        if len(routes) > 1:
+            text = f"the route is {len(routes)} stretches of road that do not join"
+            say(f"{text}: the stand-in car drives the first, {routes[0].end_m:.0f} m", error=True)
         real = config.standin_dem
         ground = heights if real is None else profiles_of(opened, Path(real))
         standin = standin_path(osm, graph, routes[0], ground)

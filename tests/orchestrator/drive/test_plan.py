@@ -45,6 +45,24 @@ def test_without_arguments_the_stand_in_car_drives_through_the_drawn_town() -> N
     assert start == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
+def test_of_a_route_that_leaves_the_map_for_long_the_stand_in_says_how_much_it_drives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = geo_from_local(town().graph.frame, town_line())
+    half = len(line) // 2
+    away = line[half] + [0.02, 0.0]  # 2 km to the north
+    file = tmp_path / "route.geojson"
+    there = np.concatenate([line[:half], [away], line[half:]])[:, ::-1]
+    file.write_text(json.dumps({"type": "LineString", "coordinates": there.tolist()}))
+    inputs = inputs_for(tmp_path, route=str(file))
+
+    assert len(inputs.routes) > 1  # type: ignore[attr-defined]
+    driven_m = inputs.routes[0].end_m  # type: ignore[attr-defined]
+    assert f"the stand-in car drives the first, {driven_m:.0f} m\n" in capsys.readouterr().err
+    inputs_for(tmp_path)
+    assert capsys.readouterr().err == ""
+
+
 def test_reading_writes_nothing_and_planning_makes_the_runs_folder(tmp_path: Path) -> None:
     inputs = inputs_for(tmp_path)
     assert list(tmp_path.iterdir()) == []
