@@ -139,6 +139,29 @@ def test_a_centre_lane_is_where_turns_across_the_road_begin(place):
     assert {arm.lanes_in for arm in world.junctions[0].arms} == {1}
 
 
+def _limits_kmph(street: dict[str, str]) -> dict[str, float]:
+    """Return the limits of the lanes of one way of a crossing whose street has these tags."""
+    world = world_of(crossing(street={"highway": "secondary", "name": "Street", **street}))
+    lanes = (lane for lane in world.lanes if lane.osm_way == 11)
+    return {lane.id.rsplit(".", 1)[-1]: lane.speed_limit_mps.value * 3.6 for lane in lanes}
+
+
+def test_each_direction_has_its_own_limit():
+    limits = _limits_kmph({"maxspeed:forward": "70", "maxspeed:backward": "30"})
+    assert limits == pytest.approx({"f0": 70.0, "b0": 30.0})
+
+
+def test_a_lane_s_own_limit_goes_before_that_of_its_road():
+    lanes = {"oneway": "yes", "lanes": "3", "maxspeed": "100", "maxspeed:lanes": "80|none|"}
+    assert _limits_kmph(lanes) == pytest.approx({"f0": 80.0, "f1": 130.0, "f2": 100.0})
+
+
+def test_lanes_of_one_direction_have_limits_beside_those_of_the_other():
+    both = {"lanes:forward": "2", "lanes:backward": "1", "lanes": "3", "maxspeed": "60"}
+    limits = _limits_kmph({**both, "maxspeed:lanes:forward": "60|30", "maxspeed:backward": "50"})
+    assert limits == pytest.approx({"f0": 60.0, "f1": 30.0, "b0": 50.0})
+
+
 def test_buses_keep_to_their_lane_through_a_junction():
     street = {
         "highway": "secondary",

@@ -203,18 +203,25 @@ def test_nobody_who_tells_how_a_road_is_driven_looks_at_what_is_left_out(tmp_pat
 
 @pytest.mark.parametrize(
     ("tags", "kmph"),
-    [({}, 100.0), ({"source:maxspeed": "DE:urban"}, 50.0), ({"lit": "yes"}, 50.0)],
+    [
+        ({}, (100.0, 100.0)),
+        ({"source:maxspeed": "DE:urban"}, (50.0, 50.0)),
+        ({"lit": "yes"}, (50.0, 50.0)),
+        ({"maxspeed": "70", "maxspeed:backward": "30"}, (70.0, 30.0)),
+    ],
 )
-def test_a_road_has_the_limit_of_all_of_its_tags(
-    tags: dict[str, str], kmph: float, tmp_path: Path
+def test_a_road_has_the_limits_of_all_of_its_tags(
+    tags: dict[str, str], kmph: tuple[float, float], tmp_path: Path
 ) -> None:
     sketch = crossing((20, [1, 2, 3, 4, 5], {"highway": "secondary", "name": "", **tags}))
     (edge,) = [edge for edge in sketch.graph(tmp_path).edges if edge.way_id == 20]
-    assert edge.limit_forward_mps.value == pytest.approx(kmph / 3.6)
+    limits_mps = edge.limit_forward_mps.value, edge.limit_backward_mps.value
+    assert [limit * 3.6 for limit in limits_mps] == pytest.approx(kmph)
 
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("name", ["leeds", "liechtenstein"])
 def test_real_roads_have_the_limits_of_all_of_their_tags(name: str, data_dir: Path) -> None:
-    edges = build_road_graph(read_map(data_dir / MAPS[name])).edges
-    assert all(edge.limit_forward_mps == speed_limit(edge.tags, edge.country) for edge in edges)
+    for edge in build_road_graph(read_map(data_dir / MAPS[name])).edges:
+        assert edge.limit_forward_mps == speed_limit(edge.tags, edge.country)
+        assert edge.limit_backward_mps == speed_limit(edge.tags, edge.country, reverse=True)
