@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
@@ -233,10 +234,12 @@ def _connecting_road(
     lane_number = -1 if runs_along(-1, side) else 1
     first, last = start.width_m.value, to.width_m.value
     half = -0.5 * lane_number
+    # Who turns obeys the slower of both lanes, as in the other formats.
+    limit = min(start.speed_limit_mps, to.speed_limit_mps, key=lambda limit: limit.value)
     lane = OdrLane(
         number=lane_number,
         width=Cubic.between(first, last, curve.length_m),
-        lane=to,
+        lane=msgspec.structs.replace(to, speed_limit_mps=limit),
         predecessor=a.road.numbers[start.id],
         successor=b.road.numbers[to.id],
     )

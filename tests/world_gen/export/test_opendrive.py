@@ -30,7 +30,6 @@ from tests.world_gen.export.read_opendrive import OpenDriveFile, bend_rad, gap_m
 
 COVERS = (
     "foretwin.world_gen.export.opendrive_elements",
-    "foretwin.world_gen.export.opendrive_places",
     "foretwin.world_gen.export.opendrive_roads",
     "foretwin.world_gen.export.opendrive_tapers",
 )
