@@ -30,7 +30,6 @@ from foretwin.world_gen.export.opendrive_tapers import taper
 
 MIN_ROAD_M = 0.005
 """Where two lanes meet in one point a connecting road has this length: too short for a gap."""
-_MEET_M = 0.005
 _SAME_EDGE_M = 0.001
 _ASIDE_M = 0.05
 """Lanes of joined roads whose ends lie farther apart are not linked: a file must not jump."""
@@ -151,14 +150,15 @@ def _places(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadJoint]:
 
 
 def _goes_on(place: _RoadJoint, lanes: Mapping[str, Lane]) -> bool:
-    """Return whether two roads meet in a point and lanes of one lead straight into the other."""
+    """Return whether lanes of one of two roads lead straight into the other from where they end.
+
+    Their reference lines may lie apart there, as those of roads of another `placement`.
+    """
     if len(place.ends) != 2 or place.connections:
         return False
-    a, b = place.ends
-    if math.hypot(*(_tip(a) - _tip(b))) > _MEET_M:
-        return False
-    first, second = a.road.lane_ids, b.road.lane_ids
-    return bool(_pairs(first, second, lanes) or _pairs(second, first, lanes))
+    first, second = (end.road.lane_ids for end in place.ends)
+    pairs = _pairs(first, second, lanes) + _pairs(second, first, lanes)
+    return any(math.dist(one.centerline[-1], to.centerline[0]) <= _ASIDE_M for one, to in pairs)
 
 
 def _pairs(
@@ -168,11 +168,6 @@ def _pairs(
     first = (lanes[i] for i in start if i in lanes)
     pairs = ((lane, j) for lane in first for j in lane.successor_ids)
     return [(lane, lanes[j]) for lane, j in pairs if j in to and j in lanes]
-
-
-def _tip(end: _PlainEnd) -> Array:
-    tip: Array = end.road.reference_line[-1 if end.at_end else 0]
-    return tip
 
 
 def _outward(end: _PlainEnd) -> Array:
