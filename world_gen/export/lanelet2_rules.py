@@ -47,18 +47,24 @@ class _StopLines:
 
     def __init__(self, world: World, drawn: Lanelet2Map) -> None:
         self._drawn = drawn
-        self.of_lane = {
-            line.lane_id: line
-            for line in world.stop_lines
-            if line.control.value != "none" and line.connection_id is None
-        }
+        self.of_lane: dict[str, list[StopLine]] = defaultdict(list)
+        """Those of each lane, as its driver meets them: a light may stand before a sign."""
         self._at_sign = {
             line.connection_id: line for line in world.stop_lines if line.connection_id
         }
         self._ways: dict[tuple[str, ...], int] = {}
-        for lane_id, line in self.of_lane.items():
-            if line.control.value != "signal":
-                self.way((lane_id,))
+        for line in world.stop_lines:
+            if line.control.value != "none" and line.connection_id is None:
+                self.of_lane[line.lane_id].append(line)
+        lanes = {lane.id: lane for lane in world.lanes}
+        for name, lines in self.of_lane.items():
+            if len(lines) > 1:
+                path = shapely.LineString(lanes[name].centerline)
+                along_m = shapely.line_locate_point(path, [_middle(line) for line in lines])
+                lines[:] = [lines[i] for i in np.argsort(along_m)]
+            for line in lines:
+                if line.control.value != "signal":
+                    self.drawn_once([line])
 
     def where_it_waits(self, connection: Connection, conflict: Conflict) -> int | None:
         """Return the last line before the ground that a connection shares with another."""
@@ -66,20 +72,25 @@ class _StopLines:
         if line is not None:
             path = shapely.LineString(connection.centerline)
             shared = path.project(shapely.points(conflict.area))
-            if np.min(shared) > path.project(shapely.Point(line.ends.mean(axis=0))):
-                return self._drawn_once([line])
+            if np.min(shared) > path.project(_middle(line)):
+                return self.drawn_once([line])
         return self.way((connection.from_lane_id,))
 
-    def way(self, lane_ids: Iterable[str]) -> int | None:
-        """Return one line across all these lanes that have a stop line, from left to right."""
-        mine = [self.of_lane[name] for name in lane_ids if name in self.of_lane]
+    def way(self, lane_ids: Iterable[str], head: Signal | None = None) -> int | None:
+        """Return one line across all these lanes that have a stop line, from left to right.
+
+        That is the last one of each lane, or that of a light.
+        """
+        known = [self.of_lane[name] for name in lane_ids if name in self.of_lane]
+        mine = [lines[-1] if head is None else _nearest(head, lines) for lines in known]
         if not mine:
             return None
         across = mine[0].ends[1] - mine[0].ends[0]
         mine.sort(key=lambda line: float(line.ends[0] @ across))
-        return self._drawn_once(mine)
+        return self.drawn_once(mine)
 
-    def _drawn_once(self, lines: list[StopLine]) -> int:
+    def drawn_once(self, lines: list[StopLine]) -> int:
+        """Return the way of lines that lie side by side."""
         key = tuple(line.id for line in lines)
         if key not in self._ways:
             self._ways[key] = self._draw(lines)
@@ -129,16 +140,15 @@ class _Rules:
     def add_lights(self) -> None:
         """Add one rule for the heads that show one group to the same lanes.
 
-        Connections name it, as Autoware wants it; so does the lane before them where all that
-        follow it obey the same heads, as Lanelet2 has it.
+        Connections that obey it name it, as Autoware wants it; so does the lane before them where
+        all that follow it do, as Lanelet2 has it, and that of a light away from junctions.
         """
         shown = {signal.id: _draw_light(signal, self._drawn) for signal in self._world.signals}
+        signal_of = {signal.id: signal for signal in self._world.signals}
         heads: dict[tuple[str, str], list[str]] = defaultdict(list)
-        groups_at: dict[str, set[str]] = defaultdict(set)
         for signal in self._world.signals:
             for lane_id in signal.lane_ids:
                 heads[signal.group_id, lane_id].append(signal.id)
-                groups_at[lane_id].add(signal.group_id)
         governed: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
         for (group, lane_id), names in heads.items():
             governed[group, tuple(names)].append(lane_id)
@@ -147,13 +157,20 @@ class _Rules:
             if connection.id in self._ids:
                 following[connection.from_lane_id].append(connection)
         for (group, signals), lane_ids in governed.items():
-            line = self._lines.way(lane_ids)
+            line = self._lines.way(lane_ids, signal_of[signals[0]])
             members = _members("way", "refers", (shown[name][0] for name in signals))
             members += _members("way", "light_bulbs", (shown[name][1] for name in signals))
             members += _members("way", "ref_line", [line])
-            named = [n for n in lane_ids if n in self._ids and groups_at[n] == {group}]
-            after = (c for lane_id in lane_ids for c in following[lane_id])
-            named += [c.id for c in after if c.signal_group_id in (None, group)]
+            obeying = {
+                name: [c.id for c in following[name] if c.signal_group_id == group]
+                for name in lane_ids
+            }
+            named = [
+                name
+                for name, mine in obeying.items()
+                if name in self._ids and len(mine) in (0, len(following[name]))
+            ]
+            named += chain.from_iterable(obeying.values())
             self._add("traffic_light", members, named, **{"foretwin:group": group})
 
     def add_all_way_stops(self, junctions: set[str]) -> None:
@@ -229,13 +246,24 @@ class _Rules:
             part.from_lane_id if isinstance(part, Connection) else part.id for part in parts
         )
         near = [
-            name
+            line
             for name in lanes
-            if (line := self._lines.of_lane.get(name)) is not None
-            and line.control.value != "give_way"
+            for line in self._lines.of_lane.get(name, ())
+            if line.control.value != "give_way"
             and shapely.distance(crossing, shapely.LineString(line.ends)) <= STOP_BEFORE_M
         ]
-        return list(dict.fromkeys(self._lines.way((name,)) for name in near))
+        return [self._lines.drawn_once([line]) for line in near]
+
+
+def _nearest(head: Signal, lines: Sequence[StopLine]) -> StopLine:
+    """Return the line at which a light hangs, of those of one lane."""
+    lit = [line for line in lines if line.control.value == "signal"] or lines
+    place = shapely.Point(head.position[:2])
+    return min(lit, key=lambda line: shapely.distance(place, _middle(line)))
+
+
+def _middle(line: StopLine) -> shapely.Point:
+    return shapely.Point(line.ends.mean(axis=0))
 
 
 def _members(kind: MemberKind, role: str, refs: Iterable[int | None]) -> list[RelationMember]:

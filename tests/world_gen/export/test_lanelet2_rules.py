@@ -17,7 +17,7 @@ from foretwin.world_gen.export.choices import Lanelet2Dialect
 from foretwin.world_gen.export.lanelet2 import write_lanelet2
 from tests.world_gen.drawn_maps import crossing, world_of
 from tests.world_gen.export.drawn_world import ZEBRA, road, world
-from tests.world_gen.export.lanelet2_file import read, written
+from tests.world_gen.export.lanelet2_file import Read, read, written
 from tests.world_gen.export.signalled import signalled_crossing
 
 WIDE, SIGNALLED = Quantity(4.0, "default"), Choice("traffic_signals", "tagged")
@@ -43,6 +43,54 @@ def test_lights_stand_at_height_and_name_their_stop_line(tmp_path: Path) -> None
         assert [b["color"] for b in bulbs] == ["red", "yellow", "green"]
         assert found.ways[roles["ref_line"]][1]["type"] == "stop_line"
         assert named.count(rule) == 4  # the lane before the line and its three movements
+
+
+def who_names(found: Read, rule: int) -> set[str]:
+    return {
+        tags["foretwin:id"]
+        for members, tags in found.relations.values()
+        if ("relation", rule, "regulatory_element") in members
+    }
+
+
+def test_who_passes_beside_a_light_does_not_name_it(tmp_path: Path) -> None:
+    drawn = signalled_crossing()
+    slip = next(c for c in drawn.connections if c.turn == "right")
+    beside = msgspec.structs.replace(slip, signal_group_id=None, control="give_way")
+    drawn = msgspec.structs.replace(
+        drawn, connections=tuple(beside if c is slip else c for c in drawn.connections)
+    )
+    found = written(drawn, tmp_path)
+    named = {name for rule, _, _ in found.rules("traffic_light") for name in who_names(found, rule)}
+    lit = {c.id for c in drawn.connections} - {slip.id}
+    lanes = {c.from_lane_id for c in drawn.connections} - {slip.from_lane_id}
+    assert named == lit | lanes
+
+
+def test_a_light_before_a_junction_s_own_has_its_line_and_lane(tmp_path: Path) -> None:
+    drawn = signalled_crossing()
+    head, line = drawn.signals[0], drawn.stop_lines[0]
+    assert head.lane_ids == (line.lane_id,)
+    lane = next(lane for lane in drawn.lanes if lane.id == line.lane_id)
+    back = 20.0 * unit(lane.centerline[0] - lane.centerline[-1])
+    before = msgspec.structs.replace(
+        head, id="before", group_id="before", position=head.position + np.array([*back, 0.0])
+    )
+    its_line = msgspec.structs.replace(line, id="line before", ends=line.ends + back)
+    drawn = msgspec.structs.replace(
+        drawn, signals=(*drawn.signals, before), stop_lines=(*drawn.stop_lines, its_line)
+    )
+    found = written(drawn, tmp_path)
+    rules = {tags["foretwin:group"]: rule for rule, _, tags in found.rules("traffic_light")}
+    assert who_names(found, rules["before"]) == {lane.id}
+    for name, wanted in ((before.group_id, its_line), (head.group_id, line)):
+        lines = [
+            [[float(found.nodes[n][key]) for key in ("local_x", "local_y")] for n in nodes]
+            for _, members, tags in found.rules("traffic_light")
+            for nodes in (found.ways[ref][0] for _, ref, role in members if role == "ref_line")
+            if tags["foretwin:group"] == name
+        ]
+        assert any(np.allclose(ends, wanted.ends, atol=0.001) for ends in lines), name
 
 
 def test_a_light_lies_from_left_to_right_as_its_driver_sees_it(tmp_path: Path) -> None:
