@@ -227,12 +227,9 @@ def traffic_lights(
     world: World, lanes: Mapping[str, int], time_step_s: float, ids: Iterator[int]
 ) -> RoadControls:
     """Return a light for each head that some lane obeys; one without a plan is not active."""
-    plans = {
-        group.id: junction.plan
-        for junction in world.junctions
-        if junction.plan is not None
-        for group in junction.plan.groups
-    }
+    of_junctions = (j.plan for j in world.junctions if j.plan is not None)
+    known = (*of_junctions, *world.crossing_plans)
+    plans = {group.id: plan for plan in known for group in plan.groups}
     lights = RoadControls()
     for signal in world.signals:
         governed = [name for name in signal.lane_ids if name in lanes]
@@ -254,12 +251,12 @@ def traffic_lights(
 
 
 def _direction(world: World, lane_ids: Sequence[str], group_id: str) -> str:
-    """Return for which turns a light stands, by the connections of its group."""
+    """Return for which turns a light stands, by the connections of its group; for all if none."""
     side = world.intersection.driving_side
     turns = {
         indicated(c.turn, side)
         for c in world.connections
-        if c.from_lane_id in lane_ids and c.signal_group_id in (None, group_id)
+        if c.from_lane_id in lane_ids and c.signal_group_id == group_id
     }
     words = [turn for turn in _FROM_LEFT if turn in turns]
     return words[0] + "".join(word.title() for word in words[1:]) if 0 < len(words) < 3 else "all"

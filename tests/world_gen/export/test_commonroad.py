@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 import datetime
-from collections import Counter
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from lxml import etree
 
 from foretwin.contracts.beside_road import Building
 from foretwin.contracts.provenance import Choice, Quantity
-from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.world import ATTRIBUTION, StopLine, World
 from foretwin.world_gen.export.commonroad import write_commonroad
-from foretwin.world_gen.export.commonroad_controls import cycle
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import ZEBRA, road, world
 from tests.world_gen.export.signalled import signalled_crossing
 
-COVERS = (
-    "foretwin.world_gen.export.commonroad_controls",
-    "foretwin.world_gen.export.commonroad_intersections",
-)
+COVERS = ("foretwin.world_gen.export.commonroad_intersections",)
 DAY = datetime.date(2025, 6, 1)
 STRAIGHT = [(0.0, 0.0), (50.0, 0.0)]
 
@@ -134,71 +125,6 @@ def test_a_roundabout_is_an_intersection_for_each_arm(tmp_path: Path) -> None:
 def _gap(point: Any, arm: int) -> float:
     places = {1: (15.0, 0.0), 2: (0.0, 15.0), 3: (-15.0, 0.0)}
     return float(np.hypot(*(point - places[arm])))
-
-
-def test_lights_show_the_plan_of_their_group(tmp_path: Path) -> None:
-    drawn = signalled_crossing()
-    root = written(drawn, tmp_path)
-    seen = Counter()
-    for light in root.iterfind("trafficLight"):
-        shown = [
-            (e.findtext("color"), int(e.findtext("duration")))
-            for e in light.iterfind("cycle/cycleElement")
-        ]
-        assert light.findtext("active") == "true"
-        assert light.findtext("direction") == "all"
-        seen[tuple(shown)] += 1
-    assert seen == {
-        (("green", 300), ("yellow", 30), ("red", 270)): 2,  # Street: 20 + 20 + 200 + 30 after it
-        (("red", 350), ("green", 200), ("yellow", 30), ("red", 20)): 2,
-    }
-    governed = [e for e in root.iterfind("lanelet") if refs(e, "trafficLightRef")]
-    assert len(governed) == 4
-    for lanelet in governed:
-        assert refs(lanelet, "trafficLightRef") == refs(lanelet.find("stopLine"), "trafficLightRef")
-
-
-@given(
-    greens_s=st.lists(st.floats(5.0, 60.0), min_size=1, max_size=5),
-    amber_s=st.floats(0.0, 5.0),
-    red_amber_s=st.floats(0.0, 3.0),
-    all_red_s=st.floats(0.0, 4.0),
-    mine=st.data(),
-)
-def test_a_cycle_is_as_long_as_its_plan(
-    greens_s: list[float],
-    amber_s: float,
-    red_amber_s: float,
-    all_red_s: float,
-    mine: st.DataObject,
-) -> None:
-    flags = [mine.draw(st.booleans()) for _ in greens_s]
-    plan = SignalPlan(
-        groups=(SignalGroup(id="g", connection_ids=()),),
-        phases=tuple(
-            SignalPhase(green_s=green, green_group_ids=("g",) if flag else ())
-            for green, flag in zip(greens_s, flags, strict=True)
-        ),
-        amber_s=amber_s,
-        red_amber_s=red_amber_s,
-        all_red_s=all_red_s,
-        source="default",
-    )
-    shown = cycle(plan, "g")
-    total = sum(greens_s) + len(greens_s) * (amber_s + all_red_s)
-    assert sum(e.duration_s for e in shown) == pytest.approx(total)
-    green = sum(e.duration_s for e in shown if e.color == "green")
-    assert green >= sum(g for g, flag in zip(greens_s, flags, strict=True) if flag) - 1e-9
-    assert all(a.color != b.color for a, b in pairwise(shown))
-    both = [i for i, e in enumerate(shown) if e.color == "redYellow"]
-    assert all(shown[(i + 1) % len(shown)].color == "green" for i in both)
-
-
-def test_a_light_without_a_plan_is_not_active(tmp_path: Path) -> None:
-    drawn = msgspec.structs.replace(signalled_crossing(), junctions=())
-    for light in written(drawn, tmp_path).iterfind("trafficLight"):
-        assert light.findtext("active") == "false"
-        assert light.findtext("cycle/cycleElement/color") == "inactive"
 
 
 def sign_ids(root: Any) -> list[tuple[str, str]]:
