@@ -9,10 +9,8 @@ own frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Crossing, Lane, LaneKind, World
 from foretwin.geometry.world_heights import heights_of
 from foretwin.world_gen.export import lanelets
@@ -23,7 +21,7 @@ from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationM
 from foretwin.world_gen.export.lanelet2_rules import add_rules
 from foretwin.world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
 from foretwin.world_gen.export.lanelets import SIDES, URBAN_MPS, Marking
-from foretwin.world_gen.export.road_heights import RoadHeights
+from foretwin.world_gen.export.road_heights import layered
 
 AUTOWARE_MAP_NAME = "lanelet2_map.osm"
 """A map of this name gets the projector file under the name that Autoware looks for beside it."""
@@ -64,11 +62,10 @@ def write_lanelet2(world: World, path: Path, *, dialect: Lanelet2Dialect | None 
 
 def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
     """Return the World's lanes, connections, rules and surroundings as a map not yet written."""
-    drawn = Lanelet2Map(heights_of(world))
+    drawn = Lanelet2Map(heights_of(world) or layered(world))
     borders = lane_borders(world)
-    heights = _heights(world, borders, drawn)
-    members = _lane_members(world, borders, heights, drawn)
-    members |= _connection_members(world, borders, heights, drawn)
+    members = _lane_members(world, borders, drawn)
+    members |= _connection_members(world, borders, drawn)
     crosswalks = {c.id: _crosswalk(c, drawn) for c in world.crossings}
     ids = {name: drawn.new_id() for name in members}
     rules = add_rules(world, ids, crosswalks if crosswalk_rules else {}, drawn)
@@ -88,23 +85,12 @@ def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
     return drawn
 
 
-_Heights = Callable[[Lane | Connection, Array], Array]
-"""Gives the heights (N,) of a border (N, 2) of a lane or connection."""
-
-
-def _heights(world: World, borders: dict[str, Borders], drawn: Lanelet2Map) -> _Heights:
-    if drawn.hills is not None:
-        return drawn.hills.along
-    layers = RoadHeights(world, borders)
-    return lambda part, line: layers.along(line, part.layer)
-
-
 def _lane_members(
-    world: World, borders: dict[str, Borders], heights: _Heights, drawn: Lanelet2Map
+    world: World, borders: dict[str, Borders], drawn: Lanelet2Map
 ) -> dict[str, list[RelationMember]]:
     """Draw the borders of lanes, each once, and return them as left and right of every lane."""
     nodes = {
-        lane.id: tuple(drawn.road_nodes(line, heights(lane, line)) for line in borders[lane.id])
+        lane.id: tuple(drawn.road_nodes(lane, line) for line in borders[lane.id])
         for lane in world.lanes
     }
     markings = lanelets.lane_markings(world, borders)
@@ -133,14 +119,14 @@ def border_tags(marking: Marking) -> dict[str, str]:
 
 
 def _connection_members(
-    world: World, borders: dict[str, Borders], heights: _Heights, drawn: Lanelet2Map
+    world: World, borders: dict[str, Borders], drawn: Lanelet2Map
 ) -> dict[str, list[RelationMember]]:
     found: dict[str, list[RelationMember]] = {}
     for connection in world.connections:
         if connection.id in borders:
             members = found[connection.id] = []
             for side, line in zip(SIDES, oriented(borders[connection.id]), strict=True):
-                nodes = drawn.road_nodes(line, heights(connection, line))
+                nodes = drawn.road_nodes(connection, line)
                 members.append(RelationMember("way", drawn.road_way(nodes, VIRTUAL), side))
     return found
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
-from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.contracts.world import ATTRIBUTION, Connection, Lane, World
 from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.export.xml_tree import in_comment, legal
 
@@ -43,7 +43,7 @@ class Lanelet2Map:
         self._xyz: list[tuple[float, float, float]] = []
         self._node_ids: list[int] = []
         self._node_tags: dict[int, Tags] = {}
-        self._node_at: dict[tuple[int, int], int] = {}
+        self._node_at: dict[tuple[int, int, int | None], int] = {}
         self._way_over: dict[tuple[int, ...], int] = {}
         self._ways: list[tuple[int, tuple[int, ...], Tags]] = []
         self._relations: list[tuple[int, Sequence[RelationMember], Tags]] = []
@@ -73,14 +73,19 @@ class Lanelet2Map:
             self.node(x, y, z) for (x, y), z in zip(points.tolist(), z_m.tolist(), strict=True)
         )
 
-    def road_nodes(self, line: Array, z_m: Array) -> tuple[int, ...]:
-        """Return the nodes of a line (N, 2) at heights (N,), shared where coordinates are equal."""
+    def road_nodes(self, part: Lane | Connection, line: Array) -> tuple[int, ...]:
+        """Return the nodes of a border (N, 2), shared with those at the same place.
+
+        Between its ends that is with those of its layer alone: what passes over it stays apart.
+        """
+        z_m = np.zeros(len(line)) if self.hills is None else self.hills.along(part, line)
         found: list[int] = []
         keys = np.rint(line * 1000.0).astype(np.int64).tolist()
-        for (x, y), point, z in zip(keys, line.tolist(), z_m.tolist(), strict=True):
-            node = self._node_at.get((x, y))
+        for i, ((x, y), point, z) in enumerate(zip(keys, line.tolist(), z_m.tolist(), strict=True)):
+            key = (x, y, None if i in (0, len(keys) - 1) else part.layer)
+            node = self._node_at.get(key)
             if node is None:
-                node = self._node_at[x, y] = self.node(point[0], point[1], z)
+                node = self._node_at[key] = self.node(point[0], point[1], z)
             if not found or found[-1] != node:
                 found.append(node)
         return tuple(found)

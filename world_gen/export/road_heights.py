@@ -9,10 +9,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Connection, Lane, Road, World
-from foretwin.geometry.polyline import arc_lengths, length
+from foretwin.contracts.elevation import Elevation, HeightProfile
+from foretwin.contracts.world import Road, World
+from foretwin.geometry.polyline import length
+from foretwin.geometry.world_heights import WorldHeights
 from foretwin.world_gen.elevation.crossings import LAYER_HEIGHT_M
-from foretwin.world_gen.export.lane_borders import Borders
 
 RAMP_SLOPE = 0.06
 """Mean slope of a ramp (RASt 06: at most 6 to 8 % on main roads)."""
@@ -20,39 +21,48 @@ Node = str | tuple[str, bool]
 """A place, or a road's free end by its id and whether it is the end of its line."""
 
 
-class RoadHeights:
-    """Heights at the ends of lanes, shared by all that meet there; ramps run between them."""
+def layered(world: World) -> WorldHeights | None:
+    """Return heights of a World without an elevation: those of layers; None where all is level."""
+    if not any(road.layer for road in world.roads):
+        return None
+    at = layer_heights(world.roads)
+    roads = {road.id: road for road in world.roads}
+    lanes = {lane.id: lane for lane in world.lanes}
 
-    def __init__(self, world: World, borders: Mapping[str, Borders]) -> None:
-        self._at: dict[tuple[int, int], float] = {}
-        parts: list[Lane | Connection] = [*world.lanes, *world.connections]
-        for part in parts:
-            if part.layer == 0 or part.id not in borders:
-                continue
-            height = part.layer * LAYER_HEIGHT_M
-            for line in borders[part.id]:
-                for key in _keys(line):
-                    self._at[key] = max(self._at.get(key, 0.0), height, key=abs)
+    def end_m(lane_id: str, *, last: bool) -> float:
+        lane = lanes[lane_id]
+        return at[node_of(roads[lane.road_id], at_end=last != lane.reverse)]
 
-    def along(self, line: Array, layer: int) -> Array:
-        """Return heights (N,) of a border (N, 2) in metres.
+    flat = Elevation(
+        source="layers",
+        base_m=0.0,
+        grade_std=0.0,
+        roads=tuple(
+            _rise(r.id, r.reference_line, *(at[node_of(r, at_end=last)] for last in (False, True)))
+            for r in world.roads
+        ),
+        connections=tuple(
+            _rise(
+                c.id,
+                c.centerline,
+                end_m(c.from_lane_id, last=True),
+                end_m(c.to_lane_id, last=False),
+            )
+            for c in world.connections
+        ),
+        ground_from_m=(0.0, 0.0),
+        ground_step_m=1.0,
+        ground_m=np.zeros((2, 2)),
+    )
+    return WorldHeights(world, flat)
 
-        A lane of another layer than 0 lies level; one of layer 0 rises or falls evenly between
-        the heights at its ends.
-        """
-        if not self._at:
-            return np.zeros(len(line))
-        first, last = (self._at.get(key, 0.0) for key in _keys(line))
-        s = arc_lengths(line)
-        heights: Array = first + (last - first) * s / max(float(s[-1]), 1e-6)
-        if layer != 0:
-            heights[1:-1] = layer * LAYER_HEIGHT_M
-        return heights
 
-
-def _keys(line: Array) -> tuple[tuple[int, int], tuple[int, int]]:
-    (x0, y0), (x1, y1) = np.rint(line[[0, -1]] * 1000.0).astype(np.int64).tolist()
-    return (x0, y0), (x1, y1)
+def _rise(name: str, line: Array, start_m: float, end_m: float) -> HeightProfile:
+    """Return a change of height that is level at both ends."""
+    along_m = np.array([0.0, length(line)])
+    return HeightProfile(
+        id=name, along_m=along_m, height_m=np.array([start_m, end_m]), grade=np.zeros(2)
+    )
 
 
 def node_of(road: Road, *, at_end: bool) -> Node:

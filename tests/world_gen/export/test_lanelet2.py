@@ -29,7 +29,6 @@ COVERS = (
     "foretwin.world_gen.export.lanelet2_primitives",
     "foretwin.world_gen.export.lanelet2_surroundings",
     "foretwin.world_gen.export.lanelets",
-    "foretwin.world_gen.export.road_heights",
 )
 
 
@@ -147,26 +146,6 @@ def test_lines_between_lanes_say_who_may_cross(
     assert found.border("a.f0", "right")["subtype"] == subtype
     assert found.border("a.f1", "left")["subtype"] == subtype
     assert found.border("a.f1", "right") == {"type": "curbstone", "subtype": "high"}
-
-
-def test_roads_over_each_other_part_by_height_and_meet_at_their_ends(tmp_path: Path) -> None:
-    first, lanes = road("ramp", [(-50.0, 0.0), (-10.0, 0.0)], ahead=[3.0])
-    over = road("over", [(-10.0, 0.0), (10.0, 0.0)], ahead=[3.0], layer=1)
-    under = road("under", [(0.0, -50.0), (0.0, 50.0)], ahead=[3.0])
-    ramp = [msgspec.structs.replace(lanes[0], successor_ids=("over.f0",))]
-    found = written(world((first, ramp), over, under), tmp_path)
-
-    def heights(name: str) -> set[float]:
-        return {
-            float(found.nodes[n]["ele"])
-            for kind, ref, _ in found.lanelet(name)[0]
-            if kind == "way"
-            for n in found.ways[ref][0]
-        }
-
-    assert heights("over.f0") == {5.0}
-    assert heights("under.f0") == {0.0}
-    assert heights("ramp.f0") == {0.0, 5.0}
 
 
 HAIRPIN = Borders(
