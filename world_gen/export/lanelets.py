@@ -79,6 +79,8 @@ def _key(line: Array) -> bytes:
 def _between(lane: Lane, side: Side, other: Lane, its_side: Side, road: Road | None) -> Marking:
     if its_side == side:  # driven the other way
         return _middle_line(other, road)
+    if "closed" in (lane.kind, other.kind):
+        return Marking("thick", "solid", other.id)  # as beside hard shoulders
     left, right = (other, lane) if side == "left" else (lane, other)
     to_right = left.change in ("both", "right")
     to_left = right.change in ("both", "left")

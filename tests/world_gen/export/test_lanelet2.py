@@ -148,6 +148,14 @@ def test_lines_between_lanes_say_who_may_cross(
     assert found.border("a.f1", "right") == {"type": "curbstone", "subtype": "high"}
 
 
+def test_nobody_changes_to_a_closed_lane(tmp_path: Path) -> None:
+    one, lanes = road("a", [(0.0, 0.0), (50.0, 0.0)], ahead=[3.0, 3.0])
+    shoulder = msgspec.structs.replace(lanes[1], kind="closed")
+    found = written(world((one, [lanes[0], shoulder])), tmp_path)
+    line = {"type": "line_thick", "subtype": "solid", "lane_change": "no"}
+    assert found.border("a.f0", "right") == found.border("a.f1", "left") == line
+
+
 HAIRPIN = Borders(
     np.array([[21.768, -4.729], [21.6, -4.7], [21.55, -4.2], [21.609, -4.129]]),
     np.array([[21.965, -1.235], [18.9, -1.4], [17.0, -4.0], [18.5, -7.6], [20.952, -7.567]]),
