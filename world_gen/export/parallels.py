@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.polyline import meeting, mitres
 
 _SHORTEST_M = 0.002
@@ -27,11 +27,11 @@ def parallel(
     lines: Array = xy_m + left_m[:, None, None] * rays
     forward = (np.diff(lines, axis=1) * d).sum(axis=2) > _SHORTEST_M
     for i in np.nonzero(~forward.all(axis=1))[0]:
-        kept = _forward_part(lines[i], d)
+        kept, rays_kept = _forward_part(lines[i], d)
         if len(kept) == 2 and (kept[1] - kept[0]) @ d.sum(axis=0) <= 0.0:
             # A bend tighter than the distance from end to end: its centre is all that is left.
             kept = np.broadcast_to(kept.mean(axis=0), kept.shape)
-        lines[i] = filled(kept, len(xy_m))
+        lines[i] = _spread(kept, rays_kept)
     return lines
 
 
@@ -40,30 +40,49 @@ def untangled(line: Array, directions: Array) -> Array:
 
     Both ends stay where they are, and there are N points again.
     """
-    return filled(_forward_part(line, directions), len(line))
+    return _spread(*_forward_part(line, directions))
 
 
-def _forward_part(line: Array, directions: Array) -> Array:
-    points, ahead = line, directions
+def _forward_part(line: Array, directions: Array) -> tuple[Array, Indices]:
+    """Return what does not run backwards of a line (N, 2), and on which ray each point lies."""
+    points, ahead, rays = line, directions, np.arange(len(line))
     for _ in range(len(line)):
         forward = (np.diff(points, axis=0) * ahead).sum(axis=1) > _SHORTEST_M
         if forward.all() or len(points) == 2:
             break
-        points, ahead = _without_loop(points, ahead, int(np.argmin(forward)))
-    return points
+        points, ahead, rays = _without_loop(points, ahead, rays, int(np.argmin(forward)))
+    return points, rays
 
 
-def _without_loop(points: Array, ahead: Array, at: int) -> tuple[Array, Array]:
+def _spread(points: Array, rays: Indices) -> Array:
+    """Return a line with a point on each ray: those that were cut off lie between the others.
+
+    So points of one ray stay beside each other. Where there is no room for that, the longest
+    steps are parted.
+    """
+    every = np.arange(rays[-1] + 1)
+    line = np.column_stack([np.interp(every, rays, points[:, axis]) for axis in (0, 1)])
+    if (np.hypot(*np.diff(line, axis=0).T) > _SHORTEST_M).all():
+        return line
+    return filled(points, len(every))
+
+
+def _without_loop(
+    points: Array, ahead: Array, rays: Indices, at: int
+) -> tuple[Array, Array, Indices]:
     """Cut off the loop around the backward step `at`, or one of the step's ends."""
     low, high = max(at - _LOOP_POINTS, 0), min(at + _LOOP_POINTS, len(points) - 1)
     met = _meeting(points[low : at + 2], points[at : high + 1])
     if met is None:
         drop = at + 1 if at + 1 < len(points) - 1 else at
-        return np.delete(points, drop, axis=0), np.delete(ahead, min(drop, len(ahead) - 1), axis=0)
+        kept = np.delete(points, drop, axis=0)
+        return kept, np.delete(ahead, min(drop, len(ahead) - 1), axis=0), np.delete(rays, drop)
     i, j, where = met
     i, j = low + i, at + j
     kept = np.concatenate([points[: i + 1], where[None], points[j + 1 :]])
-    return kept, np.concatenate([ahead[: i + 1], ahead[j:]])
+    middle = (rays[i] + rays[j + 1]) // 2
+    rays = np.concatenate([rays[: i + 1], [middle], rays[j + 1 :]])
+    return kept, np.concatenate([ahead[: i + 1], ahead[j:]]), rays
 
 
 def _meeting(first: Array, second: Array) -> tuple[int, int, Array] | None:

@@ -69,6 +69,19 @@ def test_borders_of_a_road_are_shared_and_never_cross(
         assert not shapely.LineString(inner).intersects(shapely.LineString(outer))
 
 
+def test_points_stay_side_by_side_before_and_after_a_tight_bend() -> None:
+    """The inner border loses points in a bend of 1 m, and gets them back in it alone."""
+    turned = np.linspace(-np.pi / 2, 0.0, 25)
+    bend = np.column_stack([np.cos(turned), 1.0 + np.sin(turned)])
+    before = np.array([[x, 0.0] for x in range(-60, 0, 10)])
+    after = np.array([[1.0, y] for y in range(11, 62, 10)])
+    line = np.concatenate([before, bend, after])
+    inner = lane_borders(world(road("r", line, ahead=[3.0], against=[3.0])))["r.b0"]
+    middle = (inner.left + inner.right)[::-1] / 2
+    assert middle[:6] == pytest.approx(before + np.array([0.0, 1.5]), abs=0.002)
+    assert middle[-6:] == pytest.approx(after - np.array([1.5, 0.0]), abs=0.002)
+
+
 @given(line=winding_lines(), widths=WIDTHS)
 def test_lanes_are_as_wide_as_they_say(line: Array, widths: list[float]) -> None:
     borders = lane_borders(world(road("r", line, ahead=widths)))
