@@ -28,6 +28,7 @@ from foretwin.world_gen.export.commonroad_intersections import intersections
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lanelets import URBAN_MPS, Marking
 from foretwin.world_gen.export.sdformat_shapes import extrusions
+from foretwin.world_gen.export.stop_line_lanes import StopLineLanes
 from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment, leaves
 
 VERSION = "2020a"
@@ -123,8 +124,9 @@ class _Lanelets:
         self._class_of = {road.id: road.road_class for road in world.roads}
         self._lanes = {lane.id: lane for lane in world.lanes}
         self._markings = lanelets.lane_markings(world, borders)
+        places = StopLineLanes(world)
         self._stop_lines = {
-            line.across_id: line for line in world.stop_lines if line.control.value != "none"
+            places.across(line): line for line in world.stop_lines if line.control.value != "none"
         }
         self._before: dict[str, list[int]] = defaultdict(list)
         self._after: dict[str, list[int]] = defaultdict(list)

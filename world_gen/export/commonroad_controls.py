@@ -13,6 +13,7 @@ from foretwin.contracts.signals import SignalPlan
 from foretwin.contracts.world import Connection, Lane, Turn, World
 from foretwin.world_gen.export.lane_borders import Borders
 from foretwin.world_gen.export.lanelets import indicated
+from foretwin.world_gen.export.stop_line_lanes import StopLineLanes
 from foretwin.world_gen.export.xml_tree import Element, child, element, leaves
 
 SignName = Literal["stop", "give_way", "priority", "max_speed"]
@@ -137,8 +138,10 @@ def _together(lanes: Iterable[Lane]) -> list[list[Lane]]:
 
 
 def _add_line_signs(world: World, kerb: _Kerbside) -> None:
+    places = StopLineLanes(world)
     for sign in _AT_LINES:
-        lines = {line.across_id: line for line in world.stop_lines if line.control.value == sign}
+        at = ((places.across(line), line) for line in world.stop_lines)
+        lines = {name: line for name, line in at if line.control.value == sign}
         groups = _together(lane for lane in world.lanes if lane.id in lines)
         at_lanes = [
             (lines[kerb.outermost(group).id], [lane.id for lane in group]) for group in groups
@@ -230,7 +233,7 @@ def traffic_lights(
     of_junctions = (j.plan for j in world.junctions if j.plan is not None)
     known = (*of_junctions, *world.crossing_plans)
     plans = {group.id: plan for plan in known for group in plan.groups}
-    lights = RoadControls()
+    lights, places = RoadControls(), StopLineLanes(world)
     for signal in world.signals:
         governed = [name for name in signal.lane_ids if name in lanes]
         if not governed:
@@ -246,7 +249,7 @@ def traffic_lights(
         position(light, signal.position)
         child(light, "direction", _direction(world, governed, signal.group_id))
         child(light, "active", "true" if shown else "false")
-        lights.add(light, governed)
+        lights.add(light, dict.fromkeys(places.of_head(signal, name) for name in governed))
     return lights
 
 

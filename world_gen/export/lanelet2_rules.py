@@ -15,6 +15,7 @@ from foretwin.contracts.signals import Signal
 from foretwin.contracts.world import Conflict, Connection, Lane, StopLine, World
 from foretwin.geometry.polyline import left_of
 from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, MemberKind, RelationMember
+from foretwin.world_gen.export.stop_line_lanes import StopLineLanes, middle_of, nearest
 
 LIGHT_WIDTH_M = 0.35
 LIGHT_HEIGHT_M = 0.9
@@ -60,7 +61,7 @@ class _StopLines:
         for name, lines in self.of_lane.items():
             if len(lines) > 1:
                 path = shapely.LineString(lanes[name].centerline)
-                along_m = shapely.line_locate_point(path, [_middle(line) for line in lines])
+                along_m = shapely.line_locate_point(path, [middle_of(line) for line in lines])
                 lines[:] = [lines[i] for i in np.argsort(along_m)]
             for line in lines:
                 if line.control.value != "signal":
@@ -72,7 +73,7 @@ class _StopLines:
         if line is not None:
             path = shapely.LineString(connection.centerline)
             shared = path.project(shapely.points(conflict.area))
-            if np.min(shared) > path.project(_middle(line)):
+            if np.min(shared) > path.project(middle_of(line)):
                 return self.drawn_once([line])
         return self.way((connection.from_lane_id,))
 
@@ -82,7 +83,7 @@ class _StopLines:
         That is the last one of each lane, or that of a light.
         """
         known = [self.of_lane[name] for name in lane_ids if name in self.of_lane]
-        mine = [lines[-1] if head is None else _nearest(head, lines) for lines in known]
+        mine = [lines[-1] if head is None else nearest(head, lines) for lines in known]
         if not mine:
             return None
         across = mine[0].ends[1] - mine[0].ends[0]
@@ -145,6 +146,7 @@ class _Rules:
         """
         shown = {signal.id: _draw_light(signal, self._drawn) for signal in self._world.signals}
         signal_of = {signal.id: signal for signal in self._world.signals}
+        places = StopLineLanes(self._world)
         heads: dict[tuple[str, str], list[str]] = defaultdict(list)
         for signal in self._world.signals:
             for lane_id in signal.lane_ids:
@@ -157,7 +159,8 @@ class _Rules:
             if connection.id in self._ids:
                 following[connection.from_lane_id].append(connection)
         for (group, signals), lane_ids in governed.items():
-            line = self._lines.way(lane_ids, signal_of[signals[0]])
+            head = signal_of[signals[0]]
+            line = self._lines.way(lane_ids, head)
             members = _members("way", "refers", (shown[name][0] for name in signals))
             members += _members("way", "light_bulbs", (shown[name][1] for name in signals))
             members += _members("way", "ref_line", [line])
@@ -166,7 +169,7 @@ class _Rules:
                 for name in lane_ids
             }
             named = [
-                name
+                places.of_head(head, name)
                 for name, mine in obeying.items()
                 if name in self._ids and len(mine) in (0, len(following[name]))
             ]
@@ -253,17 +256,6 @@ class _Rules:
             and shapely.distance(crossing, shapely.LineString(line.ends)) <= STOP_BEFORE_M
         ]
         return [self._lines.drawn_once([line]) for line in near]
-
-
-def _nearest(head: Signal, lines: Sequence[StopLine]) -> StopLine:
-    """Return the line at which a light hangs, of those of one lane."""
-    lit = [line for line in lines if line.control.value == "signal"] or lines
-    place = shapely.Point(head.position[:2])
-    return min(lit, key=lambda line: shapely.distance(place, _middle(line)))
-
-
-def _middle(line: StopLine) -> shapely.Point:
-    return shapely.Point(line.ends.mean(axis=0))
 
 
 def _members(kind: MemberKind, role: str, refs: Iterable[int | None]) -> list[RelationMember]:

@@ -24,6 +24,7 @@ from foretwin.world_gen.export.lanelets import crosswalk_edges
 from foretwin.world_gen.export.opendrive_places import OdrNetwork
 from foretwin.world_gen.export.opendrive_roads import OdrRoad
 from foretwin.world_gen.export.solids import STOP_LINE_M
+from foretwin.world_gen.export.stop_line_lanes import StopLineLanes
 from foretwin.world_gen.export.xml_tree import Element, child, number
 
 ISLAND_HEIGHT_M = 0.15
@@ -112,8 +113,9 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
         # CARLA tells one crosswalk from the next by the first corner, which comes again.
         ring = np.concatenate([right, left[::-1], right[:1]])
         yield _Thing("crosswalk", kind, crossing.id, (ring,))
+    places = StopLineLanes(world)
     for line in world.stop_lines:
-        road = network.road_across(line.across_id)
+        road = network.road_across(places.across(line))
         if line.control.value != "none" and road is not None:
             yield _Thing("roadMark", "signalLines", line.id, (_painted(line),), road=road)
 

@@ -16,6 +16,7 @@ from foretwin.contracts.world import DrivingSide, Lane, StopLine, World
 from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.opendrive_places import OdrNetwork
 from foretwin.world_gen.export.opendrive_roads import OdrRoad
+from foretwin.world_gen.export.stop_line_lanes import StopLineLanes
 from foretwin.world_gen.export.xml_tree import Element, child, element
 
 SIGN_BESIDE_M = 0.6
@@ -82,9 +83,10 @@ def add_signals(
 def _lights(world: World, network: OdrNetwork, lanes: Mapping[str, Lane]) -> Iterator[_Post]:
     """Yield every head once for each road whose lanes obey it."""
     kind, country, meaning = "1000001", "OpenDRIVE", "trafficLight"
+    lines = StopLineLanes(world)
     for head in world.signals:
         by_road: dict[int, list[str]] = defaultdict(list)
-        for lane_id in head.lane_ids:
+        for lane_id in dict.fromkeys(lines.of_head(head, name) for name in head.lane_ids):
             if lane_id in network.road_of:
                 by_road[network.road_of[lane_id].id].append(lane_id)
         for mine in by_road.values():
@@ -99,16 +101,18 @@ def _signs(world: World, network: OdrNetwork, lanes: Mapping[str, Lane]) -> Iter
     together: dict[tuple[int, bool, str], list[StopLine]] = defaultdict(list)
     inside = []
     side = world.intersection.driving_side
+    places = StopLineLanes(world)
     for line in world.stop_lines:
         if line.control.value not in _SIGNS:
             continue
-        if line.across_id in network.road_of:
-            road_id = network.road_of[line.lane_id].id
-            together[road_id, lanes[line.lane_id].reverse, line.control.value].append(line)
-        elif line.across_id in network.connecting:
+        across = places.across(line)
+        if across in network.road_of:
+            road_id = network.road_of[across].id
+            together[road_id, lanes[across].reverse, line.control.value].append(line)
+        elif across in network.connecting:
             inside.append(line)
     for lines in together.values():
-        yield _sign(lines, side, _ruled(network, lanes, [line.lane_id for line in lines]))
+        yield _sign(lines, side, _ruled(network, lanes, [places.across(line) for line in lines]))
     for line in inside:
         # A connecting road runs as it is driven, and has one lane.
         road = network.connecting[line.across_id]
