@@ -11,7 +11,7 @@ from foretwin.contracts.virtual_traffic import VirtualTraffic
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.virtual_traffic.staged import check_going
-from foretwin.sim_worker.virtual_traffic.sumo import NEEDS_SUMO, is_there
+from foretwin.sim_worker.virtual_traffic.sumo import NEEDS_SUMO, check_network, is_there
 
 TRAFFIC, MODULE = "traffic", "sim_worker.virtual_traffic"
 
@@ -40,5 +40,4 @@ def check(chosen: VirtualTraffic) -> None:
     if chosen.source == "sumo":
         if not is_there():
             raise UserError(NEEDS_SUMO)
-        if not Path(chosen.network or "").is_file():
-            raise UserError(f"virtual_traffic: network {chosen.network}: no such file")
+        check_network(Path(chosen.network or ""))

@@ -55,6 +55,17 @@ def is_there() -> bool:
     return find_spec("libsumo") is not None
 
 
+def check_network(network: Path) -> None:
+    """Raise UserError for a network that is not there, or that netconvert would read backwards."""
+    if not network.is_file():
+        raise UserError(f"virtual_traffic: network {network}: no such file")
+    if b'rule="LHT"' in network.read_bytes():
+        raise UserError(
+            f"virtual_traffic: network {network}: netconvert has left-hand traffic of 1.8 "
+            "driven backwards; write it with --opendrive-version 1.4"
+        )
+
+
 def net_of(network: Path, folder: Path) -> Path:
     """Return SUMO's network of an OpenDRIVE file of ours, made in `folder`, or the one given.
 

@@ -14,12 +14,13 @@ from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.virtual_traffic.source import STEP_S
-from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, is_there, net_of
+from foretwin.sim_worker.virtual_traffic.sumo import SumoTraffic, check_network, is_there, net_of
 from foretwin.sim_worker.virtual_traffic.sumo_lights import groups_of_signals
 from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.orchestrator.trip import town_world
 from tests.sim_worker.scenarios.worlds import cross
 from tests.sim_worker.virtual_traffic.motions import G_MPS2, played, still, tracks
+from tests.world_gen.drawn_maps import IRELAND, crossing, world_of
 
 CAR = load_vehicle()
 
@@ -27,6 +28,15 @@ CAR = load_vehicle()
 def test_a_network_of_sumo_is_taken_as_it_is(tmp_path: Path) -> None:
     net = tmp_path / "a.net.xml"
     assert net_of(net, tmp_path) == net
+
+
+def test_left_hand_traffic_is_taken_in_the_version_that_netconvert_reads(tmp_path: Path) -> None:
+    network = tmp_path / "a.xodr"
+    write_opendrive(world_of(crossing(origin=IRELAND)), network)
+    with pytest.raises(UserError, match=r"a\.xodr: .* left-hand .*--opendrive-version 1\.4"):
+        check_network(network)
+    write_opendrive(world_of(crossing(origin=IRELAND)), network, version="1.4")
+    check_network(network)
 
 
 @pytest.mark.skipif(is_there(), reason="SUMO is there")
