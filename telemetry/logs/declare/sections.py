@@ -97,10 +97,10 @@ class Sections:
         wanted = ("accel_x", "rate_z", "accel_y")
         found = {name: fits[f"imu.{name}"] for name in wanted if f"imu.{name}" in fits}
         if "rate_z" not in found:
-            for fit in found.values():
-                unknown.append(
-                    f"{fit.column}: {_said(fit)}; an inertial unit needs a turning rate: left out"
-                )
+            unknown += [
+                f"{fit.column}: {_said(fit)}; an inertial unit needs a turning rate: left out"
+                for fit in found.values()
+            ]
             return {}
         if "accel_x" not in found:
             # Beside a heading the rate is the heading's.
