@@ -1,7 +1,8 @@
 """Reader of GPX 1.0 and 1.1: tracks with times as logs, tracks and routes as lines.
 
 Declares: degrees on WGS84, altitude in metres as written (GPX does not say above what), times
-in UTC (ISO 8601), reference point the receiver's antenna, its place on the car unknown.
+in UTC (ISO 8601), reference point the receiver's antenna, its place on the car unknown. How good
+points are is what `fix` and `hdop` promise, and unknown where neither is told.
 """
 
 from __future__ import annotations
@@ -16,31 +17,42 @@ import numpy as np
 
 from foretwin.telemetry.logs.columns import stream_of, table_log
 from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.nmea_positions import ALONE, promised_std_m
+from foretwin.telemetry.ros_messages.foreign import NO_FIX
+
+_NO_FIX = "none"
+_QUALITY_OF_FIX = {"2d": ALONE, "3d": ALONE, "dgps": "2", "pps": "3"}
+"""GGA's quality by GPX's fixType."""
 
 
 class GpxPoint(NamedTuple):
-    """One trkpt or rtept; NaN where a coordinate is unreadable, None where no time is given."""
+    """One trkpt or rtept; NaN where a coordinate is unreadable or its spread is not told, None
+    where no time is given."""
 
     lat_deg: float
     lon_deg: float
     alt_m: float
+    std_m: float
     stamp_ns: int | None
+    fixed: bool
 
 
 def open_gpx(path: Path) -> Log:
     """Open the tracks of a GPX file as one log; raises LogError where no point has a time."""
     points = [point for track in _points(path, "trk", "trkpt") for point in track]
-    timed = [point for point in points if point.stamp_ns is not None]
+    fixed = [point for point in points if point.fixed]
+    timed = [point for point in fixed if point.stamp_ns is not None]
     if not timed:
         raise LogError(f"{path}: track without time; usable as --route only")
     stamps_ns = np.array([point.stamp_ns for point in timed], dtype=np.int64)
     return table_log(
         path.name,
-        {"gnss": stream_of("gnss", stamps_ns, np.array([point[:3] for point in timed]))},
+        {"gnss": stream_of("gnss", stamps_ns, np.array([point[:4] for point in timed]))},
         stamps_ns=stamps_ns,
         time_base="utc",
         reference_point="antenna",
-        unreadable=len(points) - len(timed),
+        unreadable=len(fixed) - len(timed),
+        refused={NO_FIX: len(points) - len(fixed)},
     )
 
 
@@ -68,12 +80,18 @@ def _name(element: ElementTree.Element) -> str:
 
 def _point(node: ElementTree.Element) -> GpxPoint:
     texts = {_name(child): (child.text or "").strip() for child in node}
-    alt_m = _number(texts.get("ele"))
+    alt_m, hdop = _number(texts.get("ele")), _number(texts.get("hdop"))
+    quality = _QUALITY_OF_FIX.get(texts.get("fix", ""))
+    std_m = math.nan
+    if hdop > 0.0 or quality is not None:
+        std_m = promised_std_m(quality or ALONE, hdop if hdop > 0.0 else None)
     return GpxPoint(
         _number(node.get("lat")),
         _number(node.get("lon")),
         alt_m if math.isfinite(alt_m) else 0.0,
+        std_m,
         stamp_ns_from_iso(texts.get("time", "")),
+        texts.get("fix") != _NO_FIX,
     )
 
 

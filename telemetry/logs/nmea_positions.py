@@ -21,7 +21,9 @@ STD_M = {"1": 2.1, "2": 1.7, "3": 2.1, "4": 0.015, "5": 0.3, "9": 1.7}
 with SBAS (u-blox NEO-M8 data sheet, over 1.177), 1 cm + 1 ppm CEP with RTK (ZED-F9P data sheet);
 floating RTK is chosen."""
 _LEAST_HDOP = 0.5
-QUALITY_OF_MODE = {"A": "1", "D": "2", "P": "3", "R": "4", "F": "5"}
+ALONE = "1"
+"""The quality of a receiver without corrections, which older RMCs do not tell: NMEA before 2.3."""
+QUALITY_OF_MODE = {"A": ALONE, "D": "2", "P": "3", "R": "4", "F": "5"}
 """GGA's quality by RMC's mode indicator: alone, differential, precise, RTK fixed and floating."""
 
 
@@ -68,5 +70,11 @@ def _fix(said: NmeaPosition, gga: NmeaPosition | None) -> drive.GnssFix:
         position = GeoPoint(position.lat_deg, position.lon_deg, gga.position.alt_m)
         if said.stamp_ns - gga.stamp_ns <= _HELD_NS:
             quality, hdop = quality or gga.quality, gga.hdop
-    std_m = None if hdop is None else STD_M[quality] * max(hdop, _LEAST_HDOP)
+    std_m = promised_std_m(quality or ALONE, hdop)
     return drive.GnssFix(stamp_ns=said.stamp_ns, position=position, std_m=std_m)
+
+
+def promised_std_m(quality: str, hdop: float | None) -> float:
+    """Return how good a fix of a quality of GGA's promises to be, one standard deviation on each
+    axis; where no HDOP is known, at one of 1."""
+    return STD_M[quality] * (1.0 if hdop is None else max(hdop, _LEAST_HDOP))

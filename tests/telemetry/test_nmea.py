@@ -242,9 +242,11 @@ def test_the_positions_of_rmc_fill_what_gga_leaves_out(tmp_path: Path) -> None:
     assert [fix.std_m for fix in found["gnss"][:3]] == pytest.approx([0.009, 1.26, 1.26])
 
 
-def test_an_hdop_of_long_ago_promises_nothing(tmp_path: Path) -> None:
+def test_without_an_hdop_of_late_a_receiver_alone_is_one_all_the_same(tmp_path: Path) -> None:
     _, found = opened(tmp_path, rmc("120000", "010326"), gga("120000"), rmc("120011", "010326"))
-    assert [fix.std_m for fix in found["gnss"]] == [pytest.approx(0.009), None]
+    assert [fix.std_m for fix in found["gnss"]] == pytest.approx([0.009, 2.1])
+    _, found = opened(tmp_path, line("GPRMC,120000,A,5230.6,N,01323.4,E,9.0,84.4,010326,,"))
+    assert [fix.std_m for fix in found["gnss"]] == [2.1]
 
 
 def test_a_log_without_a_date_counts_from_its_first_time_and_says_so(tmp_path: Path) -> None:

@@ -56,6 +56,34 @@ def test_gpx_track_is_a_log_in_utc(tmp_path: Path) -> None:
     assert log.skipped.total() == 2, "counted anew at each reading"
 
 
+@pytest.mark.parametrize(
+    ("said", "std_m"),
+    [
+        ("", None),
+        ("<fix>3d</fix><hdop>1.5</hdop>", 3.15),
+        ("<fix>dgps</fix>", 1.7),
+        ("<hdop>2.0</hdop>", 4.2),
+        ("<fix>5d</fix><hdop>0</hdop>", None),
+    ],
+)
+def test_how_good_gpx_points_are_is_what_fix_and_hdop_promise(
+    tmp_path: Path, said: str, std_m: float | None
+) -> None:
+    log = open_log(
+        write(tmp_path, "ride.gpx", GPX.format(track=TRACK.replace("</ele>", "</ele>" + said)))
+    )
+    first, second, *_ = (fix.std_m for _, fix in log.samples())  # type: ignore[attr-defined]
+    assert first == (None if std_m is None else pytest.approx(std_m))
+    assert second is None
+
+
+def test_gpx_points_without_a_fix_are_counted(tmp_path: Path) -> None:
+    track = TRACK.replace("</ele>", "</ele><fix>none</fix>")
+    log = open_log(write(tmp_path, "ride.gpx", GPX.format(track=track)))
+    assert len(list(log.samples())) == 3
+    assert log.skipped["receiver without fix"] == 1
+
+
 def test_gpx_route_is_a_line_and_no_log(tmp_path: Path) -> None:
     path = write(tmp_path, "plan.gpx", GPX.format(track=""))
     np.testing.assert_array_equal(read_line(path).lat_deg, [52.0, 52.1])
