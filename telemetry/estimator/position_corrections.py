@@ -149,9 +149,10 @@ class PositionCorrections:
         wheels = self._measured.fresh("speed_mps", fix.stamp_ns)
         unturned = not self._measured.tells_turning(fix.stamp_ns)
         unseen = wheels and unturned and not self._measured.fresh("yaw_rad", fix.stamp_ns)
-        sharp = unseen and not (standing or wander or self._doubted)
+        sharp = unseen and not standing and (not wander or white > 0.5 * std)
         if sharp and bear_anew(filter_, self._gate.recent, std, white, self._lever):
             self._facing.take(filter_)
+            self._doubted = ()
             return Corrected(standing)
         innovation = filter_.position_innovation(xy_m, self._lever, wander=wander)
         square = innovation.square(white)
