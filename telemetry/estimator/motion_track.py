@@ -165,8 +165,8 @@ class MotionTrack:
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
         self._positions.noise.take(time_s, xy)
-        white_m, turned_rad = self._positions.noise.white_std_m(fix), self._convergence_rad
-        if self._corrections.watch_fix(fix.stamp_ns, xy, white_m, convergence_rad=turned_rad):
+        sure_m, turned_rad = self._positions.noise.sure_white_std_m(fix), self._convergence_rad
+        if self._corrections.watch_fix(fix.stamp_ns, xy, sure_m, convergence_rad=turned_rad):
             filter_, self._filter, self._standing = None, None, False  # a sensor led it astray
         if filter_ is None:
             self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))

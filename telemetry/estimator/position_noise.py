@@ -19,6 +19,9 @@ from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 UNKNOWN_STD_M = 0.05
 """Of fixes that state none, before the car has moved enough to tell. Chosen: between survey
 receivers with corrections, which mostly leave it out, and others."""
+UNSEEN_STD_M = 2.0
+"""The same, where other sensors are held against them. Chosen: ways of 30 m count then, which a
+receiver between houses seldom jumps."""
 LEAST_STD_M = 0.012
 """No receiver on a moving car is better (NovAtel OEM7 with RTK: 1 cm + 1 ppm)."""
 WANDER_M = 0.5
@@ -143,6 +146,12 @@ class PositionNoise:
             return max(self.seen_m, LEAST_STD_M)
         # This share is nobody's word: where surprises cannot tell, as much as they leave open.
         return max(white, self._seen_beyond(white), min(self._untold_m, std))
+
+    def sure_white_std_m(self, fix: GnssFix) -> float:
+        """Return a white noise that is surely no smaller: beyond it fixes contradict a sensor."""
+        if self.seen_m is not None:
+            return self.white_std_m(fix)
+        return UNSEEN_STD_M if fix.std_m is None else self.std_m(fix)
 
     def _seen_beyond(self, stated_m: float) -> float:
         """Return what was seen where it gives the lie to `stated_m`, 0 elsewhere."""

@@ -89,3 +89,23 @@ def test_who_turns_is_found_again_by_the_next_fixes() -> None:
 
     assert np.mean([errors.position_m for errors in found]) < 9.0
     assert np.mean([errors.yaw_deg for errors in found]) < 70.0
+
+
+@pytest.mark.parametrize("stated_m", [5.0, None])
+@pytest.mark.parametrize("seed", range(4))
+def test_wheels_are_believed_beside_fixes_that_jump_about_a_car_that_pulls_away(
+    seed: int, stated_m: float | None
+) -> None:
+    """Jumps of 10 m and more are no way of the car's: true wheels were left out from then on."""
+    estimator, random = StateEstimator(info()), np.random.default_rng(seed)
+    for tick in range(600):
+        time_s = 0.1 * tick
+        speed_mps = min(0.7 * time_s, SPEED_MPS)
+        estimator.handle("speed", SpeedSample(stamp_ns=tick * 10**8, speed_mps=speed_mps))
+        if tick % 10 == 0:
+            at_m = speed_mps * (time_s - 0.5 * speed_mps / 0.7)
+            off_m = random.normal(0.0, 5.0, 2)
+            estimator.handle("heading", HeadingSample(stamp_ns=tick * 10**8, yaw_rad=0.0))
+            estimator.handle(*fix(time_s, at_m + off_m[0], off_m[1], stated_m))
+
+    assert estimator.left_out == frozenset()
