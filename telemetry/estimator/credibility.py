@@ -41,7 +41,8 @@ _LEAST_SWING_MPS, _SWING_DEVIATIONS, _LEAST_SPEEDS, _LONGEST_SWING_S = 1.5, 6.0,
 """So much, and so many times what they are good to, must speeds vary about a steady change, in a
 root mean square: that may be a bias or a grade. Over a longer time grades change, too. Chosen."""
 _FORCE_ASTRAY = 0.5
-"""Of the larger of two swings: half or twice as much, or late by a second. Chosen."""
+"""Of the larger of two swings, where wheels tell of speeds: half or twice as much, or late by a
+second. What fixes show of them is rougher than it seems: _ASTRAY. Chosen."""
 
 
 class Credibility:
@@ -227,11 +228,12 @@ class ForceCredibility(Credibility):
         std_mps = max(one.std_mps for one in self._speeds)
         if swing_mps < max(_LEAST_SWING_MPS, _SWING_DEVIATIONS * std_mps):
             return
+        most = _ASTRAY if std_mps > 0.0 else _FORCE_ASTRAY
         fits = []
         for sums_mps in zip(*(one.felt_mps for one in self._speeds), strict=False):
             felt, felt_mps = _about_a_steady_change(times_s, np.array(sums_mps))
             off_mps = math.sqrt(float(np.mean((swing - felt) ** 2)))
-            fits.append(off_mps <= _FORCE_ASTRAY * max(swing_mps, felt_mps))
+            fits.append(off_mps <= most * max(swing_mps, felt_mps))
         if fits[0] or not any(fits):
             self._speeds = self._speeds[-1:]
             self.weigh(fits)
