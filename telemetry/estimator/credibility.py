@@ -203,17 +203,13 @@ class ForceCredibility(Credibility):
         super().__init__()
         self._speeds: tuple[_SpeedTold, ...] = ()
 
-    def part(self) -> None:
-        """Take that nobody knows what was between the speeds so far and the next."""
-        self._speeds = ()
-
     def take(
         self, time_s: float, speed_mps: float, felt_mps: tuple[float, ...] | None, *, std_mps: float
     ) -> None:
         """Compare a speed good to `std_mps`, negative in reverse, with the sum felt until then by
         each lateness, None if unknown; it says something once all of them are known."""
         if felt_mps is None or len(felt_mps) < len(LATE_S):
-            self.part()
+            self._speeds = ()  # what was felt in between is not known
             return
         since_s = time_s - _LONGEST_SWING_S
         kept = (one for one in self._speeds if one.time_s >= since_s)

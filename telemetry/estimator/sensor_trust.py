@@ -57,9 +57,6 @@ class SensorTrust:
             case ImuSample(rate_radps=rate, accel_mps2=accel):
                 self._turned = self._turned.gone_on(time_s, rate[2] - gyro_bias_radps)
                 if message.tells_force:
-                    if not self._pushed.joins(time_s):
-                        self._forces = shallow_copy(self._forces)
-                        self._forces.part()
                     self._pushed = self._pushed.gone_on(time_s, accel[0])
             case SpeedSample(speed_mps=speed):
                 if self._wheels.holds and time_s - self._felt_s >= _SPEED_EVERY_S:

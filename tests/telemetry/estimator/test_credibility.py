@@ -175,9 +175,8 @@ def test_speeds_that_hardly_vary_or_are_rough_say_nothing_of_forces() -> None:
 def test_what_was_felt_over_a_gap_is_not_known() -> None:
     credibility = ForceCredibility()
     for k in range(40):
-        if k % 5 == 0:
-            credibility.part()
-        credibility.take(0.5 * k, speed_mps(0.5 * k), 4 * (0.0,), std_mps=0.0)
+        felt_mps = None if k % 5 == 0 else 4 * (0.0,)
+        credibility.take(0.5 * k, speed_mps(0.5 * k), felt_mps, std_mps=0.0)
     assert credibility.holds
 
 
@@ -186,3 +185,9 @@ def test_how_late_speeds_are_is_not_known_as_a_drive_begins() -> None:
     for k in range(40):
         credibility.take(0.5 * k, speed_mps(0.5 * k), (0.0, 0.0), std_mps=0.0)
     assert credibility.holds
+
+
+def test_rough_speeds_contradict_forces_where_they_are_plainly_wrong() -> None:
+    assert not pushed(lambda time_s: 2.5 * speed_mps(time_s))
+    assert pushed(lambda time_s: 2.5 * speed_mps(time_s), std_mps=0.1)
+    assert not pushed(lambda time_s: -speed_mps(time_s), std_mps=0.1)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.sensor_trust import LEFT_OUT, SensorTrust
 from tests.telemetry.winding_drive import (
+    BRISK,
     TICK_S,
     TICKS,
     WINDING,
@@ -155,3 +156,31 @@ def test_fixes_that_wander_while_the_car_stands_say_nothing_of_its_sensors(seed:
         place = place + 0.1 * np.array([math.cos(course_rad), math.sin(course_rad)])
         trust.take_fix(stamp_ns, place, 0.02, convergence_rad=0.0)
         assert trust.left_out == frozenset()
+
+
+def test_a_gyro_alone_tells_of_no_force_and_costs_no_speed() -> None:
+    estimator, states = driven(wheels=truly, forces=None, way=BRISK)
+    assert "accel_mps2" in states[-1][1].estimated
+    assert estimator.left_out == frozenset()
+    assert errors(states, from_s=10.0, way=BRISK)[0] < 0.2
+    _, felt = driven(wheels=truly, way=BRISK)
+    assert "accel_mps2" not in felt[-1][1].estimated
+
+
+@pytest.mark.parametrize(("told", "believed"), [(truly, True), (lambda _: 0.0, False)])
+def test_fixes_alone_show_whether_forces_are_felt(told: Told, believed: bool) -> None:
+    estimator, _ = driven(forces=told, way=BRISK)
+    assert ("forces" not in estimator.left_out) == believed
+
+
+def test_forces_that_were_silent_for_a_while_are_not_summed_up_over_it() -> None:
+    trust = SensorTrust()
+    for tick in range(TICKS):
+        for _, message in measured(tick, gyro=truly, wheels=truly, way=BRISK):
+            if not isinstance(message, ImuSample) or tick % 400 < 300:
+                trust.take(message, gyro_bias_radps=0.0, curvature_pm=None)
+        if tick % 10 == 0:
+            _, _, _, x, y = BRISK[tick]
+            stamp_ns = round(tick * TICK_S * 1e9)
+            trust.take_fix(stamp_ns, np.array([x, y]), 0.02, convergence_rad=0.0)
+        assert "forces" not in trust.left_out
