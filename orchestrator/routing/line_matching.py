@@ -160,7 +160,7 @@ def _visit(near: NearEdge) -> EdgeVisit:
 def _driven_onto(last: EdgeVisit, hypothesis: Hypothesis) -> list[EdgeVisit]:
     """Return the visits after the last one, which is at its end unless the road was turned in."""
     step = hypothesis.near
-    if not hypothesis.via and key_of(last.edge.back) == key_of(step.directed_edge):
+    if not hypothesis.via and last.edge.turns_back(step.directed_edge):
         return [EdgeVisit(step.directed_edge, last.edge.edge.length_m - last.to_m, step.s_m)]
     last.to_m = last.edge.edge.length_m
     through = [EdgeVisit(edge, 0.0, edge.edge.length_m) for edge in hypothesis.via]

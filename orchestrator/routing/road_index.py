@@ -161,7 +161,7 @@ def reach(
     def push(last: DirectedEdge, effort: float, gap: float, via: tuple[DirectedEdge, ...]) -> None:
         nonlocal count
         for step in graph.at_node(last.end_node):
-            turned = step.edge.index == last.edge.index and step.reverse != last.reverse
+            turned = last.turns_back(step)
             if legal_only and (turned or legality(step) != "car"):
                 continue
             heapq.heappush(queue, (effort + (U_TURN_M if turned else 0.0), count, gap, step, via))

@@ -55,7 +55,7 @@ class ShortestWays:
     def _effort_m(self, before: DirectedEdge, after: DirectedEdge) -> float:
         """Return what it costs to go from one edge onto the next, and to drive that one."""
         drive_m = float(after.edge.length_m * travel_factor(after))
-        turns_back = before.edge.index == after.edge.index and before.reverse != after.reverse
+        turns_back = before.turns_back(after)
         if self._lawful is None:
             return drive_m + U_TURN_M * turns_back
         enters = legality(after) not in ("car", legality(before))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from foretwin.orchestrator.routing.road_index import key_of
 from foretwin.orchestrator.routing.turning import TURN_BACK_M
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
@@ -56,4 +55,4 @@ def without_spurs(visits: Iterable[EdgeVisit]) -> list[DirectedEdge]:
 
 
 def _turns_back(one: EdgeVisit, other: EdgeVisit) -> bool:
-    return key_of(one.edge.back) == key_of(other.edge)
+    return one.edge.turns_back(other.edge)

@@ -62,7 +62,7 @@ def turns_back(route: Route, place: int, s_m: float, match: Match) -> bool:
         if float(route.start_m[number + 1]) > s_m + TURN_BACK_M:
             return False
         edge, matched = route.edges[number], match.directed_edge
-        if key_of(route.edges[number + 1]) != key_of(edge.back):
+        if not edge.turns_back(route.edges[number + 1]):
             continue
         beyond_m = match.s_on_edge_m
         if matched.end_node == edge.end_node:

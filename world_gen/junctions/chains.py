@@ -164,8 +164,7 @@ class _Walk:
         node = last.end_node
         while node not in self._ends:
             a, b = self._leaving[node]
-            came_by_a = a.edge.index == last.edge.index and a.reverse != last.reverse
-            last = b if came_by_a else a
+            last = b if last.turns_back(a) else a
             edges.append(last)
             node = last.end_node
         there, back = self._both_ways(edges)

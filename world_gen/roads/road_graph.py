@@ -79,6 +79,10 @@ class DirectedEdge(NamedTuple):
         """The same edge in the other direction."""
         return DirectedEdge(self.edge, not self.reverse)
 
+    def turns_back(self, onto: DirectedEdge) -> bool:
+        """Return whether who drives on `onto` next has turned back in the road."""
+        return onto.edge.index == self.edge.index and onto.reverse != self.reverse
+
     @property
     def start_node(self) -> int:
         """OSM id of the node where driving begins."""
