@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.signals import SignalPlan
 from foretwin.contracts.world import Connection, Lane, Turn, World
 from foretwin.world_gen.export.lane_borders import Borders
-from foretwin.world_gen.export.lanelets import indicated
+from foretwin.world_gen.export.lanelets import indicated, slower_lane
 from foretwin.world_gen.export.stop_line_lanes import StopLineLanes
 from foretwin.world_gen.export.xml_tree import Element, child, element, leaves
 
@@ -177,8 +177,7 @@ def _add_speed_limits(
     by_id = {lane.id: lane for lane in world.lanes}
     for c in world.connections:
         if c.id in lanes:
-            ends = (by_id[c.from_lane_id], by_id[c.to_lane_id])
-            slower[min(ends, key=lambda lane: lane.speed_limit_mps.value).id].append(c)
+            slower[slower_lane(by_id[c.from_lane_id], by_id[c.to_lane_id]).id].append(c)
     for group in _together(lane for lane in world.lanes if lane.kind in ("driving", "bus")):
         by_limit: dict[tuple[float, bool], list[Lane]] = defaultdict(list)
         for lane in group:

@@ -162,7 +162,7 @@ def _connection_tags(
     tags["foretwin:id"] = connection.id
     tags["foretwin:width"] = f"{connection.width_m.value:.2f} {connection.width_m.source}"
     if "speed_limit" in tags:
-        slower = min(start.speed_limit_mps, end.speed_limit_mps, key=lambda limit: limit.value)
+        slower = lanelets.slower_lane(start, end).speed_limit_mps
         tags["speed_limit"] = f"{slower.value * 3.6:.0f}"
         tags["foretwin:speed_limit"] = slower.source
     tags.pop("road_name", None)

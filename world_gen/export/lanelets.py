@@ -1,6 +1,7 @@
 """What Lanelet2 and CommonRoad, whose maps are both made of lanelets, say alike.
 
-Which line lies beside a lane and which lane beyond it, which way turns are indicated, crosswalks.
+Which line lies beside a lane and which lane beyond it, which way turns are indicated, crosswalks,
+whose limit a turn obeys: much of it OpenDRIVE says, too.
 """
 
 from __future__ import annotations
@@ -102,6 +103,11 @@ def narrower_lane(connection: Connection, lanes: Mapping[str, Lane]) -> Lane:
     """Return of the lanes that a connection joins the one that fewer may use."""
     start, end = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
     return end if start.kind == "driving" else start
+
+
+def slower_lane(start: Lane, to: Lane) -> Lane:
+    """Return which of the lanes that a connection joins has the limit that it obeys."""
+    return min(start, to, key=lambda lane: lane.speed_limit_mps.value)
 
 
 def indicated(turn: Turn, side: DrivingSide) -> Turn:

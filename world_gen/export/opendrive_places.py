@@ -15,6 +15,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Connection, DrivingSide, Lane, Road, World
 from foretwin.geometry.polyline import unit
+from foretwin.world_gen.export.lanelets import slower_lane
 from foretwin.world_gen.export.opendrive_cubics import Cubic, Rise
 from foretwin.world_gen.export.opendrive_curve import curve_between, fit_curve
 from foretwin.world_gen.export.opendrive_roads import (
@@ -229,8 +230,7 @@ def _connecting_road(
     lane_number = -1 if runs_along(-1, side) else 1
     first, last = start.width_m.value, to.width_m.value
     half = -0.5 * lane_number
-    # Who turns obeys the slower of both lanes, as in the other formats.
-    limit = min(start.speed_limit_mps, to.speed_limit_mps, key=lambda limit: limit.value)
+    limit = slower_lane(start, to).speed_limit_mps
     lane = OdrLane(
         number=lane_number,
         width=Cubic.between(first, last, curve.length_m),
