@@ -57,14 +57,10 @@ class Trail(NamedTuple):
     rate: float = 0.0
     value: float = 0.0
 
-    def joins(self, time_s: float) -> bool:
-        """Whether a sample of `time_s` follows the latest without a gap."""
-        return 0.0 <= time_s - self.time_s <= _GAP_S
-
     def gone_on(self, time_s: float, rate: float) -> Trail:
         """Return the trail gone on by a rate, evenly from the one before."""
         value = self.value
-        if self.joins(time_s):
+        if self._joins(time_s):
             value += 0.5 * (self.rate + rate) * (time_s - self.time_s)
         return Trail(self._marked(time_s, value), time_s, rate, value)
 
@@ -73,9 +69,12 @@ class Trail(NamedTuple):
         value = self.value + math.remainder(angle_rad - self.value, math.tau)
         return Trail(self._marked(time_s, value), time_s, 0.0, value)
 
+    def _joins(self, time_s: float) -> bool:
+        return 0.0 <= time_s - self.time_s <= _GAP_S
+
     def _marked(self, time_s: float, value: float) -> tuple[tuple[float, float], ...]:
         marks = self.marks
-        if not self.joins(time_s):
+        if not self._joins(time_s):
             return ((time_s, value),)
         if time_s - marks[-1][0] < _MARK_S:
             return marks

@@ -226,7 +226,7 @@ class ForceCredibility(Credibility):
             return
         most = _ASTRAY if std_mps > 0.0 else _FORCE_ASTRAY
         fits = []
-        for sums_mps in zip(*(one.felt_mps for one in self._speeds), strict=False):
+        for sums_mps in zip(*(one.felt_mps for one in self._speeds), strict=True):
             felt, felt_mps = _about_a_steady_change(times_s, np.array(sums_mps))
             off_mps = math.sqrt(float(np.mean((swing - felt) ** 2)))
             fits.append(off_mps <= most * max(swing_mps, felt_mps))
