@@ -9,6 +9,7 @@ early or late.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -24,7 +25,7 @@ from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places
 from foretwin.sim_worker.scenarios.casting import cast_all
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
-from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage
+from foretwin.sim_worker.scenarios.placement import PassageFinder, places_on_passage
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
 from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
@@ -48,10 +49,13 @@ class KnownScenarios:
         self._ways: dict[int, Way | None] = {}
         """Those that cases were cast on: as long as they are kept, no other has their identity."""
 
+    @functools.cached_property
+    def _finder(self) -> PassageFinder:
+        return PassageFinder(self._network)
+
     def on(self, path: FrenetPath, from_arc_m: float, vehicle: VehicleParameters) -> PathScenarios:
         """Return the scenarios on a path, for a car at `from_arc_m` of it."""
-        found = passage_on_path(self._network, path, from_arc_m)
-        return PathScenarios(self, path, vehicle, found)
+        return PathScenarios(self, path, vehicle, self._finder.first_on(path, from_arc_m))
 
     def way(self, passage: Passage) -> Way:
         """Return the way that takes a passage."""

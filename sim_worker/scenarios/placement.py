@@ -122,32 +122,36 @@ def places_on_passage(
     return tuple(_places_of(scenario, network, passage))
 
 
-def passage_on_path(network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float) -> Passage | None:
-    """Return the first passage ahead that a path takes."""
-    length = ego_path.length_m
-    arcs = np.arange(max(0.0, ego_arc_m - _BEHIND_PATH_M), max(length, ego_arc_m + 1.0), 2.0)
-    ahead = shapely.LineString(ego_path.point_at(arcs))
-    best: tuple[float, Passage] | None = None
-    for junction in network.world.junctions:
-        passages = network.passages(junction.summary.id)
-        near = [
-            (p, _line(p, network))
-            for p in passages
-            if ahead.distance(shapely.Point(p.connections[0].centerline[-1])) < _NEAR_PATH_M
-        ]
-        matches = [m for p, line in near if (m := _match(p, line, ego_path, ego_arc_m))]
-        if not matches:
-            continue
-        _, entry, passage = min(matches, key=lambda match: (match[0], match[2].name))
-        if best is None or entry < best[0]:
-            best = (entry, passage)
-    return None if best is None else best[1]
+class PassageFinder:
+    """Says which passage of a World's junctions a path takes; keeps what it lays beside paths."""
 
+    def __init__(self, network: RoadNetwork) -> None:
+        self._network = network
+        junctions = network.world.junctions
+        self._passages = [p for j in junctions for p in network.passages(j.summary.id)]
+        ends = [p.connections[0].centerline[-1] for p in self._passages]
+        self._ends = shapely.points(np.reshape(ends, (-1, 2)))
+        self._lines: dict[int, Array] = {}
 
-def _line(passage: Passage, network: RoadNetwork) -> Array:
-    """Return the line of what a passage's way has between entering and leaving the junction."""
-    way = network.way(passage)
-    return way.path.point_at(np.linspace(way.entry_m, way.exit_m, _SAMPLES))
+    def first_on(self, path: FrenetPath, ego_arc_m: float) -> Passage | None:
+        """Return the first passage ahead of a position that the path takes."""
+        length = path.length_m
+        arcs = np.arange(max(0.0, ego_arc_m - _BEHIND_PATH_M), max(length, ego_arc_m + 1.0), 2.0)
+        ahead = shapely.LineString(path.point_at(arcs))
+        near = np.flatnonzero(shapely.distance(ahead, self._ends) < _NEAR_PATH_M).tolist()
+        found = (_match(self._passages[n], self._line(n), path, ego_arc_m) for n in near)
+        best: dict[str, tuple[float, float, Passage]] = {}
+        for match in sorted(filter(None, found), key=lambda match: (match[0], match[2].name)):
+            best.setdefault(match[2].junction_id, match)
+        return min(best.values(), key=lambda match: match[1])[2] if best else None
+
+    def _line(self, number: int) -> Array:
+        """Return the line of what a passage's way has between entering and leaving the junction."""
+        if number not in self._lines:
+            way = self._network.way(self._passages[number])
+            places = np.linspace(way.entry_m, way.exit_m, _SAMPLES)
+            self._lines[number] = way.path.point_at(places)
+        return self._lines[number]
 
 
 def _match(

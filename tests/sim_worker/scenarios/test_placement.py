@@ -22,7 +22,7 @@ from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
-from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage
+from foretwin.sim_worker.scenarios.placement import PassageFinder, places_on_passage
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.relations import ways_of
@@ -218,10 +218,11 @@ def live_path(world: World, turn: str) -> tuple[RoadNetwork, FrenetPath]:
 @pytest.mark.parametrize("world", [cross(), cross(left_hand=True), ring(), tee()])
 def test_the_connection_that_a_path_takes_is_found_by_its_shape(world: World, turn: str) -> None:
     roads, path = live_path(world, turn)
-    found = passage_on_path(roads, path, 5.0)
+    finder = PassageFinder(roads)
+    found = finder.first_on(path, 5.0)
     assert found is not None
     assert found.turn == turn
-    assert passage_on_path(roads, path, path.length_m - 5.0) is None
+    assert finder.first_on(path, path.length_m - 5.0) is None
 
 
 def test_who_joins_the_ring_enters_where_the_ego_passes() -> None:
