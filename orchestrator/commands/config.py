@@ -14,6 +14,7 @@ import msgspec
 from foretwin.contracts.did_you_mean import meant
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.field_words import FieldWords, fields_of, summary_of
+from foretwin.orchestrator.commands.cli_drive import drive
 from foretwin.orchestrator.commands.config_formats import (
     HIDDEN,
     KINDS,
@@ -53,8 +54,6 @@ class Key(NamedTuple):
 @functools.cache
 def _flags() -> frozenset[str]:
     """Return the settings of a drive that flags set."""
-    from foretwin.orchestrator.commands.cli import drive
-
     names = inspect.signature(drive).parameters.keys() - {"config"}
     return frozenset(name.removesuffix("_file") for name in names)
 

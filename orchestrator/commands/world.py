@@ -146,9 +146,11 @@ def _write_one(
         "attribution": world.attribution,
     }
     if request.report:
+        from foretwin.world_gen.report.text import as_text
+
         report = write_report(world, request.out)
         body["report"] = report
-        words += f"\n{report.as_text().rstrip()}"
+        words += f"\n{as_text(report).rstrip()}"
     else:
         words = "\n".join([words, *kind_lines(kinds)])
     return CommandResult(body, words)

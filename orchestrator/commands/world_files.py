@@ -64,9 +64,10 @@ def write_each(
 def write_report(world: World, path: Path) -> WorldReport:
     """Write what was tagged, inferred and a default beside a World's file; returns it."""
     from foretwin.world_gen.report.report import report_of
+    from foretwin.world_gen.report.text import as_markdown
 
     report = report_of(world)
-    for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):
+    for ending, text in ((".report.md", as_markdown(report)), (".report.json", report.as_json())):
         path.with_name(path.name + ending).write_text(text, encoding="utf-8")
     return report
 

@@ -8,7 +8,6 @@ from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
 from foretwin.sim_worker.planners.frenet_lattice import FrenetLattice
 from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from foretwin.sim_worker.planners.registry import AS_PLANNED, REMOTE
 from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
 
@@ -17,7 +16,7 @@ BUILT_IN: dict[str, type[Planner]] = {
     "constant_speed": ConstantSpeed,
     "gap_acceptance": GapAcceptance,
     "frenet_lattice": FrenetLattice,
-    AS_PLANNED: AsPlanned,
+    "as_planned": AsPlanned,
     "reverse_pursuit": ReversePursuit,
-    REMOTE: RemotePlanner,
+    "remote": RemotePlanner,
 }

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import msgspec
 
 from foretwin.contracts.world import World, WorldJunction
-from foretwin.world_gen.report import text as report_text
 from foretwin.world_gen.report.subjects import Neighbourhood, building_subject, junction_subjects
 from foretwin.world_gen.report.values import SUBJECT_WEIGHT, SubjectReport
 
@@ -61,14 +60,6 @@ class WorldReport(msgspec.Struct, frozen=True, kw_only=True):
     junctions: tuple[JunctionReport, ...]
     buildings: SubjectReport
     notes: tuple[NoteCount, ...]
-
-    def as_text(self) -> str:
-        """Return the report as plain text of at most 100 columns."""
-        return report_text.as_text(self)
-
-    def as_markdown(self) -> str:
-        """Return the report as Markdown."""
-        return report_text.as_markdown(self)
 
     def as_json(self) -> str:
         """Return the report as indented JSON, one object."""

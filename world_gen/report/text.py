@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
+from foretwin.world_gen.report.report import JunctionReport, WorldReport
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SubjectReport
-
-if TYPE_CHECKING:
-    from foretwin.world_gen.report.report import JunctionReport, WorldReport
 
 COLUMNS = 100
 _HOW = ", ".join(f"{source} {worth:g}" for source, worth in SOURCE_CONFIDENCE.items())

@@ -16,6 +16,7 @@ from foretwin.orchestrator.config import DriveConfig
 
 COVERS = (
     "foretwin.orchestrator.commands.cli",
+    "foretwin.orchestrator.commands.cli_drive",
     "foretwin.orchestrator.commands.cli_maps",
     "foretwin.orchestrator.commands.cli_options",
 )

@@ -9,6 +9,7 @@ import pytest
 
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.report.report import JunctionReport, note_kind, report_of
+from foretwin.world_gen.report.text import as_markdown, as_text
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
 from tests.world_gen.drawn_maps import (
     AVENUE,
@@ -165,7 +166,7 @@ def test_buildings_are_counted_together(world):
 
 def test_every_form_names_the_source_and_fits(world):
     report = report_of(world)
-    text, page, data = report.as_text(), report.as_markdown(), json.loads(report.as_json())
+    text, page, data = as_text(report), as_markdown(report), json.loads(report.as_json())
     assert text.endswith(ATTRIBUTION + "\n")
     assert ATTRIBUTION in page
     assert data["attribution"] == ATTRIBUTION
@@ -178,7 +179,7 @@ def test_every_form_names_the_source_and_fits(world):
 
 def test_names_from_the_map_cannot_break_a_page():
     nasty = {"highway": "residential", "name": "A|B *<b>* `x`"}
-    page = report_of(world_of(crossing(street=nasty))).as_markdown()
+    page = as_markdown(report_of(world_of(crossing(street=nasty))))
     assert r"A\|B \*\<b\>\* \`x\`" in page
 
 
