@@ -34,8 +34,8 @@ from foretwin.sim_worker.analysis.gap.measured_motion import (
     manoeuvre_of,
 )
 from foretwin.sim_worker.analysis.gap.measured_turning import MeasuredDrive
+from foretwin.sim_worker.analysis.identify.road_grade import climb_under
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
-from foretwin.sim_worker.analysis.road_grade import climb_under
 from foretwin.sim_worker.vehicle.lag import without_lags
 
 _EVERY_S, _TOLD = 1.0, 0.95

@@ -22,8 +22,8 @@ from foretwin.sim_worker.analysis.gap.free_run import (
     tire_angles,
 )
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.analysis.identify.road_grade import climb_under
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
-from foretwin.sim_worker.analysis.road_grade import climb_under
 
 BLOCK = round(0.2 / PERIOD_S)
 BLOCK_S = BLOCK * PERIOD_S

@@ -21,11 +21,11 @@ from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.identify import longitudinal
 from foretwin.sim_worker.analysis.identify.acceptance import HALF_OF_95
 from foretwin.sim_worker.analysis.identify.actuator import fit_following
+from foretwin.sim_worker.analysis.identify.road_grade import grade_from_altitude, grade_from_roads
 from foretwin.sim_worker.analysis.identify.steering import SteeringFit, fit_steering, steering_map
 from foretwin.sim_worker.analysis.identify.steering_signals import Theta
 from foretwin.sim_worker.analysis.identify.step import TURNING_MPS2
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
-from foretwin.sim_worker.analysis.road_grade import grade_from_altitude, grade_from_roads
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient
 
 UNDERSTEER_NAME = UNDERSTEER_GRADIENT

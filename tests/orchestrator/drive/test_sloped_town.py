@@ -41,7 +41,7 @@ from tests.world_gen.elevation.hills import raster
 
 COVERS = (
     "foretwin.orchestrator.routing.route_heights",
-    "foretwin.sim_worker.analysis.road_grade",
+    "foretwin.sim_worker.analysis.identify.road_grade",
 )
 SRTM_NOISE_M = 3.7
 Samples = list[tuple[str, Any]]

@@ -10,11 +10,11 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.analysis.identify.road_grade import grade_from_altitude
 from foretwin.sim_worker.analysis.identify.steering import fit_steering
 from foretwin.sim_worker.analysis.identify.steering_signals import Theta
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
-from foretwin.sim_worker.analysis.road_grade import grade_from_altitude
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
 from tests.sim_worker.standin_drives import city_minute, estimate, straight_minute
