@@ -220,6 +220,8 @@ TELEMETRY_CHANNELS = tuple(
     name for name, channel in CHANNELS.items() if "/telemetry/" in channel.key
 )
 """What a vehicle may send, `end` included."""
+SAMPLE_CHANNELS = tuple(name for name in TELEMETRY_CHANNELS if name != "end")
+"""Those of a vehicle's samples, which are counted."""
 
 ALIVE_KEY = f"{PREFIX}/{_RUN}/alive/{{process}}"
 """Under which each process of a run is alive; its token adds the life that it is in."""

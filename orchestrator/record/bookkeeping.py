@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from foretwin.contracts.keys import SAMPLE_CHANNELS
 from foretwin.contracts.numbering import Numberings
 from foretwin.contracts.running import MOST_LISTED, RunningMeans, RunningQuantiles
 from foretwin.contracts.simulation import Comparison, PlanComparison
@@ -52,7 +53,9 @@ class TelemetryCount:
 
     def settle(self, published: dict[str, int]) -> None:
         """Count what the vehicle says it published and that never came, first samples included."""
-        missing = sum(max(0, sent - self.by_channel[name]) for name, sent in published.items())
+        missing = sum(
+            max(0, published.get(name, 0) - self.by_channel[name]) for name in SAMPLE_CHANNELS
+        )
         self.lost_before = max(self.lost_before, missing - self.numbers.missing.total())
 
     def record(self, skipped_invalid: int) -> dict[str, Any]:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.contracts.keys import SAMPLE_CHANNELS
 from foretwin.contracts.tally import Tally
-
-_COUNTED = tuple(name for name in TELEMETRY_CHANNELS if name != "end")
 
 
 def telemetry_ledger(tally: Tally | None, published: Mapping[str, int]) -> dict[str, Any]:
@@ -22,14 +20,14 @@ def telemetry_ledger(tally: Tally | None, published: Mapping[str, int]) -> dict[
     known, missing = tally.numbers.published, tally.numbers.missing
     lost_by = {
         "never_came": sum(
-            missing[name] + max(0, published.get(name, 0) - known[name]) for name in _COUNTED
+            missing[name] + max(0, published.get(name, 0) - known[name]) for name in SAMPLE_CHANNELS
         ),
-        "unwritten": sum(tally.unwritten.get(name, 0) for name in _COUNTED),
-        "refused": sum(tally.refused.get(name, 0) for name in _COUNTED),
+        "unwritten": sum(tally.unwritten.get(name, 0) for name in SAMPLE_CHANNELS),
+        "refused": sum(tally.refused.get(name, 0) for name in SAMPLE_CHANNELS),
     }
     return {
-        "published": sum(max(published.get(name, 0), known[name]) for name in _COUNTED),
-        "recorded": sum(tally.recorded.get(name, 0) for name in _COUNTED),
+        "published": sum(max(published.get(name, 0), known[name]) for name in SAMPLE_CHANNELS),
+        "recorded": sum(tally.recorded.get(name, 0) for name in SAMPLE_CHANNELS),
         "lost": sum(lost_by.values()),
         "lost_by": lost_by,
     }

@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple, Protocol
 import msgspec
 
 from foretwin.contracts.drive import DriveEnd, VehicleInfo
+from foretwin.contracts.keys import SAMPLE_CHANNELS
 from foretwin.contracts.segments import Roll, next_number, segment_file
 from foretwin.contracts.simulation import Event
 from foretwin.contracts.tally import Tally, tally_file, write_tally
@@ -156,9 +157,11 @@ class DriveRecording:
         write_tally(self.tally.without(waiting), tally_file(self._path))
 
     def _take_end(self, end: DriveEnd, sender: int) -> None:
-        """Count as missing what the vehicle says it sent and that never came."""
-        for channel, count in end.published.items():
-            self.tally.numbers.reach(channel, count, sender=sender)
+        """Count as missing what the vehicle says it sent and that never came; of other channels
+        than a vehicle's nothing comes here."""
+        for channel in SAMPLE_CHANNELS:
+            if count := end.published.get(channel):
+                self.tally.numbers.reach(channel, count, sender=sender)
 
     def _open(self) -> list[Event]:
         """Begin a part and give it all that waits."""

@@ -61,6 +61,13 @@ def test_what_the_vehicle_says_it_sent_settles_the_losses() -> None:
     assert count.lost == 15  # never fewer than known
 
 
+def test_of_what_is_no_sample_nothing_is_lost() -> None:
+    count = counted(0, 1)
+    count.settle({"gnss": 2, "end": 1, "wheel_ticks": 500, "real_cloud": 90})
+
+    assert count.lost == 0
+
+
 def test_a_sample_that_came_twice_stands_for_no_other() -> None:
     count = counted(0, 1)
     count.take("gnss", sender=0, seq=1, sent_ns=1, now_ns=1)

@@ -213,6 +213,14 @@ def test_what_a_killed_recorder_had_and_nobody_has_any_more_is_missing(tmp_path:
     assert balances(again)
 
 
+def test_of_what_is_no_sample_of_a_vehicle_nothing_is_missing(tmp_path: Path) -> None:
+    recording = DriveRecording(tmp_path / "drive.mcap")
+    said = {"wheel_ticks": 500, "real_cloud": 90, "end": 3, "": 7, "speed": 2}
+    recording.add("end", DriveEnd(stamp_ns=START_NS, published=said), sender=7, seq=0)
+    recording.finish()
+    assert recording.tally.numbers.missing == {"speed": 2, "end": 0}  # none is asked for by name
+
+
 def test_what_the_guard_does_not_let_in_is_counted_once(tmp_path: Path) -> None:
     recording = DriveRecording(tmp_path / "drive.mcap")
     recording.add("imu", imu(0), sender=7, seq=0)
