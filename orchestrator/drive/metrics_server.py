@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler
@@ -23,7 +24,7 @@ TYPE = "text/plain; version=0.0.4; charset=utf-8"
 ANSWER_S = 2.0
 """So long may the drive's loop take to say what everything is."""
 CLIENT_S = 5.0
-"""So long may who asks take over it."""
+"""So long may who asks take over it, all in all: the end of a drive waits for it."""
 
 
 @contextlib.contextmanager
@@ -60,9 +61,7 @@ class MetricsServer:
         self._read, self._processes = read, processes
         self._asked, self._told = threading.Event(), threading.Event()
         self._samples: list[MetricSample] = []
-        self._server = TCPServer(
-            listener.getsockname(), _handler(self.page), bind_and_activate=False
-        )
+        self._server = _Server(listener.getsockname(), _handler(self.page), bind_and_activate=False)
         self._server.socket.close()
         self._server.socket = listener
         self._thread = threading.Thread(
@@ -109,10 +108,30 @@ def told_metrics(
         server.close()
 
 
+class _Server(TCPServer):
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing on the drive's screen of who hung up, or was hung up on."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+
 def _handler(page: Callable[[], str | None]) -> type[BaseHTTPRequestHandler]:
     class MetricsRequest(BaseHTTPRequestHandler):
-        timeout = CLIENT_S
         server_version, sys_version = "foretwin", ""
+
+        def setup(self) -> None:
+            super().setup()
+            # A `timeout` is of each word alone: who says one now and then would stay for ever.
+            self._let_go = threading.Timer(CLIENT_S, self._hang_up)
+            self._let_go.start()
+
+        def finish(self) -> None:
+            self._let_go.cancel()
+            super().finish()
+
+        def _hang_up(self) -> None:
+            with contextlib.suppress(OSError):  # who asked is gone
+                self.connection.shutdown(socket.SHUT_RDWR)
 
         def do_GET(self) -> None:
             if self.path.partition("?")[0] != "/metrics":
@@ -127,8 +146,7 @@ def _handler(page: Callable[[], str | None]) -> type[BaseHTTPRequestHandler]:
             self.send_header("Content-Type", TYPE)
             self.send_header("Content-Length", str(len(data)))
             self.end_headers()
-            with contextlib.suppress(OSError):  # who asked is gone
-                self.wfile.write(data)
+            self.wfile.write(data)
 
         def log_message(self, *_: Any) -> None:
             """Say nothing: who watches asks for ever."""

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import contextlib
 import socket
+import struct
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +16,7 @@ from foretwin.contracts.ports import LOOPBACK, free_port
 from foretwin.orchestrator.drive import metrics_server
 from foretwin.orchestrator.drive.metrics_server import TYPE, listening, told_metrics
 from foretwin.orchestrator.drive.operator_metrics import MetricSample
+from tests.contracts.bus_sides import DEADLINE_S
 
 
 @contextmanager
@@ -79,6 +82,44 @@ def test_who_says_nothing_keeps_nobody_out_for_long(
         port = int(address.rsplit(":", 1)[1])
         with socket.create_connection((LOOPBACK, port)):
             assert httpx.get(f"{address}/metrics", timeout=30.0).status_code == 200
+
+
+def test_who_spells_his_question_out_holds_up_neither_others_nor_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(metrics_server, "CLIENT_S", 0.2)
+    over, port = threading.Event(), free_port()
+    with listening(str(port)) as listener, told_metrics(listener, lambda _: [], processes=tmp_path):
+        slow = socket.create_connection((LOOPBACK, port), timeout=DEADLINE_S)
+        slow.sendall(b"GET /")
+
+        def spell() -> None:
+            with contextlib.suppress(OSError):
+                while not over.wait(0.02):
+                    slow.sendall(b"m")
+
+        speller = threading.Thread(target=spell)
+        speller.start()
+        try:
+            assert slow.recv(1) == b"", "he was let go"
+        finally:
+            over.set()
+            speller.join()
+            slow.close()
+    assert capfd.readouterr().err == ""
+
+
+def test_who_hangs_up_leaves_nothing_on_the_screen(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with telling(tmp_path) as address:
+        port = int(address.rsplit(":", 1)[1])
+        gone = socket.create_connection((LOOPBACK, port))
+        gone.sendall(b"GET /met")
+        gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # by a reset
+        gone.close()
+        assert httpx.get(f"{address}/metrics").status_code == 200
+    assert capfd.readouterr().err == ""
 
 
 def test_a_place_that_is_taken_is_told_before_anything_is_done() -> None:
