@@ -18,6 +18,8 @@ from foretwin.orchestrator.drive.process_watch import ProcessWatch
 from foretwin.orchestrator.drive.supervision import DriveError
 
 START_TIMEOUT_S = 120.0
+ASK_AGAIN_S = 0.1
+"""So long after a question that nobody answered the vehicle is asked again what it is."""
 LEAST_FREE_BYTES = 1_000_000
 """With less than this left on the disk it is the disk that kept a process from starting."""
 
@@ -63,8 +65,10 @@ class Joining:
 
     def _ask_info(self, deadline: float) -> bool:
         conductor, config = self.conductor, self.conductor.plan.config
+        live = config.resolved_source == "live"
         answers = Mailbox(4)
         while not self.stop():
+            heard_ns = conductor.intake.first_stamp_ns
             self.bus.request(
                 "info", InfoRequest(), answers, timeout_s=2.0, vehicle=config.vehicle_id
             )
@@ -72,16 +76,16 @@ class Joining:
             if isinstance(reply, Reply) and reply.message is not None:
                 conductor.take_info(reply.message)
                 return True
-            if config.resolved_source == "live":
-                # A live car may start when it likes, and need not know our question.
+            # A live car need not know our question: one that was there when it was asked does not.
+            # A gateway knows it, and the antenna's place.
+            if live and heard_ns is not None and conductor.plan.ros2 is None:
+                conductor.take_info(unannounced(config.vehicle_id, heard_ns))
+                return True
+            if not live and time.monotonic() > deadline:
+                raise DriveError("the vehicle does not say what it is; see log.jsonl")
+            time.sleep(ASK_AGAIN_S)  # where nobody is there, that is said at once
+            if live:  # it may start when it likes
                 while (item := conductor.mailbox.take()) is not None:
                     conductor.handle(item)
                 self.look_after(conductor, time.monotonic())
-                first_ns = conductor.intake.first_stamp_ns
-                # A gateway knows our question, and the antenna's place.
-                if first_ns is not None and conductor.plan.ros2 is None:
-                    conductor.take_info(unannounced(config.vehicle_id, first_ns))
-                    return True
-            elif time.monotonic() > deadline:
-                raise DriveError("the vehicle does not say what it is; see log.jsonl")
         return False

@@ -34,7 +34,6 @@ from tests.system.foretwin_command import (
 
 COVERS = (
     "foretwin.orchestrator.drive.orchestrator",
-    "foretwin.orchestrator.drive.joining",
     "foretwin.orchestrator.drive.start_anew",
 )
 
