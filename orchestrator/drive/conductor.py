@@ -88,7 +88,7 @@ class Conductor:
         self.beside = OtherVehicleFeed(context, lambda: self.intake.clock_offset_ns)
         self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self.active_world = ActiveWorldNews(
-            context, self.questions, next_stamp_ns=lambda: self.intake.now_stamp_ns + 1
+            context, self.questions, next_stamp_ns=lambda: self.intake.next_stamp_ns
         )
         self.fleet = FleetHandler(context, self.rounds, self.tuning.parameters)
         self.worlds.on_load = self.fleet.load
@@ -242,7 +242,7 @@ class Conductor:
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""
         intake, between = self.intake, not self.rounds.open
-        times = {"stamp_ns": intake.now_stamp_ns + 1, "start_stamp_ns": intake.start_stamp_ns}
+        times = {"stamp_ns": intake.next_stamp_ns, "start_stamp_ns": intake.start_stamp_ns}
         for change in self.changes.make(**times, between_rounds=between):
             self.tell(Notice("info", f"set {change.text}"))
             self.tables.add("changes", [change.row()])

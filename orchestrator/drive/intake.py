@@ -198,6 +198,11 @@ class Intake:
         return self.latest.state.stamp_ns if self.latest else self.start_stamp_ns
 
     @property
+    def next_stamp_ns(self) -> int:
+        """The earliest stamp of the next state; 0, which is none, before the clock is known."""
+        return self.now_stamp_ns + 1 if self.info else 0
+
+    @property
     def skipped_invalid(self) -> int:
         """Samples refused so far: by the source's reader, by the estimator, by the codec."""
         by_estimator = sum(self._estimator.skipped.values()) if self._estimator else 0

@@ -78,7 +78,7 @@ class TuningLink:
             return
         simulating = [name for name in sorted(self._alive) if self._simulates(name)]
         changes = self.parameters.hand_over(
-            simulating, watcher=TUNING, stamp_ns=self._intake.now_stamp_ns + 1
+            simulating, watcher=TUNING, stamp_ns=self._intake.next_stamp_ns
         )
         self._expect_no_watcher()
         if not changes:

@@ -110,7 +110,7 @@ class VirtualTrafficLink:
     def _tell(self, course: TrafficCourse) -> None:
         self._course = msgspec.structs.replace(
             course,
-            stamp_ns=self.intake.now_stamp_ns + 1,
+            stamp_ns=self.intake.next_stamp_ns,
             start_stamp_ns=self.intake.start_stamp_ns,
             on=self.on,
         )

@@ -39,6 +39,15 @@ def ready(conductor: Conductor) -> list[str]:
     return conductor.mission.worlds_ahead()
 
 
+def test_what_is_said_before_the_car_has_a_clock_carries_no_stamp(house: House) -> None:
+    conductor = house.conductor
+    conductor.active_world.mirror_up()
+    conductor.intake.info = None  # a live car that has not come yet
+    conductor.active_world.mirror_up()
+    told = [one.stamp_ns for one in house.watched("active_world")]
+    assert told == [INFO.start_stamp_ns + 1, 0]
+
+
 def test_a_world_is_ready_once_every_worker_has_loaded_it(house: House) -> None:
     house.drive(20, working=False)
     assert "n4" in house.conductor.worlds.building

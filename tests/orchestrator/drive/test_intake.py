@@ -83,7 +83,9 @@ def test_before_the_car_has_said_what_it_is_samples_are_counted_alone() -> None:
     assert telemetry.intake.counts.received == 3
     assert telemetry.intake.latest is None
     assert telemetry.intake.now_stamp_ns == 0
+    assert telemetry.intake.next_stamp_ns == 0, "no stamp: who shows it would count from there"
     telemetry.intake.take_info(INFO)
+    assert telemetry.intake.next_stamp_ns == START_NS + 1
     assert telemetry.send(FIXES[3])[0] is not None
 
 
