@@ -46,8 +46,6 @@ from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 _PORTION = 16
 """So many samples at most between two looks at the orchestrator's orders."""
 _DIAGNOSTICS_NS = _ROUTE_EVERY_NS = 1_000_000_000
-_MEASURED_WITHIN_NS = 500_000_000
-"""A measured steering angle that is older says nothing of now."""
 _CLOUDS = 8  # so many wait, the newest: one is a megabyte
 _STATE_EVERY_NS, _OBJECTS_EVERY_NS = 20_000_000, 100_000_000
 
@@ -201,12 +199,12 @@ class Gateway:
 
     def _command(self, message: VehicleCommand) -> None:
         now_ns, stamp_ns = self._mono_ns(), self._wall_ns()
-        known = now_ns - self.inwards.tire_angle_mono_ns <= _MEASURED_WITHIN_NS
         admitted = self.gate.admit(
             self._out.on_lot(message),
             now_ns=now_ns,
             link_up=self._foreign.connected,
-            tire_angle_rad=self.inwards.tire_angle_rad if known else None,
+            tire_angle_rad=self.inwards.measured("tire_angle_rad", now_ns=now_ns),
+            speed_mps=self.inwards.measured("speed_mps", now_ns=now_ns),
         )
         for row in self._out.rows("vehicle_command"):
             if admitted is None:

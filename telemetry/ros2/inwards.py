@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
@@ -47,6 +47,9 @@ from foretwin.telemetry.ros_messages.status import StatusJoiner, StatusPart
 from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 Samples = list[tuple[str, msgspec.Struct]]
+Measure = Literal["tire_angle_rad", "speed_mps"]
+MEASURED_WITHIN_NS = 500_000_000
+"""What was measured longer ago says nothing of now."""
 
 
 class Wanted(NamedTuple):
@@ -90,9 +93,8 @@ class Inwards:
         self.fix: GeoPoint | None = None
         """The car's newest position, as it came."""
         self.first_stamp_ns: int | None = None
-        self.tire_angle_rad: float | None = None
-        """The newest measured angle at the tyres."""
-        self.tire_angle_mono_ns = 0
+        self._measured: dict[Measure, tuple[float, int]] = {}
+        """The newest value of each, and when it came."""
         self.objects = HeardObjects(None)
         """What the newest road users came in."""
         self.route: drive.RouteToGoal | None = None
@@ -115,6 +117,11 @@ class Inwards:
     def lost(self) -> Counter[str]:
         """By topic, samples that the sequence numbers of rmw_zenoh say went missing."""
         return +self._numbers.missing
+
+    def measured(self, what: Measure, *, now_ns: int) -> float | None:
+        """Return what the car measured last, None where that says nothing of now."""
+        value, at_ns = self._measured.get(what, (None, 0))
+        return value if now_ns - at_ns <= MEASURED_WITHIN_NS else None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -279,6 +286,6 @@ class Inwards:
             self.fix = message.position
         if isinstance(message, drive.SpeedSample):
             self._commands.note(message)
+            self._measured["speed_mps"] = message.speed_mps, arrived.received_mono_ns
         if isinstance(message, drive.SteeringSample) and message.tire_angle_rad is not None:
-            self.tire_angle_rad = message.tire_angle_rad
-            self.tire_angle_mono_ns = arrived.received_mono_ns
+            self._measured["tire_angle_rad"] = message.tire_angle_rad, arrived.received_mono_ns

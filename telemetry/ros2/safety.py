@@ -33,7 +33,8 @@ class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Bounds of a command: values, how fast they may change, and how often one is sent."""
 
     max_speed_mps: float = 8.0
-    """Above it nothing accelerates."""
+    """The most that is asked for; at or above it, and where the speed is not known, nothing is
+    accelerated."""
     max_accel_mps2: float = 1.5
     """The most that is asked for."""
     max_decel_mps2: float = 4.0
@@ -122,12 +123,19 @@ class VehicleGate:
             self._state, (self.reason, self.why) = "shut", trouble
 
     def admit(
-        self, command: VehicleCommand, *, now_ns: int, link_up: bool, tire_angle_rad: float | None
+        self,
+        command: VehicleCommand,
+        *,
+        now_ns: int,
+        link_up: bool,
+        tire_angle_rad: float | None,
+        speed_mps: float | None,
     ) -> VehicleCommand | None:
         """Return the command within its bounds, or None where nothing may be sent now.
 
-        `tire_angle_rad` is what the vehicle measured last: the first command starts from there, so
-        that nothing jumps. A number that is not finite is refused and shuts the gate.
+        `tire_angle_rad` and `speed_mps` are what the vehicle measures now. The first command starts
+        from that angle, so that nothing jumps; who obeys the acceleration alone has no other bound
+        than that speed. A number that is not finite is refused and shuts the gate.
         """
         if self.look(now_ns=now_ns, link_up=link_up) != "open":
             return self._held("gate " + self._state)
@@ -151,6 +159,9 @@ class VehicleGate:
             before_tire, before_accel = before.tire_angle_rad, before.accel_mps2
             # A pause gives no leave to jump.
             passed_s = min((now_ns - sent_ns) / 1e9, 0.1)
+        wished_accel = command.accel_mps2
+        if speed_mps is None or not abs(speed_mps) < limits.max_speed_mps:
+            wished_accel = min(wished_accel, 0.0)
         bounded = msgspec.structs.replace(
             command,
             tire_angle_rad=_within(
@@ -159,7 +170,7 @@ class VehicleGate:
                 limits.max_tire_angle_rad,
             ),
             accel_mps2=_within(
-                _near(command.accel_mps2, before_accel, limits.max_jerk_mps3 * passed_s),
+                _near(wished_accel, before_accel, limits.max_jerk_mps3 * passed_s),
                 -limits.max_decel_mps2,
                 limits.max_accel_mps2,
             ),

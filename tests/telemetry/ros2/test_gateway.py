@@ -16,9 +16,15 @@ from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.lot_guard import LotGuard
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
-from foretwin.telemetry.ros_messages.parts import ODOMETRY, typestore, yaw_of
+from foretwin.telemetry.ros_messages.parts import (
+    ODOMETRY,
+    VELOCITY_REPORT,
+    typestore,
+    yaw_of,
+)
 from tests.contracts.memory_bus import MemoryBus
 from tests.contracts.mirror_samples import mirror_sample
+from tests.telemetry.autoware_messages import velocity_report
 from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
     FRAME,
@@ -39,6 +45,13 @@ COVERS = (
 
 S = 10**9
 TOWARDS = ("/control/cmd", "/perception/objects", "/clock")
+SPEED = f"""
+[[in]]
+topic = "/vehicle/velocity"
+type = "{VELOCITY_REPORT}"
+channel = "speed"
+"""
+SPEED_KEY = "0/vehicle/velocity/autoware_vehicle_msgs::msg::dds_::VelocityReport_/RIHS01_x"
 
 
 def state(stamp_ns: int) -> VehicleState:
@@ -235,14 +248,24 @@ def test_nothing_goes_towards_the_vehicle_without_both_switches(enabled: bool, f
     assert ground.foreign.on("/foretwin/diagnostics")
 
 
-def test_both_switches_let_it_out_within_its_bounds() -> None:
-    ground = Ground(enabled=True, flag=True)
+@pytest.mark.parametrize(
+    ("speed_mps", "age_ms", "accel_mps2"),
+    [(7.9, 0.0, 4.0 / 50.0), (7.9, 501.0, 0.0), (8.1, 0.0, 0.0), (None, 0.0, 0.0)],
+)
+def test_both_switches_let_it_out_within_its_bounds(
+    speed_mps: float | None, age_ms: float, accel_mps2: float
+) -> None:
+    ground = Ground(enabled=True, flag=True, more=SPEED)
+    if speed_mps is not None:
+        report = velocity_report(5 * S, speed_mps=speed_mps, yaw_rate_radps=0.0)
+        ground.arrive(SPEED_KEY, bytes(typestore().serialize_cdr(report, VELOCITY_REPORT)))
+    ground.step(age_ms)
     ground.say_everything()
     assert ground.towards() == dict.fromkeys(TOWARDS, 1)
     data = ground.foreign.on("/control/cmd")[0]
     control = typestore().deserialize_cdr(data, "autoware_control_msgs/msg/Control")
     assert control.lateral.steering_tire_angle == pytest.approx(0.1 + 0.3 / 50.0)
-    assert control.longitudinal.acceleration == pytest.approx(4.0 / 50.0)
+    assert control.longitudinal.acceleration == pytest.approx(accel_mps2)
     assert control.longitudinal.velocity == pytest.approx(8.0)
     tokens = [token for token in ground.foreign.tokens if "%control%cmd" in token]
     assert len(tokens) == 1

@@ -25,8 +25,15 @@ def command(
     )
 
 
-def admit(gate: VehicleGate, wished: VehicleCommand, now_ns: int, link_up: bool = True):  # type: ignore[no-untyped-def]
-    return gate.admit(wished, now_ns=now_ns, link_up=link_up, tire_angle_rad=0.0)
+def admit(  # type: ignore[no-untyped-def]
+    gate: VehicleGate,
+    wished: VehicleCommand,
+    now_ns: int,
+    link_up: bool = True,
+    tire: float | None = 0.0,
+    speed: float | None = 1.0,
+):
+    return gate.admit(wished, now_ns=now_ns, link_up=link_up, tire_angle_rad=tire, speed_mps=speed)
 
 
 def open_gate(now_ns: int = 0) -> VehicleGate:
@@ -107,6 +114,23 @@ def test_a_stale_word_and_one_from_the_future_open_nothing_and_are_counted() -> 
     assert gate.state == "open"
 
 
+@pytest.mark.parametrize("speed", [LIMITS.max_speed_mps, -9.0, 30.0, math.nan, None])
+def test_a_car_that_is_too_fast_or_whose_speed_is_not_known_is_not_accelerated(
+    speed: float | None,
+) -> None:
+    gate, sent, now = open_gate(), [], 0
+    for number in range(60):
+        now = number * 20 * MS
+        gate.heartbeat(now, now_ns=now)
+        measured = LIMITS.max_speed_mps - 0.01 if number < 25 else speed
+        sent.append(admit(gate, command(now, accel=9.0), now, speed=measured).accel_mps2)
+    assert sent[24] == LIMITS.max_accel_mps2, "for half a second it is slow enough"
+    assert all(later <= before for before, later in itertools.pairwise(sent[24:]))
+    assert sent[-1] == 0.0
+    now += 20 * MS
+    assert admit(gate, command(now, accel=-9.0), now, speed=speed).accel_mps2 < 0.0, "it may brake"
+
+
 DEFAULTS = {
     "max_speed_mps": 8.0, "max_accel_mps2": 1.5, "max_decel_mps2": 4.0, "max_jerk_mps3": 4.0,
     "max_tire_angle_rad": 0.5, "max_tire_rate_radps": 0.3, "max_rate_hz": 50.0,
@@ -147,8 +171,8 @@ def test_a_number_that_is_none_shuts(field: str, number: float) -> None:
 def test_the_first_command_starts_from_the_measured_angle() -> None:
     gate = open_gate()
     wished = command(0, tire=-0.4)
-    assert gate.admit(wished, now_ns=0, link_up=True, tire_angle_rad=None) is None
-    first = gate.admit(wished, now_ns=0, link_up=True, tire_angle_rad=0.2)
+    assert admit(gate, wished, 0, tire=None) is None
+    first = admit(gate, wished, 0, tire=0.2)
     assert first is not None
     assert first.tire_angle_rad == pytest.approx(0.2 - LIMITS.max_tire_rate_radps / 50.0)
 
@@ -168,9 +192,9 @@ def test_a_command_is_as_fresh_as_the_word_must_be(ago_ns: int, admitted: bool) 
 @pytest.mark.parametrize("measured", [0.51, -0.51, math.nan, math.inf, None])
 def test_no_first_command_from_an_angle_beyond_the_bound_or_unknown(measured: float | None) -> None:
     gate = open_gate()
-    sent = gate.admit(command(0), now_ns=0, link_up=True, tire_angle_rad=measured)
+    sent = admit(gate, command(0), 0, tire=measured)
     assert sent is None
-    within = gate.admit(command(0), now_ns=0, link_up=True, tire_angle_rad=0.5)
+    within = admit(gate, command(0), 0, tire=0.5)
     assert within is not None
     assert within.tire_angle_rad == pytest.approx(0.5 - LIMITS.max_tire_rate_radps / 50.0)
 
@@ -235,7 +259,7 @@ def test_never_outside_the_bounds_and_never_after_the_dead_mans_time(
             down = down or word is not None
         elif what == "command":
             wished = command(now, tire, accel, speed)
-            out = gate.admit(wished, now_ns=now, link_up=True, tire_angle_rad=measured)
+            out = admit(gate, wished, now, tire=measured)
             if out is not None:
                 assert config_on
                 assert flag_on
