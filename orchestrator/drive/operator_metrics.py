@@ -131,8 +131,8 @@ class DriveCounts:
         ended = msgspec.structs.asdict(jobs_ledger(dispatch.count))
         yield MetricSample("jobs_given_total", ended.pop("given"))
         yield from _by("jobs_ended_total", "how", ended)
-        at_work = len(dispatch.busy)
-        counts = {"at_work": at_work, "waiting": dispatch.open - at_work}
+        waiting = dispatch.waiting
+        counts = {"at_work": dispatch.open - waiting, "waiting": waiting}
         yield from _by("jobs_open", "state", counts)
         yield MetricSample("jobs_requeued_total", dispatch.requeued)
 

@@ -71,6 +71,11 @@ class Dispatch:
         """How many tasks are neither answered nor given up."""
         return len(self._open)
 
+    @property
+    def waiting(self) -> int:
+        """How many of them are with no worker; who is `busy` may be at one that has ended."""
+        return sum(map(len, self._waiting.values()))
+
     def submit(
         self, task: Task, *, due_s: float | None = None, span_s: float = 0.0, near: bool = False
     ) -> None:
@@ -233,8 +238,7 @@ class Dispatch:
 
     def _assignment(self, now_s: float) -> Assignment | None:
         """Return the next task to be given, to the idlest, then fastest worker that may take it."""
-        waiting = sum(map(len, self._waiting.values()))
-        most = self.in_flight if waiting >= len(self._workers) else 1
+        most = self.in_flight if self.waiting >= len(self._workers) else 1
         may_hold = self.sickness.may_hold(self._workers, most, now_s=now_s)
         free = [
             (len(worker.at_work), self.far.expected_s(worker_id, now_s=now_s), worker_id)

@@ -76,6 +76,11 @@ def test_jobs_wait_or_are_at_work(house: House) -> None:
     assert sum(open_jobs.values()) == jobs == page["jobs_given_total"]
     assert 0 < open_jobs["at_work"] <= house.plan.config.workers
 
+    for named in house.conductor.rounds.open.orders[0].recorded:  # their workers are at them still
+        house.conductor.rounds.dispatcher.cancel(named.sha256)
+    page = told(DriveCounts(house.conductor).samples(1.0))
+    assert page['jobs_open{state="at_work"}'] == page['jobs_open{state="waiting"}'] == 0
+
 
 def test_the_age_of_results_begins_with_the_first_one(house: House) -> None:
     counts = DriveCounts(house.conductor)
