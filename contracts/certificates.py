@@ -7,6 +7,7 @@ What can be seen from here is looked at here.
 from __future__ import annotations
 
 import datetime
+import ipaddress
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -93,13 +94,21 @@ def time_trouble(certificate: Certificate, file: str, *, now: datetime.datetime)
 def host_trouble(files: TlsFiles, host: str) -> str | None:
     """Return what is wrong where a router's certificate does not stand for `host`."""
     hosts = read_certificate(Path(files.certificate)).hosts
-    if host.strip("[]") in hosts:
+    if _plain(host) in map(_plain, hosts):
         return None
     known = ", ".join(hosts) or "no host"
     return (
         f"{files.certificate}: stands for {known}, not for {host}; make another with foretwin "
         f"secure add router --host {host}"
     )
+
+
+def _plain(host: str) -> str:
+    """Return one spelling of a host: TLS takes names in any case, and addresses by their value."""
+    try:
+        return str(ipaddress.ip_address(host.strip("[]")))
+    except ValueError:
+        return host.lower()
 
 
 def _x509(file: Path) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import datetime
 import ipaddress
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ from foretwin.contracts.partial_file import partial_file
 
 LOCAL_HOSTS = "localhost", "127.0.0.1", "::1"
 MOST_DAYS = 366
+_DNS_NAME = re.compile(r"[A-Za-z0-9_]([A-Za-z0-9_-]{0,62})(\.[A-Za-z0-9_]([A-Za-z0-9_-]{0,62}))*")
+_LONGEST_NAME = 253
 _BEFORE = datetime.timedelta(minutes=10)
 """Clocks of two machines differ; a certificate begins so long before it was made."""
 
@@ -36,7 +39,7 @@ def make_authority(folder: Path, *, name: str, days: int, now: datetime.datetime
     """
     from cryptography import x509
 
-    check_days(days)
+    check_days(days, "--campaign-days")
     if (folder / AUTHORITY).exists():
         raise UserError(f"{folder}: holds a campaign already; a new one needs a new folder")
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -63,8 +66,9 @@ def issue(
 ) -> Path:
     """Make or renew the certificate of a role; returns its folder.
 
-    The router's stands for `hosts` as a server and for nothing else; every other one is a client's
-    alone, so that no role can pose as the router. None outlives the authority. Raises UserError.
+    The router's stands for `hosts` as a server, and for those of the one before it, and for nothing
+    else; every other one is a client's alone, so that no role can pose as the router. None outlives
+    the authority. Raises UserError.
     """
     from cryptography import x509
     from cryptography.x509.oid import ExtendedKeyUsageOID
@@ -83,7 +87,8 @@ def issue(
     purpose = ExtendedKeyUsageOID.SERVER_AUTH if serves else ExtendedKeyUsageOID.CLIENT_AUTH
     builder = builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=True)
     if serves:
-        names = [_host_name(host) for host in dict.fromkeys((*LOCAL_HOSTS, *hosts))]
+        before = _hosts_before(folder / role / CERTIFICATE)
+        names = [host_name(host) for host in dict.fromkeys((*LOCAL_HOSTS, *before, *hosts))]
         builder = builder.add_extension(x509.SubjectAlternativeName(names), critical=False)
     builder = builder.add_extension(
         x509.AuthorityKeyIdentifier.from_issuer_public_key(authority_key.public_key()), False
@@ -123,10 +128,10 @@ def _authority(folder: Path, *, now: datetime.datetime) -> tuple[Any, Any]:
     return x509.load_pem_x509_certificate(file.read_bytes()), key
 
 
-def check_days(days: int) -> None:
+def check_days(days: int, option: str = "--days") -> None:
     """Raise UserError for a life that no certificate may have."""
     if not 1 <= days <= MOST_DAYS:
-        raise UserError(f"--days {days}: 1 to {MOST_DAYS}")
+        raise UserError(f"{option} {days}: 1 to {MOST_DAYS}")
 
 
 def _begun(name: str, *, now: datetime.datetime) -> Any:
@@ -147,17 +152,25 @@ def _named(name: str) -> Any:
         raise UserError(f"--name {name!r}: {error}") from error
 
 
-def _host_name(host: str) -> Any:
+def _hosts_before(file: Path) -> tuple[str, ...]:
+    """Return for whom the certificate stands that is renewed; of a broken one nobody."""
+    try:
+        return read_certificate(file).hosts
+    except (OSError, UserError):
+        return ()
+
+
+def host_name(host: str) -> Any:
+    """Return a host as a certificate names it; raises UserError for what names none."""
     from cryptography import x509
 
     try:
         return x509.IPAddress(ipaddress.ip_address(host.strip("[]")))
     except ValueError:
         pass
-    try:
-        return x509.DNSName(host)
-    except ValueError as error:
-        raise UserError(f"--host {host!r}: a host's name or address: {error}") from error
+    if _DNS_NAME.fullmatch(host) is None or len(host) > _LONGEST_NAME:
+        raise UserError(f"--host {host!r}: a host's name or address alone, such as twin-pc")
+    return x509.DNSName(host)
 
 
 def _new_key() -> Any:

@@ -18,7 +18,12 @@ from foretwin.contracts.campaign import (
 from foretwin.contracts.certificates import UTC, read_certificate, time_trouble, troubles
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.terminal import say
-from foretwin.orchestrator.campaign.issuing import check_days, issue, make_authority
+from foretwin.orchestrator.campaign.issuing import (
+    check_days,
+    host_name,
+    issue,
+    make_authority,
+)
 from foretwin.orchestrator.campaign.joining import LOCAL_ROLES
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.drive.exit_words import EXIT_DONE, EXIT_PARTLY
@@ -28,6 +33,8 @@ def begin(folder: Path, *, hosts: Sequence[str], days: int, role_days: int) -> C
     """Make a campaign with what a drive itself needs."""
     now = datetime.datetime.now(UTC)
     check_days(role_days)
+    for host in hosts:  # what is made is not made again
+        host_name(host)
     name = f"foretwin {folder.resolve().name}"
     make_authority(folder, name=name, days=days, now=now)
     for role in LOCAL_ROLES:

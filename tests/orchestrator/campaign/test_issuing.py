@@ -83,6 +83,38 @@ def test_the_router_stands_for_its_hosts(tmp_path: Path) -> None:
     assert hosts == (*LOCAL_HOSTS, "car-pc", "10.0.0.7", "fd00::7")
 
 
+def test_a_renewed_router_stands_for_the_same_hosts_and_for_more(tmp_path: Path) -> None:
+    folder = campaign(tmp_path / "c")
+    issue(folder, "router", days=1, now=now(), hosts=("car-pc",))
+    issue(folder, "router", days=1, now=now())
+    issue(folder, "router", days=1, now=now(), hosts=("10.0.0.7", "car-pc"))
+    hosts = read_certificate(folder / "router" / CERTIFICATE).hosts
+    assert hosts == (*LOCAL_HOSTS, "car-pc", "10.0.0.7")
+    (folder / "router" / CERTIFICATE).write_text("torn")
+    issue(folder, "router", days=1, now=now())
+    assert read_certificate(folder / "router" / CERTIFICATE).hosts == LOCAL_HOSTS
+
+
+NO_HOSTS = (
+    "",
+    "twin-pc:7447",
+    "tls/twin-pc",
+    "twin pc",
+    "*.car.local",
+    "a..b",
+    "-a",
+    "Straße",
+    "a\n",
+)
+
+
+@pytest.mark.parametrize("host", NO_HOSTS)
+def test_what_names_no_host_is_refused(tmp_path: Path, host: str) -> None:
+    folder = campaign(tmp_path / "c")
+    with pytest.raises(UserError, match="a host's name or address alone"):
+        issue(folder, "router", days=1, now=now(), hosts=(host,))
+
+
 def test_what_cannot_be_made_is_said_in_a_line(tmp_path: Path) -> None:
     folder = campaign(tmp_path / "c")
     with pytest.raises(UserError, match="a new one needs a new folder"):
@@ -94,7 +126,7 @@ def test_what_cannot_be_made_is_said_in_a_line(tmp_path: Path) -> None:
     for days in (0, 367):
         with pytest.raises(UserError, match=f"--days {days}: 1 to 366"):
             issue(folder, "car", days=days, now=now())
-        with pytest.raises(UserError, match=f"--days {days}: 1 to 366"):
+        with pytest.raises(UserError, match=f"--campaign-days {days}: 1 to 366"):
             make_authority(tmp_path / "d", name="d", days=days, now=now())
     with pytest.raises(UserError, match="the campaign ended"):
         issue(folder, "car", days=1, now=now() + 31 * DAY)

@@ -36,6 +36,16 @@ def test_a_campaign_from_its_beginning(tmp_path: Path, capsys: pytest.CaptureFix
         assert list(troubles(role_files(tmp_path / "c", role), now=now())) == []
 
 
+def test_a_campaign_that_cannot_be_begun_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(tmp_path / "c")
+    assert secure("init", "--folder", folder, "--host", "twin-pc:7447") == 2
+    assert "--host 'twin-pc:7447'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+    assert secure("init", "--folder", folder, "--host", "twin-pc") == 0
+
+
 def test_show_says_what_is_of_no_use_any_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -58,7 +68,7 @@ def test_show_says_what_is_of_no_use_any_more(
         (("add", "car"), "certificates are made where the campaign began"),
         (("show",), "missing; foretwin secure init"),
         (("init", "--days", "0"), "--days 0: 1 to 366"),
-        (("init", "--campaign-days", "0"), "--days 0: 1 to 366"),
+        (("init", "--campaign-days", "0"), "--campaign-days 0: 1 to 366"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(
