@@ -62,6 +62,8 @@ def _answer(tls: TlsFiles, place: ListenPlace) -> str | None:
     """Return what the router has against a certificate, None where it takes it."""
     try:
         connection = socket.create_connection(place, timeout=_REACH_S)
+    except UnicodeError:  # of a name that no network can have
+        return f"{place.host}: no name of a host"
     except OSError as error:
         return f"nobody listens at {place.host}:{place.port}: {error.strerror or error}"
     with connection:

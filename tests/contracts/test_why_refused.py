@@ -88,6 +88,12 @@ def test_a_certificate_that_is_gone(campaigns: Path, endpoint: str, tmp_path: Pa
     assert cause(endpoint, tls) == f"[Errno 2] No such file or directory: '{tls.key}'"
 
 
+def test_a_name_that_no_host_can_have(campaigns: Path) -> None:
+    tls = role_files(campaigns / "ours", "car")
+    for name in ("twin..pc", ".twin-pc", 70 * "x"):
+        assert cause(f"tls/{name}:7447", tls) == f"{name}: no name of a host"
+
+
 def test_nobody_there_and_somebody_who_speaks_no_tls(campaigns: Path) -> None:
     tls, port = role_files(campaigns / "ours", "car"), free_port()
     assert f"nobody listens at localhost:{port}" in cause(f"tls/localhost:{port}", tls)
