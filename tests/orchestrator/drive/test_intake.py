@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import msgspec
 import numpy as np
 import pytest
@@ -19,7 +21,11 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.mailbox import Mailbox, Received
 from foretwin.orchestrator.drive.intake import Intake
-from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, estimate_object
+from foretwin.orchestrator.drive.telemetry_watch import (
+    TelemetryWatch,
+    estimate_line,
+    estimate_object,
+)
 from foretwin.telemetry.estimator.innovations import Surprises
 from foretwin.telemetry.estimator.mounting import Learnt, Mounting
 from foretwin.telemetry.estimator.reported_state import StateConsistency
@@ -240,6 +246,35 @@ def test_a_run_says_how_far_its_states_can_be_trusted() -> None:
     assert estimate["receiver_slips"] == 0
     assert 0.0 < record["speed_std_mps"] < 2.0
     assert 0.0 < record["yaw_std_rad"] < 1.0
+
+
+def test_messages_of_another_type_are_told_once_and_other_faults_are_not_taken_for_them() -> None:
+    watch = TelemetryWatch()
+    estimator = SimpleNamespace(clock_steps=0, left_out=frozenset(), refused=["speed_wrong_type"])
+    told = watch.estimator(estimator)  # type: ignore[arg-type]
+    assert told == ["telemetry: speed carries messages of another type; refused"]
+    estimator.refused += ["gnss_out_of_bounds"]
+    assert watch.estimator(estimator) == []  # type: ignore[arg-type]
+
+
+def test_the_summary_says_how_far_states_can_be_trusted() -> None:
+    unknown = Learnt(0.0, 1.0, observable=False)
+    surprises = {"gnss": Surprises(taken=200, within=190.0)}
+    plain = Stretched(1.0, 1.0, 1.0)
+    mounting = Mounting(unknown, unknown, unknown, turns=0)
+    little = StateConsistency(surprises, 1.0, plain, 0.02, 0, mounting)
+    assert estimate_line(little) == (
+        "estimate: within its 95 %: gnss 95 %; fixes taken for good to 0.02 m"
+    )
+    late = mounting._replace(
+        antenna_forward_m=Learnt(1.5, 0.1, observable=True),
+        fixes_late_s=Learnt(0.2, 0.01, observable=True),
+    )
+    much = StateConsistency(surprises, 1.5, plain, None, 3, late)
+    assert estimate_line(much) == (
+        "estimate: within its 95 %: gnss 95 %; the receiver slipped 3 times; antenna 1.50 ± 0.20 m "
+        "ahead of the axle; fixes 200 ± 20 ms late; spreads widened by 1.5"
+    )
 
 
 def test_a_sensor_that_does_not_go_with_positions_is_told_once() -> None:

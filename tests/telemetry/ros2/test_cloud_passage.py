@@ -16,7 +16,7 @@ from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.clouds import cloud_from, cloud_of
 from foretwin.telemetry.ros_messages.parts import POINT_CLOUD2, typestore
-from tests.telemetry.ros2.gateway_ground import FRAME, mapping_text
+from tests.telemetry.ros2.gateway_ground import FIX_KEY, FRAME, fix, mapping_text
 from tests.telemetry.ros2.passing_ground import PERCEPTION, PassingGround, S
 from tests.telemetry.ros2.test_merged_objects import VAN, user
 
@@ -186,3 +186,15 @@ def test_of_clouds_that_come_too_fast_the_newest_eight_go_out() -> None:
         one.header.stamp.nanosec for one in passing.heard_on("/foretwin/points", POINT_CLOUD2)
     ]
     assert stamps == list(range(12, 20))
+
+
+def test_clouds_that_wait_keep_no_sample_out_and_the_newest_are_passed_on() -> None:
+    passing = Passing()
+    ros = cloud_from(PointCloud(stamp_ns=5 * S, points=POINTS), frame_id="lidar")
+    cloud = bytes(typestore().serialize_cdr(ros, POINT_CLOUD2))
+    for key, payload in (*((RAW, cloud) for _ in range(11)), (FIX_KEY, fix(5 * S, 52.5, 13.4))):
+        passing.foreign.arrive(key, payload, mono_ns=passing.now_ns)
+    passing.step()
+    dropped = passing.gateway.report()["dropped"]
+    assert (dropped["clouds"], dropped["samples"]) == (3, 0)
+    assert passing.gateway.report()["in"]["gnss"] == 1

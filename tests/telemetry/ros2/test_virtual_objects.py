@@ -141,7 +141,9 @@ def test_who_sets_out_does_so_with_the_first_state_and_anew_where_the_clock_goes
     [
         ("lat_deg = 89.9", None), ("lat_deg = 90.0", "degrees"), ("lon_deg = -180.0", None),
         ("lon_deg = 180.1", "degrees"), ("alt_m = inf", "finite"), ("yaw_deg = nan", "finite"),
-        ("length_m = 50.0", "length_m 50.0: above 0 and below 50"), ("width_m = 49.9", None),
+        ("length_m = 50.0", "length_m 50.0: above 0 and below 50"),
+        ("length_m = 50.1", "length_m 50.1: above 0"), ("speed_mps = 0.5", "way_m: how far"),
+        ("width_m = 49.9", None),
         ("speed_mps = 50.0\nway_m = 1000.0", None),
         ("speed_mps = 50.1\nway_m = 1.0", "0 to 50"), ("speed_mps = -0.1\nway_m = 1.0", "0 to 50"),
         ("way_m = 1000.1", "0 to 1000"), ("way_m = -0.1", "0 to 1000"), ("way_m = 5.0", None),
