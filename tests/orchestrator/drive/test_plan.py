@@ -16,10 +16,11 @@ from foretwin.contracts.credentials import read_credentials
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_from_local, local_from_geo
 from foretwin.orchestrator.config import ConfigError, DriveConfig
-from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs, starts_a_car
 from foretwin.orchestrator.drive.processes import PROCESSES, ROUTER, process_ids
 from foretwin.orchestrator.drive.router_start import on_local_bus
 from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.other_vehicle_config import OtherVehicleConfig
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.junctions.intersections import junctions_on_route
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
@@ -150,13 +151,24 @@ def test_a_log_gives_the_drives_frame_and_on_request_its_route(tmp_path: Path) -
     assert predicted.info.vehicle_id  # type: ignore[attr-defined]
 
 
+def test_a_live_car_behind_no_gateway_of_ours_needs_no_certificate_of_the_drives() -> None:
+    second = OtherVehicleConfig(id="second", live=True)
+    gateway = msgspec.structs.replace(second, ros2="second.toml")
+    assert starts_a_car(DriveConfig())
+    assert not starts_a_car(DriveConfig(source="live", vehicles=(second,)))
+    assert starts_a_car(DriveConfig(source="live", vehicles=(second, gateway)))
+    assert starts_a_car(DriveConfig(source="live", ros2="autoware"))
+
+
 def test_a_log_driven_elsewhere_is_refused_with_both_places(tmp_path: Path) -> None:
-    log = gpx(tmp_path, town_line()[::8] + 20_000.0)
+    places = town_line()[::8] + 20_000.0
+    log = gpx(tmp_path, places)
 
     with pytest.raises(UserError, match="holds no position of the drive") as refused:
         inputs_for(tmp_path, map=str(MAP_FILE), log=str(log))
     assert str(log) in str(refused.value)
-    assert "the map covers" in str(refused.value)
+    begins = ", ".join(f"{one:.5f}" for one in geo_from_local(town().graph.frame, places[0]))
+    assert f"which begins at {begins}); the map covers" in str(refused.value)
     assert "\n" not in str(refused.value)
 
 

@@ -65,6 +65,7 @@ def test_what_else_is_wrong_keeps_it_from_opening_and_shuts_it() -> None:
     gate = VehicleGate(LIMITS, config_on=True, flag_on=True, trouble=lambda _: wrong[0])
     gate.heartbeat(0, now_ns=0)
     assert (gate.state, gate.why) == ("waiting", "the car is outside its fence")
+    assert gate.counts == {"word before the car is ready": 1}
     wrong[0] = None
     gate.heartbeat(MS, now_ns=MS)
     assert (gate.look(now_ns=MS, link_up=True), gate.why) == ("open", "both switches are on")
