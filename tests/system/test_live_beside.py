@@ -34,7 +34,9 @@ live = true
 """
 MIRRORED = '\n[mirrored]\nvehicles = ["second", "third"]\n'
 SECOND_AHEAD_M, THIRD_AHEAD_M = 25.0, 50.0
-FLAGS = ("--source", "live", "--futures", "8", "--workers", "1", "--rate", "0.5")
+FLAGS = (
+    "--source", "live", "--futures", "8", "--workers", "1", "--rate", "0.5", "--insecure",
+)  # fmt: skip
 
 
 class NativeCar:
