@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 import string
 from collections.abc import Iterable, Iterator, Mapping
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
+from foretwin.contracts.terminal import plain
 from foretwin.contracts.world import World
 from foretwin.orchestrator.report.blocks import Plotted, Report
 
@@ -28,20 +30,24 @@ _NAME_FILES = frozenset(
 
 
 class PlaceNames:
-    """Replaces what tells a place in words: each name by a letter, in the order of appearance."""
+    """Replaces what tells a place in words: each name by a letter, in the order of appearance.
+
+    Pictures are SVG already, where an apostrophe or an ampersand is written otherwise.
+    """
 
     def __init__(self, names: Iterable[str]) -> None:
-        known = sorted({name for name in names if len(name) >= _SHORTEST_NAME})
+        known = {name for name in names if len(name) >= _SHORTEST_NAME}
+        self._names = {escape(plain(name)): name for name in known} | {name: name for name in known}
         self._letters: dict[str, str] = {}
         self._free = _letters()
-        longest_first = sorted(known, key=lambda name: (-len(name), name))
+        longest_first = sorted(self._names, key=lambda name: (-len(name), name))
         words = "|".join(re.escape(name) for name in longest_first)
         self._pattern = re.compile(rf"(?<!\w)(?:{words})(?!\w)") if known else None
 
     def without(self, text: str) -> str:
         """Return a text without names, ids of the map, and degrees."""
         if self._pattern is not None:
-            text = self._pattern.sub(lambda found: f"street {self._letter(found[0])}", text)
+            text = self._pattern.sub(lambda found: f"street {self._letter(self._names[found[0]])}", text)
         return _DEGREES.sub(_LEFT_OUT, _IDS.sub(_LEFT_OUT, text))
 
     def _letter(self, name: str) -> str:

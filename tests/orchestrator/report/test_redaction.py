@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.orchestrator.report.drawing import Canvas
 from foretwin.orchestrator.report.page import html_of
 from foretwin.orchestrator.report.redaction import PlaceNames, Redaction
 from foretwin.orchestrator.report.write_report import report_of_folders
@@ -48,6 +49,14 @@ def test_a_name_has_the_same_letter_everywhere_and_ids_are_left_out() -> None:
     assert names.without("lane w23755731.25663407.f0 with 12.5 m") == "lane … with 12.5 m"
     assert PlaceNames(()).without("Ring") == "Ring"
     assert PlaceNames({"Q7"}).without("Q7, not Q72") == "street A, not Q72"
+
+
+def test_a_name_is_left_out_as_pictures_write_it() -> None:
+    names = PlaceNames({"King's Road", "Marks & Spencer Way"})
+    picture = Canvas(0.0, 0.0, 9.0, 9.0).svg("King's Road \u00d7 Marks & Spencer Way", "#fff")
+
+    assert names.without("King's Road") == "street A"
+    assert 'aria-label="street A \u00d7 street B"' in names.without(picture)
 
 
 def test_the_crossing_of_these_tests_has_names_to_be_left_out() -> None:
