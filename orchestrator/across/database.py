@@ -49,7 +49,7 @@ def ask(tables: RunTables, sql: str) -> AskedRows:
         lacks = _TABLE.search(str(error))
         if lacks is None:
             raise UserError(f"query: {_why(error)}") from error
-        names.append(lacks[1])
+        names.append(lacks[1].lower())
     except (OSError, pa.ArrowException, duckdb.Error) as error:
         if not tables.leave_out_damaged(names):
             raise UserError(f"query: {_why(error)}") from error
@@ -57,21 +57,24 @@ def ask(tables: RunTables, sql: str) -> AskedRows:
 
 
 def tables_asked(tables: RunTables, sql: str) -> list[str]:
-    """Return the tables that a question names; UserError for anything but one SELECT."""
+    """Return the tables that a question names, as SQL does in letters of any case.
+
+    Raises UserError for anything but one SELECT.
+    """
     parser = duckdb.connect(":memory:", config=LOCKED)
     try:
         kinds = [one.type.name for one in parser.extract_statements(sql)]
         if len(kinds) != 1 or kinds[0] not in ("SELECT", "EXPLAIN", "MULTI"):
             raise UserError("query: one SELECT is asked for; runs are read, never changed")
         if kinds[0] != "MULTI":  # as PIVOT is
-            return sorted(parser.get_table_names(sql)) or tables.names
+            return sorted({one.lower() for one in parser.get_table_names(sql)}) or tables.names
     except duckdb.ParserException as error:
         raise UserError(f"query: {_why(error)}") from error
     except duckdb.Error:  # of JOIN … USING: it looks at columns of tables that are not there yet
         pass
     finally:
         parser.close()
-    words = set(re.findall(r"\w+", sql))
+    words = set(re.findall(r"\w+", sql.lower()))
     return [name for name in tables.names if name in words]
 
 

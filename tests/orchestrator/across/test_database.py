@@ -58,6 +58,16 @@ def test_runs_sweeps_and_lakes_are_asked_together_each_run_once(tmp_path: Path) 
     assert asked(joined) == [(6,)]
 
 
+def test_tables_are_named_in_letters_of_any_case(tmp_path: Path) -> None:
+    three(tmp_path)
+    asked = Asked(tmp_path / "runs")
+
+    assert asked("SELECT count(*) FROM FUTURES NATURAL JOIN Runs") == asked(
+        "SELECT count(*) FROM futures NATURAL JOIN runs"
+    )
+    assert len(asked("PIVOT Futures ON Planner USING count(*) GROUP BY run")) == 3
+
+
 def test_the_record_of_a_run_is_asked_as_json(tmp_path: Path) -> None:
     made_run(tmp_path / "runs", told_by_nobody={"deep": [1, 2]})
 
