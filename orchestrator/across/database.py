@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import difflib
 import re
 from collections.abc import Iterable, Sequence
@@ -28,6 +29,7 @@ _ALL_LISTED = 30
 """So many columns are listed where one was misspelt, else the nearest."""
 _COLUMN = re.compile(r'(?:Referenced column|does not have a column named|column) "([^"]+)"')
 _TABLE = re.compile(r'Table with name "?([^"]+?)"? does not exist')
+_ZONED = "TIMESTAMP WITH TIME ZONE"
 
 
 class AskedRows(NamedTuple):
@@ -91,9 +93,9 @@ def columns_in(tables: RunTables, names: Iterable[str]) -> dict[str, dict[str, s
 def _answered(tables: RunTables, names: Sequence[str], sql: str) -> AskedRows:
     with _database(tables, names) as database:
         try:
-            result = database.execute(sql)
-            names_told = [one[0] for one in result.description]
-            return AskedRows(_each_another(names_told), result.fetchall())
+            described = database.execute(sql).description
+            rows = _rows_of(database, sql, [str(kind) for _, kind, *_ in described])
+            return AskedRows(_each_another([name for name, *_ in described]), rows)
         except duckdb.BinderException as error:
             columns = {
                 name: [row[0] for row in database.execute(f'DESCRIBE "{name}"').fetchall()]
@@ -102,6 +104,36 @@ def _answered(tables: RunTables, names: Sequence[str], sql: str) -> AskedRows:
             raise UserError(f"query: {_with_columns(error, columns)}") from error
         except duckdb.InterruptException as error:
             raise KeyboardInterrupt from error
+
+
+def _rows_of(
+    database: duckdb.DuckDBPyConnection, sql: str, kinds: Sequence[str]
+) -> list[tuple[Any, ...]]:
+    """Return the rows of a question that was just executed; its columns are of these types.
+
+    Of an instant with a time zone DuckDB makes no Python object without the package pytz: its text
+    is asked for instead.
+    """
+    if not any(_ZONED in kind for kind in kinds):
+        return database.fetchall()
+    told = (f"#{n}::{kind.replace(_ZONED, 'VARCHAR')}" for n, kind in enumerate(kinds, start=1))
+    database.execute(f'CREATE TEMP TABLE "the answer" AS {sql}')
+    rows = database.execute(f'SELECT {", ".join(told)} FROM "the answer"').fetchall()
+    return [
+        tuple(
+            _instant(cell) if kind == _ZONED else cell
+            for cell, kind in zip(row, kinds, strict=True)
+        )
+        for row in rows
+    ]
+
+
+def _instant(text: str | None) -> datetime.datetime | str | None:
+    """Return the instant of a text of DuckDB, the text where Python has none, as of infinity."""
+    try:
+        return text and datetime.datetime.fromisoformat(text)
+    except ValueError:
+        return text
 
 
 def _each_another(names: Sequence[str]) -> list[str]:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import datetime
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -66,6 +67,22 @@ def test_tables_are_named_in_letters_of_any_case(tmp_path: Path) -> None:
         "SELECT count(*) FROM futures NATURAL JOIN runs"
     )
     assert len(asked("PIVOT Futures ON Planner USING count(*) GROUP BY run")) == 3
+
+
+def test_an_instant_has_its_time_zone(tmp_path: Path) -> None:
+    three(tmp_path)
+
+    answer = ask(
+        Asked(tmp_path / "runs").tables,
+        "SELECT to_timestamp(0.5) AS t, [to_timestamp(0)] AS t, TIMESTAMPTZ 'infinity', "
+        "NULL::TIMESTAMPTZ, 1::HUGEINT FROM runs LIMIT 1; -- the first",
+    )
+
+    assert answer.columns[:2] == ["t", "t_1"]
+    ((half, (zero,), never, none, one),) = answer.rows
+    assert half == datetime.datetime(1970, 1, 1, 0, 0, 0, 500_000, tzinfo=datetime.UTC)
+    assert datetime.datetime.fromisoformat(zero).timestamp() == 0
+    assert (never, none, one) == ("infinity", None, 1)
 
 
 def test_the_record_of_a_run_is_asked_as_json(tmp_path: Path) -> None:
