@@ -61,7 +61,7 @@ def found_in(given: Sequence[str]) -> FoundRuns:
                 found.doubled.append(f"{row.folder}: {same}")
                 remark = f"called as {first} is"
                 found.rows.append(msgspec.structs.replace(row, remark=remark))
-    found.rows.sort(key=_by_time)
+    found.rows.sort(key=by_time)
     return found
 
 
@@ -74,7 +74,8 @@ def once(rows: Sequence[RunRow]) -> Iterator[RunRow]:
             yield row
 
 
-def _by_time(row: RunRow) -> tuple[str, str]:
+def by_time(row: RunRow) -> tuple[str, str]:
+    """Return what runs are listed by."""
     return row.time or "", row.run
 
 

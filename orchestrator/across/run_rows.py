@@ -31,7 +31,7 @@ class RunRow(msgspec.Struct, frozen=True, kw_only=True):
     """drive or sweep"""
     time: str | None = None
     """When: a drive's begin, by its id and the clock of its computer; when a sweep last said how
-    far it is."""
+    far it is, of one in a lake the day."""
     state: str
     """completed, interrupted, failed, vehicle_ended, recovered, running, killed, stopped (a sweep
     that can go on), damaged"""
@@ -40,6 +40,7 @@ class RunRow(msgspec.Struct, frozen=True, kw_only=True):
     map: str | None = None
     """Name of the map's file."""
     map_sha256: str | None = None
+    """None of a sweep of given Worlds."""
     planner: str | None = None
     """Several of a sweep: with commas."""
     vehicle: str | None = None
@@ -87,11 +88,15 @@ def row_of_folder(folder: Path) -> RunRow:
         return _damaged(folder, SWEEP if swept else DRIVE, f"{file.name}: {one_line(error)}")
     try:
         if swept:
+            from foretwin.orchestrator.lake.sources import map_of_sweep  # not wanted without sweeps
+
             row = sweep_row(record, folder=str(folder), record_text=data.decode())
+            sha256 = map_of_sweep(folder, record) or None
             state = COMPLETED if record.get("complete") else STOPPED
             state = RUNNING if is_locked(folder / LOCK) else state
             told = datetime.datetime.fromtimestamp(file.stat().st_mtime)
-            return msgspec.structs.replace(row, state=state, time=f"{told:%Y-%m-%d %H:%M:%S}")
+            when = f"{told:%Y-%m-%d %H:%M:%S}"
+            return msgspec.structs.replace(row, state=state, time=when, map_sha256=sha256)
         row = drive_row(record, folder=str(folder), record_text=data.decode().rstrip())
         if row.state == RUNNING or any((folder / RESULTS).glob("*.arrows")):
             running = is_locked(folder / LOG)

@@ -143,11 +143,13 @@ def _of_lake(lake: FoundLake, name: str) -> ds.Dataset:
 
 def lake_rows(lake: FoundLake) -> list[RunRow]:
     """Return the rows of the runs that are in a lake."""
-    asked: Sequence[str] = (RUN_ID, "kind", "folder", "record")
+    asked: Sequence[str] = (RUN_ID, "kind", "folder", "map_sha256", "record")
     rows = []
     for one in _of_lake(lake, RUNS).to_table(columns=list(asked)).to_pylist():
         record: dict[str, Any] = msgspec.json.decode(one["record"])
         make = drive_row if one["kind"] == DRIVE else sweep_row
         row = make(record, folder=one["folder"], record_text=one["record"])
-        rows.append(msgspec.structs.replace(row, run=one[RUN_ID]))
+        run = one[RUN_ID]
+        when = row.time or lake.manifest.runs[run].partition.day
+        rows.append(msgspec.structs.replace(row, run=run, time=when, map_sha256=one["map_sha256"]))
     return rows

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from foretwin.contracts.terminal import console, say
-from foretwin.orchestrator.across.places import found_in
+from foretwin.orchestrator.across.places import by_time, found_in
 from foretwin.orchestrator.across.run_rows import DAMAGED, KILLED, RunRow
 from foretwin.orchestrator.across.table_heads import not_whole
 from foretwin.orchestrator.across.tables import lake_rows
@@ -34,6 +34,7 @@ def list_runs(places: Sequence[str], *, as_csv: bool) -> CommandResult:
     for lake in found.lakes:
         there = {row.run for row in rows}
         rows += [row for row in lake_rows(lake) if row.run not in there]
+    rows.sort(key=by_time)
     told = [_told(row) for row in rows]
     if as_csv:
         return CommandResult(

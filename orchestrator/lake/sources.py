@@ -7,7 +7,7 @@ import functools
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -127,7 +127,7 @@ class SourceTables:
                         self._files.setdefault(name, []).append(path)
                         self.schemas[name] = _with_run_id(file.schema_arrow.remove_metadata())
                         self.size_bytes += path.stat().st_size
-        self._map_sha256 = self._sha256_of_map()
+        self._map_sha256 = _sha256_of_map(source)
         self.partition = self._partition()
         """Where the run belongs."""
 
@@ -139,20 +139,6 @@ class SourceTables:
             # So that a hash of digits alone is no number to whoever guesses types.
             map=f"osm-{sha256[:_MAP_DIGITS]}" if sha256 else NONE,
         )
-
-    def _sha256_of_map(self) -> str:
-        """Return the hash of the map; of a sweep of given Worlds there may be several."""
-        record = self.source.record
-        if self.source.kind == "drive":
-            return str((record.get("map") or {}).get("sha256") or "")
-        if not (record.get("spec") or {}).get("map"):
-            return ""
-        worlds = self.source.folder / WORLDS
-        try:
-            world_id = next(iter(sorted(worlds.glob("*.world")))).stem
-            return load_world(worlds, world_id).map_sha256
-        except (StopIteration, OSError, SchemaMismatch):
-            return ""
 
     def batches(self, table: str) -> Iterator[pa.RecordBatch]:
         """Yield the rows of a table in their order."""
@@ -188,6 +174,24 @@ class SourceTables:
             "record": json.dumps(record, ensure_ascii=False, separators=(",", ":")),
             **known,
         }
+
+
+def _sha256_of_map(source: RunSource) -> str:
+    if source.kind == "drive":
+        return str((source.record.get("map") or {}).get("sha256") or "")
+    return map_of_sweep(source.folder, source.record)
+
+
+def map_of_sweep(folder: Path, record: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a sweep's map; empty for given Worlds, which may be of several."""
+    if not (record.get("spec") or {}).get("map"):
+        return ""
+    worlds = folder / WORLDS
+    try:
+        world_id = next(iter(sorted(worlds.glob("*.world")))).stem
+        return load_world(worlds, world_id).map_sha256
+    except (StopIteration, OSError, SchemaMismatch):
+        return ""
 
 
 def _day(source: RunSource) -> str:

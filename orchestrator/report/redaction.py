@@ -47,7 +47,9 @@ class PlaceNames:
     def without(self, text: str) -> str:
         """Return a text without names, ids of the map, and degrees."""
         if self._pattern is not None:
-            text = self._pattern.sub(lambda found: f"street {self._letter(self._names[found[0]])}", text)
+            text = self._pattern.sub(
+                lambda found: f"street {self._letter(self._names[found[0]])}", text
+            )
         return _DEGREES.sub(_LEFT_OUT, _IDS.sub(_LEFT_OUT, text))
 
     def _letter(self, name: str) -> str:

@@ -9,7 +9,9 @@ import pytest
 from foretwin.orchestrator.across.run_rows import row_of_folder, sweep_row
 from foretwin.orchestrator.record.run_state import RunGoesOnError, run_lock
 from foretwin.orchestrator.sweep.lock import folder_lock
+from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.lake.made_runs import made_run, made_sweep
+from tests.sim_worker.scenarios.worlds import cross
 
 
 def test_a_drive_is_told_by_its_record(tmp_path: Path) -> None:
@@ -44,8 +46,13 @@ def test_a_sweep_is_told_by_its_record(tmp_path: Path) -> None:
     told = {"spec": spec, "rows": 40, "placed": 34, "played": 33, "collided": 12, "failed": 1,
             "worlds": 4, "failures": {}, "playing_s": 2.5}  # fmt: skip
 
-    row = row_of_folder(made_sweep(tmp_path / "sweep", **told))
+    sweep = made_sweep(tmp_path / "sweep", **told)
+    assert row_of_folder(sweep).map_sha256 is None
+    WorldStore(sweep / "worlds").save(cross())
 
+    row = row_of_folder(sweep)
+
+    assert row.map_sha256 == cross().map_sha256
     assert (row.run, row.kind, row.state) == ("sweep-0cdb5ed7a3db79d9", "sweep", "completed")
     assert (row.what, row.planner, row.map, row.futures) == ("scp", "a, b", "town.osm", 40)
     assert row.verdict == "12 of 33 collided, 1 failed"

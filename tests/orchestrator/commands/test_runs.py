@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,9 @@ import pytest
 from foretwin.orchestrator.commands.cli import run as command
 from foretwin.orchestrator.lake.collect import collect
 from foretwin.orchestrator.lake.store import FolderStore
-from tests.orchestrator.lake.made_runs import made_run, made_sweep
+from foretwin.world_gen.world_store import WorldStore
+from tests.orchestrator.lake.made_runs import MAP_SHA256, made_run, made_sweep
+from tests.sim_worker.scenarios.worlds import cross
 
 
 @pytest.fixture
@@ -85,6 +88,26 @@ def test_the_runs_of_a_lake_are_listed(tmp_path: Path, capsys: pytest.CaptureFix
 
     (row,) = json.loads(capsys.readouterr().out)
     assert (row["run"], row["state"], row["folder"]) == (run.name, "completed", str(run))
+
+
+def test_runs_of_a_lake_stand_in_the_order_of_time_and_sweeps_have_a_day_and_a_map(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late, early = made_run(tmp_path, day="20261124"), made_run(tmp_path, day="20261122")
+    between = made_run(tmp_path, vehicle_id="bus")
+    sweep = made_sweep(tmp_path / "sweep", spec={"map": "town.osm"})
+    WorldStore(sweep / "worlds").save(cross())
+    os.utime(sweep / "sweep.json", (0, 0))
+    collect(FolderStore(tmp_path / "lake"), [late, early, sweep])
+
+    assert command(["runs", str(tmp_path / "lake"), str(between), "--json"]) == 0
+
+    rows = json.loads(capsys.readouterr().out)
+    names = ["sweep-0cdb5ed7a3db79d9", early.name, between.name, late.name]
+    assert [row["run"] for row in rows] == names
+    assert rows[0]["time"][:5] in ("1969-", "1970-")
+    assert {row["map_sha256"] for row in rows[1:]} == {MAP_SHA256}
+    assert rows[0]["map_sha256"] == cross().map_sha256
 
 
 def test_a_run_that_is_named_twice_or_lies_in_a_lake_too_is_listed_once(
