@@ -30,7 +30,6 @@ COVERS = (
     "foretwin.orchestrator.report.first_page",
     "foretwin.orchestrator.report.junction_parts",
     "foretwin.orchestrator.report.junction_picture",
-    "foretwin.orchestrator.report.page",
     "foretwin.orchestrator.report.plots",
     "foretwin.orchestrator.report.replayed",
     "foretwin.orchestrator.report.run_report",
