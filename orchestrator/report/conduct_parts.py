@@ -228,7 +228,7 @@ def _ledger(ledger: Mapping[str, Any]) -> list[Block]:
         return [Prose("The run's record holds no ledger.", "watch")]
     table = Listed(
         "What became of it",
-        ("of", "count", ""),
+        ("of", "what", "count"),
         tuple(rows),
         frozenset({2}),
         note="Each round is run, missed, spared (machine too slow), unseeded (nothing to begin "

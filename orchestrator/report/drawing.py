@@ -21,6 +21,8 @@ class Canvas:
     def __init__(self, west_m: float, south_m: float, east_m: float, north_m: float) -> None:
         self._box = (west_m, south_m, east_m, north_m)
         self._parts: list[str] = []
+        self._leads_on = False
+        """Whether something drawn is a link."""
 
     @property
     def width_m(self) -> float:
@@ -79,6 +81,7 @@ class Canvas:
         size = round(size_m * UNITS_PER_M)
         said = f'<text x="{x}" y="{y}" font-size="{size}" {style}>{escape(plain(text))}</text>'
         self._parts.append(f'<a href="#{to}">{said}</a>' if to else said)
+        self._leads_on |= bool(to)
 
     def scale_bar(self) -> None:
         """Draw how long a round number of metres is, in the lower left corner."""
@@ -94,10 +97,14 @@ class Canvas:
         self.words(above, f"{long_m} m", 0.022 * self.width_m, 'fill="#1c2530"')
 
     def svg(self, label: str, ground: str) -> str:
-        """Return all of it as one SVG element; `label` is for who cannot see it."""
+        """Return all of it as one SVG element; `label` is for who cannot see it.
+
+        What is an image to who reads the page aloud has no links: with some, it is a group.
+        """
+        role = "group" if self._leads_on else "img"
         wide, high = (round(one * UNITS_PER_M) for one in (self.width_m, self.height_m))
         return (
-            f'<svg viewBox="0 0 {wide} {high}" role="img" '
+            f'<svg viewBox="0 0 {wide} {high}" role="{role}" '
             f'aria-label="{escape(plain(label), quote=True)}" '
             f'font-family="system-ui, DejaVu Sans, sans-serif">'
             f'<rect width="{wide}" height="{high}" fill="{ground}"/>{"".join(self._parts)}</svg>'

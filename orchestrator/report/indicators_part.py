@@ -43,7 +43,17 @@ def indicators_part(found: DriveIndicators) -> Chapter:
         )
     blocks.append(Prose(_on_trend(found)))
     if found.indicators:
-        columns = ("what", "events", "of", "", "in drives", "rate", "95 % from", "to", "later half")
+        columns = (
+            "what",
+            "events",
+            "of",
+            "unit",
+            "in drives",
+            "rate",
+            "95 % from",
+            "to",
+            "later half",
+        )
         blocks.append(
             Listed(
                 f"Over {plural(found.drives, 'drive')}",

@@ -215,7 +215,7 @@ def _key_figures(seen: Sequence[_Seen]) -> Listed:
     for name, get in _ROWS:
         cells = [get(one) for one in seen]
         rows.append(row(name, *cells, change_between(cells[0], cells[-1])))
-    columns = ("", *(one.name for one in seen), "last minus first")
+    columns = ("figure", *(one.name for one in seen), "last minus first")
     return Listed("What each came to", columns, tuple(rows), frozenset(range(1, len(seen) + 2)))
 
 
@@ -244,7 +244,9 @@ def _settings(seen: Sequence[_Seen], *, places: bool) -> Block:
     if not rows:
         return Prose("Settings, versions and map are the same.")
     return Listed(
-        "Settings and versions that differ", ("", *(one.name for one in seen)), tuple(rows)
+        "Settings and versions that differ",
+        ("setting", *(one.name for one in seen)),
+        tuple(rows),
     )
 
 

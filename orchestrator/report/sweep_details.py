@@ -124,7 +124,7 @@ def losses_chapter(sweep: SweepMaterial) -> Chapter:
     told = tuple(row(name, number(float(count), 0)) for name, count in jobs.items())
     blocks: list[Block] = []
     if told:
-        blocks.append(Listed("Jobs", ("count", ""), told, frozenset({1})))
+        blocks.append(Listed("Jobs", ("what", "count"), told, frozenset({1})))
     else:
         blocks.append(Prose("The sweep's record holds no ledger: it was never ended.", "watch"))
     failed = [

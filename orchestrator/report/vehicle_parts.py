@@ -37,7 +37,7 @@ def vehicle_part(run: RunMaterial) -> Chapter:
     )
     table = Listed(
         "Parameters in use, and what the driving says of them (95 % intervals)",
-        ("parameter", "in use", "identified", "interval", "", "why not"),
+        ("parameter", "in use", "identified", "interval", "fits", "why not"),
         rows,
         frozenset({1, 2}),
     )

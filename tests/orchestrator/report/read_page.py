@@ -16,6 +16,8 @@ class ReadPage(HTMLParser):
         self.links: list[str] = []
         self.loaded: list[str] = []
         self.codes: list[str] = []
+        self.nameless = html.count('<button type="button"></button>')
+        """Buttons of which nobody who hears the page learns what they do."""
         self._in_code = False
         self.feed(html)
 

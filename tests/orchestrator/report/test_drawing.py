@@ -25,6 +25,16 @@ def test_north_is_up_and_a_metre_is_ten_units() -> None:
     assert 'aria-label="words &amp; more"' in drawn
 
 
+def test_what_has_links_is_no_image_to_who_hears_the_page() -> None:
+    canvas = Canvas(0.0, 0.0, 10.0, 10.0)
+    canvas.words(np.array([5.0, 5.0]), "1", 2.0, 'fill="red"')
+    assert '<svg viewBox="0 0 100 100" role="img"' in canvas.svg("", "#fff")
+
+    canvas.words(np.array([5.0, 5.0]), "2", 2.0, 'fill="red"', to="junction-2")
+
+    assert '<svg viewBox="0 0 100 100" role="group"' in canvas.svg("", "#fff")
+
+
 def test_areas_have_holes_and_are_cut_at_the_edge() -> None:
     canvas = Canvas(0.0, 0.0, 10.0, 10.0)
     square = np.array([[-5.0, -5.0], [20.0, -5.0], [20.0, 20.0], [-5.0, 20.0]])

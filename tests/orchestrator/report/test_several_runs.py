@@ -25,6 +25,7 @@ def test_two_runs_stand_side_by_side(tmp_path: Path) -> None:
     assert "constant_speed" in page
     assert "last minus first" in page
     read = ReadPage(page)
+    assert read.nameless == 0
     assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
 
 

@@ -44,6 +44,7 @@ def page(swept: Path) -> str:
 @pytest.mark.judge
 def test_it_tells_outcomes_and_stands_alone(swept: Path, page: str) -> None:
     read, record = ReadPage(page), json.loads((swept / "sweep.json").read_text())
+    assert read.nameless == 0
 
     assert f"Of {record['played']} cases that were played {record['collided']}" in page
     assert "Outcome by junction, scenario and planner" in page

@@ -53,6 +53,7 @@ def test_it_stands_alone(page: str) -> None:
     read = ReadPage(page)
 
     assert read.loaded == []
+    assert read.nameless == 0
     assert read.links
     assert [link for link in read.links if not link.startswith("#")] == []
     assert {link.removeprefix("#") for link in read.links} - read.anchors == set()
