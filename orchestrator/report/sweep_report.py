@@ -21,6 +21,7 @@ from foretwin.orchestrator.report.blocks import (
     Report,
     TableCell,
     Tone,
+    listed_words,
     number,
     plural,
     row,
@@ -118,8 +119,14 @@ def _verdict(sweep: SweepMaterial) -> tuple[str, Tone]:
     were = "was" if played == 1 else "were"
     said = f"Of {plural(played, 'case')} that {were} played {collided} end in a collision"
     if len(ranked) > 1:
-        (_, best, hit, there), (_, worst, most, of) = ranked[0], ranked[-1]
-        said += f": fewest with {best} ({hit} of {there}), most with {worst} ({most} of {of})"
+        fewest, most = (
+            listed_words(
+                [f"{who} ({hit} of {there})" for of, who, hit, there in ranked if of == at]
+            )
+            for at in (ranked[0][0], ranked[-1][0])
+        )
+        same = ", the same share with each planner"
+        said += same if fewest == most else f": fewest with {fewest}, most with {most}"
     failed = int(sweep.record.get("failed") or 0)
     tone: Tone = "good" if not collided else "watch"
     if failed or not sweep.record.get("complete"):

@@ -138,6 +138,29 @@ def test_futures_that_failed_are_neither_played_nor_left_out(swept: Path, tmp_pa
     assert report_of_folders([out]).verdict == report.verdict
 
 
+@pytest.mark.parametrize(
+    ("collided", "said"),
+    [
+        ({"a": 5, "b": 5}, ", the same share with each planner."),
+        (
+            {"a": 5, "b": 5, "c": 7},
+            ": fewest with a (5 of 10) and b (5 of 10), most with c (7 of 10).",
+        ),
+    ],
+)
+def test_planners_that_collide_as_often_are_told_alike(
+    swept: Path, tmp_path: Path, collided: dict[str, int], said: str
+) -> None:
+    out = tmp_path / "alike"
+    shutil.copytree(swept, out)
+    record = json.loads((out / "sweep.json").read_text())
+    entry = record["scenarios"][0] | {"played": 10, "scored": 10}
+    groups = [entry | {"planner": who, "collided": hit} for who, hit in collided.items()]
+    (out / "sweep.json").write_text(json.dumps(record | {"scenarios": groups}))
+
+    assert report_of_folders([out]).verdict.endswith(f"end in a collision{said}")
+
+
 def test_a_sweep_whose_rows_are_damaged_is_refused(swept: Path, tmp_path: Path) -> None:
     (tmp_path / "sweep.json").write_bytes((swept / "sweep.json").read_bytes())
     (tmp_path / "rows").mkdir()
