@@ -9,7 +9,15 @@ import rerun as rr
 
 from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.contracts.world import ATTRIBUTION
-from foretwin.viewer.rows import Row, document, in_markdown, path_part, plain_text, static
+from foretwin.viewer.rows import (
+    Row,
+    document,
+    in_markdown,
+    path_part,
+    place_text,
+    plain_text,
+    static,
+)
 
 WORKER_COLOURS = {
     "starting": 0x607D8BFF,
@@ -81,7 +89,7 @@ class RunLog:
         """Return the status line."""
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
-            name = in_markdown(progress.next_intersection)
+            name = in_markdown(place_text(progress.next_intersection, progress.junction_id or ""))
             ahead = f"next **{name}** {progress.arrival_text}"
         now = "" if self._clock is None else f", now {self._clock()}"
         memory = f" · {progress.memory_mb:.0f} MB" if progress.memory_mb is not None else ""

@@ -236,6 +236,13 @@ def test_who_watches_sees_when_what_is_shown_was_sent() -> None:
     assert "now" not in told["recorded"]
 
 
+def test_a_junction_whose_name_no_font_has_is_told_by_its_id() -> None:
+    progress = next(m.message for m in scene.drive(duration_s=1.0) if m.channel == "progress")
+    progress = msgspec.structs.replace(progress, next_intersection="東京通り", junction_id="n7")
+
+    assert "next **… n7** in" in text_of(Shown(monitor_of().handle("progress", progress))["status"])
+
+
 def test_threats_say_who_comes_from_where_how_likely_and_when() -> None:
     view = round_of(
         ("car", line((20.0, -20.0), (0.0, 10.0)), 1e-2),
