@@ -24,7 +24,7 @@ from foretwin.contracts.segments import (
 from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
 from foretwin.contracts.trace import span, traced
-from foretwin.viewer.blueprint import DEFAULT, drive_blueprint
+from foretwin.viewer.blueprint import drive_blueprint
 from foretwin.viewer.keeping_up import KeepingUp
 from foretwin.viewer.live_viewer import (
     live_viewer,
@@ -244,7 +244,7 @@ def main(arguments: list[str] | None = None) -> int:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--setup", type=Path, metavar="FILE", help="a ViewerSetup as JSON")
     what.add_argument("--open", type=Path, metavar="RRD", help="show an existing recording")
-    parser.add_argument("--layout", default=DEFAULT, help="of --open: a name or a TOML file")
+    parser.add_argument("--layout", help="of --open: a name or a TOML file; default: its own")
     parser.add_argument("--view", choices=("native", "web"), default="native", help="of --open")
     given = parser.parse_args(arguments)
     try:

@@ -20,8 +20,10 @@ from foretwin.viewer.live_viewer import (
 from foretwin.viewer.recordings import copy_with_blueprint, is_complete
 
 
-def show(recording: Path, *, layout: str = DEFAULT, view: str = "native") -> None:
+def show(recording: Path, *, layout: str | None = None, view: str = "native") -> None:
     """Become the native viewer of `recording` and of its later parts, or serve it for a browser.
+
+    Without a `layout` it is shown in its own.
 
     Raises FileNotFoundError, NoViewerError or UserError, in one line.
     """
@@ -43,12 +45,12 @@ def show(recording: Path, *, layout: str = DEFAULT, view: str = "native") -> Non
     os.execve(program, arguments, offline_environment())
 
 
-def _laid_out(recording: Path, layout: str) -> Path:
-    """Return a recording with this layout: a copy, but where it is complete and has its own."""
-    if layout == DEFAULT and is_complete(recording):
+def _laid_out(recording: Path, layout: str | None) -> Path:
+    """Return a recording with this layout: a copy, but where it is complete and keeps its own."""
+    if layout is None and is_complete(recording):
         return recording
     owned = make_temporary("foretwin-shown-")
     owned.keep_over_exec()  # the next one to be shown finds whether this one still is
     copy = owned.path / recording.name
-    copy_with_blueprint(recording, copy, drive_blueprint(read_layout(layout)))
+    copy_with_blueprint(recording, copy, drive_blueprint(read_layout(layout or DEFAULT)))
     return copy

@@ -27,7 +27,10 @@ def view(
         Path, typer.Argument(metavar="[RUN]", help="folder or id of a run, or latest")
     ] = Path("latest"),
     out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
-    layout: LayoutOption = None,
+    layout: Annotated[
+        str | None,
+        typer.Option(help="drive, identify, gap or sweep, or a TOML file [default: the run's own]"),
+    ] = None,
     shown: Annotated[
         Shown, typer.Option("--view", help="in a window, or served for a browser until Ctrl-C")
     ] = Shown.native,
@@ -40,4 +43,4 @@ def view(
     """
     from foretwin.orchestrator.commands.view import open_view
 
-    raise typer.Exit(open_view(run, out=out, layout=layout or "drive", view=shown.value))
+    raise typer.Exit(open_view(run, out=out, layout=layout, view=shown.value))

@@ -64,8 +64,9 @@ def test_another_layout_is_laid_over_a_copy(
     monkeypatch.setattr(viewer, "copy_with_blueprint", lambda source, copy, blueprint: None)
     recording = tmp_path / "monitor.rrd"
     recording.write_bytes(b"RRF2")
-    for layout in ("drive", "gap"):
+    for layout in (None, "gap", "drive"):
         viewer.show(recording, layout=layout, view="web")
     assert shown[0] == str(recording)
-    assert Path(shown[1]).name == recording.name
-    assert Path(shown[1]) != recording
+    for copy in shown[1:]:
+        assert Path(copy).name == recording.name
+        assert Path(copy) != recording

@@ -36,13 +36,13 @@ def recorded(tmp_path: Path) -> Path:
     return folder
 
 
-def test_the_latest_run_is_shown_as_a_drive_in_a_window(
+def test_the_latest_run_is_shown_in_its_own_layout_in_a_window(
     recorded: Path, started: list[list[str]]
 ) -> None:
     assert run(["view", "--out", str(recorded.parent)]) == 2
     (command,) = started
-    shown = ["--open", str(recorded / "monitor.rrd"), "--layout", "drive", "--view", "native"]
-    assert command[-6:] == shown
+    assert command[-4:] == ["--open", str(recorded / "monitor.rrd"), "--view", "native"]
+    assert "--layout" not in command
 
 
 def test_a_recording_is_shown_in_the_layout_and_place_that_are_asked_for(
@@ -54,10 +54,10 @@ def test_a_recording_is_shown_in_the_layout_and_place_that_are_asked_for(
         assert command[-6:] == [
             "--open",
             str(recorded / "monitor.rrd"),
-            "--layout",
-            "gap",
             "--view",
             "web",
+            "--layout",
+            "gap",
         ]
     assert len(started) == 2
 
