@@ -14,6 +14,7 @@ from foretwin.world_gen.junctions.intersections import Junction
 
 MOST_JUNCTIONS, SEEN_LATELY_S = 64, 120.0
 """So many junctions, and all that were seen so lately, keep their Worlds."""
+_NONE = RoundsOf()
 
 
 class Moment(NamedTuple):
@@ -36,14 +37,13 @@ class Visit:
     ready: Moment | None = None
     entered: Moment | None = None
     arrived: Moment | None = None
-    rounds: int = 0
-    futures: int = 0
+    counted: RoundsOf = _NONE
     seen_s: float = 0.0
     """Drive time when the junction was last ahead."""
 
     def record(self, *, mono_s: float) -> dict[str, Any]:
         """Return the entry of run.json; a World that never came is late by all the time since."""
-        return {**self._told(mono_s=mono_s), "rounds": self.rounds, "futures": self.futures}
+        return {**self._told(mono_s=mono_s), **self.counted._asdict()}
 
     def row(self, *, mono_s: float) -> dict[str, Any]:
         """Return the row of the table `junctions`, as far as is known."""
@@ -70,18 +70,31 @@ class VisitBook:
         """By junction, the one seen last at the end."""
         self.arrived: FirstOf[Visit] = FirstOf(MOST_LISTED)
         self._news: list[Visit] = []
-        self._earlier = Visited([], {})
+        self._earlier: list[dict[str, Any]] = []
+        """Records of passages that another book held."""
+        self._open: dict[str, RoundsOf] = {}
+        """Rounds of junctions, by id, since their last passage."""
+        self._now = ""
+        """The junction of the rounds on end that are counted now,"""
+        self._behind: Visit | None = None
+        """its passage that was made meanwhile, whose they are unless one more is."""
 
     def go_on(self, earlier: Visited) -> None:
         """Begin with what another book of the same drive held."""
-        self._earlier = earlier
+        self._earlier, self._open = earlier.records, dict(earlier.ahead)
 
     def records(self, *, mono_s: float) -> FirstOf[dict[str, Any]]:
         """Return the `intersections` of run.json: those that the car reached, in order."""
         listed: FirstOf[dict[str, Any]] = FirstOf(MOST_LISTED)
-        listed.extend(self._earlier.records)
+        listed.extend(self._earlier)
         listed.extend(one.record(mono_s=mono_s) for one in self.arrived)
         listed.left_out += self.arrived.left_out
+        # Until another passage comes, rounds are of the last one; one that is not listed has them.
+        rest = {} if listed.left_out else dict(self._open)
+        for place, one in reversed(list(enumerate(listed))):
+            if (more := rest.pop(one["id"], None)) is not None:
+                counted = RoundsOf(one["rounds"], one["futures"]).plus(more)
+                listed[place] = {**one, **counted._asdict()}
         return listed
 
     def take_news(self) -> list[Visit]:
@@ -122,8 +135,7 @@ class VisitBook:
             more = load and not before.load
             before.load = before.load or load
             return more
-        rounds, futures = self._earlier.ahead.pop(junction.summary.id, RoundsOf())
-        visit = Visit(junction, load, at, rounds=rounds, futures=futures, seen_s=at.drive_time_s)
+        visit = Visit(junction, load, at, seen_s=at.drive_time_s)
         self._latest[junction.summary.id] = visit
         if before is None:
             self._forget(before_s=at.drive_time_s - SEEN_LATELY_S)
@@ -145,6 +157,7 @@ class VisitBook:
                 return
             oldest.world = None
             del self._latest[junction_id]
+            self._open.pop(junction_id, None)
 
     def take_world(self, junction_id: str, world: World, at: Moment) -> None:
         """A junction's World is ready, for every visit that has waited for it."""
@@ -163,15 +176,20 @@ class VisitBook:
             visit.failed = True
 
     def count_round(self, junction_id: str, *, futures: int) -> None:
-        """A round for a junction is complete."""
-        if (visit := self._latest.get(junction_id)) is not None:
-            visit.rounds += 1
-            visit.futures += futures
+        """A round for a junction is complete; it is of the passage that `by_passage` says."""
+        if junction_id != self._now:
+            if self._behind is not None:
+                self._behind.counted = self._behind.counted.plus(self._open.pop(self._now, _NONE))
+            self._now, self._behind = junction_id, None
+        self._open[junction_id] = self._open.get(junction_id, _NONE).plus(RoundsOf(1, futures))
 
     def arrive(self, junction_id: str, at: Moment) -> None:
         """The car is at the junction's centre."""
         visit = self._latest[junction_id]
         visit.arrived, visit.entered = at, visit.entered or at
+        visit.counted = visit.counted.plus(self._open.pop(junction_id, _NONE))
+        if junction_id == self._now:
+            self._behind = visit
         self.arrived.append(visit)
         self._news.append(visit)
 

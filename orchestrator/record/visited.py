@@ -1,8 +1,11 @@
-"""The junctions that a car reached, from the tables of its run."""
+"""The junctions that a car reached, from the tables of its run, and which rounds were whose."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +18,10 @@ class RoundsOf(NamedTuple):
     rounds: int = 0
     futures: int = 0
 
+    def plus(self, other: RoundsOf) -> RoundsOf:
+        """Return both together."""
+        return RoundsOf(self.rounds + other.rounds, self.futures + other.futures)
+
 
 class Visited(NamedTuple):
     """The `intersections` of run.json, and the rounds of junctions that were not reached yet."""
@@ -26,24 +33,48 @@ class Visited(NamedTuple):
 def visited_junctions(results: Path) -> Visited:
     """Return what the tables of junctions and rounds tell, in the order of the passages.
 
-    A passage counts as its last row says. A round belongs to the passage that was seen ahead last.
+    A passage counts as its last row says.
     """
     passages: dict[tuple[str, float], dict[str, Any]] = {}
     for row in kept_rows(results, "junctions"):
         passages[row["id"], row["seen_at_s"]] = row
-    seen_at_s: dict[str, list[float]] = defaultdict(list)
-    for junction_id, seen_s in passages:
-        seen_at_s[junction_id].append(seen_s)
-    count: dict[tuple[str, float | None], RoundsOf] = defaultdict(RoundsOf)
-    for row in kept_rows(results, "rounds", "intersection_id", "drive_time_s", "futures"):
-        junction_id = row["intersection_id"]
-        known = seen_at_s.get(junction_id, [])
-        before = [seen_s for seen_s in known if seen_s <= row["drive_time_s"]] or known[:1]
-        which = (junction_id, before[-1] if before else None)
-        count[which] = RoundsOf(count[which].rounds + 1, count[which].futures + row["futures"])
+    reached = list(passages.values())
+    rounds = kept_rows(results, "rounds", "intersection_id", "drive_time_s", "futures")
+    count = {
+        key: RoundsOf(len(rows), sum(row["futures"] for row in rows))
+        for key, rows in by_passage(rounds, reached).items()
+    }
     records = []
-    for key, row in passages.items():
+    for place, row in enumerate(reached):
         told = {name: value for name, value in row.items() if name != "seen_at_s"}
-        records.append({**told, **count[key]._asdict()})
-    ahead = {junction_id: of for (junction_id, seen_s), of in count.items() if seen_s is None}
+        records.append({**told, **count.get((row["id"], place), RoundsOf())._asdict()})
+    ahead = {junction_id: of for (junction_id, which), of in count.items() if which is None}
     return Visited(records, ahead)
+
+
+def by_passage(
+    rounds: Iterable[dict[str, Any]], reached: Sequence[Mapping[str, Any]]
+) -> dict[tuple[str, int | None], list[dict[str, Any]]]:
+    """Return rounds by junction and by the place of its passage in `reached`, None where the car
+    was never there.
+
+    A round is of the passage that comes next; rounds that go on while the car is about to leave a
+    junction, until there are some of another, are of the passage that they began for. `VisitBook`
+    counts so while the drive goes on.
+    """
+    arrivals: dict[str, list[tuple[float, int]]] = defaultdict(list)
+    for place, one in enumerate(reached):
+        arrivals[one["id"]].append((one.get("arrived_at_s") or 0.0, place))
+    found: dict[tuple[str, int | None], list[dict[str, Any]]] = defaultdict(list)
+    on_end = itertools.groupby(rounds, key=lambda row: row["intersection_id"])
+    blocks = [(junction_id, list(rows)) for junction_id, rows in on_end]
+    ends_s = [block[0]["drive_time_s"] for _, block in blocks[1:]] + [math.inf]
+    for (junction_id, block), end_s in zip(blocks, ends_s, strict=False):
+        told, first_s = arrivals[junction_id], block[0]["drive_time_s"]
+        during = [one for one in told if first_s <= one[0] < end_s]
+        meant = during or [one for one in told if one[0] >= end_s][:1] or told[-1:]
+        for row in block:
+            after = [place for at_s, place in meant if at_s >= row["drive_time_s"]]
+            which = after[0] if after else meant[-1][1] if meant else None
+            found[junction_id, which].append(row)
+    return found

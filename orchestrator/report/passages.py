@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ import pyarrow.compute as pc
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
+from foretwin.orchestrator.record.visited import by_passage
 from foretwin.orchestrator.report.blocks import Tone
 from foretwin.orchestrator.report.material import RunMaterial, TableRow, most_critical
 from foretwin.sim_worker.driver_model import STANDING_MPS
@@ -87,7 +87,7 @@ def passages(run: RunMaterial) -> list[JunctionPassed]:
     """Return the junctions of a run in the order in which the car came there; those that it saw
     ahead and did not reach come last."""
     reached = [dict(place) for place in run.record.get("intersections") or []]
-    rounds = _by_passage(run.rounds, reached)
+    rounds = by_passage(run.rounds, reached)
     known = {row["id"]: row for row in run.rows("junctions")}
     ahead = [
         {**known.get(junction_id, {"id": junction_id}), "arrived_at_s": None}
@@ -116,27 +116,6 @@ def _named_in(run: RunMaterial, rounds: Sequence[TableRow]) -> Mapping[str, Any]
         "lat": place.lat,
         "lon": place.lon,
     }
-
-
-def _by_passage(
-    rounds: Iterable[TableRow], reached: Sequence[Mapping[str, Any]]
-) -> dict[tuple[str, int | None], list[TableRow]]:
-    """Return rounds by junction and passage: the next one, and rounds that go on while the car is
-    about to leave a junction those of the passage that they began for."""
-    arrivals: dict[str, list[tuple[float, int]]] = defaultdict(list)
-    for place, one in enumerate(reached):
-        arrivals[one["id"]].append((one.get("arrived_at_s") or 0.0, place))
-    found: dict[tuple[str, int | None], list[TableRow]] = defaultdict(list)
-    for junction_id, on_end in itertools.groupby(rounds, key=lambda row: row["intersection_id"]):
-        block, told = list(on_end), arrivals[junction_id]
-        first_s, last_s = block[0]["drive_time_s"], block[-1]["drive_time_s"]
-        during = [one for one in told if first_s <= one[0] <= last_s]
-        meant = during or [one for one in told if one[0] > last_s][:1] or told[-1:]
-        for row in block:
-            after = [place for at_s, place in meant if at_s >= row["drive_time_s"]]
-            which = after[0] if after else meant[-1][1] if meant else None
-            found[junction_id, which].append(row)
-    return found
 
 
 def _futures_by_round(futures: pa.Table | None) -> dict[int, pa.Table]:

@@ -199,7 +199,7 @@ def test_a_whole_drive_leaves_its_rounds_in_the_tables(house: House) -> None:
     assert [r["round_id"] for r in rows["rounds"]] == list(range(len(rows["rounds"])))
     assert {r["worker_id"] for r in rows["futures"]} == {"w0", "w1"}
     assert {r["horizon_s"] for r in rows["comparisons"]} == {1.0, 2.0, 4.0, 8.0}
-    records = [visit.record(mono_s=0.0) for visit in house.mission.arrived]
+    records = house.mission.visits.records(mono_s=0.0)
     assert [r["id"] for r in records] == ["n4", "n11"]
     counted = {r["id"]: r["rounds"] for r in records}
     told = [r["intersection_id"] for r in rows["rounds"]]

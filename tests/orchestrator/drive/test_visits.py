@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from foretwin.contracts.running import MOST_LISTED
 from foretwin.orchestrator.drive import visits
 from foretwin.orchestrator.drive.visits import Moment, VisitBook
+from foretwin.orchestrator.record.visited import by_passage
+from foretwin.world_gen.junctions.intersections import Junction
 from tests.orchestrator.grid_map import FRAME, grid, junctions
 from tests.orchestrator.trip import world_named
 
@@ -20,6 +26,11 @@ def seen() -> VisitBook:
     book = VisitBook()
     assert book.see(JUNCTION, Moment(100.0, 0.0), load=True)
     return book
+
+
+def _called(name: str) -> Junction:
+    summary = msgspec.structs.replace(JUNCTION.summary, id=name)
+    return msgspec.structs.replace(JUNCTION, summary=summary)
 
 
 def ready_before_s(book: VisitBook, *, mono_s: float) -> float:
@@ -126,6 +137,34 @@ def test_more_passages_than_are_listed_are_counted() -> None:
         book.arrive(NAME, Moment(at_s, at_s))
         book.see(JUNCTION, Moment(at_s, at_s), load=True)
     assert (len(book.arrived), book.arrived.left_out) == (MOST_LISTED, 5)
+
+
+@given(st.lists(st.tuples(st.sampled_from("ab"), st.sampled_from(["round", "arrival"]))))
+def test_rounds_are_counted_as_tables_tell_them_afterwards(
+    happens: list[tuple[str, str]],
+) -> None:
+    """Around a block of houses a junction is ahead again as soon as the car has passed it."""
+    book = VisitBook()
+    rounds: list[dict[str, Any]] = []
+    reached: list[dict[str, Any]] = []
+    places = {name: _called(name) for name in "ab"}
+    for at_s, (name, what) in enumerate(happens, start=1):
+        now = Moment(at_s, at_s)
+        for one in places.values():
+            book.see(one, now, load=True)
+        if what == "round":
+            book.count_round(name, futures=at_s)
+            row = {"intersection_id": name, "drive_time_s": at_s, "futures": at_s}
+            rounds.append(row)
+        else:
+            book.arrive(name, now)
+            reached.append({"id": name, "arrived_at_s": at_s})
+
+    counted = [(one["rounds"], one["futures"]) for one in book.records(mono_s=0.0)]
+
+    told = by_passage(rounds, reached)
+    of = [told.get((one["id"], place), []) for place, one in enumerate(reached)]
+    assert counted == [(len(rows), sum(row["futures"] for row in rows)) for rows in of]
 
 
 def test_a_junction_is_known_by_its_streets_where_they_have_names() -> None:

@@ -30,15 +30,16 @@ def write(folder: Path, **tables: list[dict[str, Any]]) -> None:
     streams.close()
 
 
-def test_each_passage_has_the_rounds_since_it_was_seen_ahead(tmp_path: Path) -> None:
+def test_each_passage_has_the_rounds_before_it_and_while_the_car_leaves(tmp_path: Path) -> None:
     write(
         tmp_path,
-        junctions=[passage("a", 0.0, 10.0), passage("b", 2.0, 20.0), passage("a", 15.0, 30.0)],
-        rounds=[a_round("a", 1.0), a_round("a", 9.0), a_round("b", 12.0), a_round("a", 25.0)],
-    )
+        junctions=[passage("a", 0.0, 10.0), passage("b", 2.0, 20.0), passage("a", 10.0, 30.0)],
+        rounds=[a_round("a", 1.0), a_round("a", 9.0), a_round("a", 11.0), a_round("b", 12.0),
+                a_round("a", 25.0)],
+    )  # fmt: skip
     records = visited_junctions(tmp_path).records
     assert [(one["id"], one["rounds"], one["futures"]) for one in records] == [
-        ("a", 2, 8), ("b", 1, 4), ("a", 1, 4),
+        ("a", 3, 12), ("b", 1, 4), ("a", 1, 4),
     ]  # fmt: skip
     assert "seen_at_s" not in records[0]
     assert records[0]["arrived_at_s"] == 10.0
