@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.frames import LocalFrame, geo_from_local
+from foretwin.contracts.frames import LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
+from foretwin.contracts.terminal import say
 from foretwin.orchestrator.commands.compare_text import difference_lines
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.record.run_state import check_finished
@@ -29,6 +31,8 @@ from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs.log import Log
 from foretwin.telemetry.logs.opening import open_log
 
+_MOVES_MPS, _ONE_PLACE_M = 1.0, 0.05
+"""Two cars that move never are this near each other at one time. Chosen."""
 _PLACE_M = 10.0
 """Between two places that JSON lists."""
 _MOST_ASKED = 500
@@ -44,6 +48,8 @@ class ComparedDrives(NamedTuple):
     difference: DriveDifference
     unplaced: tuple[Path, ...]
     """Drives that do not say where on the car their positions are of."""
+    one_drive: bool = False
+    """Whether both are recordings of one drive, which tells nothing of how far people differ."""
 
 
 def compare_logs(
@@ -67,7 +73,15 @@ def compare_logs(
     if found is None:
         raise UserError(_nothing_common(first, second, a, b, same=same))
     known = ((first, placed), (second, others_placed))
-    return ComparedDrives(first, second, frame, found, tuple(one for one, at in known if not at))
+    unplaced = tuple(one for one, at in known if not at)
+    one_drive = not same and _are_one_drive(states, others, frame)
+    if one_drive:
+        say(
+            f"{first} and {second} are recordings of one drive, at one time at one place: "
+            "they say nothing of how far people differ",
+            error=True,
+        )
+    return ComparedDrives(first, second, frame, found, unplaced, one_drive)
 
 
 def compare(
@@ -109,6 +123,7 @@ def as_object(found: ComparedDrives) -> dict[str, Any]:
         "second": {"log": str(found.second), "length_m": one.b_m, "common_m": one.common_b_m},
         "position_std_m": list(one.std_m),
         "unplaced": [str(path) for path in found.unplaced],
+        "one_drive": found.one_drive,
         "opposite_m": one.opposite_m,
         "differences": {name: _spread(spread) for name, spread in one.spreads.items()},
         "after": [_after(row) for row in one.after],
@@ -134,6 +149,28 @@ def estimated_states(recording: Path, declaration: Path | None) -> tuple[list[Ve
     if not states:
         raise UserError(f"{recording}: no position in the drive, so there is no way to compare")
     return states, log.info.body_from_antenna_m is not None
+
+
+def _are_one_drive(
+    states: Sequence[VehicleState], others: Sequence[VehicleState], frame: LocalFrame
+) -> bool:
+    """Whether both were at the same places at the same time while they moved."""
+    stamps_ns, other_ns = (np.array([s.stamp_ns for s in some]) for some in (states, others))
+    at_once = (other_ns >= stamps_ns[0]) & (other_ns <= stamps_ns[-1])
+    at_once &= np.array([s.speed_mps for s in others]) > _MOVES_MPS
+    if not at_once.any():
+        return False
+    here, there = (
+        local_from_geo(
+            frame,
+            np.array([s.position.lat_deg for s in some]),
+            np.array([s.position.lon_deg for s in some]),
+        )
+        for some in (states, others)
+    )
+    when_s, now_s = ((ns - stamps_ns[0]) * 1e-9 for ns in (stamps_ns, other_ns[at_once]))
+    beside = np.column_stack([np.interp(now_s, when_s, axis) for axis in here.T])
+    return bool(np.median(np.hypot(*(beside - there[at_once]).T)) < _ONE_PLACE_M)
 
 
 def _line(recording: Path, states: list[VehicleState], frame: LocalFrame) -> DriveLine:

@@ -81,6 +81,8 @@ def _people(run: Path, against: Path) -> list[HumanRow]:
     from foretwin.orchestrator.commands.compare import compare_logs
 
     found = compare_logs(first_left(run / DRIVE_FILE), against)
+    if found.one_drive:
+        return []
     return [
         HumanRow(row.horizon_s, row.along.places, *map(_rms, (row.along, row.across, row.speed)))
         for row in found.difference.after

@@ -93,6 +93,22 @@ def test_a_drive_is_compared_with_itself_where_it_came_again(
     assert "drives no 30 m of its way a second time" in capsys.readouterr().err
 
 
+def test_that_two_recordings_are_of_one_drive_is_said(
+    pair: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = str(recorded(tmp_path / "copy.mcap", BEND, 10.0))
+    told = "copy.mcap are recordings of one drive, at one time at one place: they say nothing"
+
+    assert run(["compare", pair[0], copy, "--json"]) == 0
+    said = capsys.readouterr()
+    assert told in said.err
+    assert json.loads(said.out)["one_drive"]
+    assert run(["compare", *pair, "--json"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert not json.loads(said.out)["one_drive"]
+
+
 def test_what_cannot_be_compared_is_said_in_one_line(
     pair: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -128,6 +129,18 @@ def test_mistakes_are_told_in_one_line_and_leave_nothing(
     assert told in said
     assert said.count("\n") == 1
     assert not list(tmp_path.glob("report*"))
+
+
+def test_the_recording_of_the_run_itself_is_no_other_drive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = told_run(tmp_path), tmp_path / "report.html"
+    copy = shutil.copy(folder / DRIVE_FILE, tmp_path / "copy.mcap")
+
+    assert run(["report", str(folder), "--out", str(out), "--against", str(copy)]) == 0
+
+    assert "are recordings of one drive" in capsys.readouterr().err
+    assert "How far people differ on this road is not known here" in out.read_text()
 
 
 def test_people_are_compared_with_what_is_left_of_the_recording(
