@@ -10,9 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from foretwin.contracts.bus import Bus, Mailbox, Received, ask
+from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.codec import read_message
-from foretwin.contracts.drive import InfoRequest
 from foretwin.contracts.guard import Refused
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.refusals import Refusals
@@ -25,6 +24,7 @@ from foretwin.contracts.setup import ViewerSetup
 from foretwin.contracts.terminal import say
 from foretwin.contracts.trace import span, traced
 from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.drive_start import start_of_drive
 from foretwin.viewer.keeping_up import KeepingUp
 from foretwin.viewer.live_viewer import (
     live_viewer,
@@ -39,8 +39,6 @@ MAILBOX_DEPTH = 4096
 FLUSH_PERIOD_S = 0.9
 GATHER_S = 0.03
 """Messages are taken in portions: waking up for each costs more than the eye gains."""
-INFO_S = 2.0
-"""How long the vehicle may take to say when its drive began, where the setup does not."""
 
 
 class Farewell(NamedTuple):
@@ -212,14 +210,8 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     messages = Mailbox(MAILBOX_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
 
     def find_start(first_stamp_ns: int) -> int:
-        if setup.start_stamp_ns:
-            return setup.start_stamp_ns
-        try:
-            info = ask(bus, "info", InfoRequest(), timeout_s=INFO_S, vehicle=setup.vehicle_id)
-        except TimeoutError as problem:
-            _log.warning("drive time counts from the first stamp: %s", problem)
-            return first_stamp_ns
-        return int(info.start_stamp_ns)
+        told_ns = setup.start_stamp_ns
+        return start_of_drive(bus, setup.vehicle_id, told_ns=told_ns, first_stamp_ns=first_stamp_ns)
 
     recorder = Recorder(setup, messages, find_start, life.refusals)
     for channel in recorder.channels:

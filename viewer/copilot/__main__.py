@@ -42,6 +42,7 @@ from foretwin.viewer.copilot.server import (
     PageActions,
     page_app,
 )
+from foretwin.viewer.drive_start import start_of_drive
 
 MAILBOX_DEPTH = 4096
 FRAME_S = 0.2
@@ -65,7 +66,9 @@ class Display:
         """Held while what is known changes: pages ask for plans from threads of their own."""
         self._now = DriveNow(
             drive_frame=setup.drive_frame,
-            start_stamp_ns=setup.start_stamp_ns,
+            find_start=lambda first_ns: start_of_drive(
+                bus, setup.vehicle_id, told_ns=setup.start_stamp_ns, first_stamp_ns=first_ns
+            ),
             load_world=self._load_world,
             now_s=time.monotonic(),
         )

@@ -38,18 +38,20 @@ _OTHERS_SHOWN = 10
 class DriveNow:
     """What is known of one drive; times are of one rising clock, in seconds.
 
-    `load_world` returns the World of an id, or raises OSError or ValueError.
+    `find_start` is called once, with the first state's stamp, and returns that of the drive's
+    start. `load_world` returns the World of an id, or raises OSError or ValueError.
     """
 
     def __init__(
         self,
         *,
         drive_frame: LocalFrame,
-        start_stamp_ns: int,
+        find_start: Callable[[int], int],
         load_world: Callable[[str], World],
         now_s: float,
     ) -> None:
-        self._frame, self._start_ns, self._load_world = drive_frame, start_stamp_ns, load_world
+        self._frame, self._load_world = drive_frame, load_world
+        self._find_start, self._start_ns = find_start, 0
         self.alerts = Alerts(now_s)
         self.marks = 0
         self._state: VehicleState | None = None
@@ -93,8 +95,8 @@ class DriveNow:
         self._takes[channel](message, now_s)
 
     def _take_state(self, state: VehicleState, now_s: float) -> None:
-        if self._start_ns == 0:
-            self._start_ns = state.stamp_ns
+        if self._state is None:
+            self._start_ns = self._find_start(state.stamp_ns)
         self._state = state
         self._round.state(state, now_s)
         self.alerts.state(state, now_s)

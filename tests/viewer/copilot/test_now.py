@@ -38,11 +38,18 @@ class Drive:
 
     def __init__(self, world: World | None = None, start_ns: int = START_NS) -> None:
         self.loads: list[str] = []
+        self.firsts: list[int] = []
+        """Stamps with which it was asked when the drive began."""
+        self._start_ns = start_ns
         self._world = world
         self.now = DriveNow(
-            drive_frame=DRIVE_FRAME, start_stamp_ns=start_ns, load_world=self._load, now_s=0.0
+            drive_frame=DRIVE_FRAME, find_start=self._find, load_world=self._load, now_s=0.0
         )
         self.now_s = 0.0
+
+    def _find(self, first_stamp_ns: int) -> int:
+        self.firsts.append(first_stamp_ns)
+        return self._start_ns
 
     def _load(self, world_id: str) -> World:
         self.loads.append(world_id)
@@ -240,11 +247,12 @@ def test_only_worlds_that_were_told_of_are_read_and_those_that_cannot_be_are_non
     assert drive.loads == ["torn"]
 
 
-def test_drive_time_begins_with_the_first_state_where_nobody_says_when() -> None:
-    drive = Drive(start_ns=0)
+def test_drive_time_counts_from_the_start_of_the_drive_whenever_the_display_came() -> None:
+    drive = Drive(start_ns=START_NS - 20 * 10**9)
     drive.goes_on(3.0)
     drive.goes_on(5.0)
-    assert drive.frame().drive_s == pytest.approx(2.0)
+    assert drive.frame().drive_s == pytest.approx(25.0)
+    assert drive.firsts == [state_at(3.0).stamp_ns]
 
 
 def test_the_end_of_the_run_is_shown() -> None:
