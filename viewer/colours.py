@@ -1,4 +1,4 @@
-"""The one table of colours of all views: Rerun's and the co-pilot display's."""
+"""What all views share, Rerun's and the co-pilot display's: the one table of colours."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ CRITICAL: Colour = (234, 62, 56)
 NOMINAL: Colour = (250, 250, 255)
 """Of the nominal future among those from safe to critical."""
 ROAD_USER: Colour = (214, 112, 214)
+DETECTED: Colour = (206, 190, 150)
+"""Of who is really there, as the car says."""
+SEEN_FOR_NS = 1_000_000_000
+"""So long who was detected is shown."""
 VIRTUAL: Colour = (255, 150, 60)
 """Of who exists in a going simulation alone."""
 

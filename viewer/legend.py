@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from foretwin.contracts.simulation import AMBER_FROM, RED_FROM
 from foretwin.viewer.colours import (
     CRITICAL,
+    DETECTED,
     GHOST,
     NOMINAL,
     REAL,
@@ -58,6 +59,7 @@ ENTRIES: tuple[tuple[LegendEntry, ...], ...] = (
     (
         LegendEntry("line", ROUTE, "route"),
         LegendEntry("line", CORRECTION, "what corrects the twin"),
+        LegendEntry("box", DETECTED, "detected road user"),
         LegendEntry("box", VIRTUAL, "virtual road user"),
     ),
 )

@@ -14,16 +14,17 @@ from foretwin.contracts.roads_shown import RoadsShown
 from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
+from foretwin.viewer.colours import DETECTED, VIRTUAL
 from foretwin.viewer.legend import legend_rows
 from foretwin.viewer.log_camera_image import CameraImageLog
 from foretwin.viewer.log_drive import DriveLog
 from foretwin.viewer.log_lot import rows_of_injection
 from foretwin.viewer.log_point_cloud import PointCloudLog
 from foretwin.viewer.log_radar_list import rows_of_radar_list
+from foretwin.viewer.log_road_users import DETECTED_PATH, VIRTUAL_PATH, RoadUsersLog
 from foretwin.viewer.log_roads import rows_of_roads
 from foretwin.viewer.log_run import RunLog, rows_of_event
 from foretwin.viewer.log_tuning import TuningLog
-from foretwin.viewer.log_virtual_traffic import VirtualTrafficLog
 from foretwin.viewer.log_world import rows_of_world, world_centre
 from foretwin.viewer.rows import Row
 
@@ -65,12 +66,13 @@ class Monitor:
         """The stamp of the drive's start, once it is known."""
         self._load_world, self._roads, self._lot = load_world, roads, lot
         self._drive = DriveLog(drive_frame)
+        self._detected = RoadUsersLog(drive_frame, DETECTED_PATH, DETECTED)
         self._run = RunLog(title, attribution, clock)
         self._tuning = TuningLog()
         self._centres: dict[str, Array] = {}
         self._now_ns = 0
         self._handlers: dict[str, Callable[[Any, int], list[Row]]] = {
-            "state": self._drive.state,
+            "state": lambda one, ns: [*self._drive.state(one, ns), *self._detected.old(ns)],
             "gnss": self._drive.gnss,
             "plan": self._drive.plan,
             "end": lambda end, ns: self._say("info", f"vehicle: {end.reason}", ns),
@@ -82,7 +84,8 @@ class Monitor:
                 one, ns, self._frame
             ),
             "mirror": self._drive.mirror,
-            "virtual_traffic": VirtualTrafficLog(drive_frame).rows,
+            "virtual_traffic": RoadUsersLog(drive_frame, VIRTUAL_PATH, VIRTUAL).rows,
+            "objects": self._detected.rows,
             "injection": rows_of_injection,
             "point_cloud": PointCloudLog().rows,
             "radar_list": rows_of_radar_list,

@@ -7,7 +7,7 @@ import rerun as rr
 from foretwin.contracts.camera_image import CameraImage
 from foretwin.contracts.point_cloud import Mount
 from foretwin.viewer.log_camera_image import PATH, CameraImageLog
-from tests.viewer.test_log_virtual_traffic import cells
+from tests.viewer.test_log_road_users import cells
 
 
 def image(sensor: str = "a b") -> CameraImage:

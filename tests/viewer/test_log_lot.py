@@ -11,7 +11,7 @@ from foretwin.contracts.towards_vehicle import Injection
 from foretwin.viewer.log_lot import rows_of_lot
 from tests.viewer import scene
 from tests.viewer.shown import Shown, monitor_of, text_of
-from tests.viewer.test_log_virtual_traffic import cells
+from tests.viewer.test_log_road_users import cells
 
 _JUNCTION = geo_pose(scene.DRIVE_FRAME, 30.0, -40.0, 0.0).position
 ANCHOR = Anchor(

@@ -8,7 +8,7 @@ import rerun as rr
 
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.viewer.log_point_cloud import MOST_POINTS, PATH, PointCloudLog
-from tests.viewer.test_log_virtual_traffic import cells
+from tests.viewer.test_log_road_users import cells
 
 
 def cloud(count: int, sensor: str = "a b") -> PointCloud:

@@ -9,7 +9,7 @@ import rerun as rr
 from foretwin.contracts.point_cloud import Mount
 from foretwin.contracts.radar_list import RadarList
 from foretwin.viewer.log_radar_list import PATH, colours_of, rows_of_radar_list
-from tests.viewer.test_log_virtual_traffic import cells
+from tests.viewer.test_log_road_users import cells
 
 
 def test_returns_are_drawn_where_they_are() -> None:

@@ -22,6 +22,7 @@ from foretwin.contracts.simulation import (
 from foretwin.contracts.terminal import plain
 from foretwin.contracts.towards_vehicle import Injection
 from foretwin.contracts.world import World
+from foretwin.viewer.colours import SEEN_FOR_NS
 from foretwin.viewer.copilot import words
 from foretwin.viewer.copilot.alerts import Alerts
 from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
@@ -30,7 +31,6 @@ from foretwin.viewer.copilot.right_of_way import RightOfWay, of_junction, right_
 from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S, RoundNow
 from foretwin.viewer.danger import Danger, instant_of
 
-SEEN_FOR_NS = 1_000_000_000
 MOST_SEEN = 60
 _OTHERS_SHOWN = 10
 

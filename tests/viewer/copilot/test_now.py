@@ -13,9 +13,10 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
 from foretwin.contracts.simulation import ActiveWorld, RunEnd, WorldNotice
 from foretwin.contracts.world import World
+from foretwin.viewer.colours import SEEN_FOR_NS
 from foretwin.viewer.copilot.frame import AheadFrame, AheadLight, PageFrame
 from foretwin.viewer.copilot.lights_now import LIGHT_FOR_NS
-from foretwin.viewer.copilot.now import SEEN_FOR_NS, DriveNow
+from foretwin.viewer.copilot.now import DriveNow
 from foretwin.viewer.copilot.words import INJECTION_FOR_S
 from tests.viewer import scene
 from tests.viewer.copilot.rounds import line, round_of

@@ -1,4 +1,4 @@
-"""Virtual traffic as rows: boxes in a colour of their own, whose name says that nobody is there."""
+"""Road users around the car as rows of boxes: those that it detects, and virtual ones apart."""
 
 from __future__ import annotations
 
@@ -7,28 +7,27 @@ import rerun as rr
 
 from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from foretwin.viewer.colours import VIRTUAL
+from foretwin.viewer.colours import SEEN_FOR_NS, Colour
 from foretwin.viewer.log_drive import PERIOD_NS
 from foretwin.viewer.rows import Row
 
-PATH = "world/virtual_traffic"
+DETECTED_PATH, VIRTUAL_PATH = "world/detected", "world/virtual_traffic"
 _HEIGHT_M = 1.6
 """Of all: they do not say how high they are."""
 
 
-class VirtualTrafficLog:
-    """Turns road users of the going simulation into rows, at most at about 10 Hz of drive time."""
+class RoadUsersLog:
+    """Turns one source's road users into rows of a path, at most at about 10 Hz of drive time."""
 
-    def __init__(self, drive_frame: LocalFrame) -> None:
-        self._frame = drive_frame
+    def __init__(self, drive_frame: LocalFrame, path: str, colour: Colour) -> None:
+        self._frame, self._path, self._colour = drive_frame, path, colour
         self._last_ns: int | None = None
 
     def rows(self, message: RoadUsers, drive_ns: int) -> list[Row]:
         """Return the boxes of all, none where there is nobody any more."""
         users = message.users
         if not users:
-            self._last_ns = None
-            return [Row(PATH, drive_ns, rr.Clear(recursive=False))]
+            return self._none(drive_ns)
         if self._last_ns is not None and 0 <= drive_ns - self._last_ns < PERIOD_NS:
             return []
         self._last_ns = drive_ns
@@ -42,8 +41,18 @@ class VirtualTrafficLog:
             half_sizes=0.5 * size,
             centers=np.column_stack([xy, np.full(len(users), 0.5 * _HEIGHT_M + 0.05)]),
             quaternions=turned,
-            colors=[VIRTUAL],
+            colors=[self._colour],
             radii=0.04,
             fill_mode="majorwireframe",
         )
-        return [Row(PATH, drive_ns, boxes)]
+        return [Row(self._path, drive_ns, boxes)]
+
+    def old(self, drive_ns: int) -> list[Row]:
+        """Return what takes those away of whom nothing was told for a second."""
+        if self._last_ns is None or drive_ns - self._last_ns <= SEEN_FOR_NS:
+            return []
+        return self._none(drive_ns)
+
+    def _none(self, drive_ns: int) -> list[Row]:
+        self._last_ns = None
+        return [Row(self._path, drive_ns, rr.Clear(recursive=False))]
