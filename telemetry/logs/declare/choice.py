@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.telemetry.logs.declare.likeness import SURE, likeness
 from foretwin.telemetry.logs.declare.motion import GridMotion, on_grid
 from foretwin.telemetry.logs.declare.names import called
 from foretwin.telemetry.logs.declare.places import Place
-from foretwin.telemetry.logs.declare.roles import ROLES, fits_of, heading_of
+from foretwin.telemetry.logs.declare.roles import ROLES, fits_of, heading_of, without_reverse
 from foretwin.telemetry.logs.declare.sensors import ChangingColumn
 
 CountryOf = Callable[[float, float], str]
@@ -89,7 +90,7 @@ def chosen_place(
     ]
     others = sorted(_listed(other) for other in groups if not other & group)
     also = f"; other positions: {'; '.join(others)}" if others else ""
-    chosen = _order_of(rows, country_of=country_of, answers=answers)
+    chosen = _order_of(rows, sensors, country_of=country_of, answers=answers)
     return chosen._replace(evidence=chosen.evidence + also)
 
 
@@ -98,8 +99,9 @@ def _listed(group: frozenset[str]) -> str:
 
 
 def _order_of(
-    rows: list[tuple[float, Place]], *, country_of: CountryOf | None, answers: dict[str, str]
-) -> Chosen:
+    rows: list[tuple[float, Place]], sensors: dict[str, ChangingColumn], *,
+    country_of: CountryOf | None, answers: dict[str, str],
+) -> Chosen:  # fmt: skip
     rows = sorted(rows, key=lambda row: row[0])
     unit, question = _unit_of(rows, country_of=country_of, answers=answers)
     if question is not None:
@@ -115,6 +117,11 @@ def _order_of(
         return Chosen(None, f"{answers[first]} cannot be {first}", False)
     if len(rows) == 1:
         return Chosen(rows[0][1], "the only order of these columns that is on Earth", True)
+    if rows[0][1].motion.sparse:
+        # Ways that are too short by what bends cut off come near to some unit in either order.
+        whatever = [(_by_any_speed(place, sensors), place) for _, place in rows]
+        if np.isfinite([score for score, _ in whatever]).any():
+            rows = sorted(whatever, key=lambda row: row[0])
     if np.isfinite(rows[0][0]) and rows[0][0] * _PLAINLY < rows[1][0]:
         said = f"{rows[1][0] / rows[0][0]:.1f} times" if np.isfinite(rows[1][0]) else "not at all"
         return Chosen(
@@ -191,6 +198,16 @@ def _by_speed(place: Place, beside: dict[str, ChangingColumn]) -> float:
         ),
         default=np.inf,
     )
+
+
+def _by_any_speed(place: Place, sensors: dict[str, ChangingColumn]) -> float:
+    """Return what the column that goes best with the way per time leaves, be its unit as it may."""
+    speed_mps = place.motion.speed_mps[:, None]
+    found = [
+        likeness(without_reverse(on_grid(place.motion, *column)), speed_mps)
+        for column in _beside(place, sensors).values()
+    ]
+    return min((one.left for one in found if one and one.chance >= SURE), default=np.inf)
 
 
 def _by_heading(place: Place, beside: dict[str, ChangingColumn]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,11 @@ class Likeness(NamedTuple):
     """Seconds that were compared."""
     independent: float
     """How many samples of them count anew."""
+
+    @property
+    def size_doubt(self) -> float:
+        """The first size's standard deviation as a share, by what is left of the column."""
+        return math.sqrt(self.left / max((1.0 - self.left) * self.independent, 1e-9))
 
     def plainer_than(self, other: Likeness) -> bool:
         """Tell whether another reading of the same column can be ruled out against this one."""

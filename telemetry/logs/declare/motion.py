@@ -19,6 +19,8 @@ _HOLE_S = 2.5
 _SPARSEST_S = 20.0
 """Positions farther apart than this tell no motion: so are those of a clock whose unit is not
 this one, a thousand times as long."""
+_SPARSE_S = 6.0
+"""Smoothed over so long either way where positions come every 3 s, as a fleet's mostly do."""
 MOVES_MPS = 3.0
 """Below, a course says little."""
 FASTEST_MPS = 90.0
@@ -35,6 +37,11 @@ class GridMotion(NamedTuple):
     course_rad: Array
     turn_radps: Array
     accel_mps2: Array
+
+    @property
+    def sparse(self) -> bool:
+        """Whether bends lie between positions, which make ways too short by a lot."""
+        return self.half * GRID_S > _SPARSE_S
 
     @property
     def curvature_pm(self) -> Array:

@@ -31,6 +31,10 @@ UNDERSTEER_S2PM2 = (0.0, 0.0015, 0.003, 0.005)
 _ODD_LEFT, _ODD_LEVEL = 0.03, 0.5
 """So little of a column stays unexplained by the speed, and so far from zero, in m/s, does it stand
 where the car does, that it has to do with it whatever its size."""
+_DOUBT = 2.0
+"""A unit is open within so many standard deviations of the size."""
+_STRAIGHT_ON_RAD = 0.1
+"""So little turned between positions that are far apart, chord and way are alike to 1 %."""
 _TURNED_RAD, _MOST_REVERSE = 2.6, 0.3
 """A heading that differs so much from the course is that of a car in reverse, for a smaller part of
 a drive than that."""
@@ -156,6 +160,8 @@ def fits_of(
         if role.field == "forward":
             # Speeds have no level: what they are at a standstill is no other unit.
             size = _speed_size(motion, values)
+            if size == 0.0:
+                continue
         # Noise of positions makes sizes too small, by no more than what it leaves unexplained.
         most = 0.0 if role.section == "speed" else -math.log1p(-like.left)
         beyond = {
@@ -166,7 +172,13 @@ def fits_of(
             continue
         if abs(float(like.sizes[-1])) > role.level * role.sizes[unit] * _scale(role):
             continue
-        found.append(RoleFit(role, column, unit, size < 0.0, like))
+        # Feet per second are km/h but for a tenth: where a size is that rough, both are open.
+        open_units = [unit]
+        if role.field == "forward":
+            open_units += [
+                one for one in beyond if one != unit and beyond[one] < _DOUBT * like.size_doubt
+            ]
+        found += [RoleFit(role, column, one, size < 0.0, like) for one in open_units]
     return sorted(found, key=lambda fit: fit.like.left)
 
 
@@ -182,8 +194,18 @@ def without_reverse(speed: Array) -> Array:
 
 
 def _speed_size(motion: GridMotion, values: Array) -> float:
-    """Return a speed column's size per m/s, negative where it is so most of the way."""
+    """Return a speed column's size per m/s, negative where it is so most of the way.
+
+    0 where nothing is known of it while the car moves.
+    """
     both = np.isfinite(values) & motion.moves
+    if not both.any():
+        return 0.0
+    if motion.sparse:
+        # What is cut off between positions is nothing where the car goes straight on.
+        turned_rad = np.abs(motion.turn_radps) * motion.half * GRID_S
+        straight = both & (turned_rad < _STRAIGHT_ON_RAD)
+        both = straight if straight.any() else both
     size = float(np.median(np.abs(values[both]) / motion.speed_mps[both]))
     return -size if float(np.sum(values[both])) < 0.0 else size
 
