@@ -29,7 +29,9 @@ FEET = re.compile(r"ft\b|feet|fu.{1,2}$", re.IGNORECASE)
 EPSG = re.compile(r"epsg\D{0,3}(\d{4,5})", re.IGNORECASE)
 ZONE = re.compile(r"(?:utm|zone)\D{0,2}(\d{1,2})\s*([C-X]?)", re.IGNORECASE)
 
-COMMANDED = re.compile(r"command|cmd|target|desired|request|demand|setpoint|soll", re.IGNORECASE)
+COMMANDED = re.compile(
+    r"command|cmd|control|ctrl|target|desired|request|demand|setpoint|soll", re.IGNORECASE
+)
 """What a controller wanted, which resembles what then happened as a sensor of it does."""
 
 

@@ -105,8 +105,12 @@ class Sections:
         if "accel_x" not in found:
             # Beside a heading the rate is the heading's.
             return {} if sensors.heading is not None else {"rate_z": found["rate_z"]}
-        if not self.together([found["rate_z"].column, found["accel_x"].column]):
-            unknown.append("imu: acceleration and turning rate stand in different rows: left out")
+        turning, ahead = found["rate_z"].column, found["accel_x"].column
+        if not self.together([turning, ahead]):
+            unknown.append(
+                f"imu: acceleration ({ahead}) and turning rate ({turning}) stand in different rows:"
+                " left out"
+            )
             return {}
         names = [fit.column for fit in found.values()]
         if not self.together(names):

@@ -11,7 +11,9 @@ from foretwin.telemetry.logs.declare import propose
 from tests.telemetry.logs.declare.test_propose import drawn_drive, one_table
 
 
-@pytest.mark.parametrize("wanted", ["steering_cmd", "target_steering", "Lenkwinkel_soll"])
+@pytest.mark.parametrize(
+    "wanted", ["steering_cmd", "target_steering", "Lenkwinkel_soll", "control_wheel"]
+)
 def test_what_was_measured_is_taken_before_what_was_wanted(tmp_path: Path, wanted: str) -> None:
     drive = drawn_drive()
     wheel = drive["steering"].columns["wheel"]
@@ -46,3 +48,22 @@ def test_a_gyro_alone_is_an_inertial_unit_without_forces(tmp_path: Path) -> None
     assert found is not None
     assert found.imu is not None
     assert (found.imu.rate_z.column, found.imu.accel_x) == ("r", None)
+
+
+def test_a_commanded_acceleration_does_not_hide_the_measured_one(tmp_path: Path) -> None:
+    drive = drawn_drive()
+    fixes, imu = drive["gnss"].stamps_ns, drive["imu"]
+    rate, accel = (
+        np.interp(fixes, imu.stamps_ns, imu.columns[name]) for name in ("rate_z", "accel_x")
+    )
+    noise = np.random.default_rng(3).normal(0.0, 0.1 * np.std(accel), len(accel))
+    now_and_then = np.where(np.arange(len(accel)) % 3 == 0, accel, np.nan)
+    found = propose(one_table(tmp_path, r=rate, a=accel + noise, control_accel=now_and_then))
+    assert found.declaration is not None
+    assert found.declaration.imu is not None
+    assert found.declaration.imu.accel_x is not None
+    assert found.declaration.imu.accel_x.column == "a"
+
+    alone = propose(one_table(tmp_path, r=rate, control_accel=now_and_then))
+    said = "acceleration (control_accel) and turning rate (r) stand in different rows"
+    assert said in "\n".join(alone.unknown)
