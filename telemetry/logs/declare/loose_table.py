@@ -15,6 +15,7 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
 from foretwin.contracts.arrays import Array, Stamps
+from foretwin.telemetry.logs.declare.hemispheres import negated_by_letters
 from foretwin.telemetry.logs.declare.layout import TextLayout, layout_of
 from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.table_cells import (
@@ -61,19 +62,26 @@ class TimeTexts(NamedTuple):
 class LooseTable(NamedTuple):
     """Columns (N,) by name, NaN where a cell is empty or no number; stamps of those that are times.
 
-    `texts` are the columns that are neither.
+    `texts` are the columns that are neither, with one of their cells. `negated` are columns
+    whose sign was turned here, by the column of letters that says so.
     """
 
     path: Path
     layout: TextLayout
     columns: dict[str, Array]
     times: dict[str, TimeTexts]
-    texts: tuple[str, ...]
+    texts: dict[str, str]
+    negated: dict[str, str]
 
     @property
     def rows(self) -> int:
         """How many rows there are."""
         return len(next(iter(self.columns.values())))
+
+    @property
+    def words_of_texts(self) -> str:
+        """The columns that are no numbers, each with a cell of it."""
+        return ", ".join(f"{name} (such as {cell})" for name, cell in self.texts.items() if cell)
 
 
 def read_loose_table(path: Path) -> LooseTable:
@@ -90,7 +98,8 @@ def read_loose_table(path: Path) -> LooseTable:
         table = _parsed(path, text, layout)
     columns: dict[str, Array] = {}
     times: dict[str, TimeTexts] = {}
-    texts = []
+    texts: dict[str, str] = {}
+    letters: dict[str, frozenset[str]] = {}
     cells: dict[str, list[str]] = {}
     for name, column in zip(table.column_names, table.columns, strict=True):
         numbers = _numbers(column, layout.decimal)
@@ -100,14 +109,23 @@ def read_loose_table(path: Path) -> LooseTable:
             times[name] = said
             cells[name] = [str(cell or "") for cell in column.to_pylist()]
         else:
-            texts.append(name)
+            filled = [
+                text for cell in column.unique().to_pylist() if (text := str(cell or "").strip())
+            ]
+            texts[name] = next(iter(filled), "")
+            letters[name] = frozenset(text.upper() for text in filled)
     times |= _with_dates(cells, times)
     if table.num_rows < _LEAST_ROWS or not columns:
         raise LogError(
             f"{path}: no table of a drive: {table.num_rows} rows, {len(columns)} columns of numbers"
             f" (separated by {layout.delimiter!r}); a drive has {_LEAST_ROWS} rows and more"
         )
-    return LooseTable(path, layout, columns, times, tuple(texts))
+    try:
+        negated = negated_by_letters(table.column_names, columns, letters)
+    except ValueError as error:
+        raise LogError(f"{path}: {error}") from None
+    columns |= {name: -columns[name] for name in negated}
+    return LooseTable(path, layout, columns, times, texts, negated)
 
 
 def _parsed(path: Path, text: str, layout: TextLayout) -> pa.Table:

@@ -123,8 +123,16 @@ def _written(
     assert place is not None
     sections = Sections(table.columns, clock.time_s, _speed_of_rows(place, clock.time_s))
     evidence = {"time": [_clock_said(table, clock, place)]}
-    given: dict[str, Any] = {name: col(column, place.unit) for name, column in place.fields.items()}
+    given: dict[str, Any] = {
+        name: col(column, place.unit, negate=column in table.negated)
+        for name, column in place.fields.items()
+    }
     evidence["position"] = [_place_said(place, clock.time_s), chosen.evidence, framed]
+    evidence["position"] += [
+        f"{column} is negative: {table.negated[column]} says so in each row"
+        for column in place.fields.values()
+        if column in table.negated
+    ]
     if place.frame in ("projected", "local"):
         by = "their names alone" if place.unit == "ft" else "usage alone"
         proof = "a speed fits" if "speed.forward" in sensors.fits else "nothing else tells"
@@ -150,6 +158,8 @@ def _written(
     left = [name for name in rest if name not in sensors.doubts]
     if left:
         unknown.append(f"not taken: {', '.join(left)}")
+    if table.texts:
+        unknown.append(f"no numbers, not read: {table.words_of_texts}")
     if place.frame == "local":
         x, y = place.fields.values()
         unknown.insert(0, f"position: that {x} points east and {y} north (odometry's axes do not)")

@@ -117,9 +117,10 @@ def _clocks_and_places(
         raise LogError(
             f"{table.path}: no columns that lie where EPSG {epsg} is used, and move as a car does"
         )
+    no_numbers = f"; no numbers stand in {table.words_of_texts}" if table.texts else ""
     raise LogError(
         f"{table.path}: no columns that move as a car does (degrees, radians, ECEF or metres, at a"
-        f" time of {clocks[0].column!r} in {clocks[0].unit}): nothing to declare"
+        f" time of {clocks[0].column!r} in {clocks[0].unit}): nothing to declare{no_numbers}"
     )
 
 

@@ -23,7 +23,7 @@ SPRING_S = 1_523_201_497.0
 def test_a_clock_is_found_in_its_unit(unit: str, hz: float, zero_s: float, base: str) -> None:
     time_s = np.arange(0.0, 60.0, 1.0 / hz)
     counted = (zero_s + time_s) / float(Fraction(TIME_NS[unit]) / 10**9)
-    table = LooseTable(Path("log.csv"), COMMAS, {"when": counted}, {}, ())
+    table = LooseTable(Path("log.csv"), COMMAS, {"when": counted}, {}, {}, {})
     found = {clock.unit: clock for clock in clocks_of(table)}
     assert found[unit].base == base
     assert found[unit].time_s == pytest.approx(time_s, abs=1e-3)
@@ -35,7 +35,7 @@ def test_a_clock_is_found_in_its_unit(unit: str, hz: float, zero_s: float, base:
 @pytest.mark.parametrize(("first", "counts"), [(SPRING_S, False), (1_000.0, True)])
 def test_second_after_second_since_1970_is_no_number_of_rows(first: float, counts: bool) -> None:
     columns = {"when": first + np.arange(900.0)}
-    (clock, *_) = clocks_of(LooseTable(Path("log.csv"), COMMAS, columns, {}, ()))
+    (clock, *_) = clocks_of(LooseTable(Path("log.csv"), COMMAS, columns, {}, {}, {}))
     assert clock.unit == "s"
     assert clock.counts is counts
 
@@ -46,7 +46,7 @@ def test_rows_of_several_sensors_share_a_stamp_and_come_behind_a_finer_clock() -
     dates = np.round(shared * 1e9).astype(np.int64)
     columns = {"shared": shared, "fine": fine, "coarse": np.floor(fine)}
     table = LooseTable(
-        Path("log.csv"), COMMAS, columns, {"date": TimeTexts(dates, "iso8601", False)}, ()
+        Path("log.csv"), COMMAS, columns, {"date": TimeTexts(dates, "iso8601", False)}, {}, {}
     )
     found = [clock.column for clock in clocks_of(table) if clock.unit in ("s", "iso8601")]
     assert found == ["fine", "date", "shared"]
