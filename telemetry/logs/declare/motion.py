@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,8 @@ _SMOOTH_S = 1.0
 """Over so long a parabola is laid through positions, or over five of them: shorter, and noise is
 taken for turning."""
 _HOLE_S = 2.5
+_PARKED_S = 600.0
+"""Without positions for so long, another drive begins: a grid over days would hold nothing else."""
 _SPARSEST_S = 20.0
 """Positions farther apart than this tell no motion: so are those of a clock whose unit is not
 this one, a thousand times as long."""
@@ -61,8 +64,12 @@ def motion_of(time_s: Array, xy_m: Array, *, whole: bool = False) -> GridMotion 
     """Return the motion of positions (N, 2) at rising times (N,); None where they are too few or
     too far apart.
 
-    Of long drives the stretch that turns most, unless the `whole` is wanted.
+    Unless the `whole` is wanted, of several drives the one with the most positions, and of a long
+    drive the stretch that turns most.
     """
+    if not whole:
+        drive = _longest_drive(time_s)
+        time_s, xy_m = time_s[drive], xy_m[drive]
     if len(time_s) < 10 or time_s[-1] - time_s[0] < 5.0:
         return None
     usual_s = float(np.median(np.diff(time_s)))
@@ -90,6 +97,11 @@ def motion_of(time_s: Array, xy_m: Array, *, whole: bool = False) -> GridMotion 
         np.where(moves, (vx * ax + vy * ay) / np.maximum(speed, MOVES_MPS), np.nan),
     )
     return motion if whole else _livelier(motion)
+
+
+def _longest_drive(time_s: Array) -> slice:
+    ends = [0, *(np.flatnonzero(np.diff(time_s) > _PARKED_S) + 1).tolist(), len(time_s)]
+    return max((slice(*pair) for pair in itertools.pairwise(ends)), key=lambda s: s.stop - s.start)
 
 
 def on_grid(motion: GridMotion, time_s: Array, values: Array) -> Array:

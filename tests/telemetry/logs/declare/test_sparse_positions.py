@@ -1,4 +1,4 @@
-"""Tables of a fleet: a row each second, a new position every few; ways between are cut short."""
+"""Tables of a fleet: drives weeks apart, a row each second, a new position every few seconds."""
 
 from __future__ import annotations
 
@@ -70,3 +70,11 @@ def test_a_speed_known_only_where_the_car_creeps_is_none() -> None:
     values = np.where(motion.time_s < 110.0, motion.speed_mps, np.nan)
     assert len(values) * GRID_S > 190.0
     assert fits_of(motion, "v", values, ROLES[:1]) == []
+
+
+def test_weeks_between_two_drives_of_a_table_are_not_gone_through() -> None:
+    time_s = np.concatenate([np.arange(0.0, 100.0), 3.0e6 + np.arange(0.0, 200.0)])
+    motion = motion_of(time_s, np.stack([10.0 * np.arange(300.0), np.zeros(300)], axis=1))
+    assert motion is not None
+    assert motion.time_s[0] == 3.0e6
+    assert len(motion.time_s) * GRID_S == pytest.approx(199.0)
