@@ -191,5 +191,7 @@ def read_given(path: Path, kind: type[Message]) -> Message:
     something else or cannot be read."""
     try:
         return read_message(path, kind)
-    except (SchemaMismatch, OSError) as error:
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror or error}") from error
+    except SchemaMismatch as error:
         raise UserError(" ".join(str(error).split())) from error

@@ -23,11 +23,13 @@ from foretwin.contracts.codec import (
     decode,
     encode,
     header_of,
+    read_given,
     read_message,
     sender_of,
     write_message,
 )
 from foretwin.contracts.drive import GnssFix, PlannedTrajectory, SpeedSample, VehicleInfo
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import FuturesResult
 from foretwin.contracts.keys import CHANNELS
@@ -272,3 +274,10 @@ def test_threads_that_meet_a_type_for_the_first_time_decode_it() -> None:
     )
 
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_a_file_that_a_user_named_is_named_first_where_it_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=rf"^{tmp_path}/none\.world: No such file or directory$"):
+        read_given(tmp_path / "none.world", World)
+    with pytest.raises(UserError, match=rf"^{tmp_path}: Is a directory$"):
+        read_given(tmp_path, World)
