@@ -35,6 +35,8 @@ ANSWERS = {
     "reference_point": "what on the car the positions are of",
 }
 """What a user may answer beforehand, by key."""
+_LATE_S = 2.0
+"""Rows that come so late, and no later, are put in order as they are read."""
 _UNKNOWN_POINT = "unknown: positions do not tell what on the car they are of"
 
 
@@ -158,6 +160,12 @@ def _written(
     left = [name for name in rest if name not in sensors.doubts]
     if left:
         unknown.append(f"not taken: {', '.join(left)}")
+    back = np.fmax.accumulate(clock.time_s) - clock.time_s > _LATE_S
+    if back.any():
+        unknown.append(
+            f"{clock.column}: {back.sum()} of {table.rows} rows are stamped earlier than rows above"
+            " them, as where a table holds two cars: of these and those the fewer are left out"
+        )
     if table.texts:
         unknown.append(f"no numbers, not read: {table.words_of_texts}")
     if place.frame == "local":

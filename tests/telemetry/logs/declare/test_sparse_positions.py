@@ -78,3 +78,13 @@ def test_weeks_between_two_drives_of_a_table_are_not_gone_through() -> None:
     assert motion is not None
     assert motion.time_s[0] == 3.0e6
     assert len(motion.time_s) * GRID_S == pytest.approx(199.0)
+
+
+def test_of_two_cars_in_one_table_it_is_told_that_one_is_left_out(tmp_path: Path) -> None:
+    path = fleet_table(tmp_path, every_s=4, seed=0)
+    names, *rows = path.read_text().splitlines()
+    alone = propose(path).unknown
+    path.write_text("\n".join([names, *rows, *rows[200:500], ""]))
+    said = "time: 300 of 1200 rows are stamped earlier than rows above them"
+    assert not any("stamped earlier" in line for line in alone)
+    assert any(line.startswith(said) for line in propose(path).unknown)
