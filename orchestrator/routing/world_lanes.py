@@ -21,6 +21,7 @@ from foretwin.geometry.polyline import densified, headings_rad
 from foretwin.orchestrator.routing.driving_path import turn_radii
 from foretwin.orchestrator.routing.rounding import FINE_M
 from foretwin.orchestrator.routing.route import Route
+from foretwin.world_gen.roads.joined_edges import alike
 
 BESIDE_M = 15.0
 """A lane farther from the route's path than this is no lane of its road."""
@@ -105,7 +106,10 @@ class WorldLanes:
         for number in range(first, last + 1):
             edge = route.edges[number]
             span = float(route.start_m[number]), float(route.start_m[number + 1])
-            spans.setdefault((edge.edge.way_id, edge.reverse), []).append(span)
+            # Past a driveway a World's lane may go on into the next way, and is of one of both.
+            for other in route.edges[max(number - 1, 0) : number + 2]:
+                if other is edge or alike(other.edge, edge.edge):
+                    spans.setdefault((other.edge.way_id, other.reverse), []).append(span)
         found = {}
         for piece in self._pieces:
             if piece.road is not None and piece.road in spans:

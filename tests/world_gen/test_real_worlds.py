@@ -171,7 +171,7 @@ def test_who_goes_round_an_island_into_the_other_carriageway_turns_back(data_dir
     turns = {
         c.turn
         for c in world.connections
-        if c.from_lane_id.startswith("w4612756.1287617237.1285251502")
+        if c.from_lane_id.startswith("w4612756.29217276.1285251502.f0")
         and c.to_lane_id.startswith("w4612758.29217276.1285251472")
     }
     # By 210 degrees to the left, though both lanes have an angle of 150 to the right.

@@ -52,7 +52,7 @@ def world_elevation(
         road.id: _along_edge(
             road,
             around.edges[edge_of_road[road.id]],
-            profiles.of_edge[edge_of_road[road.id]],
+            _of_edge(edge_of_road[road.id], around, profiles),
         )
         for road in roads
         if edge_of_road.get(road.id) in profiles.of_edge
@@ -84,6 +84,20 @@ def world_elevation(
             ground_m=ground,
         ),
         tuple(notes),
+    )
+
+
+def _of_edge(index: int, around: Surroundings, profiles: RoadProfiles) -> HeightProfile:
+    """Return the heights along an edge, one after the other of those joined in it."""
+    parts = [profiles.of_edge[i] for i in around.joined.parts.get(index, (index,))]
+    if len(parts) == 1:
+        return parts[0]
+    begin_m = np.cumsum([0.0, *(part.along_m[-1] for part in parts[:-1])])
+    return HeightProfile(
+        id=parts[0].id,
+        along_m=np.concatenate([p.along_m + m for p, m in zip(parts, begin_m, strict=True)]),
+        height_m=np.concatenate([part.height_m for part in parts]),
+        grade=np.concatenate([part.grade for part in parts]),
     )
 
 

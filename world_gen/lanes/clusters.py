@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import compress
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -19,10 +18,11 @@ from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.extent import Extent
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex
-from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.cluster import Cluster, clusters_of
 from foretwin.world_gen.lanes.cross_section import cross_section, widened
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
-from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.past_driveways import JoinedRoads, past_driveways
 from foretwin.world_gen.lanes.places import whole_where_led_through
 from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
@@ -33,6 +33,7 @@ from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, country_
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
+_SAME_END_M = 0.01
 
 
 class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
@@ -57,6 +58,7 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
     ring_edges: frozenset[int]
     shifts_m: Mapping[int, tuple[float, float]]
     """How far left of their way roads in a transition begin and end, by edge index."""
+    joined: JoinedRoads
     notes: tuple[str, ...] = ()
 
     @property
@@ -109,14 +111,13 @@ def surroundings(
         wanted.update(edge.index for edge in near if edge.drivable)
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
     edges.update(ring_curves(edges))
-    edges.update(moved)
-    sections = _sections(index, edges)
-    sections |= {i: widened(sections[i], factor) for i, factor in widths.items()}
-    clusters = _clusters(index, made_for, edges, extent)
-    shifts = transition_shifts(clusters, edges, sections)
-    heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
-    cut_m = trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags)
-    clusters = whole_where_led_through(clusters, made_for, cut_m, extent)
+    joined, laid = _past_driveways(index, made_for, edges, extent)
+    made_for = tuple([joined.junction(junction) for junction in made_for])
+    edges = {**joined.edges(edges), **moved}
+    if moved or least_trims_m or widths:
+        laid = _laid(index, made_for, joined, edges, extent, least_trims_m, widths)
+    sections, heads, cut_m = laid.sections, laid.heads, laid.trims_m
+    clusters = whole_where_led_through(laid.clusters, made_for, cut_m, extent)
     whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
     inner = {i for junction in whole.values() for i in junction.inner}
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
@@ -132,8 +133,9 @@ def surroundings(
         clusters=clusters,
         trims_m=cut_m,
         heads=heads,
-        shifts_m=shifts,
+        shifts_m=laid.shifts_m,
         ring_edges=ring_edges,
+        joined=joined,
         notes=(
             *restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
             *barrier_notes(edges.values(), graph.closed_nodes, index.osm.node_tags),
@@ -143,6 +145,63 @@ def surroundings(
             *_beyond_notes(made_for, edges, cut_m, extent),
         ),
     )
+
+
+class _Layout(NamedTuple):
+    """Where the lanes of some roads end; see `Surroundings`."""
+
+    sections: Mapping[int, CrossSection]
+    clusters: tuple[Cluster, ...]
+    shifts_m: Mapping[int, tuple[float, float]]
+    heads: Heads
+    trims_m: Mapping[tuple[int, bool], float]
+
+
+def _laid(
+    index: MapIndex,
+    made_for: tuple[Junction, ...],
+    joined: JoinedRoads,
+    edges: Mapping[int, RoadEdge],
+    extent: Extent,
+    least_trims_m: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+    widths: Mapping[int, float] = MappingProxyType({}),
+) -> _Layout:
+    sections = _sections(index, edges)
+    sections |= {i: widened(sections[i], factor) for i, factor in widths.items()}
+    clusters = clusters_of(index, made_for, joined, edges, extent)
+    shifts = transition_shifts(clusters, edges, sections)
+    heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
+    cut_m = trims(clusters, edges, sections, shifts, heads, least_trims_m, index.osm.node_tags)
+    return _Layout(sections, clusters, shifts, heads, cut_m)
+
+
+def _past_driveways(
+    index: MapIndex, made_for: tuple[Junction, ...], edges: Mapping[int, RoadEdge], extent: Extent
+) -> tuple[JoinedRoads, _Layout]:
+    """Return the roads that go on from a junction past driveways, where their lanes then end
+    elsewhere there, and the layout with them."""
+
+    def laid(joined: JoinedRoads) -> _Layout:
+        return _laid(index, made_for, joined, joined.edges(edges), extent)
+
+    nothing, all_of_them = JoinedRoads(), past_driveways(index.graph, edges, index.junction_of_node)
+    parted = laid(nothing)
+    if not all_of_them.parts:
+        return nothing, parted
+    whole = laid(all_of_them)
+    changed = {}
+    for road, parts in all_of_them.parts.items():
+        ends = (parts[0], edges[parts[0]].start_node), (parts[-1], edges[parts[-1]].end_node)
+        for reverse, (part, node) in zip((False, True), ends, strict=True):
+            moved_m = whole.trims_m.get((road, reverse), 0.0) - parted.trims_m.get(
+                (part, reverse), 0.0
+            )
+            if node in index.junction_of_node and abs(moved_m) > _SAME_END_M:
+                changed[road] = parts
+    if not changed:
+        return nothing, parted
+    joined = JoinedRoads(changed)
+    return joined, whole if changed == all_of_them.parts else laid(joined)
 
 
 def _side_notes(edges: Mapping[int, RoadEdge], side: DrivingSide) -> list[str]:
@@ -213,63 +272,3 @@ def _in_frame(
         for edge, xy, longest_m in zip(edges, moved.split(), step_m, strict=True)
         if longest_m > _REPEAT_M
     }
-
-
-class _ClusterNodes(NamedTuple):
-    nodes: frozenset[int]
-    inner: frozenset[int] = frozenset()
-    junction: Junction | None = None
-    whole: bool = False
-    ring: bool = False
-
-
-def _clusters(
-    index: MapIndex, made_for: tuple[Junction, ...], edges: Mapping[int, RoadEdge], extent: Extent
-) -> tuple[Cluster, ...]:
-    leaving: dict[int, list[DirectedEdge]] = {}
-    for edge in edges.values():
-        for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
-            leaving.setdefault(directed.start_node, []).append(directed)
-    known = list(leaving)
-    at = np.array([leaving[node][0].xy_m[0] for node in known]).reshape(-1, 2)
-    near: set[int] = {node for junction in made_for for node in junction.nodes}
-    near.update(compress(known, extent.holds(at)))
-    others = {j.summary.id: j for j in made_for}
-    for node in sorted(near):
-        if found := index.junction_of_node.get(node):
-            others.setdefault(found.summary.id, found)
-    named = {j.summary.id for j in made_for}
-    groups: list[_ClusterNodes] = []
-    for junction in others.values():
-        whole = junction.summary.id in named or (junction.nodes <= near and _drawn(junction, edges))
-        groups.extend(_groups_of(junction, leaving, whole=whole))
-    taken = frozenset().union(*(group.nodes for group in groups))
-    groups.extend(_ClusterNodes(frozenset([n])) for n in sorted(near - taken))
-    clusters = []
-    for group in groups:
-        out = (d for node in sorted(group.nodes) for d in leaving.get(node, ()))
-        legs = tuple(d for d in out if d.edge.index not in group.inner)
-        if len(legs) >= 2:
-            clusters.append(Cluster(key=str(min(group.nodes)), legs=legs, **group._asdict()))
-    return tuple(clusters)
-
-
-def _drawn(junction: Junction, edges: Mapping[int, RoadEdge]) -> bool:
-    """Return whether all roads of a junction that cars may use are among `edges`."""
-    legs = (leg.edge for arm in junction.arms for leg in arm.outward)
-    return all(edge.index in edges for edge in legs if edge.drivable)
-
-
-def _groups_of(
-    junction: Junction, leaving: Mapping[int, list[DirectedEdge]], *, whole: bool
-) -> list[_ClusterNodes]:
-    """A ring is driven node by node, every other junction in one go."""
-    on_ring = {
-        node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
-    }
-    if junction.summary.kind in RING_KINDS and on_ring:
-        # Where a street parts into entry and exit before the ring, no car has to stop.
-        places = ((frozenset([n]), n in on_ring) for n in sorted(junction.nodes))
-        return [_ClusterNodes(n, frozenset(), junction, whole and on, on) for n, on in places]
-    nodes = frozenset(node for node in junction.nodes if node in leaving)
-    return [_ClusterNodes(nodes, frozenset(junction.inner), junction, whole)] if nodes else []

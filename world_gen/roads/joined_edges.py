@@ -42,7 +42,7 @@ def joined(edges: Sequence[RoadEdge], kept_nodes: frozenset[int]) -> list[RoadEd
         found.extend(_loop_parted(parts, edges))
     # Edges that are joined round and round have no first one.
     found.extend([i] for i in set(range(len(edges))).difference(chain.from_iterable(found)))
-    return [_one([edges[i] for i in parts], index) for index, parts in enumerate(sorted(found))]
+    return [one_edge([edges[i] for i in parts], index) for index, parts in enumerate(sorted(found))]
 
 
 def _loop_parted(parts: list[int], edges: Sequence[RoadEdge]) -> list[list[int]]:
@@ -65,12 +65,13 @@ def _followers(edges: Sequence[RoadEdge], kept_nodes: frozenset[int]) -> dict[in
         j = begins.get(edge.end_node)
         if j is None or j == i or edge.end_node in kept_nodes:
             continue
-        if min(edge.length_m, edges[j].length_m) < SHORT_M and _alike(edge, edges[j]):
+        if min(edge.length_m, edges[j].length_m) < SHORT_M and alike(edge, edges[j]):
             found[i] = j
     return found
 
 
-def _alike(edge: RoadEdge, other: RoadEdge) -> bool:
+def alike(edge: RoadEdge, other: RoadEdge) -> bool:
+    """Return whether two roads have the same name and are driven alike by all their tags."""
     of_place = (edge.driving_side, edge.country) == (other.driving_side, other.country)
     return of_place and edge.name == other.name and read_tags(edge.tags) == read_tags(other.tags)
 
@@ -80,14 +81,15 @@ def read_tags(tags: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in tags.items() if not key.startswith(UNREAD)}
 
 
-def _one(parts: Sequence[RoadEdge], index: int) -> RoadEdge:
+def one_edge(parts: Sequence[RoadEdge], index: int) -> RoadEdge:
+    """Return edges that follow each other, head to tail, as one of this index."""
     if len(parts) == 1:
         only = parts[0]
         return only if only.index == index else msgspec.structs.replace(only, index=index)
     main = max(parts, key=lambda part: (part.length_m, -part.way_id))
     xy_m = np.concatenate([parts[0].xy_m, *(part.xy_m[1:] for part in parts[1:])])
     xy_m.setflags(write=False)
-    ways = tuple(way for way, _ in groupby(part.way_id for part in parts))
+    ways = tuple(way for way, _ in groupby(chain.from_iterable(part.ways for part in parts)))
     return msgspec.structs.replace(
         main,
         index=index,
