@@ -96,10 +96,13 @@ def crossing(
     )
 
 
-def roundabout(*, origin: GeoPoint = GERMANY, clockwise: bool = False) -> OsmMap:
-    """Return a roundabout of 15 m radius with arms to the east, north and west."""
+def roundabout(
+    *, origin: GeoPoint = GERMANY, clockwise: bool = False, radius_m: float = 15.0
+) -> OsmMap:
+    """Return a roundabout with arms to the east, north and west."""
     angles = np.arange(24) * (2 * math.pi / 24) * (-1 if clockwise else 1)
-    ring = {100 + i: (15 * math.cos(a), 15 * math.sin(a)) for i, a in enumerate(angles)}
+    points = radius_m * np.cos(angles), radius_m * np.sin(angles)
+    ring = {100 + i: (x, y) for i, (x, y) in enumerate(zip(*points, strict=True))}
     north = 118 if clockwise else 106
     nodes = ring | {1: (100.0, 0.0), 2: (0.0, 100.0), 3: (-100.0, 0.0)}
     return drawn_map(

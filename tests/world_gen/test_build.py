@@ -26,7 +26,6 @@ from tests.world_gen.sketch import star
 
 COVERS = (
     "foretwin.world_gen.connections.lane_connections",
-    "foretwin.world_gen.connections.movements",
     "foretwin.world_gen.lanes.cluster",
     "foretwin.world_gen.lanes.clusters",
     "foretwin.world_gen.polygon_areas",

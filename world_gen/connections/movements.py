@@ -113,7 +113,7 @@ def _ways_through(
 
 def _around_a_nose(cluster: Cluster, toward: DirectedEdge, away: DirectedEdge) -> bool:
     """Return whether a way leads from one carriageway back into the other where they part."""
-    if len(cluster.legs) != 3 or len(cluster.nodes) != 1:
+    if len(cluster.legs) != 3 or len(cluster.nodes) != 1 or is_ring_edge(toward.edge):
         return False
     one_way = [leg for leg in cluster.legs if leg.edge.one_way]
     if {leg.edge.index for leg in one_way} != {toward.edge.index, away.edge.index}:
