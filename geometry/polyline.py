@@ -208,15 +208,14 @@ def offset(
     if abs(left_m) < 1e-9:
         return xy_m.copy()
     ray = mitres(xy_m, before=before, after=after)
-    shifted = xy_m + ray.normal * (left_m * ray.stretch)[:, None]
-    return _without_backward_runs(shifted, ray.directions)
+    return _without_backward_runs(xy_m + ray.normal * (left_m * ray.stretch)[:, None], xy_m)
 
 
-def _without_backward_runs(shifted: Array, directions: Array) -> Array:
-    forward = (np.diff(shifted, axis=0) * directions).sum(axis=1) > 0.0
+def _without_backward_runs(shifted: Array, line: Array) -> Array:
+    forward = (np.diff(shifted, axis=0) * np.diff(line, axis=0)).sum(axis=1) > 0.0
     if forward.all() or not forward.any():
         return shifted
     keep = np.concatenate([forward, [True]]) & np.concatenate([[True], forward])
     keep[0] = keep[-1] = True
-    kept: Array = shifted[keep]
-    return kept
+    # What is then joined may run backwards, too.
+    return shifted if keep.all() else _without_backward_runs(shifted[keep], line[keep])

@@ -173,15 +173,15 @@ def offset(
 
 
 def _without_backward_runs(shifted: Polylines, lines: Polylines) -> Polylines:
-    """Drop points of stretches that run against the line they were shifted from."""
+    """Drop points of stretches that run against the line they were shifted from, again where what
+    is then joined does so."""
     forward = (shifted.steps[0] * lines.steps[0]).sum(axis=1) > 0.0
     segments = ~lines.is_last
     ahead = np.bincount(lines.line[segments & forward], minlength=len(lines))
     folded = (ahead > 0) & (ahead < np.diff(lines.first) - 1)
-    if not folded.any():
-        return shifted
     keep = np.ones(len(lines.xy_m), dtype=bool)
     keep[:-1] &= forward[:-1] | lines.is_last[:-1]
     keep[1:] &= forward[:-1] | lines.is_last[:-1]
     keep[lines.first[:-1]] = keep[lines.first[1:] - 1] = True
-    return shifted.keep(keep | ~folded[lines.line])
+    keep |= ~folded[lines.line]
+    return shifted if keep.all() else _without_backward_runs(shifted.keep(keep), lines.keep(keep))

@@ -124,6 +124,22 @@ def test_an_offset_to_the_inside_of_a_tight_bend_never_runs_backwards():
     assert length(shifted) < length(hook)
 
 
+def test_what_is_left_of_a_tight_bend_is_joined_forwards():
+    # A street in New York whose inner lane would run back by a quarter of a metre, then on.
+    corner = np.array(
+        [
+            *([-50.539, 29.39], [-75.599, 39.128], [-76.009, 39.265], [-76.431, 39.364]),
+            *([-76.86, 39.422], [-77.293, 39.44], [-77.725, 39.416], [-78.153, 39.352]),
+            [-79.754, 39.036],
+        ]
+    )
+    steps = np.diff(offset(corner, 5.49), axis=0)
+    assert ((steps[1:] * steps[:-1]).sum(axis=1) > 0.0).all()
+    np.testing.assert_allclose(
+        offset(corner, 5.49)[[0, -1]], [[-52.53, 24.27], [-78.69, 33.65]], atol=0.02
+    )
+
+
 @given(begin=st.floats(0.0, 40.0), span=st.floats(0.1, 30.0))
 def test_a_cut_has_the_length_asked_for(begin, span):
     line = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 30.0], [50.0, 30.0]])
