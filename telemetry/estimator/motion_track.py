@@ -270,6 +270,7 @@ class MotionTrack:
             map_shift_m=self._aid.shift_m,
             overconfidence=self._positions.overconfidence,
             stretched=self._positions.stretched,
+            hidden_std_m=self._positions.noise.hidden_std_m(self._fix),
         )
 
     @property
@@ -286,7 +287,8 @@ class MotionTrack:
     def consistency(self) -> StateConsistency:
         """Whether the states were as sure of themselves as they turned out to be."""
         found, fix = self._positions, self._fix
-        noise_m = None if fix is None else found.noise.std_m(fix)
+        noise = found.noise
+        noise_m = None if fix is None else math.hypot(noise.std_m(fix), noise.hidden_std_m(fix))
         mounting = self._corrections.mounting.mounting
         return StateConsistency(
             self._surprises.counts,

@@ -71,11 +71,13 @@ def moving_state(
     map_shift_m: tuple[float, float] | None,
     overconfidence: float = 1.0,
     stretched: Stretched,
+    hidden_std_m: float = 0.0,
 ) -> VehicleState:
     """Return the state of a car whose heading is known.
 
     `overconfidence` is by how much the filter's spreads are too small while its sources contradict
-    each other, `stretched` what its states' errors were found to be of what is told.
+    each other, `stretched` what its states' errors were found to be of what is told, `hidden_std_m`
+    what lies under all positions alike.
     `convergence_rad` is the angle of the filter's frame against east; a car that stands has no
     speed, turning or acceleration. Fields without a fresh sample are named in `estimated`.
     """
@@ -87,6 +89,7 @@ def moving_state(
     position_std_m = (
         overconfidence * stretched.place * math.sqrt(0.5 * (variance(X, X) + variance(Y, Y)))
     )
+    position_std_m = math.hypot(position_std_m, hidden_std_m)
     if map_shift_m is not None:
         position_std_m = math.hypot(position_std_m, ALIKE_M)
     return VehicleState(

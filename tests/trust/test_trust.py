@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ImuSample
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs import Log
 from tests.telemetry.position_track import FRAME, info
 from tests.telemetry.smoothing import SmoothedTrack
 from tests.trust.consistency import consistency_of
@@ -163,3 +165,18 @@ def test_by_its_receivers_clock_the_dresden_logger_drives_evenly(data_dir: Path)
         assert [s[1].stamp_ns for s in samples] == sorted(s[1].stamp_ns for s in samples)
     assert speeds["dresden-2"] > 10.0
     assert speeds["dresden-2-own-clock"] < 3.0
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("name", ["comma2k19-ublox", "potsdamer-platz-pseudoranges"])
+def test_receivers_that_state_nothing_are_told_as_far_off_as_another_has_them(
+    name: str, data_dir: Path
+) -> None:
+    drive = next(d for d in given_drives(data_dir) if d.name == name)
+    log, truth = drive.log(), truth_of(drive)
+    silent = [
+        (channel, msgspec.structs.replace(message, std_m=None) if channel == "gnss" else message)
+        for channel, message in log.samples()
+    ][:6000]
+    states = states_of(Log(info=log.info, read=lambda _: iter(silent)), truth.frame)
+    assert consistency_of(states, truth).position_within > 0.9

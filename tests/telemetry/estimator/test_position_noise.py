@@ -84,6 +84,22 @@ def test_a_car_that_stands_shows_the_jitter_of_fixes_that_were_rough_on_the_move
     assert noise.white_std_m(fix()) > 0.2, "on the move it is as rough as it was"
 
 
+def test_a_receiver_that_states_nothing_may_be_metres_off_until_it_has_hardly_jittered() -> None:
+    assert PositionNoise().hidden_std_m(fix()) == 2.0, "nobody has seen it yet"
+    assert driven(0.003).hidden_std_m(fix()) == 0.0
+    assert driven(0.003, count=20).hidden_std_m(fix()) == 2.0, "too few to tell"
+    assert driven(0.03).hidden_std_m(fix()) == 2.0
+    assert driven(0.6, rate_hz=1.0).hidden_std_m(fix()) == pytest.approx(6.0, rel=0.5)
+    assert driven(0.03).hidden_std_m(fix(0.02)) == 0.0, "that is as large as it states"
+
+
+def test_a_receiver_that_loses_its_corrections_is_metres_off_once_it_has_shown_that() -> None:
+    noise, random = driven(0.003, count=120), np.random.default_rng(7)
+    for k in range(120):
+        noise.take(24.0 + 0.2 * k, np.array([3.0 * k, 0.0]) + random.normal(0.0, 0.05, 2))
+    assert noise.hidden_std_m(fix()) == 2.0
+
+
 def test_where_the_filter_knows_little_no_surprise_shows_that_fixes_are_good() -> None:
     seldom, random = driven(0.3, rate_hz=1.0), np.random.default_rng(5)
     for away_m in np.hypot(*random.normal(0.0, 1.0, (2, 24))):
