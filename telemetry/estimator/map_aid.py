@@ -30,7 +30,7 @@ _HEADING_EVERY_M = 25.0
 _DOUBTFUL, _UNBELIEVABLE = 2.0, 5.0
 """Standard deviations beyond which a line counts for less, and for nothing."""
 _ASTRAY = 4.0
-"""Standard deviations that a receiver is hardly ever off: sooner is the road another one."""
+"""Standard deviations that a receiver is hardly ever off: sooner is the car elsewhere."""
 _DOUBT_M = 150.0
 
 
@@ -98,14 +98,14 @@ class MapAid:
         self.shift_m = east_m + float(step[0]), north_m + float(step[1])
         return True
 
-    def watch(self, filter_: KinematicFilter, *, receiver_std_m: float) -> None:
-        """Doubt the place where it makes the receiver err as none does: the road was another."""
-        if len(filter_.mean) == SIZE:
-            return
-        if math.hypot(*filter_.mean[[GNSS_X, GNSS_Y]]) > _ASTRAY * receiver_std_m:
-            filter_.doubt_position(receiver_std_m)
-            filter_.forget_wander()
+    def astray(self, filter_: KinematicFilter, *, receiver_std_m: float) -> bool:
+        """Whether the place makes the receiver err as none does: a road was another, if there was
+        one."""
+        if math.hypot(*filter_.mean[[GNSS_X, GNSS_Y]]) <= _ASTRAY * receiver_std_m:
+            return False
+        if len(filter_.mean) > SIZE:
             self._doubt_m = _DOUBT_M
+        return True
 
 
 def _fade_offset(filter_: KinematicFilter, fading: float, spread_m: float) -> None:

@@ -191,8 +191,9 @@ class PositionCorrections:
         filter_.correct_position(innovation, noise, hold_yaw=wheels and standing)
         limit_turn(filter_, yaw_before, moved_m=self._gate.last_step_m)
         self._facing.take(filter_)
-        if wander:
-            aid.watch(filter_, receiver_std_m=std)
+        if wander and aid.astray(filter_, receiver_std_m=self.noise.most_std_m(fix)):
+            filter_.move_position(xy_m, std, self._lever)
+            filter_.forget_wander()
         if not wheels:
             stood, standing = standing, self._gate.standing(self.noise.still_std_m(fix))
             standing = standing and abs(filter_.mean[SPEED]) < CREEPING_MPS / 2.0

@@ -159,6 +159,10 @@ class PositionNoise:
         # This share is nobody's word: where surprises cannot tell, as much as they leave open.
         return max(white, self._seen_beyond(white), min(self._untold_m, std))
 
+    def most_std_m(self, fix: GnssFix) -> float:
+        """Return how far off a fix may be whatever it states: ten times what such fixes jitter."""
+        return max(self.std_m(fix), math.sqrt(self._jitter_m2 or 0.0) / _WHITE_SHARE)
+
     def hidden_std_m(self, fix: GnssFix) -> float:
         """Return what may lie under all fixes alike of a receiver that states no error.
 
@@ -168,7 +172,7 @@ class PositionNoise:
         stated = fix.std_m is not None and math.isfinite(fix.std_m)
         if stated or self._precise > 0:
             return 0.0
-        return max(UNSEEN_STD_M, math.sqrt(self._jitter_m2 or 0.0) / _WHITE_SHARE)
+        return max(UNSEEN_STD_M, self.most_std_m(fix))
 
     def sure_white_std_m(self, fix: GnssFix) -> float:
         """Return a white noise that is surely no smaller: beyond it fixes contradict a sensor."""

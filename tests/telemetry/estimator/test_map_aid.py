@@ -130,11 +130,10 @@ def test_a_place_that_makes_the_receiver_err_as_none_does_is_doubted() -> None:
     filter_, aid = rough(), MapAid()
     filter_.expect_wander(3.0)
     take(aid, filter_, line(0.0, 0.0))
+    filter_.mean[GNSS_X] = 11.0
+    assert not aid.astray(filter_, receiver_std_m=3.0)
     filter_.mean[GNSS_X] = 13.0
-    aid.watch(filter_, receiver_std_m=3.0)
-
-    assert std_of(filter_, X) == pytest.approx(3.0)
-    assert filter_.mean[GNSS_X] == 0.0
+    assert aid.astray(filter_, receiver_std_m=3.0)
     assert take(aid, filter_, line(20.0, 0.0), line(100.0, 0.0), line(250.0, 0.0)) == [False] * 3
     assert take(aid, filter_, line(255.0, 0.0)) == [True]
 

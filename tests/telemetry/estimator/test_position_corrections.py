@@ -9,6 +9,13 @@ import pytest
 
 from foretwin.contracts.drive import SpeedSample
 from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.filter_state import GNSS_X, X
+from foretwin.telemetry.estimator.innovations import SurpriseCount
+from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
+from foretwin.telemetry.estimator.map_aid import MapAid
+from foretwin.telemetry.estimator.measured import MotionSamples
+from foretwin.telemetry.estimator.position_corrections import PositionCorrections
+from foretwin.telemetry.estimator.position_gate import PositionGate
 from tests.telemetry.position_track import Sample, along, circle, fix, info, states_of, xy, yaw
 from tests.telemetry.winding_drive import WINDING, driven, truly
 
@@ -141,3 +148,24 @@ def test_a_wheel_that_says_nought_at_speed_does_not_stop_the_car_and_a_stop_does
         for k in range(60)
     ]
     assert states_of([*samples, *stopped])[-1].speed_mps == 0.0
+
+
+@pytest.mark.parametrize("beyond_m", [0.0, 60.0])
+def test_a_car_that_would_have_its_receiver_err_as_none_does_is_where_the_receiver_says(
+    beyond_m: float,
+) -> None:
+    """A telephone's car once pulled away along a wrong heading, and stayed 75 m off for 100 s."""
+    gate, surprises = PositionGate(), SurpriseCount()
+    measured = MotionSamples(steering_ratio=15.0, steering_offset_rad=0.0, skipped=gate.skipped)
+    corrections = PositionCorrections(measured, gate, surprises, (0.0, 0.0))
+    filter_ = KinematicFilter(
+        xy_m=np.array([-beyond_m, 0.0]), yaw_rad=0.0, yaw_std_rad=0.1, speed_mps=10.0
+    )
+    filter_.expect_wander(8.0)
+    filter_.mean[GNSS_X] = beyond_m
+    _, rough = fix(1.0, 0.0, 0.0, 8.0)
+    gate.judge(1.0, np.zeros(2), None)
+    corrections.correct(filter_, rough, np.zeros(2), aid=MapAid(), standing=False)
+
+    assert filter_.mean[X] == pytest.approx(0.0, abs=0.1)
+    assert filter_.mean[GNSS_X] == pytest.approx(0.0, abs=0.1)
